@@ -1,0 +1,1 @@
+"""Recorder and live monitor for free-rocking tests of stone-masonry walls."""

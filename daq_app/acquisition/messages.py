@@ -1,0 +1,139 @@
+"""What the acquisition process says to viewers, and what viewers may ask of it.
+
+Published on a PUB socket as two frames ``[topic, body]``, or three for blocks
+``[b"block", body, readings]``; bodies are UTF-8 JSON of the models below, readings raw float32
+C-order (n_channels, n_samples) in SI units (tared, scaled; not time-aligned).  Commands travel on a
+REQ/REP socket as one JSON frame `Command` → `Reply`.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
+
+
+class State(StrEnum):
+    """States of the acquisition process, in the order of a test."""
+
+    IDLE = "idle"
+    PREVIEWING = "previewing"
+    ARMED = "armed"
+    HOLDING = "holding"
+    RELEASED = "released"
+    ROCKING = "rocking"
+    AT_REST = "at_rest"
+    SAVING = "saving"
+    SAVED = "saved"
+    FAILED = "failed"
+
+
+class Message(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class StateMessage(Message):
+    """Topic ``state``: on every change and once a second."""
+
+    state: State
+    test: str = ""
+    run_path: str = ""
+    text: str = ""
+    """A plain sentence for the operator."""
+    since_sample: int = 0
+    sample: int = 0
+
+
+class BlockMessage(Message):
+    """Topic ``block``: heading of a rectangle of live data."""
+
+    first_sample: int
+    n_samples: int
+    n_channels: int
+    rate_hz: float
+    overloaded: tuple[str, ...] = ()
+
+
+class MotionMessage(Message):
+    """Topic ``motion``: live rotation and velocity of one block, decimated to `step` samples."""
+
+    first_sample: int
+    step: int
+    rate_hz: float
+    rotation_rad: list[float]
+    velocity_rad_s: list[float]
+    tilt_rad: float
+    """Mean of the tiltmeters' rotation over the block (slow, accurate: θ0)."""
+
+
+class EstimatePoint(Message):
+    """One value of r and the impact that completed it."""
+
+    impact: int
+    r: float
+
+
+class EstimateMessage(Message):
+    """Topic ``estimate``: after each impact, the whole estimate so far (idempotent)."""
+
+    theta0_rad: float
+    release_sample: int
+    impact_samples: list[float]
+    """Fractional sample indices of the impacts."""
+    peaks_rad: list[float]
+    """Signed peak rotation of each half-cycle, the release first."""
+    impact_velocities_rad_s: list[float]
+    """Signed peak velocity at each impact."""
+    eav: list[EstimatePoint]
+    crt: list[EstimatePoint]
+    eav_mean: float | None = None
+    eav_standard_error: float | None = None
+    crt_mean: float | None = None
+    crt_standard_error: float | None = None
+    r_max: float
+
+
+class HealthMessage(Message):
+    """Topic ``health``: five times a second while tasks run."""
+
+    sample: int
+    """Samples per channel read."""
+    acknowledged_sample: int
+    """Samples per channel known to be on disk (fsynced); 0 when not recording."""
+    recording: bool
+    backlog_samples: int
+    buffer_samples: int
+    gaps: int
+    lost_samples: int
+    overloaded: tuple[str, ...] = ()
+    file_bytes: int = 0
+    free_bytes: int = 0
+    block_to_disk_ms_p99: float = 0.0
+
+
+class EventMessage(Message):
+    """Topic ``event``: something that is also written into the journal."""
+
+    kind: str
+    sample: int
+    text: str
+    severity: Literal["info", "warning", "error"] = "info"
+    data: dict[str, float | str] = {}
+
+
+class Command(Message):
+    """A request. `name` is one of hello, preview, tare, arm, abort, stop, marker, note, shutdown."""
+
+    name: str
+    arguments: dict[str, float | str] = {}
+    token: str = ""
+    """The right to command; `hello` alone needs none."""
+
+
+class Reply(Message):
+    """The answer to a command: done, or why not and what to do."""
+
+    ok: bool
+    text: str = ""
+    data: dict[str, object] = {}

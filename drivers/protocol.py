@@ -1,0 +1,114 @@
+"""The one seam to the hardware.
+
+A driver opens a task plan, starts it, and hands out rectangles of readings in which no sample is
+missing.  All calls are made from one thread (the reader's); `read` blocks, the others are short.
+Nothing above this module knows which driver it talks to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.config.plan import TaskPlan
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Consecutive samples of every channel."""
+
+    first_sample: int
+    """Index of the first column since the tasks were started: 0 is the first sample of all."""
+    readings: NDArray[np.float64]
+    """(n_channels, n_samples), C-contiguous, rows in rig order, unit `Channel.reading_unit`."""
+    read_time_ns: int
+    """`time.time_ns()` when the read returned. A stamp only: time is sample index / rate."""
+    backlog_samples: int
+    """Samples per channel left in the driver's buffer after this read."""
+    overloaded: tuple[str, ...] = ()
+    """Channels that the hardware reported as overloaded since the last block."""
+
+    @property
+    def n_samples(self) -> int:
+        return int(self.readings.shape[1])
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceInfo:
+    """What a device said of itself when it was opened."""
+
+    name: str
+    product: str
+    serial: str
+    simulated: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """What the hardware made of the plan: values read back, never the ones asked for."""
+
+    rate_hz: float
+    ranges: dict[str, tuple[float, float]]
+    """Channel id → input range the hardware chose, unit of the reading."""
+    buffer_samples: int
+    devices: tuple[DeviceInfo, ...]
+    driver: str
+    """Name and version of the driver, for the run file."""
+
+
+class DriverError(Exception):
+    """A failure of the hardware, its driver or the way to it, with what the operator should do.
+
+    `partial` holds samples that were read before the failure: they are good and must be kept.
+    `retryable` says that the same call may succeed later without closing the tasks (a time-out).
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        advice: str,
+        code: int | None = None,
+        device: str = "",
+        partial: Block | None = None,
+        retryable: bool = False,
+    ) -> None:
+        self.message = message
+        self.advice = advice
+        self.code = code
+        self.device = device
+        self.partial = partial
+        self.retryable = retryable
+        where = f"{device}: " if device else ""
+        number = f" (NI-DAQmx {code})" if code is not None else ""
+        super().__init__(f"{where}{message}{number}. {advice}")
+
+
+class Driver(Protocol):
+    """Life cycle: open → start → read … → stop → close. `close` is safe at any time and twice."""
+
+    def open(self, plan: TaskPlan) -> Opened:
+        """Reserve the hardware and commit the tasks. Raises `DriverError`, leaving nothing reserved."""
+        ...
+
+    def start(self) -> None:
+        """Start the clock: slaves armed first, the master last."""
+        ...
+
+    def read(self, timeout_s: float) -> Block:
+        """Wait for the next `plan.read_samples` samples of every channel and return them.
+
+        Raises `DriverError` (with `partial` where samples had been read); `retryable` after a time-out.
+        """
+        ...
+
+    def stop(self) -> None:
+        """Stop the clock; samples not yet read are lost, so drain with `read` before."""
+        ...
+
+    def close(self) -> None:
+        """Give the hardware back."""
+        ...

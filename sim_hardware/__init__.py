@@ -1,0 +1,1 @@
+"""Everything that stands in for the rig: the wall, its sensors, the NI device server."""
