@@ -16,7 +16,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from daq_app.config.units import FAMILY_SI_UNIT, SENSITIVITY_TO_SI, G_M_S2
+from daq_app.config.units import FAMILY_SI_UNIT, G_M_S2, SENSITIVITY_TO_SI
 
 Family = Literal["lvdt", "wire", "accelerometer", "tiltmeter"]
 Vector3 = tuple[float, float, float]
@@ -253,6 +253,7 @@ class Rig(Table):
 
 
 __all__ = [
+    "G_M_S2",
     "Acquisition",
     "Certificate",
     "Channel",
@@ -260,7 +261,6 @@ __all__ = [
     "Excitation",
     "ExpectedChannels",
     "Family",
-    "G_M_S2",
     "Hardware",
     "Module",
     "Rig",
