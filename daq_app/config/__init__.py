@@ -1,0 +1,8 @@
+"""Channel-configuration layer: rig model, hardware catalogue, planner."""
+
+from daq_app.config.errors import ConfigError, Problem
+from daq_app.config.loader import load_rig, parse_rig
+from daq_app.config.rig import Channel, Rig
+from daq_app.config.scaling import Scaling
+
+__all__ = ["Channel", "ConfigError", "Problem", "Rig", "Scaling", "load_rig", "parse_rig"]
