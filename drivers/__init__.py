@@ -1,1 +1,16 @@
 """The seam to the hardware: one protocol, and the drivers that keep it."""
+
+from drivers.opening import open_driver
+from drivers.protocol import Block, DeviceInfo, Driver, DriverError, Opened
+from drivers.replay import Recording, ReplayDriver
+
+__all__ = [
+    "Block",
+    "DeviceInfo",
+    "Driver",
+    "DriverError",
+    "Opened",
+    "Recording",
+    "ReplayDriver",
+    "open_driver",
+]

@@ -63,7 +63,8 @@ class DriverError(Exception):
     """A failure of the hardware, its driver or the way to it, with what the operator should do.
 
     `partial` holds samples that were read before the failure: they are good and must be kept.
-    `retryable` says that the same call may succeed later without closing the tasks (a time-out).
+    `retryable` says that the same call may succeed later with nothing else done (a time-out);
+    `recoverable` that `Driver.recover` may make reading possible again without a new start.
     """
 
     def __init__(
@@ -75,6 +76,7 @@ class DriverError(Exception):
         device: str = "",
         partial: Block | None = None,
         retryable: bool = False,
+        recoverable: bool = False,
     ) -> None:
         self.message = message
         self.advice = advice
@@ -82,6 +84,7 @@ class DriverError(Exception):
         self.device = device
         self.partial = partial
         self.retryable = retryable
+        self.recoverable = recoverable
         where = f"{device}: " if device else ""
         number = f" (NI-DAQmx {code})" if code is not None else ""
         super().__init__(f"{where}{message}{number}. {advice}")
@@ -101,7 +104,18 @@ class Driver(Protocol):
     def read(self, timeout_s: float) -> Block:
         """Wait for the next `plan.read_samples` samples of every channel and return them.
 
-        Raises `DriverError` (with `partial` where samples had been read); `retryable` after a time-out.
+        Returns more where more are waiting. `first_sample` follows the last block, except after
+        `recover`, where it may lie beyond samples that are lost. Raises `DriverError` (with `partial`
+        where samples had been read); `retryable` after a time-out.
+        """
+        ...
+
+    def recover(self) -> None:
+        """Make reading possible again after an error that is `recoverable`, with the clock still running.
+
+        The next block begins at the oldest sample that was not read yet and still exists: a
+        `first_sample` beyond the last block's end is the gap. Raises `DriverError` where the
+        tasks are gone or the way to them is still closed (then `recoverable`: try again later).
         """
         ...
 

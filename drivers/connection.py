@@ -1,0 +1,185 @@
+"""The way to NI-DAQmx: the library of this machine, or a device server over gRPC.
+
+Everything that creates a `Task` or a `System` does so here, so that no call can reach the wrong
+machine: `nidaqmx.System.local()` and `Task()` without options always use the local library.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import re
+import uuid
+from typing import Any, NamedTuple
+
+import grpc
+import nidaqmx
+import nidaqmx.system
+from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
+
+from drivers.protocol import DriverError
+
+_CHANNEL_OPTIONS = [
+    # gRPC refuses messages above 4 MB unless told otherwise, and what a refused reply held is lost:
+    # three seconds of 41 channels at 4000 Hz are 3.9 MB.
+    ("grpc.max_receive_message_length", -1),
+    ("grpc.max_send_message_length", -1),
+    # A server that comes back after 2 s should be found at once, not after a minute of back-off.
+    ("grpc.initial_reconnect_backoff_ms", 100),
+    ("grpc.min_reconnect_backoff_ms", 100),
+    ("grpc.max_reconnect_backoff_ms", 1000),
+    # Two connections of one process must not share a socket: a fresh one is how we get rid of a dead one.
+    ("grpc.use_local_subchannel_pool", 1),
+]
+_ADDRESS = re.compile(r"^grpc(?P<tls>s?)://(?P<host>\[[0-9A-Fa-f:.]+\]|[^:/\s]+):(?P<port>\d{1,5})/?$")
+_SHORT_CALL_S = 10.0
+
+
+class Target(NamedTuple):
+    """Where the NI-DAQmx driver is: this machine (`host` empty) or a device server."""
+
+    host: str
+    port: int
+    tls: bool
+
+    def __str__(self) -> str:
+        return f"grpc{'s' if self.tls else ''}://{self.host}:{self.port}" if self.host else "local"
+
+
+def parse_target(connection: str) -> Target:
+    """``local``, ``grpc://HOST:PORT`` or ``grpcs://HOST:PORT`` (TLS as configured with nitlsconfig)."""
+    if connection == "local":
+        return Target("", 0, False)
+    match = _ADDRESS.match(connection)
+    if match is None or not 0 < int(match["port"]) < 65536:
+        raise DriverError(
+            f"'{connection}' is no way to the hardware",
+            advice="Use local, grpc://HOST:PORT or grpcs://HOST:PORT (with TLS)",
+        )
+    target = Target(match["host"], int(match["port"]), bool(match["tls"]))
+    if not target.tls and not _is_loopback(target.host) and not os.environ.get("DAQ_APP_ALLOW_PLAIN_GRPC"):
+        raise DriverError(
+            f"{target} would cross the network without encryption",
+            advice="Use grpcs://HOST:PORT (TLS, set up with nitlsconfig on both sides); on a closed "
+            "network of the rig's own you may set the environment variable DAQ_APP_ALLOW_PLAIN_GRPC=1",
+        )
+    return target
+
+
+def _is_loopback(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return False
+
+
+class _CallDetails(NamedTuple):
+    """What an interceptor hands on; gRPC reads these attributes."""
+
+    method: str
+    timeout: float | None
+    metadata: Any
+    credentials: Any
+    wait_for_ready: bool | None
+    compression: Any
+
+
+class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc]  # grpc ships no types
+    """Gives every call a deadline: the nidaqmx client sets none, so a frozen server would hang us."""
+
+    def __init__(self) -> None:
+        self.seconds = _SHORT_CALL_S
+
+    def intercept_unary_unary(self, continuation: Any, details: Any, request: Any) -> Any:
+        limited = _CallDetails(
+            details.method,
+            self.seconds,
+            details.metadata,
+            details.credentials,
+            details.wait_for_ready,
+            details.compression,
+        )
+        return continuation(limited, request)
+
+
+class Connection:
+    """One way to one NI-DAQmx driver. Not thread-safe: it belongs to the reader's thread."""
+
+    def __init__(self, connection: str) -> None:
+        self.target = parse_target(connection)
+        # Names of tasks are unique in a device server: a second session must never attach by accident.
+        self.prefix = f"daq_app_{uuid.uuid4().hex[:8]}"
+        self._deadline = _Deadline()
+        self._raw: Any = None
+        self._channel: Any = None
+        if self.is_remote:
+            self._connect()
+
+    @property
+    def is_remote(self) -> bool:
+        return bool(self.target.host)
+
+    def _connect(self) -> None:
+        address = f"{self.target.host}:{self.target.port}"
+        if self.target.tls:
+            from nitlsconfig import NitlsconfigError
+            from nitlsconfig.grpc_channel import create_grpc_device_channel
+
+            try:
+                self._raw = create_grpc_device_channel(
+                    self.target.host.strip("[]"), self.target.port, options=_CHANNEL_OPTIONS
+                )
+            except NitlsconfigError as error:
+                raise DriverError(
+                    f"TLS to {address} is not set up on this machine ({error})",
+                    advice="Set it up with nitlsconfig, as NI's gRPC Device Server describes",
+                ) from error
+        else:
+            self._raw = grpc.insecure_channel(address, options=_CHANNEL_OPTIONS)
+        self._channel = grpc.intercept_channel(self._raw, self._deadline)
+
+    def reconnect(self) -> None:
+        """Drop the socket and make a new one; does nothing for the local library."""
+        if self.is_remote:
+            self._raw.close()
+            self._connect()
+
+    def new_task(self, name: str) -> nidaqmx.Task:
+        """A new, empty task of that name (made unique)."""
+        unique = f"{self.prefix}_{name}"
+        return nidaqmx.Task(
+            unique,
+            grpc_options=self._options(unique, SessionInitializationBehavior.INITIALIZE_SERVER_SESSION),
+        )
+
+    def attach_task(self, name: str) -> nidaqmx.Task:
+        """The task that `new_task` made, over a new socket. Only for a device server."""
+        unique = f"{self.prefix}_{name}"
+        return nidaqmx.Task(
+            unique,
+            grpc_options=self._options(unique, SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION),
+        )
+
+    def system(self) -> nidaqmx.system.System:
+        """Inventory of the machine that this connection reaches."""
+        if self.is_remote:
+            return nidaqmx.system.System.remote(
+                self._options("", SessionInitializationBehavior.INITIALIZE_SERVER_SESSION)
+            )
+        return nidaqmx.system.System.local()
+
+    def limit_calls_to(self, seconds: float | None = None) -> None:
+        """Deadline of the calls that follow; None is the usual one for short calls."""
+        self._deadline.seconds = _SHORT_CALL_S if seconds is None else seconds
+
+    def close(self) -> None:
+        """Drop the socket. Tasks must have been closed before."""
+        if self._raw is not None:
+            self._raw.close()
+
+    def _options(self, name: str, behaviour: SessionInitializationBehavior) -> GrpcSessionOptions | None:
+        if not self.is_remote:
+            return None
+        return GrpcSessionOptions(self._channel, name, initialization_behavior=behaviour)

@@ -1,0 +1,293 @@
+"""The driver for NI hardware, through the real nidaqmx client: local library or gRPC, same code."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+import warnings
+from pathlib import PurePath
+
+import nidaqmx
+import numpy as np
+from nidaqmx import errors as ni_errors
+
+from daq_app.config.plan import TaskPlan
+from drivers.connection import Connection
+from drivers.error_advice import translate
+from drivers.protocol import Block, DeviceInfo, DriverError, Opened
+from drivers.stream import TaskStream
+from drivers.tasks import commit, create_task, log_to_tdms, read_ranges
+
+_HOUSEKEEPING_S = 0.1
+"""Backlog, position and overloads are asked for this often: three round trips a task, not at each read
+when reads come fast."""
+_REPLY_MARGIN_S = 2.0
+"""How much longer than the read's own time-out we wait for the server's reply."""
+_CATCH_UP_READS = 10
+"""Most read periods fetched in one call when samples have piled up."""
+_CLOSE_LIMIT_S = 2.0
+
+
+class _OutOfStepError(DriverError):
+    """What was just read may belong to other samples than we thought: it is read again, not handed out."""
+
+
+class NidaqmxDriver:
+    """Keeps `drivers.protocol.Driver`. All calls from one thread.
+
+    `backup_folder` switches on the NI driver's own TDMS logging (`start_backup`).
+    """
+
+    def __init__(self, connection: str, *, backup_folder: PurePath | None = None) -> None:
+        self._connection = Connection(connection)
+        self._backup_folder = backup_folder
+        self._plan: TaskPlan | None = None
+        self._streams: list[TaskStream] = []
+        self._next_sample = 0
+        self._backlog = 0
+        self._overloaded: tuple[str, ...] = ()
+        self._last_housekeeping = 0.0
+        self._buffer_samples = 0
+
+    def open(self, plan: TaskPlan) -> Opened:
+        """Reserve and commit the tasks. Raises `DriverError`, leaving nothing reserved."""
+        self._plan = plan
+        self._connection.limit_calls_to()
+        try:
+            devices = self._check_devices(plan)
+            for planned in plan.tasks:
+                self._streams.append(TaskStream(planned, create_task(self._connection, planned)))
+            for stream in self._streams:
+                if self._backup_folder is not None:
+                    log_to_tdms(stream.task, self._backup_folder / f"{stream.planned.name}-session.tdms")
+                commit(stream.task)
+            return self._read_back(devices)
+        except Exception as error:
+            self._close_tasks()
+            raise translate(error, doing="opening the tasks") from error
+
+    def _check_devices(self, plan: TaskPlan) -> tuple[DeviceInfo, ...]:
+        """What sits where the plan expects it; one error that lists all missing devices."""
+        present = {device.name: device for device in self._connection.system().devices}
+        wanted = sorted(
+            {item.channel.physical_channel.split("/")[0] for task in plan.tasks for item in task.channels}
+        )
+        missing = [name for name in wanted if name not in present]
+        if missing:
+            there = ", ".join(sorted(present)) or "none"
+            raise DriverError(
+                f"{'Devices are' if len(missing) > 1 else 'A device is'} missing: {', '.join(missing)}. "
+                f"Present: {there}",
+                advice="Check that the chassis is switched on and every module sits in its slot, and compare "
+                "the names in the rig file with those in NI MAX",
+                code=-200220,
+                device=missing[0],
+            )
+        return tuple(
+            DeviceInfo(
+                name=name,
+                product=str(present[name].product_type),
+                serial=f"{int(present[name].serial_num):08X}",
+                simulated=bool(present[name].is_simulated),
+            )
+            for name in wanted
+        )
+
+    def _read_back(self, devices: tuple[DeviceInfo, ...]) -> Opened:
+        rates = [float(stream.task.timing.samp_clk_rate) for stream in self._streams]
+        if max(rates) - min(rates) > 1e-9 * max(rates):
+            listed = ", ".join(
+                f"{stream.planned.name} {rate:g} Hz"
+                for stream, rate in zip(self._streams, rates, strict=True)
+            )
+            raise DriverError(
+                f"The hardware gives the tasks different rates: {listed}",
+                advice="Take a rate that every module has (`daq-app config show` lists them)",
+            )
+        ranges: dict[str, tuple[float, float]] = {}
+        for stream in self._streams:
+            ranges.update(read_ranges(stream.task, stream.planned))
+        self._buffer_samples = min(int(stream.task.in_stream.input_buf_size) for stream in self._streams)
+        version = ".".join(str(part) for part in self._connection.system().driver_version)
+        return Opened(
+            rate_hz=rates[0],
+            ranges=ranges,
+            buffer_samples=self._buffer_samples,
+            devices=devices,
+            driver=f"NI-DAQmx {version} via {self._connection.target}, nidaqmx {nidaqmx.__version__}",
+        )
+
+    def start(self) -> None:
+        """Start the clock: slaves armed first, the master last."""
+        by_role = sorted(self._streams, key=lambda stream: stream.planned.role == "master")
+        try:
+            for stream in by_role:
+                stream.task.start()
+        except Exception as error:
+            self.stop()
+            raise translate(error, doing="starting the tasks") from error
+        self._next_sample = 0
+        self._backlog = 0
+        self._last_housekeeping = time.monotonic()
+
+    def read(self, timeout_s: float) -> Block:
+        """See the protocol. Blocks up to `timeout_s` for every task together."""
+        plan = self._opened_plan()
+        wanted = self._read_size(plan)
+        deadline = time.monotonic() + timeout_s
+        try:
+            for stream in self._streams:
+                left = max(0.0, deadline - time.monotonic())
+                self._connection.limit_calls_to(left + _REPLY_MARGIN_S)
+                stream.fill(wanted, left)
+            self._connection.limit_calls_to()
+            self._housekeeping()
+        except Exception as error:
+            # After any trouble the position is checked at the next read, before its block is handed out.
+            self._last_housekeeping = 0.0
+            out_of_step = isinstance(error, _OutOfStepError)
+            partial = None if out_of_step else self._block(min(s.n_pending for s in self._streams))
+            raise translate(error, doing="reading", partial=partial) from error
+        block = self._block(wanted)
+        assert block is not None
+        return block
+
+    def _read_size(self, plan: TaskPlan) -> int:
+        periods = min(_CATCH_UP_READS, max(1, self._backlog // plan.read_samples))
+        return periods * plan.read_samples
+
+    def _block(self, n_samples: int) -> Block | None:
+        """The next `n_samples` of all tasks as one rectangle; None for no samples."""
+        if n_samples == 0:
+            return None
+        plan = self._opened_plan()
+        if len(self._streams) == 1 and np.array_equal(self._streams[0].rows, np.arange(plan.n_channels)):
+            readings = self._streams[0].take(n_samples)
+        else:
+            readings = np.empty((plan.n_channels, n_samples))
+            for stream in self._streams:
+                readings[stream.rows] = stream.take(n_samples)
+        block = Block(
+            first_sample=self._next_sample,
+            readings=readings,
+            read_time_ns=time.time_ns(),
+            backlog_samples=self._backlog,
+            overloaded=self._overloaded,
+        )
+        self._overloaded = ()
+        self._next_sample += n_samples
+        self._backlog = max(0, self._backlog - n_samples)
+        return block
+
+    def _housekeeping(self) -> None:
+        now = time.monotonic()
+        if now - self._last_housekeeping < _HOUSEKEEPING_S:
+            return
+        self._last_housekeeping = now
+        overloaded: list[str] = []
+        backlog = []
+        for stream in self._streams:
+            at = stream.device_position()
+            if at != stream.position:
+                raise _OutOfStepError(
+                    f"The device stands at sample {at} where {stream.position} was expected",
+                    advice="Reading goes on at the right sample; if it happens often, restart the server",
+                    recoverable=True,
+                )
+            backlog.append(stream.total_acquired() - at)
+            overloaded.extend(stream.overloaded())
+        # Counted before this read's block is handed out, so that `_block` subtracts it once.
+        self._backlog = max(backlog) + min(stream.n_pending for stream in self._streams)
+        self._overloaded = tuple(overloaded)
+
+    def recover(self) -> None:
+        """See the protocol: same tasks, over a new socket, at the oldest sample that still exists."""
+        plan = self._opened_plan()
+        try:
+            self._connection.limit_calls_to()
+            if self._connection.is_remote:
+                self._attach_again()
+            for stream in self._streams:
+                if stream.task.is_task_done():
+                    raise DriverError(
+                        "The device has stopped sampling",
+                        advice="What had been read is saved. Start the acquisition again",
+                    )
+            # The oldest samples are being overwritten while we ask for them: leave a margin.
+            margin = max(2 * plan.read_samples, self._buffer_samples // 20)
+            oldest = max(stream.total_acquired() for stream in self._streams) - self._buffer_samples + margin
+            position = max(self._next_sample, oldest)
+            for stream in self._streams:
+                stream.seek(position)
+        except Exception as error:
+            raise translate(error, doing="taking up reading again") from error
+        self._next_sample = position
+        self._last_housekeeping = time.monotonic()
+
+    def _attach_again(self) -> None:
+        self._connection.reconnect()
+        for stream in self._streams:
+            try:
+                stream.attach(self._connection.attach_task(stream.planned.name))
+            except ni_errors.RpcError as error:
+                if getattr(error.rpc_code, "name", "") in ("UNAVAILABLE", "DEADLINE_EXCEEDED"):
+                    raise
+                raise DriverError(
+                    "The device server has forgotten the running task: it was restarted or reset",
+                    advice="What had been read is saved. Start the acquisition again",
+                ) from error
+
+    def start_backup(self, stem: str) -> tuple[str, ...]:
+        """Begin one TDMS file per task, written by the NI driver itself; answers the paths.
+
+        Empty where no `backup_folder` was given. Raises `DriverError`.
+        """
+        if self._backup_folder is None:
+            return ()
+        paths = []
+        try:
+            for stream in self._streams:
+                path = self._backup_folder / f"{stem}-{stream.planned.name}.tdms"
+                stream.task.in_stream.start_new_file(path)
+                stream.task.in_stream.logging_pause = False
+                paths.append(str(path))
+        except Exception as error:
+            raise translate(error, doing="starting the second recorder") from error
+        return tuple(paths)
+
+    def stop_backup(self) -> None:
+        """Pause the NI driver's own recording until the next test."""
+        if self._backup_folder is None:
+            return
+        try:
+            for stream in self._streams:
+                stream.task.in_stream.logging_pause = True
+        except Exception as error:
+            raise translate(error, doing="stopping the second recorder") from error
+
+    def stop(self) -> None:
+        """Stop the clock: the master first, so that the slaves get no further edge."""
+        self._connection.limit_calls_to(_CLOSE_LIMIT_S)
+        for stream in sorted(self._streams, key=lambda stream: stream.planned.role != "master"):
+            with contextlib.suppress(ni_errors.Error), warnings.catch_warnings():
+                # NI warns that a continuous task was stopped before it was done: that is what stopping is.
+                warnings.simplefilter("ignore", ni_errors.DaqWarning)
+                stream.task.stop()
+
+    def close(self) -> None:
+        """Give the hardware back. Safe at any time and twice; a server that is gone does not hold it up."""
+        self._close_tasks()
+        self._connection.close()
+
+    def _close_tasks(self) -> None:
+        self._connection.limit_calls_to(_CLOSE_LIMIT_S)
+        for stream in self._streams:
+            with contextlib.suppress(ni_errors.Error), warnings.catch_warnings():
+                warnings.simplefilter("ignore", ni_errors.DaqWarning)
+                stream.task.close()
+        self._streams = []
+
+    def _opened_plan(self) -> TaskPlan:
+        if self._plan is None or not self._streams:
+            raise DriverError("The tasks are not open", advice="Open the hardware first")
+        return self._plan
