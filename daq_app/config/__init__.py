@@ -2,7 +2,22 @@
 
 from daq_app.config.errors import ConfigError, Problem
 from daq_app.config.loader import load_rig, parse_rig
+from daq_app.config.plan import PlannedChannel, PlannedTask, PlanNote, TaskPlan
+from daq_app.config.planner import plan_tasks
 from daq_app.config.rig import Channel, Rig
 from daq_app.config.scaling import Scaling
 
-__all__ = ["Channel", "ConfigError", "Problem", "Rig", "Scaling", "load_rig", "parse_rig"]
+__all__ = [
+    "Channel",
+    "ConfigError",
+    "PlanNote",
+    "PlannedChannel",
+    "PlannedTask",
+    "Problem",
+    "Rig",
+    "Scaling",
+    "TaskPlan",
+    "load_rig",
+    "parse_rig",
+    "plan_tasks",
+]

@@ -16,7 +16,7 @@ class PlannedChannel:
     rig_index: int
     """Row of this channel in every block: its place in the rig file."""
     skew_s: float
-    """Delay of this channel's sample after the sample clock (multiplexer); known, not corrected by the driver."""
+    """Delay of this channel's sample after the sample clock (multiplexer); the driver does not correct it."""
     input_delay_s: float
     """Lag of the converter's digital filter (delta-sigma); known, not corrected by the driver."""
 

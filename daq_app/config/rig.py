@@ -160,7 +160,7 @@ class Channel(Table):
     anchor_m: Vector3 | None = None
     """Fixed end of a wire potentiometer."""
     axis: Literal["x", "y", "z"] = "x"
-    """Sensitive axis: opening z for LVDTs; direction of tilt for tiltmeters; wall-fixed axis for accelerometers."""
+    """Sensitive axis: z for LVDTs (opening); direction of tilt for tiltmeters; wall-fixed otherwise."""
     measurement: Literal["voltage", "iepe", "lvdt_native"] = "voltage"
     sensitivity: Positive
     sensitivity_unit: str

@@ -69,10 +69,7 @@ def _syntax_problem(error: tomllib.TOMLDecodeError, text: str, file: str) -> Pro
     message = str(error)
     place = _LINE_IN_MESSAGE.search(message)
     lines = text.splitlines() or [""]
-    if place and place.group(1):
-        number = int(place.group(1))
-    else:
-        number = len(lines)
+    number = int(place.group(1)) if place and place.group(1) else len(lines)
     what = _LINE_IN_MESSAGE.sub("", message)
     shown = lines[min(number, len(lines)) - 1].strip()[:80]
     column = f", column {place.group(2)}" if place and place.group(2) else ""
