@@ -1,0 +1,55 @@
+"""Runs on disk: the journal, the HDF5 run file, and what checks, mends and converts them."""
+
+from daq_app.runfile.errors import (
+    BusyError,
+    JournalDeviceError,
+    JournalDiskFull,
+    JournalError,
+    JournalSlowDisk,
+    RunFileError,
+)
+from daq_app.runfile.finalise import finalise
+from daq_app.runfile.hdf5_read import Run, open_run
+from daq_app.runfile.journal import JournalWriter
+from daq_app.runfile.journal_read import JournalContents, read_journal
+from daq_app.runfile.locks import FolderLock
+from daq_app.runfile.model import (
+    DerivedData,
+    DerivedSignal,
+    Event,
+    Gap,
+    RunHeader,
+    host_name,
+    plan_to_dict,
+    software_versions,
+)
+from daq_app.runfile.recover import Recovery, recover
+from daq_app.runfile.verify import VerifyReport, verify
+
+__all__ = [
+    "BusyError",
+    "DerivedData",
+    "DerivedSignal",
+    "Event",
+    "FolderLock",
+    "Gap",
+    "JournalContents",
+    "JournalDeviceError",
+    "JournalDiskFull",
+    "JournalError",
+    "JournalSlowDisk",
+    "JournalWriter",
+    "Recovery",
+    "Run",
+    "RunFileError",
+    "RunHeader",
+    "VerifyReport",
+    "finalise",
+    "host_name",
+    "open_run",
+    "plan_to_dict",
+    "read_journal",
+    "recover",
+    "software_versions",
+    "verify",
+]

@@ -1,0 +1,122 @@
+"""Reading HDF5 that may come from anybody: bounded memory, and nothing outside the file.
+
+Refused: external links, soft links, external storage, virtual datasets, filters other than the standard
+ones, and datasets that claim more than their bytes on disk could hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import h5py
+import numpy as np
+
+from daq_app.runfile.errors import RunFileError
+
+_MAX_CHUNK_BYTES: Final = 2**26
+_MAX_DEFLATE_RATIO: Final = 1100
+"""Deflate cannot shrink more than about 1032 times; a claim beyond is a forged shape."""
+_MAX_TEXT_BYTES: Final = 2**28
+_MAX_ROWS: Final = 1_000_000
+_FILTERS: Final = frozenset({h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_FLETCHER32})
+
+
+def open_hdf5(path: Path) -> h5py.File:
+    """Open for reading. Raises `RunFileError` in plain words."""
+    try:
+        size = path.stat().st_size
+    except OSError as error:
+        raise RunFileError(f"{path} cannot be read ({error.strerror})", advice="Check the name.") from error
+    try:
+        return h5py.File(path, "r", locking="best-effort")
+    except (OSError, ValueError, RuntimeError) as error:
+        if size >= 8 and path.open("rb").read(8) == b"\x89HDF\r\n\x1a\n":
+            raise RunFileError(
+                f"{path} is cut short or damaged",
+                advice="If its journal is still there, `daq-app recover` makes the run anew.",
+            ) from error
+        raise RunFileError(f"{path} is no HDF5 file", advice="Give a run file (.h5).") from error
+
+
+@contextmanager
+def damage_told(path: Path, what: str) -> Iterator[None]:
+    """Whatever the HDF5 library throws at damaged bytes becomes one `RunFileError`."""
+    try:
+        yield
+    except (OSError, KeyError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError) as error:
+        raise RunFileError(
+            f"{path}: {what} is damaged",
+            advice="If its journal is still there, `daq-app recover` makes the run anew.",
+        ) from error
+
+
+def checked_dataset(
+    path: Path,
+    group: h5py.Group,
+    name: str,
+    *,
+    itemsize: int | None = None,
+    length: int | None = None,
+) -> h5py.Dataset:
+    """A one-dimensional (or scalar) dataset that is safe to read. Raises `RunFileError`."""
+
+    def refuse(why: str) -> RunFileError:
+        return RunFileError(f"{path}: {group.name.rstrip('/')}/{name} {why}")
+
+    if name not in group:
+        raise refuse("is missing")
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        raise refuse("is a link to somewhere else, which a run never holds")
+    dataset = group[name]
+    if not isinstance(dataset, h5py.Dataset) or len(dataset.shape or ()) > 1:
+        raise refuse("is not a column of data")
+    creation = dataset.id.get_create_plist()
+    if creation.get_layout() == h5py.h5d.VIRTUAL or creation.get_external_count():
+        raise refuse("takes its data from another file, which a run never does")
+    filters = [creation.get_filter(index)[0] for index in range(creation.get_nfilters())]
+    if not _FILTERS.issuperset(filters):
+        raise refuse("uses an unknown compression")
+    if itemsize is not None and (dataset.dtype.kind != "f" or dataset.dtype.itemsize != itemsize):
+        raise refuse(f"holds {dataset.dtype}, not {8 * itemsize}-bit floating point numbers")
+    if length is not None and dataset.shape != (length,):
+        raise refuse(f"has shape {dataset.shape}, not ({length},)")
+    n_bytes = dataset.size * dataset.dtype.itemsize
+    if n_bytes > _MAX_DEFLATE_RATIO * dataset.id.get_storage_size() + 2**16:
+        raise refuse("claims more data than the file holds")
+    if dataset.chunks and int(np.prod(dataset.chunks)) * dataset.dtype.itemsize > _MAX_CHUNK_BYTES:
+        raise refuse("has absurdly large chunks")
+    return dataset
+
+
+def read_text(path: Path, group: h5py.Group, name: str) -> str:
+    """A text stored as one string. Raises `RunFileError`."""
+    dataset = checked_dataset(path, group, name)
+    if dataset.shape != () or h5py.check_string_dtype(dataset.dtype) is None:
+        raise RunFileError(f"{path}: {name} is not a text")
+    value = dataset.asstr()[()]
+    return str(value)
+
+
+def read_column(path: Path, group: h5py.Group, name: str) -> list[Any]:
+    """A column of a small table, as numbers or texts. Raises `RunFileError` if it is not small."""
+    dataset = checked_dataset(path, group, name)
+    if len(dataset.shape) != 1 or dataset.shape[0] > _MAX_ROWS:
+        raise RunFileError(f"{path}: {group.name}/{name} is no table of a run")
+    if h5py.check_string_dtype(dataset.dtype) is None:
+        if dataset.dtype.kind not in "iuf":
+            raise RunFileError(f"{path}: {group.name}/{name} is neither numbers nor texts")
+        return list(dataset[()].tolist())
+    texts: list[Any] = []
+    budget = _MAX_TEXT_BYTES
+    # One by one: many rows may point to one long text, and only a sum tells.
+    strings = dataset.asstr(errors="replace")
+    for index in range(dataset.shape[0]):
+        text = strings[index]
+        budget -= len(text)
+        if budget < 0:
+            raise RunFileError(f"{path}: {group.name}/{name} is absurdly long")
+        texts.append(text)
+    return texts
