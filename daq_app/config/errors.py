@@ -15,7 +15,7 @@ class Problem:
     right: str
 
     def __str__(self) -> str:
-        return f"{self.file}: {self.key}: {self.wrong}. {self.right}"
+        return f"{self.file}: {self.key}: {self.wrong}. {self.right}".rstrip()
 
 
 class ConfigError(Exception):

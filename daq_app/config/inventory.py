@@ -26,10 +26,10 @@ class Device:
     """Key path of the module in the rig file."""
 
 
-def devices_of(hardware: Hardware, file: str = "") -> tuple[dict[str, Device], list[Problem]]:
-    """Device name → device for all that is sound, and the problems of the rest."""
+def devices_of(hardware: Hardware, file: str = "") -> tuple[dict[str, Device | None], list[Problem]]:
+    """Device name → device, and the problems; None is a module whose product is not known."""
     problems: list[Problem] = []
-    devices: dict[str, Device] = {}
+    devices: dict[str, Device | None] = {}
     chassis_keys: dict[str, str] = {}
     for index, entry in enumerate(hardware.chassis):
         key = f"hardware.chassis[{index}] ({entry.name})"
@@ -45,42 +45,43 @@ def devices_of(hardware: Hardware, file: str = "") -> tuple[dict[str, Device], l
         except catalogue.UnknownProduct as error:
             problems.append(_unknown(error, f"{key}.product", "chassis", file))
             product = None
-        for device in _modules(entry, product, key, file, problems):
-            if device.name in devices:
-                other = devices[device.name].key
-                wrong = f"two modules have the device name `{device.name}` (the other is {other})"
-                problems.append(
-                    Problem(file, f"{device.key}.name", wrong, "Give each module its own name, as in NI MAX")
-                )
+        for name, where, device in _modules(entry, product, key, file, problems):
+            if name in devices:
+                wrong = f"two modules have the device name `{name}`"
+                right = "Give each module its own slot and name, as in NI MAX"
+                problems.append(Problem(file, f"{where}.name", wrong, right))
             else:
-                devices[device.name] = device
+                devices[name] = device
     return devices, problems
 
 
 def _modules(
     entry: Chassis, chassis: ChassisProduct | None, key: str, file: str, problems: list[Problem]
-) -> list[Device]:
+) -> list[tuple[str, str, Device | None]]:
+    """(device name, key path, device) of each module; None where its product is not known."""
     slots: dict[int, str] = {}
-    devices = []
+    devices: list[tuple[str, str, Device | None]] = []
+    bus = chassis.bus if chassis else "pxie" if entry.product.upper().startswith("PXI") else "cdaq"
     for index, item in enumerate(entry.modules):
         where = f"{key}.modules[{index}]"
         earlier = slots.setdefault(item.slot, where)
         if earlier != where:
             wrong = f"slot {item.slot} holds two modules (the other is {earlier})"
             problems.append(Problem(file, f"{where}.slot", wrong, "Give each module the slot it sits in"))
+        name = item.name or catalogue.device_name(entry.name, bus, item.slot)
+        if item.name:
+            problems += _name_problems(item.name, f"{where}.name", file)
         try:
             product = catalogue.module(item.product)
         except catalogue.UnknownProduct as error:
             problems.append(_unknown(error, f"{where}.product", "modules", file))
+            devices.append((name, where, None))
             continue
         if chassis is None:
             # The chassis is unknown and reported; its modules still let the channels be checked.
             chassis = ChassisProduct(entry.product, product.bus, tuple(range(1, 19)), None, 0.0)
         problems += _fit_problems(item, product, chassis, where, file)
-        name = item.name or catalogue.device_name(entry.name, chassis.bus, item.slot)
-        if item.name:
-            problems += _name_problems(item.name, f"{where}.name", file)
-        devices.append(Device(name, product, entry.name, chassis, item.slot, where))
+        devices.append((name, where, Device(name, product, entry.name, chassis, item.slot, where)))
     return devices
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import ValidationError
 
+from daq_app.config.checks import rig_problems
 from daq_app.config.errors import ConfigError, Problem
-from daq_app.config.rig import Family, Rig
+from daq_app.config.grouping import OwnKeys, grouped
+from daq_app.config.planner import channel_problems
+from daq_app.config.rig import Channel, Family, Rig
 from daq_app.config.toml_file import parse_toml, read_text
 from daq_app.config.validation import Location, nearest, problems_of
 
@@ -22,24 +26,83 @@ def load_rig(path: Path | str) -> Rig:
 
 
 def parse_rig(text: str, file: str = "rig") -> Rig:
-    """The rig of a TOML text (of a file, or kept in a run). Raises `ConfigError` with all problems."""
+    """The rig of a TOML text (of a file, or kept in a run). Raises `ConfigError` with all problems.
+
+    Rules of the hardware are checked by `plan_tasks`: a rig that can no longer be planned can still
+    be read for analysis. But a rig that is refused here has its hardware problems listed too.
+    """
     data = parse_toml(text, file)
+    own_keys = _own_keys(data)
     problems = merge_channel_defaults(data, file)
     try:
         rig = Rig.model_validate(data)
+        channels = dict(enumerate(rig.channels))
     except ValidationError as error:
         problems += problems_of(error, Rig, file, lambda location: _channel_label(data, location))
-        raise ConfigError(problems) from None
+        salvaged = _salvage(data, error)
+        if salvaged is None:
+            raise ConfigError(grouped(problems, own_keys)) from None
+        rig, channels = salvaged
+    problems += rig_problems(rig, channels, _families(data), file)
     if problems:
-        raise ConfigError(problems)
+        problems += channel_problems(rig, channels, file)[1]
+        raise ConfigError(grouped(problems, own_keys))
     return rig
+
+
+def _salvage(data: dict[str, Any], error: ValidationError) -> tuple[Rig, dict[int, Channel]] | None:
+    """The rig without what could not be read, and its channels by their index in the file.
+
+    So that one mistyped key does not hide the other faults. None where the rest makes no rig.
+    """
+    rest = dict(data)
+    bad: set[int] = set()
+    for detail in error.errors(include_url=False):
+        location = detail["loc"]
+        if len(location) >= 2 and location[0] == "channels" and isinstance(location[1], int):
+            bad.add(location[1])
+        elif location:
+            rest.pop(str(location[0]), None)
+    listed = data.get("channels")
+    kept = [i for i in range(len(listed)) if i not in bad] if isinstance(listed, list) else []
+    rest["channels"] = [listed[i] for i in kept] if isinstance(listed, list) else []
+    rest.setdefault("name", "unnamed")
+    try:
+        rig = Rig.model_validate(rest)
+    except ValidationError:
+        return None
+    return rig, dict(zip(kept, rig.channels, strict=True))
+
+
+def _own_keys(data: dict[str, Any]) -> OwnKeys:
+    """(family, keys that the channel gives itself) of each channel, before defaults are merged."""
+    channels = data.get("channels")
+    if not isinstance(channels, list):
+        return {}
+    return {
+        index: (str(channel.get("family", "")), frozenset(channel))
+        for index, channel in enumerate(channels)
+        if isinstance(channel, dict)
+    }
+
+
+def _families(data: dict[str, Any]) -> Counter[str]:
+    """How many channels of each family the file lists."""
+    channels = data.get("channels")
+    if not isinstance(channels, list):
+        return Counter()
+    return Counter(
+        channel["family"]
+        for channel in channels
+        if isinstance(channel, dict) and isinstance(channel.get("family"), str)
+    )
 
 
 def merge_channel_defaults(data: dict[str, Any], file: str) -> list[Problem]:
     """Take the ``channel_defaults`` tables out of `data` and merge each into its family's channels.
 
     A key of the channel wins; sub-tables (certificate, excitation) are merged key by key, and
-    `assumed` lists are joined (a default that the channel overrides is assumed no more).
+    `assumed` lists are joined: those of the family name keys wherever they are given.
     """
     defaults = data.pop(DEFAULTS_KEY, {})
     if not isinstance(defaults, dict):

@@ -72,8 +72,8 @@ def _skew_notes(tasks: Sequence[PlannedTask], devices: Mapping[str, Device]) -> 
                 continue
             product = devices[name].product
             text = (
-                f"{product.name} scans its channels one after the other: the last is read {last * 1e6:.1f} µs "
-                "after the first; known per channel, corrected in the analysis"
+                f"{product.name} scans its channels one after the other: the last is read "
+                f"{last * 1e6:.1f} µs after the first; known per channel, corrected in the analysis"
             )
             settling = last / (len(of_device) - 1) - product.min_convert_period_s
             if settling < catalogue.PADDING_S * (1 - 1e-6):

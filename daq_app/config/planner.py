@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from daq_app.config import catalogue
 from daq_app.config.errors import ConfigError, Problem
+from daq_app.config.grouping import grouped
 from daq_app.config.inventory import Device, devices_of
 from daq_app.config.plan import PlannedChannel, PlannedTask, TaskPlan
 from daq_app.config.plan_notes import plan_notes
@@ -36,10 +37,10 @@ def plan_tasks(rig: Rig, file: str = "", today: dt.date | None = None) -> TaskPl
 
     Raises `ConfigError` with every rule of the hardware that the rig breaks.
     """
-    devices, problems = hardware_problems(rig, file)
+    devices, problems = channel_problems(rig, dict(enumerate(rig.channels)), file)
     if problems:
-        raise ConfigError(problems)
-    groups = _groups(_members(rig, devices))
+        raise ConfigError(grouped(problems))
+    groups = _groups(_members(dict(enumerate(rig.channels)), devices))
     rate = _common_rate(groups, rig.acquisition.rate_hz)
     tasks = _tasks(groups, rig, rate)
     return TaskPlan(
@@ -51,31 +52,25 @@ def plan_tasks(rig: Rig, file: str = "", today: dt.date | None = None) -> TaskPl
     )
 
 
-def hardware_problems(rig: Rig, file: str = "") -> tuple[dict[str, Device], list[Problem]]:
-    """The rig's devices, and every conflict between its channels and its hardware."""
-    return channel_problems(rig, dict(enumerate(rig.channels)), file)
-
-
 def channel_problems(
     rig: Rig, channels: Mapping[int, Channel], file: str
 ) -> tuple[dict[str, Device], list[Problem]]:
-    """As `hardware_problems`, for some of the channels (rig index → channel)."""
-    devices, problems = devices_of(rig.hardware, file)
-    problems += wiring_problems(channels, devices, file)
-    members = [
-        _Member(index, channel, devices[terminal_of(channel)[0]])
-        for index, channel in channels.items()
-        if terminal_of(channel)[0] in devices
-    ]
+    """The rig's devices, and every conflict of its `channels` (rig index → channel) with them."""
+    listed, problems = devices_of(rig.hardware, file)
+    problems += wiring_problems(channels, listed, file)
+    devices = {name: device for name, device in listed.items() if device}
+    members = _members(channels, devices)
     problems += _speed_problems(members, rig.acquisition.rate_hz, file)
     problems += _clock_problems(members, file)
     return devices, problems
 
 
-def _members(rig: Rig, devices: Mapping[str, Device]) -> list[_Member]:
+def _members(channels: Mapping[int, Channel], devices: Mapping[str, Device]) -> list[_Member]:
+    """The channels whose device is known, with it."""
     return [
         _Member(index, channel, devices[terminal_of(channel)[0]])
-        for index, channel in enumerate(rig.channels)
+        for index, channel in channels.items()
+        if terminal_of(channel)[0] in devices
     ]
 
 

@@ -19,9 +19,9 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from daq_app.config.units import FAMILY_SI_UNIT, G_M_S2, SENSITIVITY_TO_SI
 
 Family = Literal["lvdt", "wire", "accelerometer", "tiltmeter"]
-Vector3 = tuple[float, float, float]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
+Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+Vector3 = tuple[Finite, Finite, Finite]
 
 
 class Table(BaseModel):
@@ -49,7 +49,7 @@ class Specimen(Table):
     """About the base corner."""
     r0_m: Positive
     """Distance from the base corner to the centre of mass."""
-    alpha0_rad: Annotated[float, Field(gt=0, lt=math.pi / 2)]
+    alpha0_rad: Annotated[float, Field(gt=0, lt=math.pi / 2, allow_inf_nan=False, strict=True)]
     p_rad_s: Positive
     """As printed in the source; checked against sqrt(W R0 / I_O)."""
     length_m: Positive
@@ -75,7 +75,7 @@ class Specimen(Table):
 class Module(Table):
     """One I/O module in a slot of a chassis."""
 
-    slot: Annotated[int, Field(ge=1, le=18)]
+    slot: Annotated[int, Field(ge=1, le=18, strict=True)]
     product: str
     """NI's product name as in the catalogue, for instance ``NI 9205`` or ``PXIe-4340``."""
     name: str = ""
@@ -103,12 +103,12 @@ class Acquisition(Table):
     """How a test is recorded and when it starts and ends."""
 
     rate_hz: Positive = 4000.0
-    read_period_s: Annotated[float, Field(ge=0.01, le=1.0)] = 0.1
-    buffer_s: Annotated[float, Field(ge=2.0, le=120.0)] = 20.0
+    read_period_s: Annotated[float, Field(ge=0.01, le=1.0, allow_inf_nan=False, strict=True)] = 0.1
+    buffer_s: Annotated[float, Field(ge=2.0, le=120.0, allow_inf_nan=False, strict=True)] = 20.0
     """Length of the driver's circular buffer: how long the computer may be deaf."""
-    pre_trigger_s: Annotated[float, Field(ge=0.5, le=120.0)] = 5.0
-    post_rest_s: Annotated[float, Field(ge=0.2, le=60.0)] = 2.0
-    max_duration_s: Annotated[float, Field(ge=5.0, le=7200.0)] = 120.0
+    pre_trigger_s: Annotated[float, Field(ge=0.5, le=120.0, allow_inf_nan=False, strict=True)] = 5.0
+    post_rest_s: Annotated[float, Field(ge=0.2, le=60.0, allow_inf_nan=False, strict=True)] = 2.0
+    max_duration_s: Annotated[float, Field(ge=5.0, le=7200.0, allow_inf_nan=False, strict=True)] = 120.0
     """Longest time from release to the automatic stop."""
     velocity_cutoff_hz: Positive = 25.0
     """Cut-off of the stated low-pass differentiator (daq_app.rocking)."""
@@ -117,10 +117,10 @@ class Acquisition(Table):
 class ExpectedChannels(Table):
     """How many channels of each family the rig must have: a missing sensor is an error."""
 
-    lvdt: int = 24
-    wire: int = 5
-    accelerometer: int = 8
-    tiltmeter: int = 4
+    lvdt: Annotated[int, Field(ge=0, le=1000, strict=True)] = 24
+    wire: Annotated[int, Field(ge=0, le=1000, strict=True)] = 5
+    accelerometer: Annotated[int, Field(ge=0, le=1000, strict=True)] = 8
+    tiltmeter: Annotated[int, Field(ge=0, le=1000, strict=True)] = 4
 
     @property
     def total(self) -> int:
@@ -131,9 +131,9 @@ class Excitation(Table):
     """Supply of a sensor."""
 
     kind: Literal["none", "external_voltage", "internal_voltage", "internal_current"] = "none"
-    value: Annotated[float, Field(ge=0)] = 0.0
+    value: Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)] = 0.0
     """Volts, or amperes for ``internal_current``."""
-    frequency_hz: Annotated[float, Field(ge=0)] = 0.0
+    frequency_hz: Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)] = 0.0
     """AC excitation of native LVDT channels; 0 is DC."""
 
 
@@ -173,9 +173,9 @@ class Channel(Table):
     """Range asked of the module, volts."""
     noise_si: Positive
     """Expected rms noise at rest, SI: the sensor check and the simulation use it."""
-    time_constant_s: Annotated[float, Field(ge=0)] = 0.0
+    time_constant_s: Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)] = 0.0
     """First-order response of a slow sensor (tiltmeters)."""
-    source_impedance_ohm: Annotated[float, Field(ge=0)] = 100.0
+    source_impedance_ohm: Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)] = 100.0
     terminal_config: Literal["DIFF", "RSE", "NRSE", "PSEUDO_DIFF"] = "DIFF"
     excitation: Excitation = Excitation()
     certificate: Certificate
@@ -205,22 +205,22 @@ class Channel(Table):
 class Simulation(Table):
     """The simulated wall behind ``connection = "simulated"``: truth that no real rig file needs."""
 
-    restitution: Annotated[float, Field(gt=0, le=1)] = 0.9
+    restitution: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False, strict=True)] = 0.9
     """True r of the simulated wall."""
-    restitution_scatter: Annotated[float, Field(ge=0, le=0.05)] = 0.0
+    restitution_scatter: Annotated[float, Field(ge=0, le=0.05, allow_inf_nan=False, strict=True)] = 0.0
     """Relative standard deviation of r from impact to impact."""
-    theta0_scatter: Annotated[float, Field(ge=0, le=0.1)] = 0.01
+    theta0_scatter: Annotated[float, Field(ge=0, le=0.1, allow_inf_nan=False, strict=True)] = 0.01
     """Relative standard deviation of the release rotation about the planned level."""
     semi_rigid: bool = False
     """Move the pivot inwards by a = 2 W / (2 f_m l) (Eqns 2.1 to 2.3)."""
-    offset_scatter: Annotated[float, Field(ge=0, le=0.2)] = 0.01
+    offset_scatter: Annotated[float, Field(ge=0, le=0.2, allow_inf_nan=False, strict=True)] = 0.01
     """Standard deviation of sensor zero offsets, as a fraction of the range."""
-    seed: int = 1
-    upright_s: Annotated[float, Field(ge=0.5, le=600)] = 3.0
-    pull_s: Annotated[float, Field(ge=0.5, le=600)] = 3.0
-    hold_s: Annotated[float, Field(ge=0.5, le=600)] = 8.0
+    seed: Annotated[int, Field(ge=0, lt=2**63, strict=True)] = 1
+    upright_s: Annotated[float, Field(ge=0.5, le=600, allow_inf_nan=False, strict=True)] = 3.0
+    pull_s: Annotated[float, Field(ge=0.5, le=600, allow_inf_nan=False, strict=True)] = 3.0
+    hold_s: Annotated[float, Field(ge=0.5, le=600, allow_inf_nan=False, strict=True)] = 8.0
     """Timeline of an unattended test: upright, pulled, held, then released."""
-    effects: dict[str, dict[str, float]] = Field(default_factory=dict)
+    effects: dict[str, dict[str, Finite]] = Field(default_factory=dict)
     """Further effects by name with their parameters (sim_hardware.dynamics)."""
 
 

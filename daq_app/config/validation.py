@@ -38,8 +38,28 @@ def key_path(location: Location, label: Label | None = None) -> str:
 def problems_of(
     error: ValidationError, model: type[BaseModel], file: str, label: Label | None = None
 ) -> list[Problem]:
-    """Every complaint of a validation as a `Problem`; unknown keys get a did-you-mean."""
-    return [_problem(detail, model, file, label) for detail in error.errors(include_url=False)]
+    """Every complaint of a validation as a `Problem`; unknown keys get a did-you-mean.
+
+    A key that is missing because it is misspelt is reported once, as the misspelling.
+    """
+    details = error.errors(include_url=False)
+    meant = {
+        (*detail["loc"][:-1], near)
+        for detail in details
+        if detail["type"] == "extra_forbidden"
+        for near in _meant(detail["loc"], model)
+    }
+    return [
+        _problem(detail, model, file, label)
+        for detail in details
+        if not (detail["type"] == "missing" and detail["loc"] in meant)
+    ]
+
+
+def _meant(location: Location, model: type[BaseModel]) -> list[str]:
+    """The known key that an unknown one was probably meant to be."""
+    owner = model_at(model, location[:-1])
+    return nearest(str(location[-1]), sorted(owner.model_fields)) if owner else []
 
 
 def _problem(detail: ErrorDetails, model: type[BaseModel], file: str, label: Label | None) -> Problem:
@@ -51,12 +71,10 @@ def _problem(detail: ErrorDetails, model: type[BaseModel], file: str, label: Lab
     owner = model_at(model, location[:-1])
     last = str(location[-1]) if location else ""
     if kind == "extra_forbidden":
-        known = sorted(owner.model_fields) if owner else []
-        near = nearest(last, known)
-        hint = f"Did you mean `{near[0]}`? " if near else ""
-        return Problem(
-            file, key, f"`{last}` is no key of this table", f"{hint}Known keys: {', '.join(known)}"
-        )
+        near = _meant(location, model)
+        known = ", ".join(sorted(owner.model_fields)) if owner else ""
+        right = f"Did you mean `{near[0]}`?" if near else f"Known keys: {known}"
+        return Problem(file, key, f"`{last}` is no key of this table", right)
     if kind == "missing":
         return Problem(file, key, f"`{last}` is missing", f"Add `{last} = …`{_about(owner, last)}")
     if kind == "value_error":

@@ -28,15 +28,20 @@ def terminal_of(channel: Channel) -> tuple[str, int]:
 
 
 def wiring_problems(
-    channels: Mapping[int, Channel], devices: Mapping[str, Device], file: str
+    channels: Mapping[int, Channel], devices: Mapping[str, Device | None], file: str
 ) -> list[Problem]:
-    """Problems of all channels (rig index → channel) with their modules and with each other."""
+    """Problems of all channels (rig index → channel) with their modules and with each other.
+
+    A device that is None is reported elsewhere: its channels are only compared with each other.
+    """
     problems: list[Problem] = []
     for index, channel in channels.items():
         name, ai = terminal_of(channel)
         device = devices.get(name)
         key = channel_key(index, channel, "physical_channel")
         if device is None:
+            if name in devices:
+                continue
             near = nearest(name, devices)
             hint = f"Did you mean `{near[0]}`? " if near else ""
             known = f"{hint}Devices of this rig: {', '.join(devices) or 'none'}"
@@ -111,7 +116,7 @@ def _excitation_problems(index: int, channel: Channel, device: Device, file: str
 
 
 def _shared_terminals(
-    channels: Mapping[int, Channel], devices: Mapping[str, Device], file: str
+    channels: Mapping[int, Channel], devices: Mapping[str, Device | None], file: str
 ) -> Iterator[Problem]:
     taken: dict[tuple[str, int], tuple[int, Channel]] = {}
     for index, channel in channels.items():
