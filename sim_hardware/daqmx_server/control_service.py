@@ -1,0 +1,46 @@
+"""The way to the simulated world past NI's interface: pull the wall, release it, break things.
+
+One call, ``/rocking.SimControl/Command``: JSON object {"name": …, "arguments": {…}} in, JSON object out.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Final
+
+import grpc
+
+from sim_hardware.daqmx_server.bench import Bench
+
+SERVICE: Final = "rocking.SimControl"
+METHOD: Final = "Command"
+
+
+def run_command(bench: Bench, name: str, arguments: dict[str, Any]) -> dict[str, object]:
+    """Carry out one command. `ValueError` in words for one that is not known or not possible."""
+    with bench.changed:
+        if name == "bench":
+            return {
+                "time_s": bench.clock.now(),
+                "tasks": {t.name: t.state.name for t in bench.tasks.values()},
+            }
+        if name == "digital_edge":
+            bench.clock.power_on()
+            bench.digital_edge(str(arguments["terminal"]), bench.clock.now())
+            return {"time_s": bench.clock.now()}
+        return bench.command(name, arguments)
+
+
+def control_handler(bench: Bench) -> grpc.GenericRpcHandler:
+    """The control service as a handler of the gRPC server."""
+
+    def call(request: bytes, context: Any) -> bytes:
+        try:
+            message = json.loads(request)
+            answer = run_command(bench, str(message["name"]), dict(message.get("arguments", {})))
+        except (ValueError, KeyError, TypeError) as error:
+            context.abort(grpc.StatusCode.INVALID_ARGUMENT, f"{type(error).__name__}: {error}")
+        return json.dumps(answer).encode()
+
+    handler = grpc.unary_unary_rpc_method_handler(call, request_deserializer=None, response_serializer=None)
+    return grpc.method_handlers_generic_handler(SERVICE, {METHOD: handler})

@@ -1,0 +1,208 @@
+"""Errors of the simulated NI-DAQmx driver: NI's codes, in NI's style of text."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Final
+
+from nidaqmx.error_codes import DAQmxErrors, DAQmxWarnings
+
+
+class Code(IntEnum):
+    """The codes that this server raises (NI's numbers, `nidaqmx.error_codes`)."""
+
+    RESOURCE_RESERVED = -50103
+    ABORTED = -88710
+    INVALID_VALUE = -200077
+    MIN_NOT_BELOW_MAX = -200082
+    INVALID_TASK = -200088
+    PHYSICAL_CHANNEL_UNKNOWN = -200170
+    INVALID_DEVICE = -200220
+    READ_BUFFER_TOO_SMALL = -200229
+    TRIGGER_SOURCE_INVALID = -200265
+    SAMPLES_NEVER_AVAILABLE = -200278
+    SAMPLES_OVERWRITTEN = -200279
+    RELATIVE_TO_REF_TRIG_NOT_DONE = -200281
+    NO_REF_TRIGGER = -200282
+    SAMPLES_NOT_YET_AVAILABLE = -200284
+    REF_TRIGGER_WHEN_CONTINUOUS = -200358
+    SAMPLE_RATE_TOO_HIGH = -200332
+    DEVICE_ABSENT = -200324
+    INVALID_CHANNEL_TYPE = -200430
+    MEASUREMENT_TYPE_UNSUPPORTED = -200431
+    ATTRIBUTE_UNSUPPORTED = -200452
+    READ_NOT_STARTED = -200473
+    TIMED_OUT = -200474
+    TASK_NOT_RUNNING = -200475
+    NO_INPUT_CHANNELS = -200460
+    NEGATIVE_SAMPLE = -200277
+    NO_CHANNELS = -200478
+    TASK_RUNNING = -200479
+    CHANNEL_ALREADY_IN_TASK = -200489
+    CHANNEL_NOT_IN_TASK = -200486
+    PROPERTY_WHILE_RUNNING = -200557
+    NOT_DONE = -200560
+    EVERY_N_ZERO = -200880
+    EVERY_N_MULTIPLE = -200877
+    EVERY_N_UNBUFFERED = -200848
+    DONE_REGISTERED = -200950
+    SIGNAL_REGISTERED = -200949
+    EVERY_N_REGISTERED = -200881
+    EVENT_WHILE_RUNNING = -200960
+    DEVICE_LOST = -201003
+    NETWORK_LOST = -201390
+    DUPLICATE_TASK = -200089
+    TASK_NOT_IN_MAX = -200485
+    SCALAR_OF_MANY = -200523
+    EVERY_N_NOT_FOR_INPUT = -200965
+    SIGNAL_EVENT_UNSUPPORTED = -200987
+    INVALID_SCALE = -200447
+
+
+_TEXT: Final[dict[int, str]] = {
+    Code.RESOURCE_RESERVED: (
+        "The specified resource is reserved. The operation could not be completed as specified."
+    ),
+    Code.ABORTED: ("The operation was aborted because the task was stopped, cleared or aborted."),
+    Code.INVALID_VALUE: (
+        "Requested value is not a supported value for this property. The property value may be "
+        "invalid because it conflicts with another property."
+    ),
+    Code.MIN_NOT_BELOW_MAX: ("Specified minimum value is greater than or equal to the maximum value."),
+    Code.INVALID_TASK: ("Task specified is invalid or does not exist."),
+    Code.PHYSICAL_CHANNEL_UNKNOWN: (
+        "Physical channel specified does not exist on this device.\n\n"
+        "Refer to the documentation for channels available on this device."
+    ),
+    Code.INVALID_DEVICE: ("Device identifier is invalid."),
+    Code.READ_BUFFER_TOO_SMALL: ("Buffer is too small to fit read data."),
+    Code.TRIGGER_SOURCE_INVALID: (
+        "Source of the trigger is invalid: it is neither a channel of the task nor a terminal of its devices."
+    ),
+    Code.SAMPLES_NEVER_AVAILABLE: (
+        "Attempted to read a sample beyond the final sample acquired. The acquisition has stopped, "
+        "therefore the sample specified by the combination of position and offset will never be "
+        "available.\n\n"
+        "Specify a position and offset which selects a sample up to, but not beyond, the final sample"
+        " acquired."
+    ),
+    Code.SAMPLES_OVERWRITTEN: (
+        "The application is not able to keep up with the hardware acquisition.\n"
+        "Increasing the buffer size, reading the data more frequently, or specifying a fixed number "
+        "of samples to read instead of reading all available samples might correct the problem."
+    ),
+    Code.RELATIVE_TO_REF_TRIG_NOT_DONE: (
+        "Cannot read relative to the reference trigger until the acquisition is done."
+    ),
+    Code.NO_REF_TRIGGER: (
+        "Attempted to read relative to the reference trigger although no reference trigger is configured."
+    ),
+    Code.SAMPLES_NOT_YET_AVAILABLE: (
+        "Some or all of the samples requested have not yet been acquired.\n\n"
+        "To wait for the samples to become available use a longer read timeout or read later in your "
+        "program."
+    ),
+    Code.REF_TRIGGER_WHEN_CONTINUOUS: (
+        "Reference trigger is not supported when the sample mode is continuous."
+    ),
+    Code.SAMPLE_RATE_TOO_HIGH: (
+        "Specified sample rate is higher than the fastest rate supported by the device."
+    ),
+    Code.DEVICE_ABSENT: ("Device is not available for routing, or it is absent or unavailable."),
+    Code.INVALID_CHANNEL_TYPE: (
+        "I/O type of the physical channel does not match the I/O type required for the virtual "
+        "channel you are creating."
+    ),
+    Code.MEASUREMENT_TYPE_UNSUPPORTED: (
+        "Selected physical channel does not support the measurement type required by the virtual "
+        "channel you are creating.\n\n"
+        "Create a channel of a measurement type that is supported by the selected physical channel."
+    ),
+    Code.ATTRIBUTE_UNSUPPORTED: (
+        "Specified property is not supported by the device or is not applicable to the task."
+    ),
+    Code.READ_NOT_STARTED: (
+        "Read cannot be performed when the auto start property is false and the task is not running "
+        "or committed."
+    ),
+    Code.TIMED_OUT: ("Specified operation did not complete, because the specified timeout expired."),
+    Code.TASK_NOT_RUNNING: ("Specified operation cannot be performed when the task is not running."),
+    Code.NO_INPUT_CHANNELS: (
+        "Read cannot be performed, because there are no channels in this task from which data can be read."
+    ),
+    Code.NEGATIVE_SAMPLE: ("Attempted to read a sample before the first sample acquired."),
+    Code.NO_CHANNELS: ("Specified operation cannot be performed when there are no channels in the task."),
+    Code.TASK_RUNNING: ("Specified operation cannot be performed while the task is running."),
+    Code.CHANNEL_ALREADY_IN_TASK: (
+        "Specified channel cannot be added to the task, because a channel with the same name is "
+        "already in the task."
+    ),
+    Code.CHANNEL_NOT_IN_TASK: ("Specified channel does not exist in the task."),
+    Code.PROPERTY_WHILE_RUNNING: (
+        "Specified property cannot be set while the task is running.\n\n"
+        "Set the property prior to starting the task, or stop the task prior to setting the property."
+    ),
+    Code.NOT_DONE: (
+        "Wait Until Done did not indicate that the task was done within the specified timeout.\n\n"
+        "Increase the timeout, check the program, and make sure the acquisition or generation is "
+        "started."
+    ),
+    Code.EVERY_N_ZERO: ("Every N Samples Event interval must be greater than 0."),
+    Code.EVERY_N_MULTIPLE: ("Buffer size must be an integer multiple of the Every N Samples Event interval."),
+    Code.EVERY_N_UNBUFFERED: ("Every N Samples Event is not supported for non-buffered tasks."),
+    Code.DONE_REGISTERED: ("A Done Event is already registered for this task."),
+    Code.SIGNAL_REGISTERED: ("A Signal Event is already registered for this task."),
+    Code.EVERY_N_REGISTERED: ("An Every N Samples Event is already registered for this task."),
+    Code.EVENT_WHILE_RUNNING: ("DAQmx software event cannot be registered while the task is running."),
+    Code.DEVICE_LOST: (
+        "Device cannot be accessed.  Possible causes:\n\n"
+        "Device is no longer present in the system.\n"
+        "Device is not powered.\n"
+        "Device is powered, but was temporarily without power.\n"
+        "Device is damaged.\n\n"
+        "Ensure the device is properly connected and powered. Turn the computer off and on again. If "
+        "you suspect that the device is damaged, contact National Instruments at ni.com/support."
+    ),
+    Code.NETWORK_LOST: (
+        "The connection to the network device was lost. Check that the device is powered and "
+        "connected to the network."
+    ),
+    Code.DUPLICATE_TASK: ("Task name specified conflicts with an existing task name."),
+    Code.TASK_NOT_IN_MAX: ("Specified task is not in the Data Neighborhood of NI MAX."),
+    Code.INVALID_SCALE: ("Scale specified is invalid or does not exist."),
+}
+
+
+def error_text(code: int) -> str:
+    """NI's sentence for a code; for a code without one, its symbolic name; empty if unknown to NI."""
+    if code in _TEXT:
+        return _TEXT[code]
+    for table in (DAQmxErrors, DAQmxWarnings):
+        try:
+            name: str = table(code).name
+        except ValueError:
+            continue
+        return name.replace("_", " ").capitalize() + "."
+    return ""
+
+
+class DaqmxError(Exception):
+    """An error of the driver.
+
+    `details` are paragraphs such as ``Device Specified: cDAQ9Mod1`` that NI appends to its sentence.
+    `samples_read` is sent along where a read failed half-way.
+    """
+
+    def __init__(self, code: int, *details: str, samples_read: int | None = None) -> None:
+        self.code = int(code)
+        self.details = details
+        self.samples_read = samples_read
+        super().__init__(self.text())
+
+    def text(self, task: str = "") -> str:
+        """The extended error text as NI-DAQmx composes it."""
+        parts = [error_text(self.code), *self.details]
+        if task:
+            parts.append(f"Task Name: {task}")
+        parts.append(f"Status Code: {self.code}")
+        return "\n\n".join(parts)

@@ -1,0 +1,190 @@
+"""Streams of events: every N samples, task done, hardware signal.
+
+Each open stream holds one thread of the server. The initial metadata tells the client that the
+registration has been made; until then it does not go on to start the task.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from nidaqmx._stubs import nidaqmx_pb2 as pb
+from nidaqmx.constants import EveryNSamplesEventType, Signal
+
+from sim_hardware.daqmx_server.bench import Bench
+from sim_hardware.daqmx_server.errors import Code, DaqmxError
+from sim_hardware.daqmx_server.requests import fields_of
+from sim_hardware.daqmx_server.task import State, Task
+
+_LISTEN_S = 0.25
+
+
+class EventStream:
+    """One registration: lives until the client cancels, unregisters or clears the task."""
+
+    def __init__(self, bench: Bench, request: Any, context: Any, kind: str, already: Code) -> None:
+        self.bench = bench
+        self.task = bench.task(request.task.name)
+        if self.task.state is State.RUNNING:
+            raise DaqmxError(Code.EVENT_WHILE_RUNNING)
+        if kind in self.task.events:
+            raise DaqmxError(already)
+        self.kind = kind
+        self.task.events.add(kind)
+        self._context = context
+        context.add_callback(self._wake)
+
+    def _wake(self) -> None:
+        with self.bench.changed:
+            self.bench.changed.notify_all()
+
+    @property
+    def open(self) -> bool:
+        return self._context.is_active() and not self.task.cleared and self.kind in self.task.events
+
+    def close(self) -> None:
+        self.task.events.discard(self.kind)
+
+    def wait_for_run(self) -> bool:
+        """Wait until the task runs; False when the stream has ended instead."""
+        while self.open and self.task.run is None:
+            self.bench.changed.wait(_LISTEN_S)
+        return self.open
+
+    def wait_for_count(self, count: int) -> bool:
+        """Wait until `count` samples have been acquired; False if the run ended before."""
+        run = self.task.run
+        clock = self.bench.clock
+        forever = clock.deadline(-1)
+        while self.open and run is not None and self.task.run is run and run.failure is None:
+            if run.acquired(clock.now()) >= count:
+                return True
+            last = run.last_sample()
+            if last is not None and last < count:
+                self.bench.changed.wait(_LISTEN_S)
+            elif self.bench.readers_drive_time and run.available(clock.now()) > 0:
+                self.bench.changed.wait(_LISTEN_S)  # time moves with the reader: let it read first
+            else:
+                clock.wait(self.bench.changed, run.time_of_count(count), forever)
+        return False
+
+
+def every_n_samples(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
+    fields = fields_of(request)
+    interval = int(fields["n_samples"])
+    kind = fields["every_n_samples_event_type"]
+    with bench.changed:
+        task = bench.task(request.task.name)
+        _check_interval(task, interval, kind)
+        stream = EventStream(bench, request, context, "every_n", Code.EVERY_N_REGISTERED)
+    context.send_initial_metadata(())
+    event = pb.RegisterEveryNSamplesEventResponse(
+        every_n_samples_event_type=kind, every_n_samples_event_type_raw=kind, n_samples=interval
+    )
+    try:
+        while True:
+            with bench.changed:
+                if not stream.wait_for_run():
+                    return
+            number = 0
+            while True:
+                with bench.changed:
+                    if not stream.wait_for_count((number + 1) * interval):
+                        break
+                number += 1
+                yield event
+            with bench.changed:
+                while stream.open and task.run is not None and task.run.failure is not None:
+                    bench.changed.wait(_LISTEN_S)
+                if not stream.open:
+                    return
+    finally:
+        with bench.changed:
+            stream.close()
+
+
+def _check_interval(task: Task, interval: int, kind: int) -> None:
+    if interval == 0:
+        raise DaqmxError(Code.EVERY_N_ZERO)
+    if kind != EveryNSamplesEventType.ACQUIRED_INTO_BUFFER.value:
+        raise DaqmxError(Code.EVERY_N_NOT_FOR_INPUT)
+    if not task.is_buffered:
+        raise DaqmxError(Code.EVERY_N_UNBUFFERED)
+
+
+def done(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
+    with bench.changed:
+        stream = EventStream(bench, request, context, "done", Code.DONE_REGISTERED)
+    context.send_initial_metadata(())
+    clock = bench.clock
+    try:
+        while True:
+            status: int | None = None
+            with bench.changed:
+                if not stream.wait_for_run():
+                    return
+                run = stream.task.run
+                while stream.open and run is not None and stream.task.run is run and status is None:
+                    try:
+                        run.check(clock.now())
+                        if run.is_done(clock.now()):
+                            status = 0
+                            break
+                    except DaqmxError as error:
+                        status = error.code
+                        break
+                    last = run.last_sample()
+                    if bench.readers_drive_time or last is None:
+                        bench.changed.wait(_LISTEN_S)
+                    else:
+                        clock.wait(bench.changed, run.time_of_count(last), clock.deadline(-1))
+            if status is not None:
+                yield pb.RegisterDoneEventResponse(status=status)
+            with bench.changed:
+                while stream.open and stream.task.run is run and run is not None:
+                    bench.changed.wait(_LISTEN_S)
+                if not stream.open:
+                    return
+    finally:
+        with bench.changed:
+            stream.close()
+
+
+def signal(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
+    """Sample clock or sample complete: one event per sample; others are not known to these devices."""
+    wanted = fields_of(request)["signal_id"]
+    if wanted not in (Signal.SAMPLE_CLOCK.value, Signal.SAMPLE_COMPLETE.value):
+        raise DaqmxError(Code.SIGNAL_EVENT_UNSUPPORTED)
+    with bench.changed:
+        stream = EventStream(bench, request, context, f"signal{wanted}", Code.SIGNAL_REGISTERED)
+    context.send_initial_metadata(())
+    event = pb.RegisterSignalEventResponse(signal_id=wanted)
+    try:
+        while True:
+            with bench.changed:
+                if not stream.wait_for_run():
+                    return
+            count = 0
+            while True:
+                with bench.changed:
+                    if not stream.wait_for_count(count + 1):
+                        break
+                count += 1
+                yield event
+    finally:
+        with bench.changed:
+            stream.close()
+
+
+def unregister(bench: Bench, task_name: str, kind: str) -> None:
+    bench.task(task_name).events.discard(kind)
+    bench.changed.notify_all()
+
+
+STREAMS = {
+    "RegisterEveryNSamplesEvent": every_n_samples,
+    "RegisterDoneEvent": done,
+    "RegisterSignalEvent": signal,
+}
+__all__ = ["STREAMS", "unregister"]

@@ -1,0 +1,89 @@
+"""Command line, signals and life span of the simulated NI device server."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+
+import psutil
+
+from daq_app.config.catalogue import UnknownProduct
+from daq_app.config.errors import ConfigError
+from daq_app.config.loader import load_rig
+from sim_hardware.daqmx_server.bench import Bench
+from sim_hardware.daqmx_server.clock import BenchClock, PacedClock, SteppedClock
+from sim_hardware.daqmx_server.inventory import Inventory
+from sim_hardware.daqmx_server.server import DaqmxServer
+from sim_hardware.signals import SignalSource
+
+_PARENT_POLL_S = 0.5
+
+
+def _speed(text: str) -> float:
+    if text == "max":
+        return float("inf")
+    value = float(text)
+    if not 0 < value <= 10_000:
+        raise argparse.ArgumentTypeError("speed is a factor above 0, or max")
+    return value
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m sim_hardware.daqmx_server",
+        description="Simulated NI-DAQmx device server (gRPC, loopback only) with a rocking wall wired to it.",
+        epilog="example: python -m sim_hardware.daqmx_server --port 0 --config configs/fr1.toml --speed 10",
+    )
+    parser.add_argument("--port", type=int, default=0, help="TCP port; 0 lets the system choose")
+    parser.add_argument(
+        "--config", type=Path, required=True, metavar="RIG.toml", help="rig: hardware and wall"
+    )
+    parser.add_argument(
+        "--speed", type=_speed, default=1.0, help="time factor, or max: time moves with the reads"
+    )
+    parser.add_argument("--seed", type=int, help="seed of noise and scatter; default: the rig's")
+    parser.add_argument("--theta0-over-alpha", type=float, metavar="X", help="release rotation over alpha")
+    parser.add_argument("--finite", choices=("real", "instant"), default="real", help="clock of finite tasks")
+    parser.add_argument("--parent-pid", type=int, help="end when this process has ended")
+    return parser
+
+
+def build_bench(arguments: argparse.Namespace) -> Bench:
+    """Inventory, wall and clock from the command line. Raises `ConfigError` or `UnknownProduct`."""
+    rig = load_rig(arguments.config)
+    clock: BenchClock = SteppedClock() if arguments.speed == float("inf") else PacedClock(arguments.speed)
+    return Bench(Inventory.from_rig(rig), _wall(rig, arguments), clock, arguments.finite)
+
+
+def _wall(rig: object, arguments: argparse.Namespace) -> SignalSource:
+    from sim_hardware.virtual_rig import VirtualRig  # compiles its kernel: only once it is wanted
+
+    wall: SignalSource = VirtualRig.from_rig(
+        rig, seed=arguments.seed, theta0_over_alpha=arguments.theta0_over_alpha
+    )
+    return wall
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Serve until a signal, or until the parent has gone. Exit code 2 for a bad configuration."""
+    arguments = _parser().parse_args(argv)
+    try:
+        server = DaqmxServer(build_bench(arguments), arguments.port)
+    except (ConfigError, UnknownProduct, OSError, RuntimeError) as error:
+        print(f"daqmx_server: {error}", file=sys.stderr)
+        return 2
+    ended = threading.Event()
+    for name in ("SIGINT", "SIGTERM", "SIGBREAK"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), lambda *_: ended.set())
+    server.start()
+    print(f"Server listening on port {server.port}", flush=True)
+    while not ended.wait(_PARENT_POLL_S):
+        if arguments.parent_pid is not None and not psutil.pid_exists(arguments.parent_pid):
+            break
+    server.stop(0.5)
+    return 0

@@ -1,0 +1,173 @@
+"""Waiting for samples and handing them out: what every read call shares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from nidaqmx.constants import AcquisitionType, ReadRelativeTo
+from numpy.typing import NDArray
+
+from sim_hardware.daqmx_server.acquisition import Run, overwritten
+from sim_hardware.daqmx_server.errors import Code, DaqmxError
+from sim_hardware.daqmx_server.sampling import SampleTimes
+from sim_hardware.daqmx_server.task import State, Task
+
+ALL_AVAILABLE = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Outcome of a read: `status` is 0, or −200284 together with the samples that had come."""
+
+    codes: NDArray[np.int32]
+    """(channels to read, samples)"""
+    rows: list[int] | None
+    status: int
+    first_time_s: float
+    """Bench time of the first sample."""
+
+    @property
+    def count(self) -> int:
+        return int(self.codes.shape[1])
+
+
+def default_count(task: Task) -> int:
+    """Samples per channel that "read all available" means at this moment."""
+    if not task.is_buffered:
+        return 1
+    if task.timing.mode == AcquisitionType.FINITE.value and not task.reading.get(
+        "READ_ALL_AVAIL_SAMP", False
+    ):
+        taken = 0 if task.run is None else task.run.read_position
+        return max(task.timing.samples_per_channel - taken, 0)
+    if task.run is None:
+        return 0
+    task.run.check(task.bench.clock.glance())
+    return task.run.available(task.bench.clock.now())
+
+
+def read(task: Task, asked: int, timeout_s: float, room: int | None = None) -> Reading:
+    """Take `asked` samples per channel, waiting for them; the bench's lock is held (and let go in waiting).
+
+    `room` is the client's array in samples of all channels together.
+    """
+    _ready(task)
+    rows = task.read_rows()
+    count = default_count(task) if asked == ALL_AVAILABLE else asked
+    n_rows = len(task.channels) if rows is None else len(rows)
+    if room is not None and room < count * n_rows:
+        raise DaqmxError(Code.READ_BUFFER_TOO_SMALL)
+    if not task.is_buffered:
+        return _on_demand(task, count, rows)
+    run = task.run
+    assert run is not None
+    clock = task.bench.clock
+    deadline = clock.deadline(timeout_s)
+    run.check(clock.now())
+    start = _start(task, run)
+    status = 0
+    while run.readable(clock.now()) < start + count:
+        _refuse_never(run, start + count)
+        if not clock.wait(task.bench.changed, run.time_of_count(_needed(run, start + count)), deadline):
+            if run.readable(clock.now()) < start + count:
+                status = Code.SAMPLES_NOT_YET_AVAILABLE
+            break
+        if run.aborted or run.failure is not None:
+            run.check(clock.now())
+    taken = min(max(run.readable(clock.now()) - start, 0), count)
+    codes = run.block(start, taken, rows) if taken else np.empty((n_rows, 0), dtype=np.int32)
+    run.read_position = start + taken
+    first = run.times.time_of(run.base + start) if run.times is not None else clock.now()
+    _note_overloads(task, codes, rows)
+    _end_automatic(task, run)
+    task.bench.changed.notify_all()
+    return Reading(codes, rows, int(status), first)
+
+
+def _ready(task: Task) -> None:
+    if not task.channels:
+        raise DaqmxError(Code.NO_INPUT_CHANNELS)
+    task.check_devices()
+    if task.state is not State.RUNNING:
+        if not task.reading.get("AUTO_START", True):
+            raise DaqmxError(Code.READ_NOT_STARTED)
+        task.start()
+        task.auto_started = True
+
+
+def _end_automatic(task: Task, run: Run) -> None:
+    """A finite task that a read has started ends when the last sample has been read."""
+    if task.auto_started and run.plan.total is not None and run.read_position >= run.plan.total:
+        task.stop()
+
+
+def _needed(run: Run, position: int) -> int:
+    """Samples that must exist before a position can be read."""
+    last = run.last_sample()
+    return position if run.plan.pretrigger is None or last is None else last
+
+
+def _refuse_never(run: Run, end: int) -> None:
+    if run.plan.total is not None and end > run.plan.total:
+        raise DaqmxError(Code.SAMPLES_NEVER_AVAILABLE, samples_read=0)
+
+
+def _start(task: Task, run: Run) -> int:
+    """Position of the first sample to read, by the read attributes."""
+    settings = task.reading
+    has_ref = run.plan.pretrigger is not None
+    default = ReadRelativeTo.FIRST_PRETRIGGER_SAMPLE if has_ref else ReadRelativeTo.CURRENT_READ_POSITION
+    relative = ReadRelativeTo(settings.get("RELATIVE_TO", default.value))
+    offset = int(settings.get("OFFSET", 0))
+    now = task.bench.clock.now()
+    if relative is ReadRelativeTo.CURRENT_READ_POSITION:
+        start = run.read_position + offset
+    elif relative is ReadRelativeTo.FIRST_SAMPLE:
+        start = offset
+    elif relative is ReadRelativeTo.MOST_RECENT_SAMPLE:
+        start = run.readable(now) + offset
+    elif not has_ref:
+        raise DaqmxError(Code.NO_REF_TRIGGER)
+    elif relative is ReadRelativeTo.FIRST_PRETRIGGER_SAMPLE:
+        start = run.read_position + offset if "RELATIVE_TO" not in settings else offset
+    else:
+        start = int(run.plan.pretrigger or 0) + offset
+    if start < 0:
+        raise DaqmxError(Code.NEGATIVE_SAMPLE)
+    if run.plan.total is None and start < run.acquired(now) - run.plan.buffer:
+        raise overwritten(f"DAQmx_Val_{_NI_NAMES[relative]}", offset)
+    return start
+
+
+_NI_NAMES = {
+    ReadRelativeTo.CURRENT_READ_POSITION: "CurrReadPos",
+    ReadRelativeTo.FIRST_SAMPLE: "FirstSample",
+    ReadRelativeTo.MOST_RECENT_SAMPLE: "MostRecentSamp",
+    ReadRelativeTo.FIRST_PRETRIGGER_SAMPLE: "FirstPretrigSamp",
+    ReadRelativeTo.REFERENCE_TRIGGER: "RefTrig",
+}
+
+
+def _on_demand(task: Task, count: int, rows: list[int] | None) -> Reading:
+    """Software-timed samples: taken now, one after the other at the module's own pace."""
+    task.bench.clock.power_on()
+    now = task.bench.clock.glance()
+    sampler = task.make_sampler(SampleTimes(now, max(task.timing.max_rate_hz, 1.0)))
+    codes = sampler.codes(0, count)
+    codes = codes if rows is None else codes[rows]
+    _note_overloads(task, codes, rows)
+    if task.auto_started:
+        task.stop()
+    return Reading(codes, rows, 0, now)
+
+
+def _note_overloads(task: Task, codes: NDArray[np.int32], rows: list[int] | None) -> None:
+    """Modules that detect overloads remember the channels that reached a rail."""
+    chosen = range(len(task.channels)) if rows is None else rows
+    for values, row in zip(codes, chosen, strict=True):
+        channel = task.channels[row]
+        if channel.overload_detection and values.size:
+            low, high = channel.converter.code_limits
+            if values.min() <= low or values.max() >= high:
+                task.overloads.add(channel.name)

@@ -1,0 +1,171 @@
+"""The gRPC server: NI's services over the simulated bench, and the control service beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Final
+
+import grpc
+import session_pb2
+import session_pb2_grpc
+from nidaqmx._stubs import nidaqmx_pb2
+
+from sim_hardware.daqmx_server.attributes import AttributeGroup, Handler, attribute_handlers
+from sim_hardware.daqmx_server.bench import Bench
+from sim_hardware.daqmx_server.channel_attributes import ChannelGroup
+from sim_hardware.daqmx_server.control_service import control_handler
+from sim_hardware.daqmx_server.device_attributes import DeviceGroup, PhysicalChannelGroup, SystemGroup
+from sim_hardware.daqmx_server.errors import DaqmxError
+from sim_hardware.daqmx_server.events import STREAMS
+from sim_hardware.daqmx_server.read_calls import read_handlers
+from sim_hardware.daqmx_server.sessions import SessionError, session_handlers
+from sim_hardware.daqmx_server.task_attributes import EXPORT, READ, TIMING, TRIGGER, BufferGroup, TaskGroup
+
+_THREADS: Final = 64
+_MAX_MESSAGE: Final = 256 * 1024 * 1024
+_SERVICE: Final = nidaqmx_pb2.DESCRIPTOR.services_by_name["NiDAQmx"]
+
+_GROUPS: Final[dict[str, AttributeGroup]] = {
+    "Chan": ChannelGroup(),
+    "Read": READ,
+    "Timing": TIMING,
+    "Trig": TRIGGER,
+    "ExportedSignal": EXPORT,
+    "Buffer": BufferGroup(),
+    "Task": TaskGroup(),
+    "SystemInfo": SystemGroup(),
+    "Device": DeviceGroup(),
+    "PhysicalChan": PhysicalChannelGroup(),
+}
+
+
+def _serialise(reply: Any) -> bytes:
+    """Messages, or bytes that a handler has encoded itself."""
+    return reply if isinstance(reply, bytes) else bytes(reply.SerializeToString())
+
+
+def _fail(context: Any, error: Exception, task: str) -> None:
+    """Tell the client as NI's server does: text in the status, numbers in the trailing metadata."""
+    if isinstance(error, DaqmxError):
+        metadata = [("ni-error", str(error.code))]
+        if error.samples_read is not None:
+            metadata.append(("ni-samps-per-chan-read", str(error.samples_read)))
+        context.set_trailing_metadata(tuple(metadata))
+        context.abort(grpc.StatusCode.UNKNOWN, error.text(task))
+    context.abort(grpc.StatusCode.FAILED_PRECONDITION, str(error))
+
+
+def _task_of(request: Any) -> str:
+    return str(request.task.name) if "task" in request.DESCRIPTOR.fields_by_name else ""
+
+
+def _unary(bench: Bench, handler: Handler) -> Callable[[Any, Any], Any]:
+    def call(request: Any, context: Any) -> Any:
+        try:
+            with bench.changed:
+                return handler(bench, request)
+        except (DaqmxError, SessionError) as error:
+            _fail(context, error, _task_of(request))
+
+    return call
+
+
+def _stream(bench: Bench, handler: Callable[[Bench, Any, Any], Iterator[Any]]) -> Callable[[Any, Any], Any]:
+    def call(request: Any, context: Any) -> Iterator[Any]:
+        try:
+            yield from handler(bench, request, context)
+        except DaqmxError as error:
+            _fail(context, error, _task_of(request))
+
+    return call
+
+
+def daqmx_handler(bench: Bench) -> grpc.GenericRpcHandler:
+    """NI's NiDAQmx service; calls without a handler answer UNIMPLEMENTED by themselves."""
+    handlers = attribute_handlers(_GROUPS) | session_handlers() | read_handlers()
+    methods: dict[str, grpc.RpcMethodHandler] = {}
+    for method in _SERVICE.methods:
+        request_type: Any = getattr(nidaqmx_pb2, method.input_type.name)
+        if method.name in handlers:
+            methods[method.name] = grpc.unary_unary_rpc_method_handler(
+                _unary(bench, handlers[method.name]), request_type.FromString, _serialise
+            )
+        elif method.name in STREAMS:
+            methods[method.name] = grpc.unary_stream_rpc_method_handler(
+                _stream(bench, STREAMS[method.name]), request_type.FromString, _serialise
+            )
+    return grpc.method_handlers_generic_handler(_SERVICE.full_name, methods)
+
+
+class SessionUtilities(session_pb2_grpc.SessionUtilitiesServicer):
+    """NI's service of the device server itself."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+        self._reservations: dict[str, str] = {}
+
+    def EnumerateDevices(self, request: Any, context: Any) -> Any:
+        with self._bench.changed:
+            devices = [
+                session_pb2.DeviceProperties(
+                    name=device.name,
+                    model=device.product_name,
+                    vendor="National Instruments",
+                    serial_number=f"{device.serial:08X}",
+                    product_id=device.product_number,
+                )
+                for device in self._bench.inventory.devices.values()
+            ]
+        return session_pb2.EnumerateDevicesResponse(devices=devices)
+
+    def Reserve(self, request: Any, context: Any) -> Any:
+        holder = self._reservations.setdefault(request.reservation_id, request.client_id)
+        return session_pb2.ReserveResponse(is_reserved=holder == request.client_id)
+
+    def IsReservedByClient(self, request: Any, context: Any) -> Any:
+        held = self._reservations.get(request.reservation_id) == request.client_id
+        return session_pb2.IsReservedByClientResponse(is_reserved=held)
+
+    def Unreserve(self, request: Any, context: Any) -> Any:
+        held = self._reservations.get(request.reservation_id) == request.client_id
+        if held:
+            del self._reservations[request.reservation_id]
+        return session_pb2.UnreserveResponse(is_unreserved=held)
+
+    def ResetServer(self, request: Any, context: Any) -> Any:
+        with self._bench.changed:
+            self._bench.reset()
+        self._reservations.clear()
+        return session_pb2.ResetServerResponse(is_server_reset=True)
+
+
+class DaqmxServer:
+    """A simulated NI device server on the loopback address."""
+
+    def __init__(self, bench: Bench, port: int = 0) -> None:
+        self.bench = bench
+        self._server = grpc.server(
+            ThreadPoolExecutor(_THREADS, thread_name_prefix="daqmx"),
+            options=(
+                ("grpc.max_send_message_length", _MAX_MESSAGE),
+                ("grpc.max_receive_message_length", _MAX_MESSAGE),
+                ("grpc.so_reuseport", 0),
+            ),
+        )
+        self._server.add_generic_rpc_handlers((daqmx_handler(bench), control_handler(bench)))
+        session_pb2_grpc.add_SessionUtilitiesServicer_to_server(SessionUtilities(bench), self._server)
+        self.port = self._server.add_insecure_port(f"127.0.0.1:{port}")
+
+    @property
+    def address(self) -> str:
+        return f"127.0.0.1:{self.port}"
+
+    def start(self) -> None:
+        self._server.start()
+
+    def stop(self, grace_s: float | None = None) -> None:
+        """Abort every task, then end."""
+        with self.bench.changed:
+            self.bench.reset()
+        self._server.stop(grace_s).wait()

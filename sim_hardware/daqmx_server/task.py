@@ -1,0 +1,323 @@
+"""A task: its channels, its settings and its state."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from nidaqmx.constants import AcquisitionType, OverwriteMode, SampleTimingType, TaskMode
+from numpy.typing import NDArray
+
+from sim_hardware.daqmx_server import triggers
+from sim_hardware.daqmx_server.acquisition import ReferenceSearch, Run, RunPlan
+from sim_hardware.daqmx_server.bench import Bench
+from sim_hardware.daqmx_server.channels import VirtualChannel
+from sim_hardware.daqmx_server.errors import Code, DaqmxError
+from sim_hardware.daqmx_server.inventory import channel_list
+from sim_hardware.daqmx_server.sampling import Input, Sampler, SampleTimes
+from sim_hardware.daqmx_server.timing import TaskTiming
+
+
+class State(IntEnum):
+    """NI's task states, in order."""
+
+    UNVERIFIED = 0
+    VERIFIED = 1
+    RESERVED = 2
+    COMMITTED = 3
+    RUNNING = 4
+
+
+class Task:
+    """Everything a client can do with one task, but the reading itself (reads.py)."""
+
+    def __init__(self, bench: Bench, name: str) -> None:
+        self.bench = bench
+        self.name = name
+        self.channels: list[VirtualChannel] = []
+        self.timing = TaskTiming(self)
+        self.trigger: dict[str, Any] = {"START_TRIG_TYPE": triggers.NONE, "REF_TRIG_TYPE": triggers.NONE}
+        self.reading: dict[str, Any] = {}
+        self.exported: dict[str, Any] = {}
+        self.real_time: dict[str, Any] = {}
+        self.input_buffer: int | None = None
+        self.state = State.UNVERIFIED
+        self.run: Run | None = None
+        self.auto_started = False
+        self.overloads: set[str] = set()
+        self.overloads_reported: tuple[str, ...] = ()
+        self.events: set[str] = set()
+        self.cleared = False
+        self._explicit = State.UNVERIFIED
+
+    # --- configuration ------------------------------------------------------------------------
+
+    def configure(self) -> None:
+        """Before any change of settings: not while running, and what was verified is so no more."""
+        if self.state is State.RUNNING:
+            raise DaqmxError(Code.PROPERTY_WHILE_RUNNING)
+        if self.state < State.RESERVED:
+            self.state = State.UNVERIFIED
+
+    def add_channels(self, channels: list[VirtualChannel]) -> None:
+        if self.state is State.RUNNING:
+            raise DaqmxError(Code.TASK_RUNNING)
+        self.unreserve()
+        self.channels += channels
+
+    def channel(self, name: str) -> VirtualChannel:
+        """By virtual or physical name; −200088-style error of NI otherwise."""
+        wanted = name.strip().lower()
+        for channel in self.channels:
+            if wanted in (channel.name.lower(), channel.physical.lower()):
+                return channel
+        raise DaqmxError(Code.CHANNEL_NOT_IN_TASK, f"Channel Name: {name}")
+
+    def channels_named(self, text: str) -> list[VirtualChannel]:
+        """Channels of a list; all of them for an empty one."""
+        return [self.channel(name) for name in channel_list(text)] if text else list(self.channels)
+
+    def read_rows(self) -> list[int] | None:
+        """Rows of the channels to read, None for all in order."""
+        text = self.reading.get("CHANNELS_TO_READ", "")
+        return [self.channels.index(channel) for channel in self.channels_named(text)] if text else None
+
+    @property
+    def devices(self) -> list[str]:
+        return list(dict.fromkeys(channel.device.name for channel in self.channels))
+
+    @property
+    def hosts(self) -> list[str]:
+        """Owners of the clocks and triggers of this task's devices, the first one first."""
+        return list(dict.fromkeys(self.bench.inventory.host_of(channel.device) for channel in self.channels))
+
+    @property
+    def is_buffered(self) -> bool:
+        return bool(self.timing.timing_type != SampleTimingType.ON_DEMAND.value)
+
+    @property
+    def buffer_size(self) -> int:
+        """Samples per channel of the circular buffer: as set, or NI's default for the rate."""
+        if self.input_buffer is not None:
+            return self.input_buffer
+        samples = self.timing.samples_per_channel
+        if self.timing.mode == AcquisitionType.FINITE.value:
+            return samples
+        rate = self.timing.rate_hz
+        default = next(
+            size
+            for limit, size in ((100, 1_000), (10_000, 10_000), (1e6, 100_000), (np.inf, 1_000_000))
+            if rate <= limit
+        )
+        return max(default, samples)
+
+    # --- states -------------------------------------------------------------------------------
+
+    def control(self, action: int) -> None:
+        """NI's TaskControl."""
+        mode = TaskMode(action)
+        if mode is TaskMode.TASK_START:
+            self.start()
+        elif mode is TaskMode.TASK_STOP:
+            self.stop()
+        elif mode is TaskMode.TASK_ABORT:
+            self.abort()
+        elif mode is TaskMode.TASK_UNRESERVE:
+            self.unreserve()
+        else:
+            target = {
+                TaskMode.TASK_VERIFY: State.VERIFIED,
+                TaskMode.TASK_RESERVE: State.RESERVED,
+                TaskMode.TASK_COMMIT: State.COMMITTED,
+            }[mode]
+            self.advance(target)
+            self._explicit = max(self._explicit, target)
+
+    def advance(self, target: State) -> None:
+        """Go through the states up to the target, none left out."""
+        if target >= State.VERIFIED and self.state < State.VERIFIED:
+            self.verify()
+        if target >= State.RESERVED and self.state < State.RESERVED:
+            self.check_devices()
+            self.bench.reserve(self.devices, self.name)
+            self.state = State.RESERVED
+        if target >= State.COMMITTED and self.state < State.COMMITTED:
+            self.state = State.COMMITTED
+
+    def verify(self) -> None:
+        """Raise what is wrong with the settings."""
+        if not self.channels:
+            raise DaqmxError(Code.NO_CHANNELS)
+        self.check_devices()
+        for channel in self.channels:
+            channel.verify()
+        self.timing.verify()
+        if (
+            self.trigger["REF_TRIG_TYPE"] != triggers.NONE
+            and self.timing.mode != AcquisitionType.FINITE.value
+        ):
+            raise DaqmxError(Code.REF_TRIGGER_WHEN_CONTINUOUS)
+        self.state = State.VERIFIED
+
+    def check_devices(self) -> None:
+        """Raise if a device of the task has gone."""
+        for name in self.devices:
+            self.bench.inventory.device(name)
+
+    def start(self) -> None:
+        if self.state is State.RUNNING:
+            raise DaqmxError(Code.TASK_RUNNING)
+        self.advance(State.COMMITTED)
+        if self.is_buffered:
+            self.bench.clock.power_on()
+            self.run = self._make_run(self.bench.clock.now())
+            self.run.look(self.bench.clock.now())
+        self.state = State.RUNNING
+        self.auto_started = False
+        self.bench.changed.notify_all()
+
+    def stop(self) -> None:
+        """Back to the state the client had put the task into before the start."""
+        if self.state is not State.RUNNING:
+            return
+        if self.run is not None:
+            now = self.bench.clock.now()
+            for other in self.bench.tasks.values():
+                if other is not self and other.run is not None and other.timing.source_task() is self:
+                    other.run.halt(now)
+            self.run.aborted = True
+        self.run = None
+        self.state = State.COMMITTED
+        if self._explicit < State.COMMITTED:
+            self._fall_back(self._explicit)
+        self.bench.changed.notify_all()
+
+    def abort(self) -> None:
+        self.stop()
+        self.unreserve()
+
+    def unreserve(self) -> None:
+        """Give the devices back; settings stay."""
+        if self.state is State.RUNNING:
+            raise DaqmxError(Code.TASK_RUNNING)
+        self._explicit = State.UNVERIFIED
+        self._fall_back(State.UNVERIFIED)
+
+    def clear(self) -> None:
+        self.abort()
+        self.cleared = True
+        self.bench.changed.notify_all()
+
+    def _fall_back(self, state: State) -> None:
+        if state < State.RESERVED:
+            self.bench.release(self.name)
+            state = State.UNVERIFIED
+        self.state = state
+
+    def is_done(self) -> bool:
+        """Nothing (more) is being acquired; raises the failure that ended the run."""
+        if self.state is not State.RUNNING or self.run is None:
+            return True
+        now = self.bench.clock.glance()
+        self.run.check(now)
+        return self.run.is_done(now)
+
+    def wait_until_done(self, timeout_s: float) -> None:
+        """−200560 where the time was too short."""
+        clock = self.bench.clock
+        deadline = clock.deadline(timeout_s)
+        while not self.is_done():
+            run = self.run
+            last = run.last_sample() if run is not None else None
+            target = run.time_of_count(last) if run is not None and last is not None else None
+            if not clock.wait(self.bench.changed, target, deadline):
+                if self.is_done():
+                    return
+                raise DaqmxError(Code.NOT_DONE)
+
+    # --- the run ------------------------------------------------------------------------------
+
+    def _make_run(self, now_s: float) -> Run:
+        finite = self.timing.mode == AcquisitionType.FINITE.value
+        ref = self.trigger["REF_TRIG_TYPE"] != triggers.NONE
+        plan = RunPlan(
+            rate_hz=self.timing.rate_hz,
+            total=self.timing.samples_per_channel if finite else None,
+            pretrigger=int(self.trigger["REF_TRIG_PRETRIG_SAMPLES"]) if ref else None,
+            buffer=self.buffer_size,
+            overwrite=self.reading.get("OVERWRITE") == OverwriteMode.OVERWRITE_UNREAD_SAMPLES.value,
+            instant=finite and self.bench.finite == "instant",
+        )
+        search = self._reference_search(plan) if ref else None
+        return Run(plan, self.timing.start_rule(now_s), self.make_sampler, search)
+
+    def make_sampler(self, times: SampleTimes) -> Sampler:
+        inputs = [
+            Input(channel.physical, channel.converter, offset)
+            for channel, offset in zip(self.channels, self.timing.time_offsets_s(), strict=True)
+        ]
+        return Sampler(self.bench.source, self.bench.faults, inputs, times)
+
+    def readings(self, codes: NDArray[np.int32], rows: list[int] | None = None) -> NDArray[np.float64]:
+        """Codes (channels × samples) in the channels' units."""
+        chosen = self.channels if rows is None else [self.channels[row] for row in rows]
+        gain = np.array([c.converter.step * c.unit_per_electrical for c in chosen])[:, None]
+        zero = np.array([c.converter.middle * c.unit_per_electrical for c in chosen])[:, None]
+        values: NDArray[np.float64] = codes * gain
+        values += zero
+        return values
+
+    def trigger_readings(self, sampler: Sampler, source: str, start: int, stop: int) -> NDArray[np.float64]:
+        """Readings of the channel an analogue trigger listens to."""
+        row = self.channels.index(self._trigger_channel(source))
+        return self.readings(sampler.codes(start, stop)[[row]], [row]).ravel()
+
+    def _trigger_channel(self, source: str) -> VirtualChannel:
+        try:
+            return self.channel(source)
+        except DaqmxError:
+            raise DaqmxError(Code.TRIGGER_SOURCE_INVALID, f"Source: {source}") from None
+
+    def _reference_search(self, plan: RunPlan) -> ReferenceSearch:
+        source = triggers.source_of(self.trigger, "REF")
+        assert plan.pretrigger is not None
+        if self.trigger["REF_TRIG_TYPE"] == triggers.DIGITAL:
+            return ReferenceSearch(plan.pretrigger, edge=lambda after: self.bench.first_edge(source, after))
+        self._trigger_channel(source)
+        condition = triggers.Condition.of(self.trigger, "REF")
+
+        def readings(run: Run, start: int, stop: int) -> NDArray[np.float64]:
+            assert run.sampler is not None
+            return self.trigger_readings(run.sampler, source, start, stop)
+
+        return ReferenceSearch(
+            plan.pretrigger, crossing=triggers.CrossingSearch(condition, plan.pretrigger), readings=readings
+        )
+
+    def signal_times(self, terminal: str) -> list[float]:
+        """Instants at which this task drives the terminal: its own triggers, and exports."""
+        if self.run is None or self.run.times is None:
+            return []
+        out = []
+        if terminal in self._terminals_of("StartTrigger", "START_TRIG_OUTPUT_TERM"):
+            out.append(self.run.times.first_s)
+        if terminal in self._terminals_of("SampleClock", "SAMP_CLK_OUTPUT_TERM"):
+            out.append(self.run.times.first_s)
+        ref = self.run.ref_sample
+        if ref is not None and terminal in self._terminals_of("ReferenceTrigger", "REF_TRIG_OUTPUT_TERM"):
+            out.append(self.run.times.time_of(ref))
+        return out
+
+    def drives_clock(self, terminal: str) -> bool:
+        return terminal.lower().strip("/") in self._terminals_of("SampleClock", "SAMP_CLK_OUTPUT_TERM")
+
+    def _terminals_of(self, signal: str, export: str) -> set[str]:
+        out = {
+            f"{host}/{engine}/{signal}".lower()
+            for host in self.hosts
+            for engine in ("ai", "te0", "te1", "te2")
+        }
+        out |= {f"{device}/ai/{signal}".lower() for device in self.devices}
+        out |= {term.lower().strip("/") for term in channel_list(str(self.exported.get(export, "")))}
+        return out

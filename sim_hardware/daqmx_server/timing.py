@@ -1,0 +1,187 @@
+"""Sample timing of a task: rate, mode, clock source, and when each channel is looked at."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+from nidaqmx.constants import AcquisitionType, SampleTimingType
+
+from daq_app.config import catalogue
+from sim_hardware.daqmx_server import triggers
+from sim_hardware.daqmx_server.acquisition import StartRule
+from sim_hardware.daqmx_server.errors import Code, DaqmxError
+from sim_hardware.daqmx_server.sampling import SampleTimes
+from sim_hardware.daqmx_server.triggers import CrossingSearch
+
+if TYPE_CHECKING:
+    from sim_hardware.daqmx_server.task import Task
+
+_OWN_CLOCKS = ("", "onboardclock")
+
+
+class TaskTiming:
+    """`settings` are what the client set; the properties are what the hardware makes of it."""
+
+    def __init__(self, task: Task) -> None:
+        self._task = task
+        self.settings: dict[str, Any] = {}
+
+    @property
+    def timing_type(self) -> int:
+        return int(self.settings.get("SAMP_TIMING_TYPE", SampleTimingType.ON_DEMAND.value))
+
+    @property
+    def mode(self) -> int:
+        return int(self.settings.get("SAMP_QUANT_SAMP_MODE", AcquisitionType.FINITE.value))
+
+    @property
+    def samples_per_channel(self) -> int:
+        return int(self.settings.get("SAMP_QUANT_SAMP_PER_CHAN", 1000))
+
+    @property
+    def source(self) -> str:
+        return str(self.settings.get("SAMP_CLK_SRC", ""))
+
+    @property
+    def rate_hz(self) -> float:
+        """The rate the hardware makes of the one asked for: the slowest-dividing module decides."""
+        asked = float(self.settings.get("SAMP_CLK_RATE", 1000.0))
+        forced = self._task.bench.faults.forced_rate_hz(self._task.hosts)
+        if forced is not None:
+            return forced
+        products = {channel.product.name: channel.product for channel in self._task.channels}
+        if not products or self.source_is_foreign or asked <= 0:
+            return asked
+        try:
+            return catalogue.coerce_rate(list(products.values()), asked)
+        except ValueError:
+            return asked  # refused by `verify`
+
+    @property
+    def max_rate_hz(self) -> float:
+        """Fastest rate of this set of channels."""
+        counts = Counter(channel.device.name for channel in self._task.channels)
+        limits = []
+        for channel in self._task.channels:
+            product, n = channel.product, counts[channel.device.name]
+            single = product.max_rate_hz
+            limits.append(min(single, product.aggregate_rate_hz / n) if product.aggregate_rate_hz else single)
+        return min(limits, default=0.0)
+
+    @property
+    def timebase_hz(self) -> float:
+        """The clock that the sample clock is divided from."""
+        clocks = [c.product.delta_sigma.timebase_hz for c in self._task.channels if c.product.delta_sigma]
+        cards = [c.product.timebase_hz for c in self._task.channels]
+        return max(clocks, default=0.0) or max(cards, default=0.0) or 80e6
+
+    @property
+    def source_is_foreign(self) -> bool:
+        return self.source.lower().strip("/") not in _OWN_CLOCKS
+
+    def verify(self) -> None:
+        if self._task.is_buffered and self.rate_hz > self.max_rate_hz * (1 + 1e-9):
+            raise DaqmxError(
+                Code.SAMPLE_RATE_TOO_HIGH,
+                f"Property: DAQmx_SampClk_Rate\nRequested Value: {self.rate_hz}\n"
+                f"Maximum Value: {self.max_rate_hz}",
+            )
+
+    def convert_period_s(self) -> float:
+        """Time between the conversions of the first multiplexed device; 0 if there is none."""
+        devices = {c.device.name: c.product for c in self._task.channels}
+        counts = Counter(c.device.name for c in self._task.channels)
+        periods = catalogue.convert_periods_s(
+            [(p, counts[name]) for name, p in devices.items()], self.rate_hz
+        )
+        return next((period for period in periods if period > 0), 0.0)
+
+    def time_offsets_s(self) -> list[float]:
+        """Per channel: multiplexer skew by place in the device's scan list, minus the converter's lag."""
+        rate = self.rate_hz
+        skews = catalogue.task_skews_s([(c.device.name, c.product) for c in self._task.channels], rate)
+        return [
+            skew - catalogue.input_delay_s(channel.product, rate)
+            for skew, channel in zip(skews, self._task.channels, strict=True)
+        ]
+
+    def source_task(self) -> Task | None:
+        """The task whose sample clock this one uses."""
+        if not self.source_is_foreign:
+            return None
+        for other in self._task.bench.tasks.values():
+            if (
+                other is not self._task
+                and not other.timing.source_is_foreign
+                and other.drives_clock(self.source)
+            ):
+                return other
+        return None
+
+    def start_rule(self, armed_s: float) -> StartRule:
+        """How the instant of the first sample is found, once and for all at the start of the task."""
+        if self.source_is_foreign:
+            return _SharedClock(self._task, armed_s)
+        return _OwnClock(self._task, armed_s)
+
+
+class _OwnClock:
+    """The clock starts at the start trigger, or at once."""
+
+    def __init__(self, task: Task, armed_s: float) -> None:
+        self._task = task
+        self._armed_s = armed_s
+        self._rate = task.timing.rate_hz
+        self._kind = int(task.trigger["START_TRIG_TYPE"])
+        self._search: CrossingSearch | None = None
+        if self._kind in (triggers.ANALOG, triggers.WINDOW):
+            self._search = CrossingSearch(triggers.Condition.of(task.trigger, "START"), 0)
+            self._times = self._clock_from(armed_s)
+            self._sampler = task.make_sampler(self._times)
+
+    def _clock_from(self, first_s: float) -> SampleTimes:
+        return SampleTimes(first_s, self._rate, self._task.bench.faults.clock_changes(self._task.hosts))
+
+    def __call__(self, now_s: float) -> SampleTimes | None:
+        instant = self._trigger_instant(now_s)
+        if instant is None:
+            return None
+        delay = float(self._task.trigger.get("START_TRIG_DELAY", 0.0))
+        return self._clock_from(instant + delay)
+
+    def _trigger_instant(self, now_s: float) -> float | None:
+        if self._kind == triggers.NONE:
+            return self._armed_s
+        source = triggers.source_of(self._task.trigger, "START")
+        if self._kind == triggers.DIGITAL:
+            return self._task.bench.first_edge(source, self._armed_s)
+        assert self._search is not None
+        hit = self._search.find(
+            lambda start, stop: self._task.trigger_readings(self._sampler, source, start, stop),
+            self._times.count(now_s),
+        )
+        return None if hit is None else self._times.time_of(hit)
+
+
+class _SharedClock:
+    """Samples are taken at the clock of another task, from its first edge after this one is armed."""
+
+    def __init__(self, task: Task, armed_s: float) -> None:
+        self._task = task
+        self._armed_s = armed_s
+
+    def __call__(self, now_s: float) -> SampleTimes | None:
+        master = self._task.timing.source_task()
+        if master is None or master.run is None or master.run.times is None:
+            return None
+        times = master.run.times
+        armed = self._armed_s
+        if self._task.trigger["START_TRIG_TYPE"] == triggers.DIGITAL:
+            edge = self._task.bench.first_edge(str(self._task.trigger["DIG_EDGE_START_TRIG_SRC"]), armed)
+            if edge is None:
+                return None
+            armed = edge
+        if armed <= times.first_s:
+            return times
+        return times.from_sample(times.count(armed - 1e-12))

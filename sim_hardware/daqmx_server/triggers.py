@@ -1,0 +1,86 @@
+"""Triggers on analogue signals: what counts as a crossing, and the search for the first one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+from nidaqmx.constants import Slope, TriggerType, WindowTriggerCondition1
+from numpy.typing import NDArray
+
+Readings = Callable[[int, int], NDArray[np.float64]]
+"""Readings of the trigger's channel for samples start … stop−1."""
+Which = Literal["START", "REF"]
+
+NONE: Final[int] = TriggerType.NONE.value
+DIGITAL: Final[int] = TriggerType.DIGITAL_EDGE.value
+ANALOG: Final[int] = TriggerType.ANALOG_EDGE.value
+WINDOW: Final[int] = TriggerType.ANALOG_WINDOW.value
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """An analogue trigger as a band: fires on entering [low, high] after being outside [low_off, high_off]."""
+
+    low: float
+    high: float
+    low_off: float
+    high_off: float
+    leaving: bool = False
+    """Fires on leaving the band instead."""
+
+    @classmethod
+    def of(cls, settings: Mapping[str, Any], which: Which) -> Condition:
+        """From a task's trigger attributes; hysteresis re-arms an edge only beyond level ∓ hysteresis."""
+        if settings[f"{which}_TRIG_TYPE"] == WINDOW:
+            low, high = settings[f"ANLG_WIN_{which}_TRIG_BTM"], settings[f"ANLG_WIN_{which}_TRIG_TOP"]
+            when = settings[f"ANLG_WIN_{which}_TRIG_WHEN"]
+            return cls(low, high, low, high, when == WindowTriggerCondition1.LEAVING_WINDOW.value)
+        level = settings[f"ANLG_EDGE_{which}_TRIG_LVL"]
+        hysteresis = settings.get(f"ANLG_EDGE_{which}_TRIG_HYST", 0.0)
+        if settings[f"ANLG_EDGE_{which}_TRIG_SLOPE"] == Slope.FALLING.value:
+            return cls(-np.inf, level, -np.inf, level + hysteresis)
+        return cls(level, np.inf, level - hysteresis, np.inf)
+
+    def fires(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Where an armed trigger fires."""
+        inside = (values >= self.low) & (values <= self.high)
+        return ~inside if self.leaving else inside
+
+    def arms(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Where the signal is on the near side, so that the next crossing counts."""
+        inside = (values >= self.low_off) & (values <= self.high_off)
+        return inside if self.leaving else ~inside
+
+
+class CrossingSearch:
+    """Looks for the first crossing, continuing where it stopped, armed or not."""
+
+    _PIECE = 4096
+
+    def __init__(self, condition: Condition, first_sample: int) -> None:
+        self._condition = condition
+        self._next = first_sample
+        self._armed = False
+
+    def find(self, readings: Readings, stop: int) -> int | None:
+        """Index of the first sample at or past the crossing, among those before `stop`."""
+        while self._next < stop:
+            end = min(stop, self._next + self._PIECE)
+            values = readings(self._next, end)
+            ready = self._condition.arms(values)
+            armed = np.logical_or.accumulate(np.concatenate(([self._armed], ready)))[:-1]
+            hits = np.flatnonzero(self._condition.fires(values) & armed)
+            if len(hits):
+                return self._next + int(hits[0])
+            self._armed = bool(self._armed or ready.any())
+            self._next = end
+        return None
+
+
+def source_of(settings: Mapping[str, Any], which: Which) -> str:
+    """Channel or terminal that the configured trigger listens to."""
+    prefix = {DIGITAL: "DIG_EDGE", ANALOG: "ANLG_EDGE", WINDOW: "ANLG_WIN"}[settings[f"{which}_TRIG_TYPE"]]
+    return str(settings.get(f"{prefix}_{which}_TRIG_SRC", ""))
