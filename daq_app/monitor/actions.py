@@ -20,7 +20,7 @@ CONFIRM_WITHIN_S: Final = 2.5
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """One order: enabled in `states`; with `confirm` it must be given twice, so that one slip costs no test."""
+    """One order, enabled in `states`; with `confirm` it must be given twice: one slip costs no test."""
 
     name: str
     text: str
@@ -39,7 +39,7 @@ ACTIONS: Final = (
     Action("stop", "Stop and keep", "F7", RECORDING,
            "End the recording now and keep the run (it ends by itself at rest)"),
     Action("abort", "Abort", "F8", RECORDING,
-           "End the recording and mark the run as aborted; the number stays free", role="danger", confirm=True),
+           "End the recording as aborted; the test's number stays free", role="danger", confirm=True),
     Action("marker", "Marker", "F9", RUNNING, "Write a marker with this instant into the record"),
     Action("next", "Next test", "F6", frozenset(set(State) - RECORDING - {State.SAVING}),
            "Take the next test of the campaign"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from daq_app.acquisition.messages import MotionMessage
@@ -102,6 +103,13 @@ class Counters(QWidget):
         for name, caption in CAPTIONS.items():
             self.tiles[name] = Tile(caption)
             layout.addWidget(self.tiles[name], wide.get(name, 8))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """The figures grow with the window, to be read from afar."""
+        super().resizeEvent(event)
+        points = max(15.0, min(40.0, self.width() / 60.0))
+        for tile in self.tiles.values():
+            tile.set_points(points)
 
     def refresh(self) -> None:
         """Bring the tiles up to date."""

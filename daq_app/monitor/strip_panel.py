@@ -31,7 +31,8 @@ FAMILY_TITLES: dict[Family, str] = {
 _SMALLEST_SPAN_SI = {"lvdt": 1e-3, "wire": 4e-3, "accelerometer": 1.0, "tiltmeter": 4e-3}
 """A quiet strip is not blown up beyond this, or noise would look like motion."""
 _TITLE_PX = 18
-_LEAST_ROW_PX = 30
+_LEAST_ROW_PX = 28
+_LEAST_CELL_PX = 112
 _GAP_PX = 4
 
 
@@ -47,13 +48,19 @@ class Cell:
 def arrange(rig: Rig, width: float, height: float) -> tuple[list[Cell], list[tuple[Family, QRectF]]]:
     """Cells of all channels and the title box of each family, for a panel of that size.
 
-    Every family gets whole columns; the number of rows is the largest that keeps rows readable.
+    Every family gets whole columns; there are as few rows as leave a cell wide enough for its name.
     """
     families = [family for family in FAMILY_TITLES if rig.of_family(family)]
     if not families:
         return [], []
-    rows = max(1, int((height - _TITLE_PX) // _LEAST_ROW_PX))
-    rows = min(rows, max(len(rig.of_family(family)) for family in families))
+    most = max(len(rig.of_family(family)) for family in families)
+    rows = most
+    for candidate in range(1, most + 1):
+        needed = sum(math.ceil(len(rig.of_family(family)) / candidate) for family in families)
+        if width / needed >= _LEAST_CELL_PX:
+            rows = candidate
+            break
+    rows = max(1, min(rows, int((height - _TITLE_PX) // _LEAST_ROW_PX)))
     columns = {family: math.ceil(len(rig.of_family(family)) / rows) for family in families}
     rows = max(math.ceil(len(rig.of_family(family)) / columns[family]) for family in families)
     total = sum(columns.values())
@@ -201,13 +208,12 @@ class StripPanel(QWidget):
 def strip_path(
     low: NDArray[np.float32], high: NDArray[np.float32], box: QRectF, bottom: float, top: float
 ) -> pg.QtGui.QPainterPath:
-    """One vertical stroke per column of `low` and `high` that holds data, within `box`."""
+    """A line through the smallest and largest value of each column that holds data, within `box`."""
     known = np.flatnonzero(~np.isnan(low))
     scale = box.height() / (top - bottom)
-    x = box.left() + (known + 0.5) * (box.width() / low.size)
-    y_low = box.bottom() - (low[known] - bottom) * scale
-    y_high = box.bottom() - (high[known] - bottom) * scale
-    y_high = np.minimum(y_high, y_low - 1.0)  # a stroke of no length would not be drawn
-    xs = np.repeat(x, 2)
-    ys = np.stack((y_low, y_high), axis=1).ravel()
-    return pg.arrayToQPath(xs, ys.astype(np.float64), connect="pairs", finiteCheck=False)
+    x = np.repeat(box.left() + (known + 0.5) * (box.width() / low.size), 2)
+    extremes = np.stack((low[known], high[known]), axis=1).ravel().astype(np.float64)
+    y = box.bottom() - (extremes - bottom) * scale
+    joined = np.ones(x.size, dtype=np.int32)
+    joined[1::2] = np.diff(known, append=-1) == 1  # a gap in the data is a gap in the line
+    return pg.arrayToQPath(x, y, connect=joined, finiteCheck=False)
