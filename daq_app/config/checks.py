@@ -17,6 +17,12 @@ _P_TOLERANCE = 0.01
 _OUTPUT_TOLERANCE = 1e-6
 _FAR_M = 1.0
 """A sensor further than this outside the wall is a slip of units, not a sensor of the wall."""
+_A_SENSOR: Mapping[Family, str] = {
+    "lvdt": "an LVDT",
+    "wire": "a wire potentiometer",
+    "accelerometer": "an accelerometer",
+    "tiltmeter": "a tiltmeter",
+}
 _MEASUREMENT_FAMILY: Mapping[str, Family] = {"iepe": "accelerometer", "lvdt_native": "lvdt"}
 
 
@@ -96,7 +102,7 @@ def _channel_problems(rig: Rig, index: int, channel: Channel, file: str) -> Iter
     yield from _geometry_problems(rig, index, channel, file)
     family = _MEASUREMENT_FAMILY.get(channel.measurement, channel.family)
     if channel.family != family:
-        wrong = f"a {channel.family} cannot be measured as `{channel.measurement}`"
+        wrong = f"{_A_SENSOR[channel.family]} cannot be measured as `{channel.measurement}`"
         yield problem("measurement", wrong, f'"{channel.measurement}" is for family "{family}"')
     unit_fault = _unit_problem(index, channel, file)
     if unit_fault:
@@ -133,7 +139,9 @@ def _geometry_problems(rig: Rig, index: int, channel: Channel, file: str) -> Ite
             wrong = f"the wire would be {length:g} m long"
             yield Problem(file, key, wrong, "Give the fixed end of the wire, in metres, in the wall's frame")
     elif channel.anchor_m is not None:
-        yield Problem(file, key, f"a {channel.family} has no anchor", "Remove it, or correct `family`")
+        yield Problem(
+            file, key, f"{_A_SENSOR[channel.family]} has no anchor", "Remove it, or correct `family`"
+        )
     if channel.family == "lvdt" and channel.axis != "z":
         wrong = f"an LVDT of the base joint measures along z, not {channel.axis}"
         yield Problem(file, channel_key(index, channel, "axis"), wrong, 'Write axis = "z"')
@@ -155,9 +163,9 @@ def _unit_problem(index: int, channel: Channel, file: str) -> Problem | None:
         return None
     near = nearest(unit, fitting)
     hint = f"Did you mean `{near[0]}`? " if near and unit not in SENSITIVITY_TO_SI else ""
-    kind = (
-        "an LVDT on a native LVDT module" if channel.measurement == "lvdt_native" else f"a {channel.family}"
-    )
+    kind = _A_SENSOR[channel.family]
+    if channel.measurement == "lvdt_native":
+        kind += " on a native LVDT module"
     wrong = f"`{unit}` is no sensitivity unit for {kind}"
     right = f"{hint}Use {', '.join(fitting)}"
     return Problem(file, channel_key(index, channel, "sensitivity_unit"), wrong, right)

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from daq_app.config import catalogue
 from daq_app.config.inventory import Device
 from daq_app.config.plan import PlannedTask, PlanNote
+from daq_app.config.reach import LARGEST_LEVEL, range_ends_at
 from daq_app.config.rig import Channel, Rig
 from daq_app.config.wiring import MAX_SOURCE_IMPEDANCE_OHM, terminal_of
 
@@ -25,6 +26,7 @@ def plan_notes(
         *_coupling_notes(rig),
         *_impedance_notes(rig, devices),
         *_potentiometer_notes(rig),
+        *_range_notes(rig),
         *_certificate_notes(rig, today),
         *_task_notes(tasks, devices),
     ]
@@ -131,6 +133,18 @@ def _potentiometer_notes(rig: Rig) -> Iterator[PlanNote]:
             _names(wires),
             "read as plain voltages of an external supply that is not sampled itself: a supply that drifts "
             "by 0.1 % moves the zero by 0.1 % of the voltage. Use a regulated supply; tare before each test",
+        )
+
+
+def _range_notes(rig: Rig) -> Iterator[PlanNote]:
+    """Sensors that the largest planned release would drive out of range."""
+    ends = [(channel, range_ends_at(rig, channel)) for channel in rig.channels]
+    short = [(channel, end) for channel, end in ends if end < LARGEST_LEVEL]
+    if short:
+        yield _warning(
+            _names([channel for channel, _ in short]),
+            f"will clip: the first range ends at θ/α = {min(end for _, end in short):.2f}, and releases go "
+            f"up to {LARGEST_LEVEL:.2f}. Mount the sensor with more stroke, or check range_si",
         )
 
 

@@ -1,0 +1,94 @@
+"""`daq-app config check` and `daq-app config show`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from daq_app.cli.config_tables import plan_tables
+from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, print_problems, reported
+from daq_app.config import ConfigError, load_rig, plan_tasks
+
+
+def register(app: typer.Typer) -> None:
+    """Add the group ``config``."""
+    group = typer.Typer(no_args_is_help=True, help="Check and show rig files.")
+    group.command("check", epilog="Example: daq-app config check configs/fr1.toml configs/fr2.toml")(check)
+    group.command("show", epilog="Example: daq-app config show configs/fr1-iepe.toml")(show)
+    app.add_typer(group, name="config")
+
+
+def check(
+    files: Annotated[list[Path], typer.Argument(help="Rig files (TOML).", metavar="FILE…")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object per file.")] = False,
+) -> None:
+    """Say of each rig file whether it can be used, with every problem in it and every note.
+
+    Exit code 0 if all files are good, 2 if one is not.
+    """
+    bad = 0
+    for file in files:
+        with reported():
+            good = _check_json(file) if as_json else _check_text(file)
+        bad += not good
+    raise typer.Exit(EXIT_BAD_INPUT if bad else 0)
+
+
+def _check_text(file: Path) -> bool:
+    try:
+        rig = load_rig(file)
+        plan = plan_tasks(rig, str(file))
+    except ConfigError as error:
+        print_problems(error.problems)
+        return False
+    Console().print(
+        f"{file}: good. {len(rig.channels)} channels in {len(plan.tasks)} task(s) at {plan.rate_hz:.2f} Hz",
+        highlight=False,
+        markup=False,
+        soft_wrap=True,
+    )
+    for note in plan.notes:
+        if note.severity == "warning":
+            print_paragraph("Warning", f"{file}: {note.where}: {note.text}", style="bold yellow")
+    return True
+
+
+def _check_json(file: Path) -> bool:
+    result: dict[str, object] = {"file": str(file), "good": True, "problems": [], "notes": []}
+    try:
+        rig = load_rig(file)
+        plan = plan_tasks(rig, str(file))
+        result |= {
+            "name": rig.name,
+            "channels": len(rig.channels),
+            "rate_hz": plan.rate_hz,
+            "tasks": [
+                {"name": task.name, "role": task.role, "channels": [p.channel.id for p in task.channels]}
+                for task in plan.tasks
+            ],
+            "notes": [
+                {"severity": note.severity, "where": note.where, "text": note.text} for note in plan.notes
+            ],
+        }
+    except ConfigError as error:
+        result["good"] = False
+        result["problems"] = [{"key": p.key, "wrong": p.wrong, "right": p.right} for p in error.problems]
+    typer.echo(json.dumps(result, ensure_ascii=False))
+    return bool(result["good"])
+
+
+def show(file: Annotated[Path, typer.Argument(help="Rig file (TOML).")]) -> None:
+    """Show a rig: its sensors, NI tasks, rates, skews and delays, load of each module, notes."""
+    with reported():
+        rig = load_rig(file)
+        plan = plan_tasks(rig, str(file))
+        console = Console()
+        if not console.is_terminal:
+            console = Console(width=120)  # a file or pipe has no width of its own
+        for part in plan_tables(rig, plan):
+            console.print(part)
+            console.print()
