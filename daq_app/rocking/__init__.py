@@ -1,0 +1,63 @@
+"""Rocking analysis: classic theory, kinematics, impacts and restitution, online and offline.
+
+from daq_app.rocking import RigidBlock, period
+block = RigidBlock(weight_n=51300, r0_m=1.525, inertia_kg_m2=16107, alpha0_rad=0.215)
+block.p_rad_s, block.r_max, period(0.35, block.p_rad_s)
+"""
+
+from daq_app.rocking.block import RigidBlock, SemiRigid
+from daq_app.rocking.estimators import RestitutionEstimate, RestitutionPoint
+from daq_app.rocking.housner import FreeRocking, exact_period, free_rocking
+from daq_app.rocking.kinematics import RotationGeometry, WireRotation
+from daq_app.rocking.live import Estimate, LiveAnalyser, LiveResult
+from daq_app.rocking.phases import Phase, PhaseDetector, PhaseEvent, PhaseSettings
+from daq_app.rocking.theory import (
+    amplitude_after,
+    energy,
+    energy_after,
+    frequency_parameter,
+    impacts_until,
+    period,
+    period_after,
+    r_max_block,
+    r_max_rectangular,
+    restitution_from_peaks,
+    restitution_from_speeds,
+    time_of_impact,
+    time_to_decay,
+)
+from daq_app.rocking.velocity import VelocityFilter, VelocityStream
+
+__all__ = [
+    "Estimate",
+    "FreeRocking",
+    "LiveAnalyser",
+    "LiveResult",
+    "Phase",
+    "PhaseDetector",
+    "PhaseEvent",
+    "PhaseSettings",
+    "RestitutionEstimate",
+    "RestitutionPoint",
+    "RigidBlock",
+    "RotationGeometry",
+    "SemiRigid",
+    "VelocityFilter",
+    "VelocityStream",
+    "WireRotation",
+    "amplitude_after",
+    "energy",
+    "energy_after",
+    "exact_period",
+    "free_rocking",
+    "frequency_parameter",
+    "impacts_until",
+    "period",
+    "period_after",
+    "r_max_block",
+    "r_max_rectangular",
+    "restitution_from_peaks",
+    "restitution_from_speeds",
+    "time_of_impact",
+    "time_to_decay",
+]

@@ -1,0 +1,241 @@
+"""One half-cycle at a time: peak, times and one-sided speeds from a local model of the rotation.
+
+θ̇ jumps at each impact, so no symmetric filter can show the speeds just before and after it. Each
+half-cycle ("arc") is therefore fitted by itself, strictly between its two impacts, with
+
+    θ(t) = a + b cosh p(t−t_c) + c sinh p(t−t_c)  [+ powers 3…6 of (t−t_c) where the data ask for them]
+
+The first three terms are the general linearised motion with the nominal p but free constants; the
+powers take up the nonlinearity, another p, a yielding joint. Which powers are used is decided by
+the Bayesian information criterion. Nothing is assumed about α, energy or the neighbouring arcs.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_GUARD_S = 0.002
+_GUARD_SHARE = 0.015
+"""Kept clear of each impact: the crossing's own error, filters of the sensors, the shock itself."""
+_FALL_SHARE = 0.7
+"""Part of the fall from release to first impact that is used: its beginning depends on the release."""
+_POINTS = 160
+"""Samples are averaged to about this many points: noise becomes white and fits become cheap."""
+_MIN_POINTS = 12
+_POWERS: tuple[tuple[int, ...], ...] = ((), (4,), (3,), (3, 4), (3, 4, 5, 6))
+"""Candidate additions to the basis, from stiff to free."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """One half-cycle, signed values; arc 0 is the fall from the release to impact 1."""
+
+    index: int
+    """Number of the impact that starts it; 0 for the fall."""
+    start_s: float
+    """Zero crossing at which the arc starts (the release for arc 0), as this arc shows it."""
+    end_s: float
+    sigma_start_s: float
+    sigma_end_s: float
+    peak_rad: float
+    peak_s: float
+    sigma_peak_rad: float
+    """NaN with the peak where the arc has none (the fall: its peak is the hold)."""
+    speed_start_rad_s: float
+    """θ̇⁺ just after the impact that starts it; NaN for the fall."""
+    sigma_speed_start_rad_s: float
+    speed_end_rad_s: float
+    """θ̇⁻ just before the impact that ends it."""
+    sigma_speed_end_rad_s: float
+    powers: tuple[int, ...]
+    """Powers that were added to the basis."""
+    residual_rad: float
+    """rms of what the fit leaves, at the averaged points."""
+    points: int
+
+    @property
+    def duration_s(self) -> float:
+        return self.end_s - self.start_s
+
+
+@dataclass(frozen=True, slots=True)
+class _Basis:
+    """Columns on x ∈ [−1, 1], x = (t − centre)/half_s."""
+
+    kappa: float
+    powers: tuple[int, ...]
+
+    def values(self, x: Floats, derivative: int = 0) -> Floats:
+        """(points, columns) of the d-th derivative by x; columns scaled to reach about 1."""
+        k = self.kappa
+        c, s = np.cosh(k * x), np.sinh(k * x)
+        even, odd = math.cosh(k) - 1.0, math.sinh(k)
+        if derivative == 0:
+            columns = [np.ones_like(x), (c - 1.0) / even, s / odd, *(x**n for n in self.powers)]
+        elif derivative == 1:
+            columns = [np.zeros_like(x), k * s / even, k * c / odd]
+            columns += [n * x ** (n - 1) for n in self.powers]
+        else:
+            columns = [np.zeros_like(x), k * k * c / even, k * k * s / odd]
+            columns += [n * (n - 1) * x ** (n - 2) for n in self.powers]
+        stacked: Floats = np.stack(columns, axis=-1)
+        return stacked
+
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    basis: _Basis
+    coefficients: Floats
+    covariance: Floats
+    residual: float
+    score: float
+
+
+def fit_arc(
+    time_s: Floats,
+    rotation_rad: Floats,
+    start_s: float,
+    end_s: float,
+    *,
+    index: int,
+    p_rad_s: float,
+    zero_sigma_rad: float = 2e-5,
+) -> Arc | None:
+    """Fit the half-cycle between two zero crossings (for `index` 0 between release and crossing).
+
+    `time_s`, `rotation_rad` (n,) must cover it; NaN samples are left out. `zero_sigma_rad` is what
+    the zero of the rotation may be wrong by: it moves the crossings. None where too little is left
+    to fit, or where the fit has no zero crossing or peak where it should.
+    """
+    length = end_s - start_s
+    guard = max(_GUARD_S, _GUARD_SHARE * length)
+    first = start_s + (1.0 - _FALL_SHARE) * length if index == 0 else start_s + guard
+    points = _averaged(time_s, rotation_rad, first, end_s - guard)
+    if points is None:
+        return None
+    left = first if index == 0 else start_s
+    centre, half = (left + end_s) / 2.0, (end_s - left) / 2.0
+    x, y = (points[0] - centre) / half, points[1]
+    fit = _best_fit(x, y, p_rad_s * half)
+    end = _crossing(fit, 1.0, half, zero_sigma_rad)
+    start = None if index == 0 else _crossing(fit, -1.0, half, zero_sigma_rad)
+    if end is None or (index > 0 and start is None):
+        return None
+    peak = _peak(fit) if index > 0 else (0.0, math.nan, math.nan)
+    if peak is None:
+        return None
+    nan = math.nan
+    x_start, sigma_x_start, v_start, sigma_v_start = start or (0.0, nan, nan, nan)
+    return Arc(
+        index=index,
+        start_s=start_s if start is None else centre + half * x_start,
+        end_s=centre + half * end[0],
+        sigma_start_s=half * sigma_x_start,
+        sigma_end_s=half * end[1],
+        peak_rad=peak[1],
+        peak_s=start_s if index == 0 else centre + half * peak[0],
+        sigma_peak_rad=math.hypot(peak[2], zero_sigma_rad),
+        speed_start_rad_s=v_start,
+        sigma_speed_start_rad_s=sigma_v_start,
+        speed_end_rad_s=end[2],
+        sigma_speed_end_rad_s=end[3],
+        powers=fit.basis.powers,
+        residual_rad=fit.residual,
+        points=x.size,
+    )
+
+
+def _averaged(
+    time_s: Floats, rotation_rad: Floats, first_s: float, last_s: float
+) -> tuple[Floats, Floats] | None:
+    """Means of consecutive samples within [first, last]; None where fewer than 12 points remain."""
+    low, high = np.searchsorted(time_s, [first_s, last_s])
+    n = int(high - low)
+    size = max(1, n // _POINTS)
+    groups = n // size
+    if groups < _MIN_POINTS:
+        return None
+    stop = low + groups * size
+    t = time_s[low:stop].reshape(groups, size).mean(axis=1)
+    y = rotation_rad[low:stop].reshape(groups, size).mean(axis=1)
+    good = np.isfinite(y)
+    if np.count_nonzero(good) < _MIN_POINTS:
+        return None
+    return t[good], y[good]
+
+
+def _best_fit(x: Floats, y: Floats, kappa: float) -> _Fit:
+    """The candidate with the smallest BIC."""
+    fits = [_fit(x, y, _Basis(kappa, powers)) for powers in _POWERS if x.size >= 3 * (len(powers) + 3)]
+    return min(fits, key=lambda fit: fit.score)
+
+
+def _fit(x: Floats, y: Floats, basis: _Basis) -> _Fit:
+    design = basis.values(x)
+    q, triangle = np.linalg.qr(design)
+    coefficients = np.linalg.solve(triangle, q.T @ y)
+    residual = y - design @ coefficients
+    square = float(residual @ residual)
+    degrees = x.size - coefficients.size
+    inverse = np.linalg.inv(triangle)
+    covariance = inverse @ inverse.T * (square / degrees)
+    score = x.size * math.log(max(square, 1e-300) / x.size) + coefficients.size * math.log(x.size)
+    return _Fit(basis, coefficients, covariance, math.sqrt(square / x.size), score)
+
+
+def _row(fit: _Fit, x: float, derivative: int) -> Floats:
+    row: Floats = fit.basis.values(np.array([x]), derivative)[0]
+    return row
+
+
+def _crossing(
+    fit: _Fit, guess: float, half_s: float, zero_sigma: float
+) -> tuple[float, float, float, float] | None:
+    """x of the zero near `guess`, its sigma, the signed speed there (1/s) and its sigma."""
+    x = guess
+    for _ in range(8):
+        slope = float(_row(fit, x, 1) @ fit.coefficients)
+        if slope == 0.0:
+            return None
+        step = float(_row(fit, x, 0) @ fit.coefficients) / slope
+        x -= step
+        if abs(x - guess) > 0.25:
+            return None
+        if abs(step) < 1e-10:
+            break
+    value, slope_row = _row(fit, x, 0), _row(fit, x, 1)
+    slope = float(slope_row @ fit.coefficients)
+    curvature = float(_row(fit, x, 2) @ fit.coefficients)
+    # The speed is read where the fit crosses zero: its error counts through the shift of that place.
+    gradient = slope_row - curvature / slope * value
+    shift = math.hypot(math.sqrt(float(value @ fit.covariance @ value)), zero_sigma) / abs(slope)
+    own = float(gradient @ fit.covariance @ gradient)
+    sigma = math.hypot(math.sqrt(max(own, 0.0)), curvature / slope * zero_sigma)
+    return x, shift, slope / half_s, sigma / half_s
+
+
+def _peak(fit: _Fit) -> tuple[float, float, float] | None:
+    """x, value and sigma of the extremum between the impacts."""
+    grid = np.linspace(-0.9, 0.9, 37)
+    slopes = fit.basis.values(grid, 1) @ fit.coefficients
+    turns = np.flatnonzero(slopes[:-1] * slopes[1:] <= 0.0)
+    if turns.size == 0:
+        return None
+    at = turns[np.argmin(np.abs(grid[turns]))]
+    x = float(grid[at] - slopes[at] * (grid[at + 1] - grid[at]) / (slopes[at + 1] - slopes[at] or 1.0))
+    for _ in range(4):
+        curvature = float(_row(fit, x, 2) @ fit.coefficients)
+        if curvature == 0.0:
+            break
+        x -= float(_row(fit, x, 1) @ fit.coefficients) / curvature
+    if not abs(x) < 1.0:
+        return None
+    row = _row(fit, x, 0)
+    sigma = math.sqrt(float(row @ fit.covariance @ row))
+    return x, float(row @ fit.coefficients), sigma

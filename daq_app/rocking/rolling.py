@@ -1,0 +1,59 @@
+"""A window on the end of a growing series, with absolute indices and bounded memory."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class RollingArray:
+    """Appends columns, forgets the oldest beyond `capacity`; slices are contiguous views."""
+
+    def __init__(self, capacity: int, rows: int = 1) -> None:
+        self._capacity = capacity
+        self._data = np.empty((rows, 2 * capacity))
+        self._used = 0
+        self._end = 0
+
+    @property
+    def end(self) -> int:
+        """Absolute index after the last value."""
+        return self._end
+
+    @property
+    def start(self) -> int:
+        """Absolute index of the oldest value kept."""
+        return self._end - self._used
+
+    def grow(self, capacity: int) -> None:
+        """Keep at least `capacity` values from now on."""
+        if capacity > self._capacity:
+            data = np.empty((self._data.shape[0], 2 * capacity))
+            data[:, : self._used] = self._data[:, : self._used]
+            self._data, self._capacity = data, capacity
+
+    def append(self, values: Floats) -> None:
+        """Append (n,) or (rows, n) values."""
+        block = np.atleast_2d(values)
+        n = block.shape[1]
+        if n > self._capacity:
+            self._end += n - self._capacity
+            block, n, self._used = block[:, -self._capacity :], self._capacity, 0
+        if self._used + n > self._data.shape[1]:
+            keep = self._capacity - n
+            self._data[:, :keep] = self._data[:, self._used - keep : self._used].copy()
+            self._used = keep
+        self._data[:, self._used : self._used + n] = block
+        self._used += n
+        self._end += n
+
+    def slice(self, start: int, stop: int) -> Floats:
+        """(rows, n) view of absolute indices [start, stop), cut to what is kept."""
+        low, high = max(start, self.start) - self.start, min(stop, self._end) - self.start
+        return self._data[:, low : max(high, low)]
+
+    def last(self, n: int) -> Floats:
+        """(rows, up to n) view of the newest values."""
+        return self.slice(self._end - n, self._end)
