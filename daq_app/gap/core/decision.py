@@ -1,0 +1,149 @@
+"""From fits to a verdict. The thresholds are in one place, and `calibration` says how they are set."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from daq_app.gap.core.effects import Library
+from daq_app.gap.core.evidence import Priors, Ranked, credible_set
+from daq_app.gap.core.fit import Fit
+from daq_app.gap.core.goodness import Goodness
+from daq_app.gap.core.result import Decision, Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """What a verdict needs."""
+
+    name_probability: float = 0.90
+    """An effect is named alone from this probability on."""
+    minimum_strength: float = 4.0
+    """Posterior sd below which an effect is `below_detection`."""
+    probe_log_bayes: float = 6.0
+    """Log evidence by which a probe must beat the best named hypothesis of its family to say that the
+    family's form is unknown."""
+    goodness_p: float = 1e-3
+    goodness_tolerated: float = 0.35
+    temperature: float = 1.0
+    remainder: float = 0.05
+    """Structure that a named hypothesis may leave, as a share of the gap that it explains."""
+    parameters_gap: float = 1.3
+    """Gap at nominal parameters, over the floor, from which the answer is "parameters"."""
+    priors: Priors = field(default_factory=Priors)
+
+
+@dataclass(slots=True)
+class Material:
+    """What the verdict is made from."""
+
+    library: Library
+    ranked: Sequence[Ranked]
+    fits: Mapping[tuple[str, ...], Fit]
+    probes: Mapping[tuple[str, ...], Fit]
+    goodness: Mapping[tuple[str, ...], Goodness]
+    """Of the null, the best hypothesis and the best probe at least."""
+    null_gap: float
+    """Gap of the fit without any effect, in the noise and scatter units of the best hypothesis."""
+    nominal_gap: float
+    """Gap with all shared parameters at their nominal values, in noise and scatter units."""
+
+
+def decide(material: Material, thresholds: Thresholds) -> tuple[Decision, str]:
+    """The verdict and the next measurement."""
+    library, ranked = material.library, material.ranked
+    best = ranked[0]
+    unexplained = _unexplained(material, thresholds)
+    if unexplained is not None:
+        return unexplained
+    if not best.effects:
+        return _null(material, thresholds)
+    fit = material.fits[best.effects]
+    strength = min(fit.strength(name) for name in best.effects)
+    null = next((r.probability for r in ranked if not r.effects), 0.0)
+    if strength < thresholds.minimum_strength and null > 1e-3:
+        words = (
+            f"{fit.name} fits best, but at {strength:.1f} posterior sd it is below detection "
+            f"(nothing missing: {100 * null:.0f} %)."
+        )
+        advice = f"Repeat at the highest level: {library[best.effects[0]].name} needs a stronger signal."
+        return Decision("below_detection", best.effects, best.family, words, best.probability), advice
+    members = credible_set(ranked)
+    if best.probability >= thresholds.name_probability or len(members) == 1:
+        verdict: Verdict = "effect" if len(best.effects) == 1 else "pair"
+        words = f"{fit.name} ({best.family}) explains the gap, probability {best.probability:.3f}."
+        return Decision(verdict, best.effects, best.family, words, best.probability), _check_advice(
+            library, best
+        )
+    return _cannot_tell(library, members)
+
+
+def _unexplained(material: Material, thresholds: Thresholds) -> tuple[Decision, str] | None:
+    """None of these: the best hypothesis fails the gate, or a probe sees more than it explains."""
+    best = material.ranked[0]
+    good = material.goodness[best.effects]
+    explained = good.passed or (
+        bool(best.effects)
+        and not good.excessive_scatter
+        and good.worst_size < thresholds.remainder * material.null_gap
+    )
+    log_best = material.fits[best.effects].log_evidence
+    leader = max(material.probes, key=lambda k: material.probes[k].log_evidence, default=None)
+    margin = material.probes[leader].log_evidence - log_best if leader else float("-inf")
+    if explained and margin < thresholds.probe_log_bayes:
+        return None
+    if leader is not None and margin >= thresholds.probe_log_bayes:
+        family = material.library[leader[-1]].family
+        probe_good = material.goodness.get(leader)
+        words = (
+            f"None of the library's effects, but the family is {family}: a free form there fits better than "
+            f"{material.fits[best.effects].name} by {margin:.0f} in log evidence."
+        )
+        if probe_good is not None and not probe_good.passed:
+            words += f" Even that leaves structure: {probe_good.worst}."
+        advice = f"Look at the shape of the {family} map; add an effect of that form to the library."
+        return Decision("none_of_these", (), family, words, 1.0 - best.probability), advice
+    words = (
+        f"None of these: the best hypothesis ({material.fits[best.effects].name}) does not pass the "
+        f"goodness-of-fit gate: {good.worst}."
+    )
+    return (
+        Decision("none_of_these", (), "unknown", words, 0.0),
+        f"Look where the remaining gap lies: {good.worst}.",
+    )
+
+
+def _null(material: Material, thresholds: Thresholds) -> tuple[Decision, str]:
+    probability = material.ranked[0].probability
+    if material.nominal_gap > thresholds.parameters_gap:
+        words = (
+            "No effect is missing: other parameter values close the gap "
+            f"({material.nominal_gap:.1f} times noise and scatter at the nominal ones)."
+        )
+        return Decision("parameters", (), "none", words, probability), "Use the fitted parameters."
+    words = "Nothing is missing within noise and scatter."
+    return Decision("nothing_missing", (), "none", words, probability), "None needed at these levels."
+
+
+def _check_advice(library: Library, best: Ranked) -> str:
+    own = [c for name in best.effects for c in library[name].confusable_with]
+    if not own:
+        return "Repeat at another level to confirm the parameter."
+    return f"To confirm against {own[0].effect}: {own[0].measure}."
+
+
+def _cannot_tell(library: Library, members: Sequence[Ranked]) -> tuple[Decision, str]:
+    names = [" + ".join(m.effects) or "nothing missing" for m in members]
+    advice = ""
+    if len(members) > 1:
+        first, second = set(members[0].effects), set(members[1].effects)
+        for a in sorted(first - second):
+            for b in sorted(second - first):
+                advice = advice or (library.separating_measurement(a, b) or "")
+    families = {m.family for m in members}
+    family = members[0].family if len(families) == 1 else "several"
+    if not advice:
+        advice = "Repeat over more levels; the held-out score of each hypothesis is in the report."
+    words = "Cannot tell " + " from ".join(names[:4]) + f": {advice}."
+    total = sum(m.probability for m in members)
+    return Decision("cannot_tell", members[0].effects, family, words, total), advice

@@ -1,0 +1,148 @@
+"""Fits on all cores: interruptible, with progress, and the same answers as on one core."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from daq_app.gap.core.effects import Effect
+from daq_app.gap.core.features import Run
+from daq_app.gap.core.fit import Fit, fit
+from daq_app.gap.core.held_out import HeldOutRun, score
+from daq_app.gap.core.model import Model
+
+T = TypeVar("T")
+
+
+class Interrupted(Exception):
+    """The caller asked to stop; what was finished until then is lost on purpose."""
+
+
+@dataclass(frozen=True, slots=True)
+class FitTask:
+    """Fit one hypothesis."""
+
+    effects: tuple[Effect, ...]
+    known: dict[tuple[str, int | None], float]
+    sigmas: dict[str, float]
+
+    def run(self, model: Model, runs: Sequence[Run]) -> Fit:
+        return fit(model, runs, self.effects, self.known, self.sigmas)
+
+
+@dataclass(frozen=True, slots=True)
+class ScoreTask:
+    """Predict every run from the others under one hypothesis."""
+
+    effects: tuple[Effect, ...]
+    whole: Fit
+    by: str
+
+    def run(self, model: Model, runs: Sequence[Run]) -> list[HeldOutRun]:
+        return score(model, runs, self.effects, self.whole, self.by)
+
+
+_STATE: dict[str, Any] = {}
+"""In a worker process: the model and runs, sent once instead of with every task."""
+
+
+def _prepare(model: Model, runs: Sequence[Run]) -> None:
+    _STATE["model"], _STATE["runs"] = model, runs
+
+
+def _work(task: FitTask | ScoreTask) -> Any:
+    return task.run(_STATE["model"], _STATE["runs"])
+
+
+@contextmanager
+def _single_threaded_children() -> Iterator[None]:
+    """Workers started inside use one BLAS thread each; otherwise n workers start n² threads."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+class Workers:
+    """A pool for one model and its runs; with ``count=1`` everything runs in this process.
+
+    Use as a context manager. Worker processes are spawned, which is the only way that is safe on
+    every platform and beside a window.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        runs: Sequence[Run],
+        count: int = 1,
+        progress: Callable[[int, int, str], None] | None = None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> None:
+        self._model, self._runs, self._count = model, tuple(runs), max(count, 1)
+        self._progress = progress or (lambda done, total, text: None)
+        self._cancelled = cancelled or (lambda: False)
+        self._pool: ProcessPoolExecutor | None = None
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(wait=False, cancel_futures=True)
+
+    def run(self, tasks: Iterable[FitTask | ScoreTask], text: str) -> list[Any]:
+        """Results in the order of the tasks. Raises `Interrupted` soon after `cancelled` says so."""
+        listed = list(tasks)
+        if self._count == 1 or len(listed) < 2:
+            return self._in_process(listed, text)
+        if self._pool is None:
+            with _single_threaded_children():
+                self._pool = ProcessPoolExecutor(
+                    self._count,
+                    mp_context=multiprocessing.get_context("spawn"),
+                    initializer=_prepare,
+                    initargs=(self._model, self._runs),
+                )
+                futures = [self._pool.submit(_work, task) for task in listed]
+        else:
+            futures = [self._pool.submit(_work, task) for task in listed]
+        self._await(futures, text)
+        return [future.result() for future in futures]
+
+    def _in_process(self, tasks: Sequence[FitTask | ScoreTask], text: str) -> list[Any]:
+        results = []
+        for done, task in enumerate(tasks):
+            self._check()
+            self._progress(done, len(tasks), text)
+            results.append(task.run(self._model, self._runs))
+        self._progress(len(tasks), len(tasks), text)
+        return results
+
+    def _await(self, futures: Sequence[Future[Any]], text: str) -> None:
+        pending = set(futures)
+        while pending:
+            self._progress(len(futures) - len(pending), len(futures), text)
+            try:
+                self._check()
+            except Interrupted:
+                for future in pending:
+                    future.cancel()
+                raise
+            _, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
+        self._progress(len(futures), len(futures), text)
+
+    def _check(self) -> None:
+        if self._cancelled():
+            raise Interrupted("the diagnosis was stopped")

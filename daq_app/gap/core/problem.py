@@ -1,0 +1,106 @@
+"""A hypothesis on a set of runs, written as a vector of unknowns in unit coordinates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from daq_app.gap.core.effects import Effect
+from daq_app.gap.core.features import FloatArray, Run
+from daq_app.gap.core.model import Model, Prediction
+from daq_app.gap.core.parameters import Parameter
+
+STEP = 1e-4
+"""Half width of central differences, in prior standard deviations."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """One entry of the vector; `run` is None where all runs share it."""
+
+    key: str
+    parameter: Parameter
+    run: int | None = None
+    effect: str = ""
+
+
+@dataclass(slots=True)
+class Linearised:
+    """One run at a point: residual y − f, Jacobian of f in unit coordinates (n, p), prediction."""
+
+    residual: FloatArray
+    jacobian: FloatArray
+    prediction: Prediction
+
+
+class Problem:
+    """Maps the vector u to the model's values and linearises the prediction.
+
+    `fixed` gives unit coordinates of unknowns that are held (by key): the held-out score fits only
+    the local parameters of a run, with everything shared held at the posterior.
+    """
+
+    def __init__(self, model: Model, runs: Sequence[Run], effects: Sequence[Effect]) -> None:
+        self.model = model
+        self.runs = tuple(runs)
+        self.effects = tuple(effects)
+        unknowns = [Unknown(p.name, p) for p in model.nuisance]
+        for effect in effects:
+            unknowns += [Unknown(effect.key(p), p, None, effect.name) for p in effect.shared]
+        for index, run in enumerate(self.runs):
+            unknowns += [Unknown(p.name, p, index) for p in model.local_nuisance(run)]
+            for effect in effects:
+                unknowns += [Unknown(effect.key(p), p, index, effect.name) for p in effect.per_run]
+        self.unknowns = tuple(unknowns)
+        bounds = np.array([u.parameter.unit_bounds for u in self.unknowns]).reshape(-1, 2)
+        self.low, self.high = bounds[:, 0], bounds[:, 1]
+        self._columns = [
+            np.array([k for k, u in enumerate(self.unknowns) if u.run is None or u.run == i], dtype=np.intp)
+            for i in range(len(self.runs))
+        ]
+
+    def __len__(self) -> int:
+        return len(self.unknowns)
+
+    def columns(self, run: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+        """Indices of the unknowns that act on a run."""
+        return self._columns[run]
+
+    def values(self, run: int, u: FloatArray) -> dict[str, float]:
+        """What the model is asked with for one run."""
+        return {
+            self.unknowns[k].key: self.unknowns[k].parameter.value(float(u[k])) for k in self._columns[run]
+        }
+
+    def predict(self, run: int, u: FloatArray) -> Prediction:
+        return self.model.predict(self.runs[run], self.values(run, u))
+
+    def linearise(self, run: int, u: FloatArray, prediction: Prediction | None = None) -> Linearised:
+        """Residual and Jacobian of one run by central differences (one-sided at a bound)."""
+        here = prediction or self.predict(run, u)
+        jacobian = np.zeros((here.features.size, len(self)))
+        for k in self._columns[run]:
+            ahead, behind = min(u[k] + STEP, self.high[k]), max(u[k] - STEP, self.low[k])
+            jacobian[:, k] = (self._at(run, u, k, ahead) - self._at(run, u, k, behind)) / (ahead - behind)
+        return Linearised(self.runs[run].features.values - here.features, jacobian, here)
+
+    def _at(self, run: int, u: FloatArray, k: int, value: float) -> FloatArray:
+        moved = u.copy()
+        moved[k] = value
+        return self.predict(run, moved).features
+
+    def start(self, known: Mapping[tuple[str, int | None], float]) -> FloatArray:
+        """A starting vector: `known` unit coordinates by (key, run), else 0, inside the bounds."""
+        u = np.array([known.get((q.key, q.run), self._null(q)) for q in self.unknowns], dtype=float)
+        inside: FloatArray = np.clip(u, self.low, self.high)
+        return inside
+
+    def _null(self, unknown: Unknown) -> float:
+        effect = next((e for e in self.effects if e.name == unknown.effect), None)
+        if effect is None or unknown.parameter.scale == "log":
+            return 0.0
+        null = effect.null_value.get(unknown.parameter.name, 0.0)
+        return unknown.parameter.unit_coordinate(null) if math.isfinite(null) else 0.0

@@ -1,0 +1,123 @@
+"""The result of a diagnosis, and its JSON (format version 1, documented in docs/gap-method.md)."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from daq_app.gap.core.evidence import Ranked
+from daq_app.gap.core.goodness import Goodness
+from daq_app.gap.core.held_out import GapSize
+from daq_app.gap.core.where import GapMap
+
+FORMAT_VERSION: Final = 1
+
+Verdict = Literal[
+    "effect", "pair", "parameters", "nothing_missing", "cannot_tell", "none_of_these", "below_detection"
+]
+
+
+class CannotDiagnose(Exception):
+    """The runs do not allow any diagnosis; the message says why and what to do."""
+
+    def __init__(self, reason: str, what_to_do: str = "") -> None:
+        super().__init__(f"{reason} {what_to_do}".strip())
+        self.reason = reason
+        self.what_to_do = what_to_do
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A parameter with its 95 % interval and its prior."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    prior_mean: float
+    prior_sd: float
+    meaning: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """How strong an effect would have to be to be seen in these runs (four posterior sd)."""
+
+    effect: str
+    parameter: str
+    limit: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """The verdict with its reason in words."""
+
+    verdict: Verdict
+    effects: tuple[str, ...]
+    family: str
+    sentence: str
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """Everything a diagnosis says."""
+
+    model: str
+    runs: tuple[str, ...]
+    where: GapMap
+    which: tuple[Ranked, ...]
+    set95: tuple[Ranked, ...]
+    decision: Decision
+    parameters: tuple[Estimate, ...]
+    effect_parameters: tuple[Estimate, ...]
+    scatter: tuple[Estimate, ...]
+    gap: GapSize | None
+    remaining: GapMap
+    goodness: Goodness
+    goodness_null: Goodness
+    probes: tuple[Ranked, ...]
+    probe_shapes: dict[str, dict[str, tuple[float, float, float]]]
+    """Probe → knot → (value, low, high): the non-parametric shape of what is missing."""
+    detection: tuple[Detection, ...]
+    next_measurement: str
+    limits: tuple[str, ...] = ()
+    """Stated limits: one run only, channels left out, gaps in the record …"""
+    seconds: float = 0.0
+    notes: dict[str, Any] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, with the keys of the documented format."""
+        data = asdict(self)
+        data["format"] = FORMAT_VERSION
+        data["decision_detail"] = data["decision"]
+        data["decision"] = self.decision.verdict
+        for key in ("which", "set95", "probes"):
+            for entry in data[key]:
+                entry["effects"] = list(entry["effects"])
+        cleaned: dict[str, Any] = _plain(data)
+        return cleaned
+
+    def to_json(self, indent: int | None = 1) -> str:
+        return json.dumps(self.to_dict(), indent=indent, ensure_ascii=False, allow_nan=False)
+
+    def save(self, path: Path) -> None:
+        path.write_text(self.to_json(), encoding="utf-8")
+
+
+def _plain(value: Any) -> Any:
+    """JSON has neither tuples, nor NaN, nor NumPy scalars."""
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
