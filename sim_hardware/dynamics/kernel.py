@@ -1,0 +1,241 @@
+"""The event-driven integrator: half-cycles between impacts, pieces, impacts and peaks as tables.
+
+Steps are Dormand–Prince 8(5,3); events (impact, turning point, thresholds of non-smooth terms) are
+roots of the step's own interpolant, found by Newton's method.  A step never crosses a kink: it is
+cut there, and the next one starts in the new branch.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_hardware.dynamics import parameters as par
+from sim_hardware.dynamics import pieces as pc
+from sim_hardware.dynamics import terms
+from sim_hardware.dynamics.step import interpolant, take_step
+from sim_hardware.jit import kernel, part
+
+# how a run ended
+AT_REST: Final = 0
+DURATION_OVER: Final = 1
+OVERTURNED: Final = 2
+TABLE_FULL: Final = 3
+# columns of the impact table
+I_TIME: Final = 0
+I_BEFORE: Final = 1  # θ̇⁻, signed
+I_AFTER: Final = 2  # θ̇⁺, signed
+I_SIDE: Final = 3  # side that the wall came from
+I_KIND: Final = 4  # 0 impact, 1 second impact of a bounce
+N_IMPACT_COLUMNS: Final = 5
+# columns of the peak table: time, θ (signed)
+N_PEAK_COLUMNS: Final = 2
+
+_IMPACT: Final = 0
+_END: Final = 1
+_OVER: Final = 2
+_FULL: Final = 3
+_NEVER: Final = 2.0
+
+
+@part
+def _root(row: NDArray[np.float64], first: int, target: float, low: float, high: float) -> float:
+    """x in [low, high] where the polynomial equals `target`; the ends must bracket it."""
+    f_low = pc.horner(row, first, low) - target
+    x = high - (pc.horner(row, first, high) - target) / pc.horner_slope(row, first, high)
+    for _ in range(60):
+        if not low < x < high:
+            x = 0.5 * (low + high)
+        f = pc.horner(row, first, x) - target
+        if f == 0.0 or high - low < 4e-16:
+            return x
+        if (f < 0.0) == (f_low < 0.0):
+            low = x
+        else:
+            high = x
+        step = f / pc.horner_slope(row, first, x)
+        if abs(step) < 1e-15:
+            return x - step
+        x -= step
+    return x
+
+
+@part
+def _threshold(
+    row: NDArray[np.float64], at: float, q0: float, low: float, high: float, q_low: float, q_high: float
+) -> float:
+    """x in (low, high] where q crosses `at`, or 2 if it does not; its own starting point is no crossing."""
+    if at <= 0.0 or q0 == at or (q_low - at) * (q_high - at) >= 0.0:
+        return _NEVER
+    return _root(row, pc.ROTATION, at, low, high)
+
+
+@part
+def _first_guess(q: float, v: float, c: NDArray[np.float64]) -> float:
+    """Time to the impact of the linearised block, a little long so that the step reaches over it."""
+    rate = math.sqrt(c[terms.C_STIFF])
+    arm = max(c[terms.C_ALPHA], 1e-6)
+    fall_from = q
+    time = 0.0
+    if v > 0.0:
+        ratio = min(v / (rate * max(arm - q, 1e-6)), 0.999)
+        time = math.atanh(ratio) / rate
+        fall_from = arm - (arm - q) * math.sqrt(1.0 - ratio * ratio)
+    fall = min(fall_from / arm, 0.999)
+    return 1.02 * (time + math.acosh(1.0 / (1.0 - fall)) / rate) + 1e-9
+
+
+@part
+def _swing(
+    t: float,
+    q: float,
+    v: float,
+    side: float,
+    t_end: float,
+    tolerance: float,
+    c: NDArray[np.float64],
+    pieces: NDArray[np.float64],
+    n: int,
+    out: NDArray[np.float64],
+) -> tuple[int, int]:
+    """One half-cycle; returns (how it ended, rows used). `out` = t, q, v at the end, t and q of the peak."""
+    kq, kv = np.empty(16), np.empty(16)
+    rising = v > 0.0 or (v == 0.0 and terms.acceleration(q, v, t, c) > 0.0)
+    stiff = c[terms.C_STIFF] * max(math.sin(c[terms.C_ALPHA]), 1e-3)
+    scale_q = max(q, v * v / (2.0 * stiff))
+    scale_v = math.sqrt(v * v + 2.0 * stiff * q)
+    out[3], out[4] = t, q
+    h = min(_first_guess(q, v, c), 0.5 / math.sqrt(c[terms.C_STIFF]))
+    friction = c[terms.C_COULOMB] != 0.0
+    kinked = c[terms.C_PLAIN] == 0.0
+    while True:
+        if n >= pieces.shape[0]:
+            return _FULL, n
+        terms.set_region(c, q, rising)
+        kq[0] = v
+        kv[0] = terms.acceleration(q, v, t, c)
+        q1, v1, error = take_step(t, q, v, h, c, kq, kv, scale_q, scale_v)
+        while error > tolerance and h > 1e-10:
+            h *= max(0.2, 0.9 * (tolerance / error) ** 0.125)
+            q1, v1, error = take_step(t, q, v, h, c, kq, kv, scale_q, scale_v)
+        row = pieces[n]
+        n += 1
+        interpolant(t, q, v, q1, v1, h, c, kq, kv, row, pc.ROTATION, pc.VELOCITY)
+        row[pc.START], row[pc.SCALE], row[pc.SIDE] = t, h, side
+        x_end = 1.0
+        x_turn, ended, on_kink = 0.0, -1, -1.0
+        q_turn = q
+        if rising and v1 <= 0.0:
+            x_turn = _root(row, pc.VELOCITY, 0.0, 0.0, 1.0)
+            q_turn = pc.horner(row, pc.ROTATION, x_turn)
+        if kinked:
+            for at in (c[terms.C_WINKLER], c[terms.C_SLACK] if c[terms.C_CABLE] > 0.0 else 0.0):
+                for part in range(2):
+                    low, high = (0.0, x_turn) if part == 0 else (x_turn, 1.0)
+                    q_low, q_high = (q, q_turn) if part == 0 else (q_turn, q1)
+                    x = _threshold(row, at, q if part == 0 else -1.0, low, high, q_low, q_high)
+                    if x < x_end:
+                        x_end, on_kink = x, at
+        if x_turn > 0.0 and x_turn <= x_end:
+            rising = False
+            out[3], out[4] = t + h * x_turn, q_turn
+            if friction:
+                x_end, on_kink = x_turn, -1.0
+        if not rising and v1 > 0.0 and q1 > 0.0 and x_end == 1.0:
+            rising = True
+        if q1 <= 0.0 and x_end == 1.0:
+            x_end, ended = _root(row, pc.ROTATION, 0.0, x_turn, 1.0), _IMPACT
+        if t + h * x_end >= t_end:
+            x_end, ended, on_kink = (t_end - t) / h, _END, -1.0
+        if x_end < 1.0 or ended >= 0:
+            q1, v1 = pc.horner(row, pc.ROTATION, x_end), pc.horner(row, pc.VELOCITY, x_end)
+            if on_kink > 0.0:
+                q1 = on_kink
+            elif friction and x_end == x_turn:
+                v1 = 0.0
+        for k in range(pc.ROTATION, pc.N_COLUMNS):
+            row[k] *= side
+        t += h * x_end
+        q, v = q1, v1
+        if q > 0.5 * math.pi:
+            ended = _OVER
+        if ended >= 0:
+            out[0], out[1], out[2] = t, q, v
+            return ended, n
+        growth = 5.0 if error == 0.0 else min(5.0, 0.9 * (tolerance / error) ** 0.125)
+        h = h * growth if x_end == 1.0 else max(h * (1.0 - x_end), 0.1 * h) * 1.02
+
+
+@part
+def _fill_flat(pieces: NDArray[np.float64], n: int, t: float, q: float, v: float, side: float) -> int:
+    """A row of constant velocity; returns the rows used."""
+    row = pieces[n]
+    row[:] = 0.0
+    row[pc.START], row[pc.SCALE], row[pc.SIDE] = t, 1.0, side
+    row[pc.ROTATION], row[pc.ROTATION + 1], row[pc.VELOCITY] = side * q, side * v, side * v
+    return n + 1
+
+
+@kernel
+def integrate(
+    vector: NDArray[np.float64],
+    deviates: NDArray[np.float64],
+    pieces: NDArray[np.float64],
+    impacts: NDArray[np.float64],
+    peaks: NDArray[np.float64],
+) -> tuple[int, int, int, int, float]:
+    """Run one test; fills the tables.
+
+    `vector` (N_PARAMETERS,); `deviates` standard normal deviates of r by impact (0 beyond its end);
+    `pieces` (m, 19), `impacts` (k, 5), `peaks` (k, 2) are filled from the top.
+    Returns rows used of each, how it ended (AT_REST …) and when (seconds from release).
+    """
+    c, out = np.zeros(terms.N_COEFFICIENTS), np.zeros(5)
+    t_end = vector[par.DURATION]
+    theta0 = vector[par.THETA0]
+    release_side = -1.0 if theta0 < 0.0 else 1.0
+    side = release_side
+    t, q, v = 0.0, abs(theta0), vector[par.OMEGA0]
+    n, n_impacts, n_peaks = 0, 0, 0
+    terms.setup(vector, side, 0, release_side, c)
+    terms.hold_back(vector, q, c)
+    limit = min(impacts.shape[0] - 2, peaks.shape[0] - 1)
+    while True:
+        if q <= 0.0 and 0.5 * v * v <= terms.work_to(vector[par.REST_AMPLITUDE], c):
+            return _fill_flat(pieces, n, t, 0.0, 0.0, 0.0), n_impacts, n_peaks, AT_REST, t
+        ended, n = _swing(t, q, v, side, t_end, vector[par.TOLERANCE], c, pieces, n, out)
+        t, q, v = out[0], out[1], out[2]
+        peaks[n_peaks, 0], peaks[n_peaks, 1] = out[3], side * out[4]
+        n_peaks += 1
+        if ended == _FULL or n + 4 > pieces.shape[0] or n_impacts >= limit:
+            return n, n_impacts, n_peaks, TABLE_FULL, t
+        if ended != _IMPACT:
+            n = _fill_flat(pieces, n, t, q, 0.0, side)
+            return n, n_impacts, n_peaks, OVERTURNED if ended == _OVER else DURATION_OVER, t
+        speed = max(-v, 0.0)
+        deviate = deviates[n_peaks - 1] if n_peaks <= deviates.size else 0.0
+        r = terms.restitution(vector, speed, side, n_peaks - 1, deviate)
+        row = impacts[n_impacts]
+        row[I_TIME], row[I_BEFORE], row[I_AFTER] = t, -side * speed, -side * r * speed
+        row[I_SIDE], row[I_KIND] = side, 0.0
+        n_impacts += 1
+        q, v = 0.0, r * speed
+        side = -side
+        terms.setup(vector, side, n_peaks, release_side, c)
+        if vector[par.DWELL] > 0.0:
+            n = _fill_flat(pieces, n, t, 0.0, 0.0, side)
+            t += vector[par.DWELL]
+        if vector[par.BOUNCE] > 0.0 and v > 0.0:
+            first = speed * r ** vector[par.BOUNCE_SHARE]
+            flight = vector[par.BOUNCE] * speed / par.BOUNCE_SPEED
+            row[I_AFTER] = side * first
+            n = _fill_flat(pieces, n, t, 0.0, first, side)
+            t += flight
+            q = first * flight
+            row = impacts[n_impacts]
+            row[I_TIME], row[I_BEFORE], row[I_AFTER] = t, side * first, side * v
+            row[I_SIDE], row[I_KIND] = side, 1.0
+            n_impacts += 1

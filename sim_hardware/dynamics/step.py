@@ -1,0 +1,130 @@
+"""One Dormand–Prince 8(5,3) step of the folded equation, and its interpolant as polynomials.
+
+Coefficients: Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I*, DOP853, as
+SciPy carries them.  Rotation and speed are scalars, so a step costs no allocation.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import DOP853
+
+from sim_hardware.dynamics.terms import acceleration
+from sim_hardware.jit import part
+
+N_STAGES: Final = 12
+_N_ALL: Final = 16
+_A: Final = np.zeros((_N_ALL, _N_ALL))
+_A[:N_STAGES, :N_STAGES] = DOP853.A
+_A[13:, :] = DOP853.A_EXTRA
+_B: Final = np.array(DOP853.B)
+_C: Final = np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA])
+_E3: Final = np.array(DOP853.E3)
+_E5: Final = np.array(DOP853.E5)
+_D: Final = np.array(DOP853.D)
+
+
+@part
+def take_step(
+    t: float,
+    q: float,
+    v: float,
+    h: float,
+    c: NDArray[np.float64],
+    kq: NDArray[np.float64],
+    kv: NDArray[np.float64],
+    scale_q: float,
+    scale_v: float,
+) -> tuple[float, float, float]:
+    """(q, v, error) after `h`; stages are left in `kq` and `kv` (16), of which 0 must be set before.
+
+    The error is relative to the scales (Hairer's norm of the two embedded formulas).
+    """
+    for i in range(1, N_STAGES):
+        dq = 0.0
+        dv = 0.0
+        for j in range(i):
+            dq += _A[i, j] * kq[j]
+            dv += _A[i, j] * kv[j]
+        kq[i] = v + h * dv
+        kv[i] = acceleration(q + h * dq, kq[i], t + _C[i] * h, c)
+    dq = 0.0
+    dv = 0.0
+    for j in range(N_STAGES):
+        dq += _B[j] * kq[j]
+        dv += _B[j] * kv[j]
+    q1 = q + h * dq
+    v1 = v + h * dv
+    kq[N_STAGES] = v1
+    kv[N_STAGES] = acceleration(q1, v1, t + h, c)
+    e3q = e3v = e5q = e5v = 0.0
+    for j in range(N_STAGES + 1):
+        e3q += _E3[j] * kq[j]
+        e3v += _E3[j] * kv[j]
+        e5q += _E5[j] * kq[j]
+        e5v += _E5[j] * kv[j]
+    e5 = (e5q / scale_q) ** 2 + (e5v / scale_v) ** 2
+    e3 = (e3q / scale_q) ** 2 + (e3v / scale_v) ** 2
+    if e5 == 0.0 and e3 == 0.0:
+        return q1, v1, 0.0
+    return q1, v1, h * e5 / np.sqrt(2.0 * (e5 + 0.01 * e3))
+
+
+@part
+def _to_powers(
+    y0: float, y1: float, h: float, k: NDArray[np.float64], out: NDArray[np.float64], first: int, sign: float
+) -> None:
+    """Write the interpolant of one component as powers of x = (t − t₀)/h into `out[first:first+8]`."""
+    f = np.empty(7)
+    f[0] = y1 - y0
+    f[1] = h * k[0] - f[0]
+    f[2] = 2.0 * f[0] - h * (k[N_STAGES] + k[0])
+    for i in range(4):
+        total = 0.0
+        for j in range(_N_ALL):
+            total += _D[i, j] * k[j]
+        f[3 + i] = h * total
+    power = np.zeros(9)
+    for i in range(7):
+        power[0] += f[6 - i]
+        if i % 2 == 0:  # times x
+            for m in range(8, 0, -1):
+                power[m] = power[m - 1]
+            power[0] = 0.0
+        else:  # times (1 − x)
+            for m in range(8, 0, -1):
+                power[m] -= power[m - 1]
+    power[0] += y0
+    for m in range(8):
+        out[first + m] = sign * power[m]
+
+
+@part
+def interpolant(
+    t: float,
+    q: float,
+    v: float,
+    q1: float,
+    v1: float,
+    h: float,
+    c: NDArray[np.float64],
+    kq: NDArray[np.float64],
+    kv: NDArray[np.float64],
+    row: NDArray[np.float64],
+    first_q: int,
+    first_v: int,
+) -> None:
+    """Powers of q and v over the step just taken, after the three extra stages."""
+    for i in range(N_STAGES + 1, _N_ALL):
+        dq = 0.0
+        dv = 0.0
+        for j in range(i):
+            dq += _A[i, j] * kq[j]
+            dv += _A[i, j] * kv[j]
+        kq[i] = v + h * dv
+        kv[i] = acceleration(q + h * dq, kq[i], t + _C[i] * h, c)
+    _to_powers(q, q1, h, kq, row, first_q, 1.0)
+    _to_powers(v, v1, h, kv, row, first_v, 1.0)
