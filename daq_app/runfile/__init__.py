@@ -8,7 +8,7 @@ from daq_app.runfile.errors import (
     JournalSlowDisk,
     RunFileError,
 )
-from daq_app.runfile.finalise import finalise
+from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX
 from daq_app.runfile.hdf5_read import Run, open_run
 from daq_app.runfile.journal import JournalWriter
 from daq_app.runfile.journal_read import JournalContents, read_journal
@@ -23,10 +23,14 @@ from daq_app.runfile.model import (
     plan_to_dict,
     software_versions,
 )
-from daq_app.runfile.recover import Recovery, recover
-from daq_app.runfile.verify import VerifyReport, verify
+from daq_app.runfile.recovery import Recovery, recover
+from daq_app.runfile.saving import finalise
+from daq_app.runfile.source import rig_of
+from daq_app.runfile.verification import VerifyReport, verify
 
 __all__ = [
+    "JOURNAL_SUFFIX",
+    "RUN_SUFFIX",
     "BusyError",
     "DerivedData",
     "DerivedSignal",
@@ -50,6 +54,7 @@ __all__ = [
     "plan_to_dict",
     "read_journal",
     "recover",
+    "rig_of",
     "software_versions",
     "verify",
 ]

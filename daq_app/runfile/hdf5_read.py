@@ -11,6 +11,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 import h5py
 import numpy as np
+import psutil
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -20,6 +21,8 @@ from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.model import MAX_SAMPLES, RUN_FORMAT, DerivedData, DerivedSignal, Event, Gap, RunHeader
 from daq_app.runfile.safe_hdf5 import checked_dataset, damage_told, open_hdf5, read_column, read_text
 from daq_app.runfile.source import RunScaling, rig_of
+
+_SMALL_BYTES: Final = 2**28
 
 
 class RunAttributes(BaseModel):
@@ -92,6 +95,7 @@ class Run:
         """
         ids = self.channel_ids if ids is None else ids
         low, high, _ = slice(start, stop).indices(self.n_samples)
+        self._require_memory(8 * len(ids) * max(0, high - low))
         out = np.empty((len(ids), max(0, high - low)))
         unknown = [channel_id for channel_id in ids if channel_id not in self._raw]
         if unknown:
@@ -141,14 +145,22 @@ class Run:
         with damage_told(self.path, "the group of derived signals"):
             return self._read_derived() if layout.DERIVED in self._file else None
 
+    def _require_memory(self, n_bytes: int) -> None:
+        if n_bytes > _SMALL_BYTES and n_bytes > 0.75 * psutil.virtual_memory().available:
+            raise RunFileError(
+                f"{self.path}: {n_bytes / 1e9:.1f} GB do not fit into memory",
+                advice="Read it in parts: start, stop.",
+            )
+
     def _read_derived(self) -> DerivedData:
         group = self._group(layout.DERIVED)
         results = self._json(group, layout.RESULTS_JSON)
-        signals = {}
+        signals: dict[str, DerivedSignal] = {}
         for name in group:
             if name in (layout.TIME, layout.RESULTS_JSON):
                 continue
             dataset = checked_dataset(self.path, group, name, itemsize=8)
+            self._require_memory(8 * dataset.size * (len(signals) + 1))
             signals[name] = DerivedSignal(
                 dataset[()].astype(np.float64),
                 str(dataset.attrs.get("units", "")),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime as dt
 import hashlib
-import json
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +15,7 @@ import numpy as np
 from daq_app.config import Channel
 from daq_app.runfile import layout
 from daq_app.runfile.chunks import ChunkWriter, chunk_samples, chunk_writer, create_chunked
-from daq_app.runfile.model import RUN_FORMAT, RUN_FORMAT_VERSION, DerivedData, Event, Gap
+from daq_app.runfile.model import RUN_FORMAT, RUN_FORMAT_VERSION, DerivedData, Event, Gap, to_json
 from daq_app.runfile.source import Provenance, RunScaling, RunSource, rig_of
 
 _TEXT = h5py.string_dtype("utf-8")
@@ -62,7 +61,7 @@ def _write_root(file: h5py.File, source: RunSource, provenance: Provenance, dige
         "start_utc": started.isoformat(timespec="microseconds"),
         "start_utc_ns": np.int64(header.start_utc_ns),
         "host": header.host,
-        "versions": json.dumps(header.versions)[:_MAX_ATTRIBUTE_CHARACTERS],
+        "versions": to_json(header.versions)[:_MAX_ATTRIBUTE_CHARACTERS],
         "raw_sha256": digest,
         "lost_samples": np.int64(sum(gap.n_samples for gap in source.gaps)),
         "closed_in_good_order": np.int8(provenance.closed),
@@ -79,10 +78,10 @@ def _write_texts(file: h5py.File, source: RunSource) -> None:
     texts = {
         layout.HEADER_JSON: (header.model_dump_json(), "everything known before the first sample, JSON"),
         layout.RIG_TOML: (header.rig_text, "the rig file, letter by letter"),
-        layout.PLAN_JSON: (json.dumps(header.plan), "the NI task plan, JSON"),
+        layout.PLAN_JSON: (to_json(header.plan), "the NI task plan, JSON"),
     }
     if header.truth is not None:
-        texts[layout.TRUTH_JSON] = (json.dumps(header.truth), "what this simulated run was made from, JSON")
+        texts[layout.TRUTH_JSON] = (to_json(header.truth), "what this simulated run was made from, JSON")
     for name, (text, long_name) in texts.items():
         file.create_dataset(name, data=text, dtype=_TEXT).attrs["long_name"] = long_name
 
@@ -255,7 +254,7 @@ def _write_events(file: h5py.File, events: Sequence[Event], rate_hz: float) -> N
             "time": (samples / rate_hz, "s"),
             "kind": ([event.kind for event in events], ""),
             "text": ([event.text for event in events], ""),
-            "data": ([json.dumps(event.data) for event in events], ""),
+            "data": ([to_json(event.data) for event in events], ""),
         },
     )
 
@@ -298,7 +297,7 @@ def _write_derived(file: h5py.File, derived: DerivedData, rate_hz: float, writer
         raise ValueError("derived signals of one run must have one length")
     group.attrs["first_sample"] = np.int64(derived.first_sample)
     group.attrs["step"] = np.int64(derived.step)
-    group.create_dataset(layout.RESULTS_JSON, data=json.dumps(derived.results), dtype=_TEXT)
+    group.create_dataset(layout.RESULTS_JSON, data=to_json(derived.results), dtype=_TEXT)
     if not lengths:
         return
     n_samples = lengths.pop()

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import json
 import os
 import threading
 import time
@@ -30,7 +29,7 @@ from daq_app.runfile.errors import (
 )
 from daq_app.runfile.frames import MAX_PAYLOAD_BYTES, TAG_BYTES, FrameType, pack_frame
 from daq_app.runfile.locks import lock_file
-from daq_app.runfile.model import MAX_GAP_SAMPLES, RunHeader
+from daq_app.runfile.model import MAX_GAP_SAMPLES, RunHeader, to_json
 
 _HEADER_COPY_AFTER_FRAMES: Final = 100
 _FULL: Final = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG)
@@ -135,8 +134,8 @@ class JournalWriter:
             self._header_copied = True
 
     def append_event(self, kind: str, sample: int, text: str, data: dict[str, Any] | None = None) -> None:
-        """Write an event at an absolute sample (it may lie in the past). `data` must be JSON-able."""
-        payload = json.dumps({"kind": kind, "text": text, "data": data or {}}, ensure_ascii=False).encode()
+        """Write an event at an absolute sample (it may lie in the past). `data` is kept as JSON."""
+        payload = to_json({"kind": kind, "text": text, "data": data or {}}).encode()
         self._append(FrameType.EVENT, payload, first_sample=sample)
 
     def append_gap(self, first_sample: int, n_samples: int, reason: str) -> None:
@@ -150,7 +149,9 @@ class JournalWriter:
             raise ValueError(f"a gap of {n_samples} samples is too long for one run: start another run")
         if self._next_sample is not None and first_sample != self._next_sample:
             raise ValueError(f"gap starts at sample {first_sample}, but {self._next_sample} is the next")
-        self._append(FrameType.GAP, reason.encode(), first_sample=first_sample, n_samples=n_samples)
+        self._append(
+            FrameType.GAP, reason.encode("utf-8", "replace"), first_sample=first_sample, n_samples=n_samples
+        )
         self._next_sample = first_sample + n_samples
 
     def sync(self, timeout_s: float | None = None) -> int:

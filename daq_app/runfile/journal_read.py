@@ -19,7 +19,7 @@ from pydantic import ValidationError
 from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.frames import Frame, FrameType
 from daq_app.runfile.journal_scan import Scan, payload_is_good, scan_frames
-from daq_app.runfile.model import MAX_GAP_SAMPLES, MAX_SAMPLES, Event, Gap, RunHeader
+from daq_app.runfile.model import MAX_GAP_SAMPLES, MAX_SAMPLES, Event, Gap, RunHeader, clean_text, to_json
 
 _MAX_TEXT_BYTES: Final = 2**24
 """Longest event or reason that is read."""
@@ -153,7 +153,8 @@ class JournalContents:
                 continue
             try:
                 content = json.loads(self._payload(frame))
-                kind, text, data = str(content["kind"]), str(content["text"]), dict(content["data"])
+                kind, text = clean_text(str(content["kind"])), clean_text(str(content["text"]))
+                data = json.loads(to_json(dict(content["data"])))
             except (ValueError, KeyError, TypeError, RecursionError):
                 self.damage.append("an event that cannot be read was left out")
                 continue
@@ -188,7 +189,7 @@ class JournalContents:
     def _reason(self, frame: Frame) -> str:
         if frame.payload_bytes > _MAX_TEXT_BYTES:
             return "reason not readable"
-        return self._payload(frame).decode("utf-8", "replace")
+        return clean_text(self._payload(frame).decode("utf-8", "replace"))
 
     def _describe_damage(self) -> None:
         scan = self._scan

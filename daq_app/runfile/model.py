@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
+import math
 import platform
 import socket
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from daq_app.config.plan import TaskPlan
 
@@ -24,22 +27,55 @@ MAX_GAP_SAMPLES = 2**26
 _RESERVED_NAMES = frozenset({"time", "chunk"})
 
 
+def clean_text(text: str) -> str:
+    """Text that HDF5 and UTF-8 can hold: no NUL, no half of a surrogate pair."""
+    return text.encode("utf-8", "replace").decode().replace("\0", "\ufffd")
+
+
+def to_json(value: object) -> str:
+    """Strict JSON of nearly anything: NumPy numbers become numbers, NaN and infinity null, the rest text.
+
+    Recording never stops because somebody put something odd into an event.
+    """
+    return json.dumps(_plain(value), ensure_ascii=False, allow_nan=False)
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if value is None or isinstance(value, bool | int):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {clean_text(str(key)): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | set | frozenset):
+        return [_plain(item) for item in value]
+    return clean_text(str(value))
+
+
+_Text = Annotated[str, AfterValidator(clean_text)]
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+_LATEST_NS = 250_000_000_000 * 10**9
+"""A moment near the year 9892: the last that a calendar here can show."""
+
+
 class RunHeader(BaseModel):
     """All that is known of a run before its first sample. Stored as JSON in journal and run file."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
     format_version: Literal[1] = 1
-    run_id: Annotated[str, Field(min_length=1, max_length=200)]
+    run_id: Annotated[_Text, Field(min_length=1, max_length=200)]
     """Unique: ties the journal to its run file."""
-    test: str = ""
-    specimen: str = ""
-    rig_name: str = ""
-    rig_text: str = ""
+    test: _Text = ""
+    specimen: _Text = ""
+    rig_name: _Text = ""
+    rig_text: _Text = ""
     """The rig file, letter by letter."""
     channel_ids: Annotated[tuple[str, ...], Field(min_length=1, max_length=4096)]
     """Row order of every block."""
-    reading_units: tuple[str, ...]
+    reading_units: tuple[Annotated[_Text, Field(max_length=64)], ...]
     """Unit of each row."""
     rate_hz: Annotated[float, Field(gt=0, le=1e7, allow_inf_nan=False)]
     """Rate read back from the hardware."""
@@ -47,15 +83,15 @@ class RunHeader(BaseModel):
     """The task plan (`plan_to_dict`)."""
     opened: dict[str, Any] = Field(default_factory=dict)
     """What the hardware made of the plan: ranges, buffer, devices, driver."""
-    tare: dict[str, float] = Field(default_factory=dict)
+    tare: dict[str, _Finite] = Field(default_factory=dict)
     """Reading found at rest beyond the certificate's offset, by channel id."""
     tare_record: dict[str, Any] = Field(default_factory=dict)
     """When and on how many samples the tare was taken, scatter by channel."""
-    start_utc_ns: int = 0
+    start_utc_ns: Annotated[int, Field(ge=0, le=_LATEST_NS)] = 0
     """Wall clock at the run's first sample. A stamp only: time is sample index / rate."""
-    host: str = ""
-    versions: dict[str, str] = Field(default_factory=dict)
-    notes: str = ""
+    host: _Text = ""
+    versions: dict[str, _Text] = Field(default_factory=dict)
+    notes: _Text = ""
     truth: dict[str, Any] | None = None
     """What a simulated run was made from; None for a real one."""
     origin: dict[str, Any] | None = None
@@ -81,11 +117,18 @@ class RunHeader(BaseModel):
 
     def time_offset_s(self, channel_id: str) -> float:
         """Known lag of a channel: its sample k shows the instant ``k / rate + time_offset_s``."""
-        for task in self.plan.get("tasks", ()):
-            for channel in task.get("channels", ()):
-                if channel.get("id") == channel_id:
-                    return float(channel.get("skew_s", 0.0)) - float(channel.get("input_delay_s", 0.0))
-        return 0.0
+        return self._time_offsets.get(channel_id, 0.0)
+
+    @cached_property
+    def _time_offsets(self) -> dict[str, float]:
+        try:
+            return {
+                str(channel["id"]): float(channel["skew_s"]) - float(channel["input_delay_s"])
+                for task in self.plan["tasks"]
+                for channel in task["channels"]
+            }
+        except (KeyError, TypeError, ValueError):
+            return {}  # no plan (an imported run), or one of another version: no lag is known
 
 
 @dataclass(frozen=True, slots=True)

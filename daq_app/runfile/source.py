@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.config import Channel, ConfigError, Rig, Scaling, parse_rig
 from daq_app.runfile.model import Event, Gap, RunHeader
+
+_MAX_RIG_CHARACTERS: Final = 2**22
 
 
 class RunSource(Protocol):
@@ -68,7 +70,7 @@ def rig_of(header: RunHeader) -> Rig | None:
 
     A run is never refused for its rig: the readings stand without it.
     """
-    if not header.rig_text:
+    if not header.rig_text or len(header.rig_text) > _MAX_RIG_CHARACTERS:
         return None
     try:
         return parse_rig(header.rig_text, "rig text of the run")

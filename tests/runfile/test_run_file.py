@@ -107,9 +107,9 @@ def _change(path: Path, dataset: str, index: int, value: float) -> None:
 
 def test_changed_readings_are_found_though_every_checksum_is_right(run) -> None:
     _change(run[0], "raw/WP-1", 5, 1.5)
-    with open_run(run[0]) as opened:
-        with pytest.raises(RunFileError, match="WP-1 between samples 1000 and 1010 is damaged"):
-            opened.readings(["WP-1"], 0, 10)
+    told = pytest.raises(RunFileError, match="WP-1 between samples 1000 and 1010 is damaged")
+    with open_run(run[0]) as opened, told:
+        opened.readings(["WP-1"], 0, 10)
     with h5py.File(run[0]) as file:
         forged = file["raw/WP-1"]
         crc = zlib.crc32(forged[: forged.chunks[0]].data)

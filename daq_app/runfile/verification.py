@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from daq_app.runfile.chunks import chunk_samples
 from daq_app.runfile.errors import RunFileError
-from daq_app.runfile.finalise import is_run_of
 from daq_app.runfile.folder import JOURNAL_SUFFIX, find_journals, find_runs
 from daq_app.runfile.frames import MAGIC
 from daq_app.runfile.hdf5_read import Run, open_run
 from daq_app.runfile.hdf5_write import combined_sha256
 from daq_app.runfile.journal_read import read_journal
+from daq_app.runfile.saving import is_run_of
 from daq_app.runfile.source import RunScaling
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Literal
 
 from daq_app.runfile.errors import BusyError, RunFileError
-from daq_app.runfile.finalise import finalise_contents, is_run_of
 from daq_app.runfile.folder import RUN_SUFFIX, find_journals
 from daq_app.runfile.hdf5_read import open_run
 from daq_app.runfile.journal_read import JournalContents, read_journal
 from daq_app.runfile.locks import journal_locked
-from daq_app.runfile.verify import verify_run
+from daq_app.runfile.saving import finalise_contents, is_run_of
+from daq_app.runfile.verification import verify_run
 
 Outcome = Literal["recovered", "saved already", "in use", "empty", "failed"]
 
@@ -54,8 +54,9 @@ def _recover_one(journal: Path, thorough: bool) -> Recovery:
         return Recovery(
             journal, "in use", f"{journal.name} is being recorded or recovered by another process"
         )
-    except (RunFileError, OSError) as error:
-        return Recovery(journal, "failed", str(error))
+    except Exception as error:
+        # Whatever is wrong with this journal, the others must still be recovered.
+        return Recovery(journal, "failed", str(error) or type(error).__name__)
 
 
 def _make_run(journal: Path, contents: JournalContents, thorough: bool) -> Recovery:
