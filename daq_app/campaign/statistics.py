@@ -1,0 +1,75 @@
+"""Means over tests: each test has its own standard error, and tests differ among themselves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, stats
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class GroupMean:
+    """Mean of several tests with its 95 % confidence interval."""
+
+    mean: float
+    standard_error: float
+    low95: float
+    high95: float
+    scatter: float
+    """Standard deviation of the true values from test to test (random effect)."""
+    tests: int
+
+    @property
+    def known(self) -> bool:
+        """Whether there were tests at all."""
+        return self.tests > 0
+
+
+NO_TESTS = GroupMean(math.nan, math.nan, math.nan, math.nan, math.nan, 0)
+
+
+def random_effects_mean(values: Sequence[float], standard_errors: Sequence[float]) -> GroupMean:
+    """Mean of `values` (n,) of which each is known to its own standard error (n,).
+
+    Random-effects model, value_i = mean + scatter + error_i; the scatter by restricted maximum
+    likelihood, the interval by Hartung and Knapp's t with n − 1 degrees of freedom, never narrower
+    than the plain one. Values that are not finite are left out. One value has an interval from its
+    own standard error alone.
+    """
+    y, s = np.asarray(values, dtype=np.float64), np.asarray(standard_errors, dtype=np.float64)
+    if y.shape != s.shape:
+        raise ValueError(f"{y.size} values but {s.size} standard errors")
+    good = np.isfinite(y) & np.isfinite(s) & (s > 0)
+    y, s = y[good], s[good]
+    if y.size == 0:
+        return NO_TESTS
+    if y.size == 1:
+        reach = 1.959964 * float(s[0])
+        return GroupMean(float(y[0]), float(s[0]), float(y[0]) - reach, float(y[0]) + reach, math.nan, 1)
+    scatter = _scatter(y, s)
+    weights = 1.0 / (s**2 + scatter**2)
+    mean = float(weights @ y / weights.sum())
+    spread = float(weights @ (y - mean) ** 2 / (y.size - 1))
+    error = math.sqrt(max(spread, 1.0) / float(weights.sum()))
+    reach = float(stats.t.ppf(0.975, y.size - 1)) * error
+    return GroupMean(mean, error, mean - reach, mean + reach, scatter, int(y.size))
+
+
+def _scatter(y: Floats, s: Floats) -> float:
+    """Restricted maximum likelihood of the standard deviation between tests."""
+
+    def cost(tau: float) -> float:
+        variance = s**2 + tau**2
+        weights = 1.0 / variance
+        mean = weights @ y / weights.sum()
+        return float(np.log(variance).sum() + np.log(weights.sum()) + weights @ (y - mean) ** 2)
+
+    top = 3.0 * float(y.std()) + float(s.max())
+    found = optimize.minimize_scalar(cost, bounds=(0.0, top), method="bounded", options={"xatol": 1e-9})
+    return 0.0 if cost(0.0) <= found.fun else float(found.x)
