@@ -30,7 +30,8 @@ class State(StrEnum):
 
 
 class Message(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    # NaN (a half-cycle that could not be fitted) travels as the string "NaN": plain JSON has no such number.
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
 
 
 class StateMessage(Message):

@@ -1,0 +1,101 @@
+"""``python -m daq_app.acquisition.finalise_worker``: makes run files, one JSON line per job and answer.
+
+Jobs: ``{"job": "finalise", "journal": PATH, "out": PATH}`` and ``{"job": "recover", "folder": PATH}``. The
+process ends at once when its standard input closes, that is, when its parent dies: a half-made run
+file is a ``.tmp`` beside an untouched journal, and the next start makes it again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import sys
+import threading
+from dataclasses import asdict
+from pathlib import Path
+
+import psutil
+
+from daq_app.acquisition.finaliser import Finished
+
+
+def finalise_job(journal: Path, out: Path) -> Finished:
+    """Verify the journal, derive, write, prove; the journal goes once its run is proven."""
+    from daq_app.acquisition.derive import derive
+    from daq_app.runfile import RunFileError, finalise, read_journal
+
+    try:
+        with read_journal(journal) as contents:
+            derived, trouble = derive(contents)
+            damaged = bool(contents.damage)
+        finalise(journal, out, derived, keep_journal=damaged)
+    except RunFileError as error:
+        return Finished(False, f"The run file could not be made: {error} The journal is kept: {journal}")
+    except Exception as error:
+        return Finished(
+            False,
+            f"Making the run file failed ({type(error).__name__}: {error}). The journal is kept: {journal}",
+        )
+    return Finished(True, f"Saved as {out.name}{trouble and f'. {trouble}'}", str(out))
+
+
+def recover_job(folder: Path) -> Finished:
+    """Make runs of all orphan journals; `data` lists what was done."""
+    from daq_app.runfile import recover
+
+    done = [found for found in recover(folder) if found.outcome not in ("saved already", "in use")]
+    for found in done:
+        if found.outcome == "recovered":
+            # Proven by `recover`; under its own name it would be read again at every start.
+            found.journal.replace(found.journal.with_suffix(".journal-recovered"))
+    told = [
+        {
+            "outcome": found.outcome,
+            "text": found.text,
+            "run": str(found.run or ""),
+            "journal": str(found.journal),
+        }
+        for found in done
+    ]
+    return Finished(not any(f.outcome == "failed" for f in done), "", "", {"recoveries": told})
+
+
+def _do(job: dict[str, str]) -> Finished:
+    match job:
+        case {"job": "finalise", "journal": journal, "out": out}:
+            return finalise_job(Path(journal), Path(out))
+        case {"job": "recover", "folder": folder}:
+            try:
+                return recover_job(Path(folder))
+            except Exception as error:
+                return Finished(False, f"Recovery of {folder} failed ({type(error).__name__}: {error})")
+    return Finished(False, f"There is no job like {job}")
+
+
+def _listen(jobs: queue.SimpleQueue[str]) -> None:
+    for line in sys.stdin:
+        jobs.put(line)
+    os._exit(0)
+
+
+def main() -> None:
+    """Serve until the parent goes."""
+    # Reading and drawing come first; a run file may take a second longer.
+    with contextlib.suppress(psutil.Error, OSError, AttributeError):
+        psutil.Process().nice(psutil.BELOW_NORMAL_PRIORITY_CLASS if sys.platform == "win32" else 10)
+    answers = sys.stdout
+    sys.stdout = sys.stderr  # whatever a library prints must not be taken for an answer
+    jobs: queue.SimpleQueue[str] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(jobs,), daemon=True).start()
+    import daq_app.acquisition.derive  # noqa: F401  # loaded now, so that the first run need not wait
+
+    while True:
+        answer = _do(json.loads(jobs.get()))
+        answers.write(json.dumps(asdict(answer)) + "\n")
+        answers.flush()
+
+
+if __name__ == "__main__":
+    main()

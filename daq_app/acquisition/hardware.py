@@ -1,0 +1,50 @@
+"""From the word for the connection to a way of making drivers."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+from daq_app.acquisition.simulated import SimulatedServer
+from daq_app.runfile import RunFileError, open_run
+from drivers import Driver, DriverError, ReplayDriver, open_driver
+
+_REPLAY = "replay:"
+
+
+def driver_maker(
+    connection: str, options: argparse.Namespace, stack: ExitStack
+) -> tuple[Callable[[], Driver], str]:
+    """How to make a driver for `connection`, and the connection it comes to.
+
+    A simulated server or a run that is replayed is opened here and closed with `stack`. Raises `DriverError`.
+    """
+    if connection == "simulated":
+        server = stack.enter_context(SimulatedServer(options.rig, _server_options(options)))
+        return (lambda: open_driver(server.connection)), server.connection
+    if connection.startswith(_REPLAY):
+        return _replay(Path(connection.removeprefix(_REPLAY)), options, stack), connection
+    backup: Path | None = options.backup
+    # Checks the address now rather than in the reader's thread.
+    open_driver(connection).close()
+    return (lambda: open_driver(connection, backup_folder=backup)), connection
+
+
+def _server_options(options: argparse.Namespace) -> list[str]:
+    chosen = ["--speed", str(options.speed)]
+    if options.seed is not None:
+        chosen += ["--seed", str(options.seed)]
+    if options.theta0_over_alpha is not None:
+        chosen += ["--theta0-over-alpha", str(options.theta0_over_alpha)]
+    return chosen
+
+
+def _replay(path: Path, options: argparse.Namespace, stack: ExitStack) -> Callable[[], Driver]:
+    try:
+        run = stack.enter_context(open_run(path))
+    except RunFileError as error:
+        raise DriverError(error.message, advice=error.advice or "Choose a run file to replay") from error
+    speed = float("inf") if options.speed == "max" else float(options.speed)
+    return lambda: ReplayDriver(run, speed)

@@ -1,0 +1,147 @@
+"""Life of the acquisition process: from its options to its exit code.
+
+0 ended as asked · 2 bad options, rig file or folder · 3 hardware · 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import secrets
+import signal
+import sys
+from collections.abc import Sequence
+from concurrent.futures import Future
+from contextlib import ExitStack
+
+from daq_app.acquisition.desk import Answer, Desk, DeskError
+from daq_app.acquisition.hardware import driver_maker
+from daq_app.acquisition.items import RequestRefused
+from daq_app.acquisition.messages import Command, Reply
+from daq_app.acquisition.options import READY, parse
+from daq_app.acquisition.session import Session, SessionSettings
+from daq_app.acquisition.session_file import SessionFile, remove_session_file, write_session_file
+from daq_app.acquisition.unattended import Unattended
+from daq_app.config import ConfigError, Rig, TaskPlan, load_rig, plan_tasks
+from daq_app.runfile import FolderLock, RunFileError
+from drivers import DriverError
+
+_TICK_S = 0.2
+
+
+class Process:
+    """The main thread's part: sockets, session, unattended test, signals."""
+
+    def __init__(self, options: argparse.Namespace, rig: Rig, plan: TaskPlan, stack: ExitStack) -> None:
+        connection = options.connection or rig.hardware.connection
+        make_driver, self._connection = driver_maker(connection, options, stack)
+        self._rig = rig
+        self._rig_text = options.rig.read_text(encoding="utf-8")
+        self._token = os.environ.get("DAQ_APP_TOKEN") or secrets.token_urlsafe(24)
+        self._desk = Desk(options.bind, self._handle, self._token, options.keys)
+        stack.callback(self._desk.close)
+        self.session = Session(
+            SessionSettings(
+                rig=rig,
+                rig_text=self._rig_text,
+                plan=plan,
+                folder=options.out,
+                make_driver=make_driver,
+                release_within_s=options.release_within,
+                spare_folder=options.spare,
+            ),
+            self._desk.publisher,
+        )
+        self._unattended = Unattended(self.session, options.test, options.notes) if options.test else None
+        self._interrupted = False
+        self._leaving: Future[Reply] | None = None
+        self._folder = options.out
+
+    def run(self) -> int:
+        """Serve until told to end; the exit code."""
+        for name in ("SIGINT", "SIGTERM", "SIGBREAK"):
+            if hasattr(signal, name):
+                signal.signal(getattr(signal, name), self._on_signal)
+        address = self._desk.addresses.commands
+        write_session_file(
+            self._folder,
+            SessionFile(address=address, token=self._token, pid=os.getpid(), rig=self._rig.name),
+        )
+        self.session.start()
+        print(f"{READY}{address}", flush=True)
+        try:
+            self._desk.serve(self._tick, _TICK_S)
+        finally:
+            self.session.close()
+            remove_session_file(self._folder)
+        if self._interrupted:
+            return 130
+        if self._unattended is not None and self._unattended.exit_code:
+            print(self._unattended.text, file=sys.stderr, flush=True)
+            return self._unattended.exit_code
+        return 0
+
+    def _tick(self) -> None:
+        self.session.tick()
+        if self._unattended is not None and not self._interrupted:
+            self._unattended.advance()
+            if self._unattended.exit_code is not None:
+                self._desk.stop()
+        if (self._interrupted or self._leaving is not None) and not self.session.recording:
+            self._desk.stop()
+
+    def _on_signal(self, number: int, frame: object) -> None:
+        """Ctrl-C and the like: stop the test, keep what was recorded, end."""
+        del number, frame
+        if self._interrupted:
+            return
+        self._interrupted = True
+        if self.session.recording:
+            self.session.ask("stop", {})
+
+    def _handle(self, command: Command) -> Answer:
+        if command.name == "hello":
+            return Reply(ok=True, text="Rocking-test recorder", data=self._about())
+        if command.name == "shutdown":
+            return self._shutdown(force=bool(command.arguments.get("force", 0)))
+        return self.session.handle(command)
+
+    def _about(self) -> dict[str, object]:
+        """What a viewer needs to know before it listens."""
+        opened = self.session.opened
+        return {
+            "publisher": self._desk.addresses.publisher,
+            "rig_name": self._rig.name,
+            "rig_text": self._rig_text,
+            "channel_ids": list(self._rig.channel_ids),
+            "rate_hz": opened.rate_hz if opened else 0.0,
+            "connection": self._connection,
+            "folder": str(self._folder.resolve()),
+            "pid": os.getpid(),
+            "state": self.session.analyst.state_message().model_dump(mode="json"),
+        }
+
+    def _shutdown(self, *, force: bool) -> Answer:
+        if self.session.recording and not force:
+            raise RequestRefused("A run is being recorded. Stop or abort it first")
+        if self.session.recording:
+            self.session.ask("stop", {})
+        self._leaving = Future()
+        return Reply(ok=True, text="The acquisition process ends once everything is saved")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the process with these options; errors are one paragraph on standard error."""
+    options = parse(argv)
+    try:
+        rig = load_rig(options.rig)
+        plan = plan_tasks(rig, str(options.rig))
+        with ExitStack() as stack:
+            stack.enter_context(FolderLock(options.out))
+            return Process(options, rig, plan, stack).run()
+    except (ConfigError, RunFileError, DeskError) as error:
+        print(str(error), file=sys.stderr, flush=True)
+        return 2
+    except DriverError as error:
+        print(str(error), file=sys.stderr, flush=True)
+        return 3

@@ -1,0 +1,254 @@
+"""One session at the rig: wires the threads together and answers the requests of viewers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from daq_app.acquisition.analyst import Analyst
+from daq_app.acquisition.desk import Answer, Publisher
+from daq_app.acquisition.finaliser import Finaliser, Finished
+from daq_app.acquisition.header import make_header
+from daq_app.acquisition.items import (
+    Ask,
+    Begin,
+    Closed,
+    Item,
+    Noted,
+    RequestRefused,
+    Saved,
+    SourceEnded,
+    Started,
+)
+from daq_app.acquisition.messages import Command, EventMessage, Reply, State
+from daq_app.acquisition.preflight import check_modules, check_name, check_space
+from daq_app.acquisition.reader import Patience, Reader
+from daq_app.acquisition.recorder import Recorded, Recorder
+from daq_app.acquisition.watchdog import Watchdog
+from daq_app.config.plan import TaskPlan
+from daq_app.config.rig import Rig
+from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX
+from drivers import Driver, DriverError, Opened
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True, slots=True)
+class SessionSettings:
+    """What a session needs to know beside the rig."""
+
+    rig: Rig
+    rig_text: str
+    plan: TaskPlan
+    folder: Path
+    make_driver: Callable[[], Driver]
+    release_within_s: float = 1800.0
+    spare_folder: Path | None = None
+    patience: Patience = field(default_factory=Patience)
+
+
+class Session:
+    """Call everything from the main thread; the threads inside talk through queues."""
+
+    def __init__(self, settings: SessionSettings, publisher: Publisher) -> None:
+        self._settings = settings
+        self._publisher = publisher
+        self.finaliser = Finaliser()
+        self.recorder = Recorder(self._forward, self._announce, self._hand_over, settings.spare_folder)
+        self.analyst = Analyst(
+            settings.rig, publisher, self.recorder.inbox.put, release_within_s=settings.release_within_s
+        )
+        self.watchdog = Watchdog(self.recorder, settings.folder, self._say)
+        self.opened: Opened | None = None
+        self.error: DriverError | None = None
+        """Why sampling ended, if it ended by a fault."""
+        self._reader: Reader | None = None
+
+    # -- life ------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start the threads, recover what an earlier session left behind, and begin to sample."""
+        self.finaliser.start()
+        self.recorder.start()
+        self.analyst.start()
+        job = {"job": "recover", "folder": str(self._settings.folder)}
+        self.finaliser.submit(job, self._tell_recovery)
+        self.preview()
+
+    def close(self) -> None:
+        """Stop sampling, close and save what is open, end the threads."""
+        if self._reader is not None:
+            self._reader.request_stop()
+            self._reader.join()
+        self.recorder.inbox.put(None)
+        self.recorder.join()
+        self.finaliser.close()
+        self.analyst.inbox.put(None)
+        self.analyst.join()
+
+    def tick(self) -> None:
+        """Five times a second, on the main thread."""
+        self._publisher.send("health", self.watchdog.look(self._reader, self.analyst.overloaded))
+
+    @property
+    def state(self) -> State:
+        return self.analyst.state
+
+    @property
+    def recording(self) -> bool:
+        return self.recorder.status.recording
+
+    # -- between the threads ---------------------------------------------------------------------
+
+    def _forward(self, item: Item) -> None:
+        """On the recorder's thread, after the journal has the item."""
+        match item:
+            case Started(opened=opened):
+                self.opened = opened
+                for sentence in check_modules(self._settings.rig, opened):
+                    self._say(EventMessage(kind="hardware", sample=0, text=sentence, severity="error"))
+            case SourceEnded(error=error):
+                self.opened = None
+                self.error = error
+        self.analyst.inbox.put(item)
+
+    def _announce(self, event: EventMessage) -> None:
+        self._publisher.send("event", event)
+
+    def _say(self, event: EventMessage) -> None:
+        self.recorder.inbox.put(Noted(event))
+
+    def _hand_over(self, recorded: Recorded) -> None:
+        """On the recorder's thread, when a journal is closed."""
+        self.analyst.inbox.put(Closed(recorded.journal, recorded.end))
+        out = recorded.journal.with_suffix(RUN_SUFFIX)
+        job = {"job": "finalise", "journal": str(recorded.journal), "out": str(out)}
+        self.finaliser.submit(job, lambda finished: self._tell_saved(recorded, finished))
+
+    def _tell_saved(self, recorded: Recorded, finished: Finished) -> None:
+        """On the finaliser's thread."""
+        ok = finished.ok and recorded.end.outcome != "failed"
+        text = finished.text if ok else f"{recorded.end.text}. {finished.text}"
+        self._say(
+            EventMessage(
+                kind="saved" if finished.ok else "unsaved",
+                sample=recorded.end.sample,
+                text=text,
+                severity="info" if ok else "error",
+                data={"run": finished.path, "outcome": recorded.end.outcome, "test": recorded.header.test},
+            )
+        )
+        self.analyst.inbox.put(Saved(ok, text, finished.path))
+
+    def _tell_recovery(self, finished: Finished) -> None:
+        """On the finaliser's thread."""
+        for found in (finished.data or {}).get("recoveries", []):
+            failed = found["outcome"] == "failed"
+            self._say(
+                EventMessage(
+                    kind="recovered" if not failed else "unrecovered",
+                    sample=0,
+                    text=f"Left by an earlier session: {found['text']}",
+                    severity="error" if failed else "warning",
+                    data={"run": found["run"], "journal": found["journal"], "outcome": found["outcome"]},
+                )
+            )
+        if not finished.ok and finished.text:
+            self._say(EventMessage(kind="unrecovered", sample=0, text=finished.text, severity="error"))
+
+    # -- requests --------------------------------------------------------------------------------
+
+    def preview(self) -> str:
+        """Begin to sample, if nothing samples yet."""
+        if self._reader is not None and self._reader.is_alive():
+            return "Sampling already"
+        self.error = None
+        self._reader = Reader(
+            self._settings.make_driver,
+            self._settings.plan,
+            self.recorder.inbox.put,
+            self._settings.patience,
+        )
+        self._reader.start()
+        return "Sampling begins"
+
+    def arm(self, test: str, notes: str = "", truth: dict[str, Any] | None = None) -> Future[Path]:
+        """Record from now on as `test`. Raises `RequestRefused`; the future gives the journal's path."""
+        settings = self._settings
+        check_name(test)
+        if self.opened is None:
+            raise RequestRefused("Nothing is being sampled. Start the preview first")
+        if self.recording:
+            raise RequestRefused("A run is being recorded already. Stop or abort it before the next one")
+        wrong = check_modules(settings.rig, self.opened)
+        if wrong:
+            raise RequestRefused("; ".join(wrong))
+        check_space(settings.folder, settings.rig, self.opened.rate_hz)
+        header = make_header(
+            settings.rig,
+            settings.rig_text,
+            settings.plan,
+            self.opened,
+            self.analyst.tare,
+            test=test,
+            notes=notes,
+            truth=truth,
+        )
+        begin = Begin(settings.folder / f"{header.run_id}{JOURNAL_SUFFIX}", header)
+        self.recorder.inbox.put(begin)
+        return begin.done
+
+    def ask(self, name: str, arguments: dict[str, Any]) -> Future[tuple[str, dict[str, Any]]]:
+        """Hand a request to the analyst, in step with the samples."""
+        ask = Ask(name, arguments)
+        self.recorder.inbox.put(ask)
+        return ask.done
+
+    def handle(self, command: Command) -> Answer:
+        """Answer a viewer's command (not hello and shutdown, which the process answers)."""
+        match command.name:
+            case "preview":
+                return Reply(ok=True, text=self.preview())
+            case "arm":
+                return _reply_of(self.arm(*_arm_arguments(command.arguments)), _armed)
+            case "tare" | "abort" | "stop" | "marker" | "note":
+                return _reply_of(self.ask(command.name, dict(command.arguments)), _answered)
+        raise RequestRefused(
+            f"There is no command '{command.name[:40]}'. There are hello, preview, tare, arm, abort, stop, "
+            "marker, note and shutdown"
+        )
+
+
+def _arm_arguments(arguments: dict[str, float | str]) -> tuple[str, str, dict[str, Any] | None]:
+    truth: dict[str, Any] | None = None
+    if text := str(arguments.get("truth", "")):
+        try:
+            truth = json.loads(text)
+        except ValueError as error:
+            raise RequestRefused(f"truth is no JSON ({error})") from error
+        if not isinstance(truth, dict):
+            raise RequestRefused("truth must be a JSON object")
+    return str(arguments.get("test", "")), str(arguments.get("notes", ""))[:20_000], truth
+
+
+def _armed(journal: Path) -> Reply:
+    return Reply(ok=True, text="Armed and recording", data={"journal": str(journal)})
+
+
+def _answered(answer: tuple[str, dict[str, Any]]) -> Reply:
+    return Reply(ok=True, text=answer[0], data=answer[1])
+
+
+def _reply_of(asked: Future[_T], say: Callable[[_T], Reply]) -> Future[Reply]:
+    reply: Future[Reply] = Future()
+
+    def pass_on(done: Future[_T]) -> None:
+        error = done.exception()
+        reply.set_result(say(done.result()) if error is None else Reply(ok=False, text=str(error)))
+
+    asked.add_done_callback(pass_on)
+    return reply
