@@ -7,7 +7,12 @@ from typing import Final
 
 import typer
 
-_GROUPS: Final = ("daq_app.cli.config_commands",)
+_GROUPS: Final = (
+    "daq_app.cli.config_commands",
+    "daq_app.cli.campaign_commands",
+    "daq_app.cli.theory_commands",
+    "daq_app.cli.run_file_commands",
+)
 """Modules with a ``register(app)`` function, in the order of the help page."""
 
 

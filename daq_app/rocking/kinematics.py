@@ -20,7 +20,7 @@ from daq_app.config.rig import Channel, Rig
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-_TWIST_PRIOR_RAD = 1e-3
+_TWIST_PRIOR_RAD = 0.02
 """Plausible twist about the vertical axis: keeps the fit well posed when one end's wire is lost."""
 _AGREEMENT_RAD = 1e-3
 _AGREEMENT_RELATIVE = 0.03

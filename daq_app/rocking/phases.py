@@ -237,7 +237,7 @@ class PhaseDetector:
 
     def _free_speed_square(self, from_rad: float, at_rad: float) -> float:
         alpha, p = self.settings.alpha_rad, self.settings.p_rad_s
-        return 2.0 * p * p * (math.cos(alpha - at_rad) - math.cos(alpha - from_rad))
+        return 2.0 * p * p * (math.cos(alpha - from_rad) - math.cos(alpha - at_rad))
 
     def _check_fall(self) -> None:
         level = abs(self._hold_rad)
