@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+try:
+    import PySide6.QtWidgets  # noqa: F401 - can Qt start here?
+
+    pytest_plugins = ["pytestqt.plugin"]
+except ImportError:
+    # A shared library of the system is missing: tests/monitor skips and says which package brings it.
+    pytest_plugins = []
 
 REPOSITORY = Path(__file__).parents[1]
 

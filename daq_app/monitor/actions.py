@@ -18,6 +18,10 @@ from daq_app.monitor.session import RECORDING, RUNNING
 CONFIRM_WITHIN_S: Final = 2.5
 
 
+BETWEEN_TESTS: Final = frozenset({State.PREVIEWING, State.SAVED, State.FAILED})
+"""States in which the next test can be prepared while samples come in."""
+
+
 @dataclass(frozen=True, slots=True)
 class Action:
     """One order, enabled in `states`; with `confirm` it must be given twice: one slip costs no test."""
@@ -27,23 +31,51 @@ class Action:
     key: str
     states: frozenset[State]
     tip: str
+    sampling: bool | None = True
+    """Whether samples must (or must not) be coming in; None if it does not matter."""
     role: str = ""
     confirm: bool = False
 
 
 ACTIONS: Final = (
-    Action("preview", "Live view", "F4", frozenset({State.IDLE, State.SAVED, State.FAILED}),
-           "Start reading the sensors; nothing is recorded"),
-    Action("arm", "Arm", "F5", frozenset({State.PREVIEWING}),
-           "Start recording for the test that is chosen", role="primary"),
-    Action("stop", "Stop and keep", "F7", RECORDING,
-           "End the recording now and keep the run (it ends by itself at rest)"),
-    Action("abort", "Abort", "F8", RECORDING,
-           "End the recording as aborted; the test's number stays free", role="danger", confirm=True),
+    Action(
+        "preview",
+        "Live view",
+        "F4",
+        frozenset({State.IDLE, State.SAVED, State.FAILED}),
+        "Start reading the sensors; nothing is recorded",
+        sampling=False,
+    ),
+    Action("arm", "Arm", "F5", BETWEEN_TESTS, "Start recording the test that is chosen", role="primary"),
+    Action(
+        "next",
+        "Next test",
+        "F6",
+        frozenset(set(State) - RECORDING - {State.SAVING}),
+        "Take the next test of the campaign",
+        sampling=None,
+    ),
+    Action(
+        "stop",
+        "Stop, keep",
+        "F7",
+        RECORDING,
+        "End the recording now and keep the run (it ends by itself at rest)",
+        sampling=None,
+        confirm=True,
+    ),
+    Action(
+        "abort",
+        "Abort",
+        "F8",
+        frozenset({State.ARMED, State.HOLDING}),
+        "Give up this arming before the release; the test's number stays free",
+        sampling=None,
+        role="danger",
+        confirm=True,
+    ),
     Action("marker", "Marker", "F9", RUNNING, "Write a marker with this instant into the record"),
-    Action("next", "Next test", "F6", frozenset(set(State) - RECORDING - {State.SAVING}),
-           "Take the next test of the campaign"),
-)  # fmt: skip
+)
 
 
 class ActionBar(QWidget):
@@ -70,10 +102,10 @@ class ActionBar(QWidget):
             self.buttons[action.name] = button
             layout.addWidget(button)
 
-    def refresh(self, state: State | None, *, may_command: bool) -> None:
+    def refresh(self, state: State | None, *, sampling: bool, may_command: bool) -> None:
         """Enable what makes sense in this state; nothing without a link or the right to command."""
         for action in ACTIONS:
-            enabled = may_command and state in action.states
+            enabled = may_command and state in action.states and action.sampling in (None, sampling)
             self.buttons[action.name].setEnabled(enabled)
             if action.name in self._asked and not self._is_asked(action):
                 self._withdraw(action)
@@ -84,7 +116,7 @@ class ActionBar(QWidget):
     def _order(self, action: Action) -> None:
         if action.confirm and not self._is_asked(action):
             self._asked[action.name] = self._clock()
-            self.buttons[action.name].setText(f"Again to {action.text.lower()}  {action.key}")
+            self.buttons[action.name].setText(f"{action.key} again: {action.text.lower()}")
             QTimer.singleShot(int(1000 * CONFIRM_WITHIN_S) + 50, self, lambda: self._withdraw_if_old(action))
             return
         self._withdraw(action)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
-from daq_app.acquisition.messages import State
+from daq_app.acquisition.messages import HealthMessage, State
 from daq_app.monitor.labels import role_label, set_role
 from daq_app.monitor.session import RECORDING, Session
 from daq_app.monitor.shapes import Sign
@@ -64,7 +64,7 @@ class Header(QFrame):
         self._test.setText(message.test if message is not None and message.test else "No test chosen")
         sentence = look.sentence
         if state is not None and message is not None and message.text:
-            sentence = message.text
+            sentence = f"{message.text.rstrip('.')}. {look.sentence}"
         if session.data_missing:
             sentence = "No data for more than half a second: what is shown is not live."
         self._sentence.setText(sentence)
@@ -74,10 +74,11 @@ class Header(QFrame):
 
     def _refresh_light(self, state: State | None, colours: Colours) -> None:
         session = self._session
-        health = session.health
-        if session.recording_on_disk and health is not None:
-            seconds = health.acknowledged_sample / session.rate_hz if session.rate_hz else 0.0
-            self._show_light("disc", colours.bad, "Recording", f"{seconds:.1f} s safe on disk")
+        if session.recording_on_disk:
+            self._show_light("disc", colours.bad, "Recording", f"{session.safe_s:.1f} s safe on disk")
+        elif state in RECORDING and session.fresh(HealthMessage) and session.safe_s > 0:
+            behind = f"{session.unsafe_s:.1f} s wait for the disk"
+            self._show_light("triangle", colours.warning, "Disk is slow", behind)
         elif state in RECORDING:
             self._show_light("triangle", colours.warning, "Not confirmed", "no sample confirmed on disk")
         elif state is State.SAVED:

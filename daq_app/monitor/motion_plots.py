@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from daq_app.acquisition.messages import EstimateMessage, MotionMessage
 from daq_app.monitor.plot_base import Array, Plot, envelope, line_pen
-from daq_app.monitor.session import Session
+from daq_app.monitor.session import RECORDING, Session
 from daq_app.monitor.theme import Colours
 from daq_app.monitor.theory_overlay import current_restitution, housner_motion
 
@@ -104,15 +104,19 @@ class MotionPlots(QWidget):
             self._show_notice("No motion is measured")
             return
         released = session.estimate.release_sample if session.estimate is not None else None
+        over = released is not None and session.current_state not in RECORDING
+        until = math.inf
         if released is not None:
-            elapsed = (now - released) / rate
+            elapsed = session.since_release_s if over else (now - released) / rate
             start = -LEAD_S if elapsed < WINDOW_S - LEAD_S else self._paged_start(elapsed)
             self._set_frame(start, start + WINDOW_S, "time since release  (s)")
             origin = float(released)
+            if over:
+                until = origin + (start + WINDOW_S) * rate
         else:
             self._set_frame(-WINDOW_S, 0.0, "seconds ago")
             origin, start = now, -WINDOW_S
-        samples, rotation, velocity = session.trace.window(origin + start * rate)
+        samples, rotation, velocity = session.trace.window(origin + start * rate, until)
         time = (samples - origin) / rate
         columns = max(200, int(self.rotation.width()))
         for curve, values in zip(self._curves, (rotation * 1e3, velocity), strict=True):
@@ -120,10 +124,12 @@ class MotionPlots(QWidget):
             curve.setData(x, y, connect="finite" if np.isnan(y).any() else "all")
         self._set_limits(rotation, velocity)
         self._draw_estimate()
-        live = session.fresh(MotionMessage)
-        self._show_notice(
-            "" if live else f"Not live: the newest value is {session.age_s(MotionMessage):.1f} s old"
-        )
+        if over:
+            self._show_notice("The test has ended: this is its record, not the present")
+        elif not session.fresh(MotionMessage):
+            self._show_notice(f"Not live: the newest value is {session.age_s(MotionMessage):.1f} s old")
+        else:
+            self._show_notice("")
 
     def _paged_start(self, elapsed_s: float) -> float:
         """Left end of the frame for a long test: moves on by thirds of the frame, not with every frame."""

@@ -42,6 +42,9 @@ RECENT_S = 6.0
 TRACE_S = 180.0
 """Length of the rotation history: longer than any test's motion."""
 
+DISK_BEHIND_S = 1.5
+"""When the disk is further behind than this, recording is not called safe."""
+
 RUNNING = frozenset(
     {State.PREVIEWING, State.ARMED, State.HOLDING, State.RELEASED, State.ROCKING, State.AT_REST}
 )
@@ -99,6 +102,8 @@ class Session:
         self._newest_sample = 0
         self._last_health_sample = -1
         self._peak_rad = 0.0
+        self._rest_sample: int | None = None
+        self._armed_sample = 0
 
     def set_rig(self, rig: Rig, rate_hz: float) -> None:
         """Say what is wired: names, families and α for the displays. Forgets all data."""
@@ -141,14 +146,19 @@ class Session:
         if message.state is State.ARMED and (before is None or before.state is not State.ARMED):
             self.estimate = None
             self._peak_rad = 0.0
+            self._rest_sample = None
+            self._armed_sample = message.since_sample
+        if message.state is State.AT_REST and self._rest_sample is None:
+            self._rest_sample = message.since_sample
 
     def _on_block(self, message: BlockMessage, readings: NDArray[np.float32] | None) -> None:
         if readings is None or self.strips is None or readings.shape[0] != self.strips.n_channels:
             return
         if message.first_sample < self._newest_sample - message.n_samples:
             self._forget_data()  # the tasks were started anew
+        if self.rig is not None and message.rate_hz != self.rate_hz:
+            self.set_rig(self.rig, message.rate_hz)
         self._newest_sample = message.first_sample + message.n_samples
-        self.rate_hz = message.rate_hz
         self.strips.append(message.first_sample, readings)
         self.block_mean = readings.mean(axis=1, dtype=np.float64)
         self.overloaded = frozenset(message.overloaded)
@@ -207,6 +217,25 @@ class Session:
         return self.current_state in RUNNING and not self.fresh(BlockMessage)
 
     @property
+    def sampling(self) -> bool:
+        """Samples are coming in now."""
+        return self.fresh(BlockMessage)
+
+    @property
+    def safe_s(self) -> float:
+        """Seconds of this run that are known to be on disk."""
+        if self.health is None or self.rate_hz <= 0:
+            return 0.0
+        return max(0.0, (self.health.acknowledged_sample - self._armed_sample) / self.rate_hz)
+
+    @property
+    def unsafe_s(self) -> float:
+        """Seconds that were read and are not known to be on disk."""
+        if self.health is None or self.rate_hz <= 0:
+            return 0.0
+        return max(0.0, (self.health.sample - self.health.acknowledged_sample) / self.rate_hz)
+
+    @property
     def recording_on_disk(self) -> bool:
         """Samples are being acknowledged by the disk now: the only ground for a recording light."""
         health = self.health
@@ -215,6 +244,7 @@ class Session:
             and self.fresh(HealthMessage)
             and health.recording
             and health.acknowledged_sample > 0
+            and self.unsafe_s <= DISK_BEHIND_S
         )
 
     @property
@@ -247,9 +277,7 @@ class Session:
         """Time since release on the sample clock; NaN before it."""
         if self.estimate is None or self.rate_hz <= 0:
             return math.nan
-        end = self.sample_now
-        if self.state is not None and self.state.state not in RUNNING:
-            end = self.state.since_sample or end
+        end = self.sample_now if self._rest_sample is None else self._rest_sample
         return max(0.0, (end - self.estimate.release_sample) / self.rate_hz)
 
     def recent(self, duration_s: float) -> NDArray[np.float32] | None:

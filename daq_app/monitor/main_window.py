@@ -1,0 +1,319 @@
+"""The operator's window: pages around one session, fed by one link.
+
+The window is a client. It may be closed, killed or opened twice; the acquisition does not notice.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtWidgets import (
+    QApplication,
+    QButtonGroup,
+    QFrame,
+    QHBoxLayout,
+    QMainWindow,
+    QPushButton,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from daq_app.acquisition.messages import EventMessage, Reply, State, StateMessage
+from daq_app.config import ConfigError, parse_rig
+from daq_app.monitor.actions import ActionBar
+from daq_app.monitor.background import Background
+from daq_app.monitor.header import Header
+from daq_app.monitor.health_bar import HealthBar
+from daq_app.monitor.link import Link
+from daq_app.monitor.live_page import LivePage
+from daq_app.monitor.notices import NoticeLine
+from daq_app.monitor.prepare_page import PreparePage, Zero
+from daq_app.monitor.session import Session
+from daq_app.monitor.settings import TYPE_SIZES, WindowSettings
+from daq_app.monitor.theme import THEMES, Colours, apply_theme
+
+FRAME_MS: Final = 22
+SLOW_MS: Final = 160
+_QUIET_EVENTS: Final = frozenset({"impact", "marker", "armed", "tare"})
+"""Events that the pages show anyway."""
+
+
+class MainWindow(QMainWindow):
+    """Everything on screen. `link` None: a window for looking at runs only."""
+
+    def __init__(self, link: Link | None, settings: WindowSettings) -> None:
+        super().__init__()
+        self.setWindowTitle("Rocking-test recorder")
+        self.link = link
+        self.settings = settings
+        self.session = Session()
+        self.background = Background(self)
+        self.colours: Colours = THEMES[settings.theme]
+        self.longest_stall_s = 0.0
+        """Longest time between two frames so far: how long the window was deaf at worst."""
+        self._last_frame_s = math.nan
+        self._rig_text = ""
+        self._state_before: State | None = None
+
+        self.header = Header(self.session)
+        self.notices = NoticeLine()
+        self.actions_bar = ActionBar()
+        self.health = HealthBar(self.session)
+        self.live = LivePage(self.session, settings.alarm_levels)
+        self.prepare = PreparePage(self.session, self.background)
+        self.pages: dict[str, QWidget] = {"Prepare": self.prepare, "Live": self.live}
+        self._build()
+        self.restyle()
+        self._connect()
+        self.resize(1366, 768)
+        settings.restore_layout(self, self.splitters)
+        if link is not None:
+            link.replied.connect(self._on_reply)
+            self._adopt(link.about)
+            if not link.may_command:
+                self.notices.tell(
+                    "info", "This window may watch, not command: it was opened without the token."
+                )
+        self._frame_timer = QTimer(self)
+        self._frame_timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._frame_timer.timeout.connect(self._on_frame)
+        self._frame_timer.start(FRAME_MS)
+        self._slow_timer = QTimer(self)
+        self._slow_timer.timeout.connect(self._on_slow)
+        self._slow_timer.start(SLOW_MS)
+
+    # -- building --------------------------------------------------------------------------------
+
+    def _build(self) -> None:
+        self.stack = QStackedWidget()
+        self._nav = QButtonGroup(self)
+        rail = QVBoxLayout()
+        rail.setContentsMargins(0, 10, 0, 10)
+        rail.setSpacing(2)
+        for number, (name, page) in enumerate(self.pages.items(), start=1):
+            self.stack.addWidget(page)
+            button = QPushButton(name)
+            button.setCheckable(True)
+            button.setProperty("role", "nav")
+            button.setToolTip(f"Ctrl+{number}")
+            button.setShortcut(f"Ctrl+{number}")
+            button.clicked.connect(lambda _checked=False, p=page: self.show_page(p))
+            self._nav.addButton(button, number - 1)
+            rail.addWidget(button)
+        rail.addStretch(1)
+        for text, tip, key, act in (
+            ("Theme", "Light or dark", "Ctrl+T", self.toggle_theme),
+            ("A+", "Larger type", "Ctrl++", lambda: self.change_type_size(1)),
+            ("A−", "Smaller type", "Ctrl+-", lambda: self.change_type_size(-1)),
+        ):
+            button = QPushButton(text)
+            button.setProperty("role", "nav")
+            button.setToolTip(f"{tip}  ({key})")
+            button.setShortcut(key)
+            button.clicked.connect(act)
+            rail.addWidget(button)
+        rail_frame = QFrame()
+        rail_frame.setObjectName("bar")
+        rail_frame.setLayout(rail)
+        rail_frame.setFixedWidth(104)
+        footer = QFrame()
+        footer.setObjectName("bar")
+        footer_layout = QHBoxLayout(footer)
+        footer_layout.setContentsMargins(10, 5, 12, 5)
+        footer_layout.addWidget(self.actions_bar)
+        footer_layout.addStretch(1)
+        footer_layout.addWidget(self.health)
+        middle = QHBoxLayout()
+        middle.setSpacing(0)
+        middle.addWidget(rail_frame)
+        middle.addWidget(self.stack, 1)
+        central = QWidget()
+        layout = QVBoxLayout(central)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(self.header)
+        layout.addWidget(self.notices)
+        layout.addLayout(middle, 1)
+        layout.addWidget(footer)
+        self.setCentralWidget(central)
+        self.splitters = {"live_upper": self.live.upper, "live_whole": self.live.whole}
+        self.show_page(self.prepare)
+
+    def _connect(self) -> None:
+        self.actions_bar.ordered.connect(self._on_order)
+        self.prepare.tare_wanted.connect(lambda: self._request("tare"))
+        self.prepare.told.connect(self.notices.tell)
+        self.prepare.card.changed.connect(self._on_choice)
+        QShortcut(QKeySequence("T"), self.live).activated.connect(self.live.theory_button.toggle)
+        QShortcut(QKeySequence("C"), self.live).activated.connect(self.live.strips_button.toggle)
+
+    def show_page(self, page: QWidget) -> None:
+        """Bring a page to the front."""
+        self.stack.setCurrentWidget(page)
+        button = self._nav.button(list(self.pages.values()).index(page))
+        if button is not None:
+            button.setChecked(True)
+
+    # -- look ------------------------------------------------------------------------------------
+
+    def restyle(self) -> None:
+        """Apply theme and type size to everything."""
+        app = QApplication.instance()
+        assert isinstance(app, QApplication)
+        self.colours = THEMES[self.settings.theme]
+        apply_theme(app, self.colours, self.settings.type_size)
+        for page in self.pages.values():
+            page.restyle(self.colours)  # type: ignore[attr-defined]
+        self.notices.restyle(self.colours)
+
+    def toggle_theme(self) -> None:
+        """Change between light and dark."""
+        self.settings.theme = "light" if self.settings.theme == "dark" else "dark"
+        self.restyle()
+
+    def change_type_size(self, steps: int) -> None:
+        """Make the type larger or smaller by steps."""
+        place = TYPE_SIZES.index(self.settings.type_size) + steps
+        self.settings.type_size = TYPE_SIZES[max(0, min(len(TYPE_SIZES) - 1, place))]
+        self.restyle()
+
+    # -- flow ------------------------------------------------------------------------------------
+
+    def _adopt(self, about: Mapping[str, Any]) -> None:
+        """Take over what the acquisition says of itself."""
+        text = str(about.get("rig_text", ""))
+        rate_hz = float(about.get("rate_hz", 0.0) or 0.0)
+        if text and text != self._rig_text:
+            try:
+                rig = parse_rig(text, str(about.get("rig_name", "rig")))
+            except ConfigError as error:
+                self.notices.tell("error", f"The acquisition's rig file cannot be read here: {error}")
+                return
+            self._rig_text = text
+            self.session.set_rig(rig, rate_hz or rig.acquisition.rate_hz)
+            self.prepare.set_rig(rig)
+            self.setWindowTitle(f"{rig.name} – Rocking-test recorder")
+        self.prepare.planned_rate_hz = float(about.get("planned_rate_hz", 0.0) or 0.0)
+        if "tare" in about:
+            self.prepare.set_zero(Zero(dict(about["tare"]), dict(about.get("tare_record", {}))))
+
+    def _on_frame(self) -> None:
+        now = time.monotonic()
+        if math.isfinite(self._last_frame_s):
+            self.longest_stall_s = max(self.longest_stall_s, now - self._last_frame_s)
+        self._last_frame_s = now
+        if self.link is not None:
+            for published in self.link.take():
+                self.session.feed(published)
+                self._after(published.message)
+        if self.stack.currentWidget() is self.live:
+            self.live.draw_frame()
+
+    def _after(self, message: object) -> None:
+        match message:
+            case StateMessage():
+                self._on_state(message)
+            case EventMessage():
+                if message.kind == "tare" and self.link is not None:
+                    self.link.request("hello")
+                if message.kind not in _QUIET_EVENTS:
+                    self.notices.tell(message.severity, message.text)
+
+    def _on_state(self, message: StateMessage) -> None:
+        before, self._state_before = self._state_before, message.state
+        if before is message.state:
+            return
+        if message.state is State.ARMED:
+            self.show_page(self.live)
+        if message.state is State.PREVIEWING and before in (State.IDLE, None) and self.link is not None:
+            self.link.request("hello")
+        if message.state is State.SAVED and before is State.SAVING:
+            self._on_saved(Path(message.run_path))
+        self._on_slow()
+
+    def _on_saved(self, run: Path) -> None:
+        """A run has just been closed."""
+
+    def _on_slow(self) -> None:
+        self.header.refresh(self.colours)
+        self.health.refresh()
+        may_command = self.link is not None and self.link.may_command
+        self.actions_bar.refresh(
+            self.session.current_state, sampling=self.session.sampling, may_command=may_command
+        )
+        page = self.stack.currentWidget()
+        if page is self.live:
+            self.live.draw_slow()
+        elif page is self.prepare:
+            self.prepare.refresh()
+
+    def _on_choice(self) -> None:
+        self.live.motion.set_target(self.prepare.card.choice.target_ratio * self.session.alpha_rad)
+
+    # -- orders ----------------------------------------------------------------------------------
+
+    def _on_order(self, name: str) -> None:
+        match name:
+            case "arm":
+                self._arm()
+            case "next":
+                self.next_test()
+            case "marker":
+                self._request("marker", {"text": "marker"})
+            case _:
+                self._request(name)
+
+    def _arm(self) -> None:
+        choice = self.prepare.card.choice
+        if not choice.name:
+            self.show_page(self.prepare)
+            self.notices.tell("warning", "Give the test a name before arming.")
+            return
+        notes = choice.notes
+        check = self.prepare.check
+        looked = (
+            f"Sensor check: {check.verdict.value}. {check.summary}" if check else "Sensor check: not done."
+        )
+        self._request("arm", {"test": choice.name, "notes": f"{notes}\n{looked}".strip()})
+
+    def next_test(self) -> None:
+        """Propose the next test of the campaign."""
+        self.show_page(self.prepare)
+
+    def _request(self, name: str, arguments: Mapping[str, float | str] | None = None) -> None:
+        if self.link is not None:
+            self.link.request(name, arguments)
+
+    def _on_reply(self, name: str, reply: Reply) -> None:
+        if not reply.ok:
+            self.notices.tell("error" if name != "tare" else "warning", reply.text)
+            return
+        if name == "hello":
+            self._adopt(reply.data)
+        elif name == "tare":
+            self.notices.tell("info", reply.text)
+            self.prepare.set_zero(Zero(_numbers(reply.data.get("tare")), {}))
+            self._request("hello")
+        elif name == "marker":
+            self.notices.tell("info", f"Marker written: {reply.text}.")
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Remember the layout and hang up; a run under way goes on without the window."""
+        self._frame_timer.stop()
+        self._slow_timer.stop()
+        self.settings.save_layout(self, self.splitters)
+        if self.link is not None:
+            self.link.close()
+        self.background.finish()
+        super().closeEvent(event)
+
+
+def _numbers(value: object) -> dict[str, float]:
+    return {str(k): float(v) for k, v in value.items()} if isinstance(value, dict) else {}

@@ -1,0 +1,62 @@
+"""Window tests: skipped with the names of the system packages where Qt cannot start."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+FOLDER = Path(__file__).parent
+try:
+    import PySide6.QtWidgets  # noqa: F401
+
+    QT_TROUBLE = ""
+except ImportError as error:
+    lines = (FOLDER / "debian-packages.txt").read_text(encoding="utf-8").splitlines()
+    packages = " ".join(line for line in lines if line and not line.startswith("#"))
+    QT_TROUBLE = f"Qt needs the system packages {packages} ({error})"
+
+
+class _SkippedModule(pytest.Module):
+    def collect(self) -> Any:
+        pytest.skip(QT_TROUBLE, allow_module_level=True)
+
+
+def pytest_pycollect_makemodule(module_path: Path, parent: Any) -> pytest.Module | None:
+    """A module that uses Qt is collected as one skip where Qt cannot start."""
+    if QT_TROUBLE and "qtbot" in module_path.read_text(encoding="utf-8"):
+        return _SkippedModule.from_parent(parent, path=module_path)
+    return None
+
+
+def _load(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"monitor_{name}", FOLDER / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def rig(configs: Path) -> Any:
+    from daq_app.config import load_rig
+
+    return load_rig(configs / "fr1.toml")
+
+
+@pytest.fixture
+def stand_in(rig: Any) -> Any:
+    """The messages of a whole simulated test, without an acquisition process."""
+    return _load("stand_in").StandIn(rig)
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Any:
+    from daq_app.monitor.settings import WindowSettings
+
+    return WindowSettings(tmp_path / "window.ini")
