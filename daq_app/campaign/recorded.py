@@ -1,0 +1,125 @@
+"""Which tests a folder of runs holds, and what became of each: the reader behind `CampaignStatus.scan`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Final
+
+from daq_app.campaign.names import TestName
+from daq_app.campaign.status import RecordedTest, TestVerdict
+from daq_app.campaign.verdicts import OperatorVerdict, read_verdicts
+from daq_app.runfile import Event, Run, RunFileError, open_run, read_journal
+from daq_app.runfile.folder import RUN_SUFFIX, find_journals, find_runs
+
+_BEFORE_RELEASE: Final = frozenset({"armed", "holding"})
+_AFTER_RELEASE: Final = frozenset({"released", "rocking", "at_rest"})
+_BAD_OUTCOMES: Final = {
+    "timeout": "the wall had not come to rest when the recording ended",
+    "failed": "the recording failed before the end",
+}
+
+
+def read_recorded(folder: Path) -> list[RecordedTest]:
+    """The releases in a folder and below. Aborted armings are none; runs without a test's name neither.
+
+    Raises `ConfigError` if the operator's verdicts cannot be read, `RunFileError` if there is no folder.
+    """
+    if not folder.is_dir():
+        raise RunFileError(f"{folder} is no folder", advice="Give the folder that holds the runs.")
+    verdicts = read_verdicts(folder)
+    return [*_runs(folder, verdicts), *_orphans(folder, verdicts)]
+
+
+def _runs(folder: Path, verdicts: dict[str, OperatorVerdict]) -> Iterator[RecordedTest]:
+    for path in find_runs(folder):
+        try:
+            with open_run(path) as run:
+                test = _of_run(run, verdicts)
+        except RunFileError as error:
+            test = _unreadable(path, error)
+        if test is not None:
+            yield test
+
+
+def _of_run(run: Run, verdicts: dict[str, OperatorVerdict]) -> RecordedTest | None:
+    name = _name(run.header.test)
+    if name is None or not was_released(run.events):
+        return None
+    given = verdicts.get(run.header.run_id)
+    if given is not None:
+        verdict, reason = TestVerdict(given.verdict), given.reason
+    else:
+        verdict, reason = _judged(run)
+    return RecordedTest(name, verdict, run.header.start_utc_ns, run.path, reason)
+
+
+def was_released(events: Sequence[Event]) -> bool:
+    """Whether the wall was let go in this run. A run without states (an imported one) counts as released."""
+    last = next(
+        (event.kind for event in reversed(events) if event.kind in _BEFORE_RELEASE | _AFTER_RELEASE), ""
+    )
+    if last:
+        return last in _AFTER_RELEASE
+    return _outcome(events) != "aborted"
+
+
+def _outcome(events: Sequence[Event]) -> str:
+    ends = [event for event in events if event.kind == "end"]
+    return str(ends[-1].data.get("outcome", "")) if ends else ""
+
+
+def _judged(run: Run) -> tuple[TestVerdict, str]:
+    """What the run says of itself: its quality check if it has one, else how it ended."""
+    derived = run.derived
+    quality = derived.results.get("quality") if derived is not None else None
+    if isinstance(quality, dict) and quality.get("verdict") in ("good", "bad"):
+        reasons = quality.get("reasons")
+        text = "; ".join(map(str, reasons)) if isinstance(reasons, list) else ""
+        return TestVerdict(quality["verdict"]), text
+    if run.gaps:
+        return TestVerdict.BAD, f"{sum(gap.n_samples for gap in run.gaps)} samples are missing"
+    outcome = _outcome(run.events)
+    if outcome in _BAD_OUTCOMES:
+        return TestVerdict.BAD, _BAD_OUTCOMES[outcome]
+    states = {event.kind for event in run.events}
+    if states & _AFTER_RELEASE and "at_rest" not in states:
+        return TestVerdict.BAD, "the recording ended before the wall came to rest"
+    return TestVerdict.UNCHECKED, ""
+
+
+def _orphans(folder: Path, verdicts: dict[str, OperatorVerdict]) -> Iterator[RecordedTest]:
+    """Journals that no run file was made of yet: their samples are there, so they count as unchecked."""
+    for path in find_journals(folder):
+        if path.with_suffix(RUN_SUFFIX).exists():
+            continue
+        try:
+            with read_journal(path) as contents:
+                header, events = contents.header, tuple(contents.events)
+        except RunFileError as error:
+            test = _unreadable(path, error)
+            if test is not None:
+                yield test
+            continue
+        name = _name(header.test)
+        if name is None or not was_released(events):
+            continue
+        given = verdicts.get(header.run_id)
+        verdict = TestVerdict(given.verdict) if given else TestVerdict.UNCHECKED
+        reason = given.reason if given else "only a journal so far: `daq-app recover` makes its run file"
+        yield RecordedTest(name, verdict, header.start_utc_ns, path, reason)
+
+
+def _unreadable(path: Path, error: RunFileError) -> RecordedTest | None:
+    """A damaged file still burns its number; its name begins with the test's."""
+    name = _name(path.stem.split("_")[0])
+    if name is None:
+        return None
+    return RecordedTest(name, TestVerdict.LOST, int(path.stat().st_mtime_ns), path, error.message)
+
+
+def _name(text: str) -> TestName | None:
+    try:
+        return TestName.parse(text)
+    except ValueError:
+        return None

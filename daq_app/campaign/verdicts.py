@@ -1,0 +1,67 @@
+"""Verdicts that the operator gave on runs, kept beside them: a run file is never changed afterwards."""
+
+from __future__ import annotations
+
+import datetime as dt
+import os
+from pathlib import Path
+from typing import Final, Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from daq_app.config import ConfigError, Problem
+from daq_app.runfile.durable import replace_durably
+
+FILE_NAME: Final = "verdicts.json"
+
+
+class OperatorVerdict(BaseModel):
+    """What somebody decided about one run."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    verdict: Literal["good", "bad", "lost"]
+    reason: str = ""
+    given_utc: dt.datetime
+
+
+class _Ledger(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    schema_version: Literal[1] = 1
+    runs: dict[str, OperatorVerdict]
+    """Run id → verdict."""
+
+
+def read_verdicts(folder: Path) -> dict[str, OperatorVerdict]:
+    """Verdicts of a folder of runs by run id; empty if none was given.
+
+    Raises `ConfigError` where the file cannot be understood: a rejected test must not count as good
+    because a file is damaged.
+    """
+    path = folder / FILE_NAME
+    try:
+        return dict(_Ledger.model_validate_json(path.read_bytes()).runs)
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValidationError) as error:
+        first = error.errors()[0]["msg"] if isinstance(error, ValidationError) else str(error)
+        right = "Restore it from a backup, or move it away and give the verdicts again"
+        raise ConfigError(
+            [Problem(str(path), "the file", f"the verdicts cannot be read ({first})", right)]
+        ) from None
+
+
+def give_verdict(
+    folder: Path, run_id: str, verdict: Literal["good", "bad", "lost"], reason: str = ""
+) -> None:
+    """Record a verdict on a run, durably; a later one replaces it. Raises `ConfigError`, `OSError`."""
+    runs = read_verdicts(folder)
+    runs[run_id] = OperatorVerdict(verdict=verdict, reason=reason, given_utc=dt.datetime.now(dt.UTC))
+    path = folder / FILE_NAME
+    temporary = path.with_suffix(f".{os.getpid()}.tmp")
+    try:
+        temporary.write_text(_Ledger(runs=runs).model_dump_json(indent=1), encoding="utf-8")
+        replace_durably(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
