@@ -44,7 +44,9 @@ class Run:
         start_rule: StartRule,
         make_sampler: Callable[[SampleTimes], Sampler],
         ref_search: Callable[[Run, float], int | None] | None = None,
+        arrived: Callable[[float], float] = lambda now_s: now_s,
     ) -> None:
+        """`arrived` answers which instant's samples have reached the computer by now."""
         self.plan = plan
         self.read_position = 0
         self.failure: DaqmxError | None = None
@@ -52,6 +54,7 @@ class Run:
         self._start_rule = start_rule
         self._make_sampler = make_sampler
         self._ref_search = ref_search
+        self._arrived = arrived
         self._ref_sample: int | None = None
         self._end_s = np.inf
         self.times: SampleTimes | None = None
@@ -69,14 +72,10 @@ class Run:
             self._ref_sample = self._ref_search(self, now_s)
 
     def retime(self, times: SampleTimes) -> None:
-        """The sample clock is disturbed from now on (a fault)."""
+        """Take the clock and the world as they are from now on; earlier samples stay what they were."""
         if self.times is not None:
             self.times = times
             self.sampler = self._make_sampler(times)
-
-    def forget_ahead(self) -> None:
-        if self.sampler is not None:
-            self.sampler.forget()
 
     def halt(self, now_s: float) -> None:
         """No further samples: the clock that feeds this run has gone."""
@@ -84,7 +83,7 @@ class Run:
 
     def elapsed_samples(self, now_s: float) -> int:
         """Sample clocks seen by now, whatever the task does with them."""
-        return 0 if self.times is None else self.times.count(min(now_s, self._end_s))
+        return 0 if self.times is None else self.times.count(min(self._arrived(now_s), self._end_s))
 
     def last_sample(self) -> int | None:
         """Number of samples after which the acquisition is complete, where that is known."""

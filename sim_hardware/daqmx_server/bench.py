@@ -6,10 +6,13 @@ import time
 from threading import Condition, RLock
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
 from sim_hardware.daqmx_server.clock import BenchClock, SteppedClock
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.inventory import Inventory
+from sim_hardware.daqmx_server.inventory import Device, Inventory, module_device
 from sim_hardware.faults.board import FaultBoard
+from sim_hardware.faults.model import Fault
 from sim_hardware.signals import SignalSource
 
 if TYPE_CHECKING:
@@ -33,12 +36,12 @@ class Bench:
         self.source = source
         self.clock = clock
         self.finite = finite
-        self.faults = FaultBoard()
-        self._epoch_s = time.time()
+        self.faults = FaultBoard(clock.now, self._volts_at)
         self.tasks: dict[str, Task] = {}
-        self.scales: dict[str, object] = {}
         self._owners: dict[str, str] = {}
         self._edges: dict[str, list[float]] = {}
+        self._swapped: dict[str, Device] = {}
+        self._epoch_s = time.time()
 
     @property
     def readers_drive_time(self) -> bool:
@@ -55,18 +58,58 @@ class Bench:
         except KeyError:
             raise DaqmxError(Code.INVALID_TASK, f"Task Name: {name}") from None
 
-    def reserve(self, resources: list[str], owner: str) -> None:
+    # --- devices --------------------------------------------------------------------------------
+
+    def present(self) -> list[Device]:
+        """Devices that the driver sees at the moment."""
+        self.exchange_modules()
+        return [
+            device
+            for device in self.inventory.devices.values()
+            if not self.faults.active("module_removed", device.name) and not self._offline(device)
+        ]
+
+    def check_access(self, device: Device) -> None:
+        """Raise what the driver says of a device that has gone: −201003, or −201390 over a dead network."""
+        if self.faults.active("module_removed", device.name):
+            raise DaqmxError(Code.DEVICE_LOST, f"Device Specified: {device.name}")
+        if self._offline(device):
+            raise DaqmxError(Code.NETWORK_LOST, f"Device Specified: {device.name}")
+
+    def _offline(self, device: Device) -> bool:
+        outage = self.faults.outage([device.name, self.inventory.host_of(device)])
+        return outage is not None and outage[1]
+
+    def arrived_s(self, hosts: list[str], now_s: float) -> float:
+        """Instant up to which samples have come through: those taken during an outage come after it."""
+        outage = self.faults.outage(hosts)
+        return now_s if outage is None or outage[0].start_s is None else min(now_s, outage[0].start_s)
+
+    def exchange_modules(self) -> None:
+        """Put other products into slots, or the right ones back, as the faults say now."""
+        for name, device in list(self.inventory.devices.items()):
+            entry = self.faults.active("wrong_device", name)
+            if entry is not None and name not in self._swapped:
+                self._swapped[name] = device
+                product = entry.fault.text("product")
+                self.inventory.devices[name] = module_device(name, product, device.chassis, device.slot)
+            elif entry is None and name in self._swapped:
+                self.inventory.devices[name] = self._swapped.pop(name)
+
+    def reserve(self, devices: list[str], owner: str) -> None:
         """All or nothing; −50103 where somebody else has one of them."""
-        for resource in resources:
-            holder = self._owners.get(resource) or self.faults.reserved_by(resource)
-            if holder not in (None, owner):
-                raise DaqmxError(Code.RESOURCE_RESERVED, f"Device: {resource}")
-        for resource in resources:
-            self._owners[resource] = owner
+        for device in devices:
+            other = self._owners.get(device, owner) != owner
+            if other or self.faults.active("reserved", device):
+                raise DaqmxError(Code.RESOURCE_RESERVED, f"Device: {device}")
+        for device in devices:
+            self._owners[device] = owner
 
     def release(self, owner: str) -> None:
         self._owners = {resource: name for resource, name in self._owners.items() if name != owner}
         self.changed.notify_all()
+
+    # --- the world ------------------------------------------------------------------------------
 
     def command(self, name: str, arguments: dict[str, float | str]) -> dict[str, object]:
         """Act on the world now; what had been sampled stays as it was."""
@@ -76,12 +119,25 @@ class Bench:
         self.world_changed()
         return answer
 
+    def add_fault(self, fault: Fault) -> int:
+        """Break something, now or when the fault says."""
+        number = self.faults.add(fault)
+        self.world_changed()
+        return number
+
+    def clear_faults(self, number: int | None = None) -> None:
+        """Mend one fault or all."""
+        self.faults.clear(number)
+        self.world_changed()
+
     def world_changed(self) -> None:
         """Samples ahead of now are to be made afresh, and whoever waits should look again."""
         for task in self.tasks.values():
-            if task.run is not None:
-                task.run.forget_ahead()
+            task.disturbed()
         self.changed.notify_all()
+
+    def _volts_at(self, terminal: str, time_s: float) -> float:
+        return float(self.source.volts((terminal,), np.array([time_s]))[0, 0])
 
     def digital_edge(self, terminal: str, time_s: float) -> None:
         """A rising edge at a terminal such as ``/cDAQ1/PFI0``."""

@@ -1,6 +1,6 @@
 """The clock of the simulated bench: seconds since its power-on.
 
-Power-on is the first start of a task (or the first command that needs time), so that the first
+Power-on is the first start of a sample clock (or the first command that needs time), so that the first
 acquisition always sees the world from 0 s on: same seed, same volts, however late the client came.
 """
 
@@ -14,8 +14,8 @@ from typing import Protocol
 class BenchClock(Protocol):
     """All calls are made with the bench's lock held."""
 
-    def power_on(self) -> None:
-        """Start counting; later calls do nothing."""
+    def power_on(self) -> float:
+        """Start counting if that has not happened yet; the time now, exactly 0 at the start."""
         ...
 
     def now(self) -> float:
@@ -24,6 +24,10 @@ class BenchClock(Protocol):
 
     def glance(self) -> float:
         """`now` for somebody who polls: a clock that moves with its readers moves a little."""
+        ...
+
+    def skip(self, seconds: float) -> None:
+        """Let time pass at once, as if nobody had been listening."""
         ...
 
     def deadline(self, timeout_s: float) -> float:
@@ -38,15 +42,17 @@ class BenchClock(Protocol):
 class PacedClock:
     """The machine's monotonic clock times a factor. Time-outs are real seconds."""
 
-    _SLICE_S = 0.05  # an unknown target is looked for this often
+    _SLICE_S = 0.01  # an unknown target is looked for this often
 
     def __init__(self, speed: float = 1.0) -> None:
         self._speed = speed
         self._started: float | None = None
 
-    def power_on(self) -> None:
+    def power_on(self) -> float:
         if self._started is None:
             self._started = time.monotonic()
+            return 0.0
+        return self.now()
 
     def now(self) -> float:
         return 0.0 if self._started is None else (time.monotonic() - self._started) * self._speed
@@ -61,11 +67,15 @@ class PacedClock:
         left = deadline - time.monotonic()
         if left <= 0:
             return False
-        pause = self._SLICE_S
-        if target_s is not None:
-            pause = min((target_s - self.now()) / self._speed + 20e-6, 1.0)
-        changed.wait(max(min(pause, left), 0.0))
+        ahead = None if target_s is None else (target_s - self.now()) / self._speed
+        pause = self._SLICE_S if ahead is None or ahead < 0 else min(ahead + 20e-6, 1.0)
+        changed.wait(min(pause, left))
         return True
+
+    def skip(self, seconds: float) -> None:
+        self.power_on()
+        assert self._started is not None
+        self._started -= seconds / self._speed
 
 
 class SteppedClock:
@@ -74,14 +84,15 @@ class SteppedClock:
     Time-outs are simulated seconds.
     """
 
-    _SEARCH_S = 0.05
+    _SEARCH_S = 0.02
     _GLANCE_S = 1e-3
 
     def __init__(self) -> None:
         self._now = 0.0
 
-    def power_on(self) -> None:
-        """Nothing to do: this clock stands still by itself."""
+    def power_on(self) -> float:
+        """This clock stands still by itself."""
+        return self._now
 
     def now(self) -> float:
         return self._now
@@ -96,7 +107,10 @@ class SteppedClock:
     def wait(self, changed: Condition, target_s: float | None, deadline: float) -> bool:
         if self._now >= deadline:
             return False
-        target = self._now + self._SEARCH_S if target_s is None else max(target_s, self._now)
+        target = self._now + self._SEARCH_S if target_s is None or target_s <= self._now else target_s
         self._now = min(target, deadline)
         changed.notify_all()
         return True
+
+    def skip(self, seconds: float) -> None:
+        self._now += seconds

@@ -11,6 +11,7 @@ from typing import Any, Final
 import grpc
 
 from sim_hardware.daqmx_server.bench import Bench
+from sim_hardware.faults.model import fault_from
 
 SERVICE: Final = "rocking.SimControl"
 METHOD: Final = "Command"
@@ -28,6 +29,13 @@ def run_command(bench: Bench, name: str, arguments: dict[str, Any]) -> dict[str,
             bench.clock.power_on()
             bench.digital_edge(str(arguments["terminal"]), bench.clock.now())
             return {"time_s": bench.clock.now()}
+        if name == "fault":
+            return {"number": bench.add_fault(fault_from(arguments)), "time_s": bench.clock.now()}
+        if name == "clear_faults":
+            bench.clear_faults(int(arguments["number"]) if "number" in arguments else None)
+            return {"faults": bench.faults.listing()}
+        if name == "faults":
+            return {"faults": bench.faults.listing(), "time_s": bench.clock.now()}
         return bench.command(name, arguments)
 
 

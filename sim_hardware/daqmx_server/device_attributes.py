@@ -36,7 +36,7 @@ class SystemGroup(_ReadOnly):
             "NIDAQ_MAJOR_VERSION": DRIVER_VERSION[0],
             "NIDAQ_MINOR_VERSION": DRIVER_VERSION[1],
             "NIDAQ_UPDATE_VERSION": DRIVER_VERSION[2],
-            "DEV_NAMES": ", ".join(bench.inventory.devices),
+            "DEV_NAMES": ", ".join(device.name for device in bench.present()),
             "GLOBAL_CHANS": "",
             "TASKS": "",
             "SCALES": "",
@@ -72,7 +72,7 @@ _ANY: Final[dict[str, Callable[[Bench, Device], Any]]] = {
 
 _CHASSIS: Final[dict[str, Callable[[Bench, Device], Any]]] = {
     "CHASSIS_MODULE_DEV_NAMES": lambda bench, device: ", ".join(
-        module.name for module in bench.inventory.modules_of(device.name)
+        module.name for module in bench.present() if module.chassis == device.name
     ),
     "AI_NUM_SAMP_TIMING_ENGINES": lambda bench, device: device.timing_engines or 0,
 }
@@ -105,6 +105,7 @@ _AI: Final[dict[str, Callable[[Product], Any]]] = {
 
 class DeviceGroup(_ReadOnly):
     def get(self, bench: Bench, request: Any, name: str) -> Any:
+        bench.exchange_modules()
         device = bench.inventory.device(request.device_name)
         if name in _ANY:
             return _ANY[name](bench, device)

@@ -93,9 +93,6 @@ class Inventory:
             f"Physical Channel Name: {terminal or name}",
         )
 
-    def modules_of(self, chassis: str) -> list[Device]:
-        return [device for device in self.devices.values() if device.chassis == chassis]
-
     def host_of(self, device: Device) -> str:
         """The device that owns clocks and triggers: the chassis of a module, else the device itself."""
         return device.chassis or device.name

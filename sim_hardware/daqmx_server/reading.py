@@ -62,27 +62,92 @@ def read(task: Task, asked: int, timeout_s: float, room: int | None = None) -> R
         return _on_demand(task, count, rows)
     run = task.run
     assert run is not None
-    clock = task.bench.clock
-    deadline = clock.deadline(timeout_s)
-    run.check(clock.now())
-    start = _start(task, run)
-    status = 0
-    while run.readable(clock.now()) < start + count:
-        _refuse_never(run, start + count)
-        if not clock.wait(task.bench.changed, run.time_of_count(_needed(run, start + count)), deadline):
-            if run.readable(clock.now()) < start + count:
-                status = Code.SAMPLES_NOT_YET_AVAILABLE
-            break
-        if run.aborted or run.failure is not None:
-            run.check(clock.now())
-    taken = min(max(run.readable(clock.now()) - start, 0), count)
+    _spoil_buffer(task, run)
+    run.check(task.bench.clock.now())
+    exchange = _Exchange.of(task, run, count)
+    start = _start(task, run) if exchange is None else exchange.start
+    spoiled = task.bench.faults.take("read_timeout", task.name)
+    wanted = count if spoiled is None else min(count, int(spoiled.number("samples")))
+    in_time = _wait(task, run, start + wanted, timeout_s)
+    if spoiled is not None:
+        _let_time_out(task, run, timeout_s)
+    taken = min(max(run.readable(task.bench.clock.now()) - start, 0), wanted)
     codes = run.block(start, taken, rows) if taken else np.empty((n_rows, 0), dtype=np.int32)
     run.read_position = start + taken
-    first = run.times.time_of(run.base + start) if run.times is not None else clock.now()
+    if exchange is not None:
+        exchange.done(task)
+    first = task.bench.clock.now() if run.times is None else run.times.time_of(run.base + start)
     _note_overloads(task, codes, rows)
+    task.log_read(codes, rows, start)
     _end_automatic(task, run)
     task.bench.changed.notify_all()
-    return Reading(codes, rows, int(status), first)
+    late = not in_time or taken < count
+    return Reading(codes, rows, int(Code.SAMPLES_NOT_YET_AVAILABLE) if late else 0, first)
+
+
+def _wait(task: Task, run: Run, end: int, timeout_s: float) -> bool:
+    """Wait until the samples before `end` can be read; False when the time is over."""
+    clock = task.bench.clock
+    deadline = clock.deadline(timeout_s)
+    while run.readable(clock.now()) < end:
+        if run.plan.total is not None and end > run.plan.total:
+            raise DaqmxError(Code.SAMPLES_NEVER_AVAILABLE, samples_read=0)
+        last = run.last_sample()
+        needed = run.base + end if run.plan.pretrigger is None or last is None else last
+        if not clock.wait(task.bench.changed, run.time_of_count(needed), deadline):
+            return run.readable(clock.now()) >= end
+        if run.aborted:
+            run.check(clock.now())
+        task.check_devices()
+    return True
+
+
+def _let_time_out(task: Task, run: Run, timeout_s: float) -> None:
+    """A spoiled read lasts until its time-out, whatever there is to read."""
+    clock = task.bench.clock
+    deadline = clock.deadline(timeout_s)
+    while clock.wait(task.bench.changed, None, deadline) and not run.aborted:
+        pass
+
+
+def _spoil_buffer(task: Task, run: Run) -> None:
+    """The fault "buffer overwritten": time passes unheard until the buffer has run over."""
+    fault = task.bench.faults.take("buffer_overwritten", task.name)
+    if fault is not None and run.times is not None and run.plan.total is None:
+        now = task.bench.clock.now()
+        excess = run.read_position + run.plan.buffer + int(fault.number("lost_samples")) - run.acquired(now)
+        task.bench.clock.skip(max(excess, 0) / run.plan.rate_hz)
+
+
+@dataclass(slots=True)
+class _Exchange:
+    """The fault "reply out of order": the block after the next one comes first, then the next one.
+
+    The device's read position goes back and forth with it, so that a careful client can notice.
+    """
+
+    start: int
+    resume: int | None
+
+    @classmethod
+    def of(cls, task: Task, run: Run, count: int) -> _Exchange | None:
+        following = task.reading.get("RELATIVE_TO", _CURRENT) == _CURRENT
+        held, task.exchange = task.exchange, None
+        if held is not None and following:
+            return cls(held, held + 2 * count)
+        if following and task.resume is not None:
+            run.read_position, task.resume = task.resume, None
+        if following and task.bench.faults.take("reply_out_of_order", task.name):
+            task.exchange = run.read_position
+            return cls(run.read_position + count, None)
+        task.resume = None
+        return None
+
+    def done(self, task: Task) -> None:
+        task.resume = self.resume
+
+
+_CURRENT = ReadRelativeTo.CURRENT_READ_POSITION.value
 
 
 def _ready(task: Task) -> None:
@@ -100,17 +165,6 @@ def _end_automatic(task: Task, run: Run) -> None:
     """A finite task that a read has started ends when the last sample has been read."""
     if task.auto_started and run.plan.total is not None and run.read_position >= run.plan.total:
         task.stop()
-
-
-def _needed(run: Run, position: int) -> int:
-    """Samples that must exist before a position can be read."""
-    last = run.last_sample()
-    return position if run.plan.pretrigger is None or last is None else last
-
-
-def _refuse_never(run: Run, end: int) -> None:
-    if run.plan.total is not None and end > run.plan.total:
-        raise DaqmxError(Code.SAMPLES_NEVER_AVAILABLE, samples_read=0)
 
 
 def _start(task: Task, run: Run) -> int:

@@ -111,10 +111,6 @@ class Sampler:
         self._chunk = int(np.clip(times.rate_hz * 0.5, 1000, 65536))
         self._cache: tuple[int, NDArray[np.int32]] | None = None
 
-    def forget(self) -> None:
-        """The world has been told to behave differently from now on: samples ahead are no longer right."""
-        self._cache = None
-
     def codes(self, start: int, stop: int) -> NDArray[np.int32]:
         """Codes of samples start … stop−1, shape (inputs, samples)."""
         pieces = []

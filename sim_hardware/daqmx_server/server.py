@@ -18,6 +18,7 @@ from sim_hardware.daqmx_server.control_service import control_handler
 from sim_hardware.daqmx_server.device_attributes import DeviceGroup, PhysicalChannelGroup, SystemGroup
 from sim_hardware.daqmx_server.errors import DaqmxError
 from sim_hardware.daqmx_server.events import STREAMS
+from sim_hardware.daqmx_server.gate import Gate
 from sim_hardware.daqmx_server.read_calls import read_handlers
 from sim_hardware.daqmx_server.sessions import SessionError, session_handlers
 from sim_hardware.daqmx_server.task_attributes import EXPORT, READ, TIMING, TRIGGER, BufferGroup, TaskGroup
@@ -60,28 +61,37 @@ def _task_of(request: Any) -> str:
     return str(request.task.name) if "task" in request.DESCRIPTOR.fields_by_name else ""
 
 
-def _unary(bench: Bench, handler: Handler) -> Callable[[Any, Any], Any]:
+def _unary(bench: Bench, gate: Gate, handler: Handler) -> Callable[[Any, Any], Any]:
     def call(request: Any, context: Any) -> Any:
+        gate.pass_through()
         try:
             with bench.changed:
-                return handler(bench, request)
+                reply = handler(bench, request)
         except (DaqmxError, SessionError) as error:
+            gate.pass_through()
             _fail(context, error, _task_of(request))
+        gate.pass_through()
+        return reply
 
     return call
 
 
-def _stream(bench: Bench, handler: Callable[[Bench, Any, Any], Iterator[Any]]) -> Callable[[Any, Any], Any]:
+def _stream(
+    bench: Bench, gate: Gate, handler: Callable[[Bench, Any, Any], Iterator[Any]]
+) -> Callable[[Any, Any], Any]:
     def call(request: Any, context: Any) -> Iterator[Any]:
+        gate.pass_through()
         try:
-            yield from handler(bench, request, context)
+            for event in handler(bench, request, context):
+                gate.pass_through()
+                yield event
         except DaqmxError as error:
             _fail(context, error, _task_of(request))
 
     return call
 
 
-def daqmx_handler(bench: Bench) -> grpc.GenericRpcHandler:
+def daqmx_handler(bench: Bench, gate: Gate) -> grpc.GenericRpcHandler:
     """NI's NiDAQmx service; calls without a handler answer UNIMPLEMENTED by themselves."""
     handlers = attribute_handlers(_GROUPS) | session_handlers() | read_handlers()
     methods: dict[str, grpc.RpcMethodHandler] = {}
@@ -89,11 +99,11 @@ def daqmx_handler(bench: Bench) -> grpc.GenericRpcHandler:
         request_type: Any = getattr(nidaqmx_pb2, method.input_type.name)
         if method.name in handlers:
             methods[method.name] = grpc.unary_unary_rpc_method_handler(
-                _unary(bench, handlers[method.name]), request_type.FromString, _serialise
+                _unary(bench, gate, handlers[method.name]), request_type.FromString, _serialise
             )
         elif method.name in STREAMS:
             methods[method.name] = grpc.unary_stream_rpc_method_handler(
-                _stream(bench, STREAMS[method.name]), request_type.FromString, _serialise
+                _stream(bench, gate, STREAMS[method.name]), request_type.FromString, _serialise
             )
     return grpc.method_handlers_generic_handler(_SERVICE.full_name, methods)
 
@@ -115,7 +125,7 @@ class SessionUtilities(session_pb2_grpc.SessionUtilitiesServicer):
                     serial_number=f"{device.serial:08X}",
                     product_id=device.product_number,
                 )
-                for device in self._bench.inventory.devices.values()
+                for device in self._bench.present()
             ]
         return session_pb2.EnumerateDevicesResponse(devices=devices)
 
@@ -143,8 +153,9 @@ class SessionUtilities(session_pb2_grpc.SessionUtilitiesServicer):
 class DaqmxServer:
     """A simulated NI device server on the loopback address."""
 
-    def __init__(self, bench: Bench, port: int = 0) -> None:
+    def __init__(self, bench: Bench, port: int = 0, kill: Callable[[], None] | None = None) -> None:
         self.bench = bench
+        self.gate = Gate(bench) if kill is None else Gate(bench, kill)
         self._server = grpc.server(
             ThreadPoolExecutor(_THREADS, thread_name_prefix="daqmx"),
             options=(
@@ -153,7 +164,7 @@ class DaqmxServer:
                 ("grpc.so_reuseport", 0),
             ),
         )
-        self._server.add_generic_rpc_handlers((daqmx_handler(bench), control_handler(bench)))
+        self._server.add_generic_rpc_handlers((daqmx_handler(bench, self.gate), control_handler(bench)))
         session_pb2_grpc.add_SessionUtilitiesServicer_to_server(SessionUtilities(bench), self._server)
         self.port = self._server.add_insecure_port(f"127.0.0.1:{port}")
 
@@ -162,10 +173,12 @@ class DaqmxServer:
         return f"127.0.0.1:{self.port}"
 
     def start(self) -> None:
+        self.gate.start()
         self._server.start()
 
     def stop(self, grace_s: float | None = None) -> None:
         """Abort every task, then end."""
         with self.bench.changed:
             self.bench.reset()
+        self.gate.stop()
         self._server.stop(grace_s).wait()

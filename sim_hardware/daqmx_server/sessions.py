@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Final
 
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 from session_pb2 import Session
 
 from sim_hardware.daqmx_server import triggers
-from sim_hardware.daqmx_server.attributes import Handler
+from sim_hardware.daqmx_server.attributes import Handler, unsupported
 from sim_hardware.daqmx_server.bench import Bench
 from sim_hardware.daqmx_server.channels import create_channels
 from sim_hardware.daqmx_server.errors import Code, DaqmxError, error_text
@@ -178,6 +179,56 @@ def _nth_handler(rpc: str) -> Handler:
     return nth
 
 
+def configure_logging(bench: Bench, request: Any) -> Any:
+    """DAQmx's own TDMS recorder."""
+    task = bench.task(request.task.name)
+    task.configure()
+    fields = fields_of(request)
+    task.reading.update(
+        LOGGING_FILE_PATH=fields["file_path"],
+        LOGGING_MODE=fields["logging_mode"],
+        LOGGING_TDMS_GROUP_NAME=fields["group_name"] or task.name,
+        LOGGING_TDMS_OPERATION=fields["operation"],
+    )
+    return pb.ConfigureLoggingResponse()
+
+
+def start_new_file(bench: Bench, request: Any) -> Any:
+    task = bench.task(request.task.name)
+    if not task.log.enabled:
+        raise unsupported("Read_Logging_FilePath")
+    task.log.new_file(request.file_path)
+    return pb.StartNewFileResponse()
+
+
+def unregister_handler(kind_of: Callable[[dict[str, Any]], str], rpc: str) -> Handler:
+    """Ending an event stream from the client's side."""
+    reply = getattr(pb, f"{rpc}Response")
+
+    def unregister(bench: Bench, request: Any) -> Any:
+        bench.task(request.task.name).events.discard(kind_of(fields_of(request)))
+        bench.changed.notify_all()
+        return reply()
+
+    return unregister
+
+
+def device_handler(rpc: str) -> Handler:
+    """ResetDevice and SelfTestDevice: both need the device; a reset aborts its tasks."""
+    reply = getattr(pb, f"{rpc}Response")
+
+    def call(bench: Bench, request: Any) -> Any:
+        device = bench.inventory.device(request.device_name)
+        bench.check_access(device)
+        if rpc == "ResetDevice":
+            for task in bench.tasks.values():
+                if device.name in (*task.devices, *task.hosts):
+                    task.abort()
+        return reply()
+
+    return call
+
+
 def error_string(bench: Bench, request: Any) -> Any:
     return pb.GetErrorStringResponse(error_string=error_text(request.error_code))
 
@@ -196,6 +247,17 @@ def session_handlers() -> dict[str, Handler]:
         "CfgSampClkTiming": sample_clock,
         "CfgInputBuffer": input_buffer,
         "GetErrorString": error_string,
+        "ConfigureLogging": configure_logging,
+        "StartNewFile": start_new_file,
+        "UnregisterEveryNSamplesEvent": unregister_handler(
+            lambda fields: "every_n", "UnregisterEveryNSamplesEvent"
+        ),
+        "UnregisterDoneEvent": unregister_handler(lambda fields: "done", "UnregisterDoneEvent"),
+        "UnregisterSignalEvent": unregister_handler(
+            lambda fields: f"signal{fields['signal_id']}", "UnregisterSignalEvent"
+        ),
+        "ResetDevice": device_handler("ResetDevice"),
+        "SelfTestDevice": device_handler("SelfTestDevice"),
         "DisableStartTrig": _disable_handler("START"),
         "DisableRefTrig": _disable_handler("REF"),
     }

@@ -16,6 +16,7 @@ from sim_hardware.daqmx_server.channels import VirtualChannel
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory import channel_list
 from sim_hardware.daqmx_server.sampling import Input, Sampler, SampleTimes
+from sim_hardware.daqmx_server.tdms_log import TdmsLog
 from sim_hardware.daqmx_server.timing import TaskTiming
 
 
@@ -41,6 +42,7 @@ class Task:
         self.reading: dict[str, Any] = {}
         self.exported: dict[str, Any] = {}
         self.real_time: dict[str, Any] = {}
+        self.log = TdmsLog(self.reading)
         self.input_buffer: int | None = None
         self.state = State.UNVERIFIED
         self.run: Run | None = None
@@ -49,7 +51,10 @@ class Task:
         self.overloads_reported: tuple[str, ...] = ()
         self.events: set[str] = set()
         self.cleared = False
+        self.exchange: int | None = None
+        self.resume: int | None = None
         self._explicit = State.UNVERIFIED
+        self._scaling: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     # --- configuration ------------------------------------------------------------------------
 
@@ -57,6 +62,7 @@ class Task:
         """Before any change of settings: not while running, and what was verified is so no more."""
         if self.state is State.RUNNING:
             raise DaqmxError(Code.PROPERTY_WHILE_RUNNING)
+        self._scaling = None
         if self.state < State.RESERVED:
             self.state = State.UNVERIFIED
 
@@ -64,6 +70,7 @@ class Task:
         if self.state is State.RUNNING:
             raise DaqmxError(Code.TASK_RUNNING)
         self.unreserve()
+        self._scaling = None
         self.channels += channels
 
     def channel(self, name: str) -> VirtualChannel:
@@ -153,6 +160,7 @@ class Task:
         for channel in self.channels:
             channel.verify()
         self.timing.verify()
+        self.log.check()
         if (
             self.trigger["REF_TRIG_TYPE"] != triggers.NONE
             and self.timing.mode != AcquisitionType.FINITE.value
@@ -161,17 +169,23 @@ class Task:
         self.state = State.VERIFIED
 
     def check_devices(self) -> None:
-        """Raise if a device of the task has gone."""
-        for name in self.devices:
-            self.bench.inventory.device(name)
+        """Raise if a device of the task has gone; a run that loses one has failed for good."""
+        for channel in self.channels:
+            try:
+                self.bench.check_access(channel.device)
+            except DaqmxError as error:
+                if self.run is not None and self.run.failure is None:
+                    self.run.failure = error
+                raise
 
     def start(self) -> None:
         if self.state is State.RUNNING:
             raise DaqmxError(Code.TASK_RUNNING)
         self.advance(State.COMMITTED)
         if self.is_buffered:
-            self.bench.clock.power_on()
-            self.run = self._make_run(self.bench.clock.now())
+            # A task that waits for another one's clock or edge does not set the world going by itself.
+            clock = self.bench.clock
+            self.run = self._make_run(clock.now() if self.timing.waits_for_others else clock.power_on())
             self.run.look(self.bench.clock.now())
         self.state = State.RUNNING
         self.auto_started = False
@@ -187,6 +201,7 @@ class Task:
                 if other is not self and other.run is not None and other.timing.source_task() is self:
                     other.run.halt(now)
             self.run.aborted = True
+        self.log.close()
         self.run = None
         self.state = State.COMMITTED
         if self._explicit < State.COMMITTED:
@@ -250,7 +265,19 @@ class Task:
             instant=finite and self.bench.finite == "instant",
         )
         search = self._reference_search(plan) if ref else None
-        return Run(plan, self.timing.start_rule(now_s), self.make_sampler, search)
+        hosts = self.hosts
+        return Run(
+            plan,
+            self.timing.start_rule(now_s),
+            self.make_sampler,
+            search,
+            arrived=lambda now: self.bench.arrived_s(hosts, now),
+        )
+
+    def disturbed(self) -> None:
+        """The world or its faults have changed: samples ahead of now are made afresh."""
+        if self.run is not None and self.run.times is not None:
+            self.run.retime(self.timing.clock_from(self.run.times.first_s, self.run.times.rate_hz))
 
     def make_sampler(self, times: SampleTimes) -> Sampler:
         inputs = [
@@ -259,14 +286,37 @@ class Task:
         ]
         return Sampler(self.bench.source, self.bench.faults, inputs, times)
 
+    @property
+    def scaling(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(gain, zero) of each channel: reading = code · gain + zero."""
+        if self._scaling is None:
+            converters = [channel.converter for channel in self.channels]
+            units = np.array([channel.unit_per_electrical for channel in self.channels])
+            gain = np.array([converter.step for converter in converters]) * units
+            zero = np.array([converter.middle for converter in converters]) * units
+            self._scaling = gain, zero
+        return self._scaling
+
     def readings(self, codes: NDArray[np.int32], rows: list[int] | None = None) -> NDArray[np.float64]:
         """Codes (channels × samples) in the channels' units."""
-        chosen = self.channels if rows is None else [self.channels[row] for row in rows]
-        gain = np.array([c.converter.step * c.unit_per_electrical for c in chosen])[:, None]
-        zero = np.array([c.converter.middle * c.unit_per_electrical for c in chosen])[:, None]
-        values: NDArray[np.float64] = codes * gain
-        values += zero
+        gain, zero = self.scaling
+        if rows is not None:
+            gain, zero = gain[rows], zero[rows]
+        values: NDArray[np.float64] = codes * gain[:, None]
+        values += zero[:, None]
         return values
+
+    def log_read(self, codes: NDArray[np.int32], rows: list[int] | None, first: int) -> None:
+        """Give a block that has been read to DAQmx's own recorder, if that is on."""
+        if self.log.enabled and codes.shape[1]:
+            chosen = self.channels if rows is None else [self.channels[row] for row in rows]
+            self.log.write(
+                [channel.name for channel in chosen],
+                [channel.unit_name for channel in chosen],
+                self.readings(codes, rows),
+                first,
+                self.timing.rate_hz,
+            )
 
     def trigger_readings(self, sampler: Sampler, source: str, start: int, stop: int) -> NDArray[np.float64]:
         """Readings of the channel an analogue trigger listens to."""

@@ -8,6 +8,8 @@ from typing import Any, Final
 from nidaqmx.constants import (
     AcquisitionType,
     Edge,
+    LoggingMode,
+    LoggingOperation,
     OverwriteMode,
     ReadRelativeTo,
     SampleTimingType,
@@ -108,6 +110,11 @@ READ: Final = SettingsGroup(
         "WAIT_MODE": WaitMode.SLEEP.value,
         "SLEEP_TIME": 0.001,
         "CHANNELS_TO_READ": "",
+        "LOGGING_MODE": LoggingMode.OFF.value,
+        "LOGGING_FILE_PATH": "",
+        "LOGGING_PAUSE": False,
+        "LOGGING_TDMS_GROUP_NAME": "",
+        "LOGGING_TDMS_OPERATION": LoggingOperation.OPEN_OR_CREATE.value,
     },
     derived={
         "AVAIL_SAMP_PER_CHAN": lambda task: _samples_now(task, "available"),
@@ -130,6 +137,7 @@ READ: Final = SettingsGroup(
             "CHANNELS_TO_READ",
             "WAIT_MODE",
             "SLEEP_TIME",
+            "LOGGING_PAUSE",
         }
     ),
 )

@@ -47,7 +47,7 @@ class TaskTiming:
     def rate_hz(self) -> float:
         """The rate the hardware makes of the one asked for: the slowest-dividing module decides."""
         asked = float(self.settings.get("SAMP_CLK_RATE", 1000.0))
-        forced = self._task.bench.faults.forced_rate_hz(self._task.hosts)
+        forced = self._task.bench.faults.forced_rate_hz([*self._task.hosts, *self._task.devices])
         if forced is not None:
             return forced
         products = {channel.product.name: channel.product for channel in self._task.channels}
@@ -80,6 +80,11 @@ class TaskTiming:
     def source_is_foreign(self) -> bool:
         return self.source.lower().strip("/") not in _OWN_CLOCKS
 
+    @property
+    def waits_for_others(self) -> bool:
+        """Whether the first sample needs something that this task does not make itself."""
+        return self.source_is_foreign or self._task.trigger["START_TRIG_TYPE"] == triggers.DIGITAL
+
     def verify(self) -> None:
         if self._task.is_buffered and self.rate_hz > self.max_rate_hz * (1 + 1e-9):
             raise DaqmxError(
@@ -105,6 +110,12 @@ class TaskTiming:
             skew - catalogue.input_delay_s(channel.product, rate)
             for skew, channel in zip(skews, self._task.channels, strict=True)
         ]
+
+    def clock_from(self, first_s: float, rate_hz: float) -> SampleTimes:
+        """A sample clock from an instant on, with what faults do to it."""
+        owner = self.source_task() or self._task
+        places = [*owner.hosts, *owner.devices]
+        return SampleTimes(first_s, rate_hz, self._task.bench.faults.clock_changes(places))
 
     def source_task(self) -> Task | None:
         """The task whose sample clock this one uses."""
@@ -132,23 +143,21 @@ class _OwnClock:
     def __init__(self, task: Task, armed_s: float) -> None:
         self._task = task
         self._armed_s = armed_s
-        self._rate = task.timing.rate_hz
         self._kind = int(task.trigger["START_TRIG_TYPE"])
         self._search: CrossingSearch | None = None
         if self._kind in (triggers.ANALOG, triggers.WINDOW):
             self._search = CrossingSearch(triggers.Condition.of(task.trigger, "START"), 0)
-            self._times = self._clock_from(armed_s)
+            self._times = task.timing.clock_from(armed_s, task.timing.rate_hz)
             self._sampler = task.make_sampler(self._times)
-
-    def _clock_from(self, first_s: float) -> SampleTimes:
-        return SampleTimes(first_s, self._rate, self._task.bench.faults.clock_changes(self._task.hosts))
 
     def __call__(self, now_s: float) -> SampleTimes | None:
         instant = self._trigger_instant(now_s)
         if instant is None:
             return None
-        delay = float(self._task.trigger.get("START_TRIG_DELAY", 0.0))
-        return self._clock_from(instant + delay)
+        first = instant + float(self._task.trigger.get("START_TRIG_DELAY", 0.0))
+        rate = self._task.timing.rate_hz
+        self._task.bench.faults.acquisition_started(first, rate)
+        return self._task.timing.clock_from(first, rate)
 
     def _trigger_instant(self, now_s: float) -> float | None:
         if self._kind == triggers.NONE:

@@ -22,7 +22,7 @@ WINDOW: Final[int] = TriggerType.ANALOG_WINDOW.value
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """An analogue trigger as a band: fires on entering [low, high] after being outside [low_off, high_off]."""
+    """An analogue trigger as a band: fires on entering [low, high] after [low_off, high_off] was left."""
 
     low: float
     high: float

@@ -8,6 +8,7 @@ import grpc
 import nidaqmx
 import nidaqmx.system
 import numpy as np
+from nidaqmx.constants import AcquisitionType
 from nidaqmx.grpc_session_options import GrpcSessionOptions
 from numpy.typing import NDArray
 
@@ -68,6 +69,17 @@ class Rig:
     def system(self) -> nidaqmx.system.System:
         return nidaqmx.system.System.remote(self.options())
 
+    def skip(self, seconds: float) -> None:
+        """Let bench time pass while nobody reads."""
+        with self.bench.changed:
+            self.bench.clock.skip(seconds)
+
+    def is_waiting(self, task: str) -> bool:
+        """Whether the task runs and more samples have come than were ready at its first read."""
+        with self.bench.changed:
+            run = self.bench.tasks[task].run
+            return run is not None and run.acquired(self.bench.clock.now()) > 20
+
     def close(self) -> None:
         self.control.close()
         self.channel.close()
@@ -91,3 +103,7 @@ def make_rig(speed: float = float("inf"), finite: str = "real", source: object =
     server.start()
     channel = grpc.insecure_channel(server.address, options=[("grpc.max_receive_message_length", -1)])
     return Rig(bench, server, channel, SimControl(server.address))
+
+
+def continuous(task: nidaqmx.Task, rate_hz: float = 4000.0) -> None:
+    task.timing.cfg_samp_clk_timing(rate_hz, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=20_000)
