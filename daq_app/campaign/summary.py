@@ -1,0 +1,76 @@
+"""What the campaign's tables and figures need to know of one test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class MethodResult:
+    """r of one test by one estimator."""
+
+    r: float
+    standard_error: float
+    bias: float = 0.0
+    """What the method gives beyond the truth on simulated motion of this amplitude and noise."""
+    bias_standard_error: float = 0.0
+    points: tuple[tuple[int, float], ...] = ()
+    """(impact, r) of each point."""
+
+    @property
+    def corrected(self) -> float:
+        """r less the method's bias."""
+        return self.r - self.bias
+
+    @property
+    def corrected_standard_error(self) -> float:
+        return float(np.hypot(self.standard_error, self.bias_standard_error))
+
+
+@dataclass(frozen=True, slots=True)
+class TestSummary:
+    """One analysed test. Angles are signed so that the release is positive."""
+
+    __test__ = False  # not a test case, whatever its name starts with
+
+    test: str
+    specimen: str
+    level: str
+    repetition: bool
+    """One of the repetitions at the end (L3-R)."""
+    run: str
+    """File name of the run."""
+    alpha_rad: float
+    p_rad_s: float
+    r_max: float
+    theta0_rad: float
+    impacts_s: tuple[float, ...]
+    """Seconds after the release."""
+    peaks_rad: tuple[float, ...]
+    """|peak| of each half-cycle, the release first."""
+    periods_s: tuple[float, ...]
+    """Full period T_n after impact n (from 1): peaks of the same side of the velocity."""
+    methods: dict[str, MethodResult]
+    """By estimator: ``EAV``, ``CRT`` and others."""
+    time_s: Floats
+    """(n,) seconds after the release."""
+    rotation_rad: Floats
+    velocity_rad_s: Floats
+    good: bool
+    reasons: tuple[str, ...] = ()
+    """Why the test is left out of the means, or what the reader should know."""
+
+    @property
+    def phi(self) -> Floats:
+        """Peaks as θ/α."""
+        return np.asarray(self.peaks_rad) / self.alpha_rad
+
+    @property
+    def phi0(self) -> float:
+        """θ0/α of the release, from the tiltmeters."""
+        return abs(self.theta0_rad) / self.alpha_rad
