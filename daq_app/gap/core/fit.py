@@ -97,7 +97,7 @@ class _Search:
         for run, prediction, weight in zip(self.problem.runs, self.predictions, self.weights, strict=True):
             covariance = Covariance(run.features.sd, prediction, sigmas)
             total -= weight * log_density(run.features.values - prediction.features, covariance)
-        return total
+        return total if math.isfinite(total) else math.inf
 
     def linearise(self) -> None:
         self.lines = [
@@ -228,6 +228,8 @@ def fit(
     start_sigma = np.array([math.log((sigmas or {}).get(s.name, s.median)) for s in model.scatters])
     starts = _starts(problem, base) if multistart and effects else [base]
     searches = [_Search(problem, u, start_sigma.copy()) for u in starts]
+    # A start may lie where the model diverges; it is dropped as long as another one does not.
+    searches = [s for s in searches if math.isfinite(s.objective)] or searches[:1]
     if len(searches) > 1:
         for search in searches:
             search.run(rounds=1, steps=2)

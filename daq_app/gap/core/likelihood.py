@@ -43,7 +43,7 @@ class Covariance:
             core = np.eye(self._loadings.shape[1]) + self._loadings.T @ weighted
             self._weighted = weighted
             # k × k with eigenvalues of at least 1: its inverse is safe, and products with it are many.
-            self._inverse = np.linalg.inv(core)
+            self._inverse = np.linalg.inv(core).astype(np.float64)
             self._log_det_core = float(np.linalg.slogdet(core)[1])
 
     @property
