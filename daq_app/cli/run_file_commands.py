@@ -1,0 +1,155 @@
+"""`daq-app verify`, `daq-app recover`, `daq-app export`: runs and journals on disk."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import Progress
+from rich.table import Table
+from rich.text import Text
+
+from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
+from daq_app.runfile import Recovery, VerifyReport, recover, verify
+from daq_app.runfile.exporters import ExportFormat, export_run
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the root."""
+    app.command("verify", epilog="Example: daq-app verify runs")(verify_command)
+    app.command("recover", epilog="Example: daq-app recover runs")(recover_command)
+    app.command("export", epilog="Example: daq-app export runs/FR1-L3-2.h5 --format mat --out exported/")(
+        export_command
+    )
+
+
+def verify_command(
+    paths: Annotated[list[Path], typer.Argument(help="Runs, journals or folders of them.", metavar="PATH…")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON list.")] = False,
+) -> None:
+    """Say of each run and journal that every sample is there or known to be missing, or what is wrong.
+
+    Every sample is read and its checksums proven. Exit code 0 if all is well, 1 if not.
+    """
+    with reported():
+        reports = [verify(path) for path in paths]
+        if as_json:
+            typer.echo(json.dumps([_report_dict(report) for report in reports], ensure_ascii=False))
+        else:
+            _print_reports(reports)
+    if not all(report.ok for report in reports):
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _report_dict(report: VerifyReport) -> dict[str, Any]:
+    return {
+        "path": str(report.path),
+        "kind": report.kind,
+        "ok": report.ok,
+        "problems": list(report.problems),
+        "notes": list(report.notes),
+        "n_samples": report.n_samples,
+        "lost_samples": report.lost_samples,
+        "duration_s": report.duration_s,
+        "children": [_report_dict(child) for child in report.children],
+    }
+
+
+def _print_reports(reports: list[VerifyReport]) -> None:
+    """A table of verdicts, and under it every problem and note as a sentence of its own."""
+    table = Table(box=None)
+    for column in ("file", "kind", "verdict"):
+        table.add_column(column, overflow="fold")
+    for column in ("samples", "missing"):
+        table.add_column(column, justify="right")
+    remarks: list[tuple[str, str, str]] = []
+    for report in reports:
+        for item in (*report.children, report):
+            name = str(item.path.relative_to(report.path)) if item is not report else str(item.path)
+            verdict = "[bold red]BAD[/]" if item.problems else "[green]good[/]"
+            if item.kind != "folder":
+                numbers = (str(item.n_samples), str(item.lost_samples))
+                table.add_row(escape(name), item.kind, verdict, *numbers)
+            told = [("bold red", text) for text in item.problems] + [("bold", text) for text in item.notes]
+            remarks += [(style, name, text.replace(str(item.path), "it")) for style, text in told]
+    console = Console()
+    if table.row_count:
+        console.print(table)
+    for style, name, text in remarks:
+        line = Text(f"{name}: ", style=style)
+        line.append(text, style="default")
+        console.print(line, soft_wrap=True)
+
+
+def recover_command(
+    folder: Annotated[Path, typer.Argument(help="A folder of runs, or one journal.", metavar="DIR")],
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Take runs that are there for good without reading every sample.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON list.")] = False,
+) -> None:
+    """Make a run of every journal that has none yet, or whose run is damaged. Safe to repeat.
+
+    Journals are never changed, damaged runs are set aside and never deleted, and a journal that is
+    being recorded is left alone. Exit code 1 if a journal could not be used.
+    """
+    with reported():
+        results = recover(folder, thorough=not quick)
+        if as_json:
+            typer.echo(json.dumps([_recovery_dict(result) for result in results], ensure_ascii=False))
+        elif not results:
+            typer.echo(f"{folder}: no journals, nothing to recover")
+        for result in () if as_json else results:
+            if result.outcome == "failed":
+                print_paragraph("Not recovered", result.text)
+            else:
+                typer.echo(f"{result.journal}: {result.outcome}: {result.text}")
+    if any(result.outcome == "failed" for result in results):
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _recovery_dict(result: Recovery) -> dict[str, Any]:
+    return {
+        "journal": str(result.journal),
+        "outcome": result.outcome,
+        "text": result.text,
+        "run": None if result.run is None else str(result.run),
+        "n_samples": result.n_samples,
+        "lost_samples": result.lost_samples,
+    }
+
+
+def export_command(
+    run: Annotated[Path, typer.Argument(help="A run file.", metavar="RUN")],
+    format_: Annotated[ExportFormat, typer.Option("--format", help="What to write.")],
+    out: Annotated[Path, typer.Option("--out", help="File to write, or a folder to write into.")] = Path(),
+    raw: Annotated[
+        bool, typer.Option("--raw/--si", help="Readings of the channels, or SI with offset and tare off.")
+    ] = False,
+    from_s: Annotated[
+        float | None, typer.Option("--from", help="First time in seconds, on the run's time axis.")
+    ] = None,
+    to_s: Annotated[float | None, typer.Option("--to", help="Time in seconds before which to stop.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")] = False,
+) -> None:
+    """Write a run, or a part of it, as CSV, MATLAB, TDMS, Parquet, netCDF or NumPy file.
+
+    The file appears under its name only when it is complete; gaps are NaN.
+    """
+    with reported(), Progress(console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(f"{run.name} → {format_}", total=1.0)
+        path = export_run(
+            run,
+            out,
+            format_,
+            units="raw" if raw else "si",
+            from_s=from_s,
+            to_s=to_s,
+            overwrite=overwrite,
+            report=lambda fraction: progress.update(task, completed=fraction),
+        )
+    typer.echo(f"{path}: written, {path.stat().st_size / 1e6:.1f} MB")

@@ -1,0 +1,64 @@
+"""One door to all export formats: checks, a temporary file, and the final name only when all is written."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final, Literal
+
+from daq_app.runfile.durable import replace_durably
+from daq_app.runfile.errors import RunFileError
+from daq_app.runfile.exporters.selection import Selection, Units
+from daq_app.runfile.hdf5_read import open_run
+
+ExportFormat = Literal["csv", "mat", "tdms", "parquet", "netcdf", "npz"]
+FORMATS: Final[dict[str, str]] = {
+    "csv": ".csv",
+    "mat": ".mat",
+    "tdms": ".tdms",
+    "parquet": ".parquet",
+    "netcdf": ".nc",
+    "npz": ".npz",
+}
+"""Format → suffix of its files."""
+
+
+def export_run(
+    path: Path,
+    out: Path,
+    format_: ExportFormat,
+    *,
+    units: Units = "si",
+    from_s: float | None = None,
+    to_s: float | None = None,
+    overwrite: bool = False,
+    report: Callable[[float], None] = lambda fraction: None,
+) -> Path:
+    """Write a run, or the times ``from_s ≤ t < to_s`` of it, in another format; returns the file's path.
+
+    `out` is the file, or a folder in which it is named after the run.  An hour of recording needs no
+    more memory than a minute (MAT: one channel at a time).  Samples in gaps are NaN.  Raises
+    `RunFileError`; then, or when interrupted, nothing new is left on disk.
+    """
+    suffix = FORMATS.get(format_)
+    if suffix is None:
+        raise RunFileError(f"there is no export format {format_}", advice=f"Formats: {', '.join(FORMATS)}.")
+    final = out / f"{path.stem}{suffix}" if out.is_dir() else out
+    if final.exists() and not overwrite:
+        raise RunFileError(f"{final} exists already", advice="Choose another name, or overwrite it.")
+    temporary = final.with_name(final.name + ".part")
+    with open_run(path) as run:
+        selection = Selection.of(run, units, from_s, to_s, report)
+        write = importlib.import_module(f"daq_app.runfile.exporters.to_{format_}").write
+        try:
+            write(temporary, selection)
+            replace_durably(temporary, final)
+        except OSError as error:
+            raise RunFileError(
+                f"{final} cannot be written ({error.strerror or error})",
+                advice="Check that the folder exists, is writable and has room.",
+            ) from error
+        finally:
+            temporary.unlink(missing_ok=True)
+    return final

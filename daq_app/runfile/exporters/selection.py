@@ -1,0 +1,150 @@
+"""What of a run is exported, and how it is walked through in pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.runfile.errors import RunFileError
+from daq_app.runfile.hdf5_read import Run
+
+Units = Literal["raw", "si"]
+PIECE_SAMPLES: Final = 65536
+"""Samples per channel in memory at a time: 21 MB at 41 channels."""
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """Columns [start, stop) of all channels of a run, as readings or in SI."""
+
+    run: Run
+    units: Units
+    start: int
+    stop: int
+    report: Callable[[float], None]
+    """Told the fraction done from time to time."""
+
+    @classmethod
+    def of(
+        cls,
+        run: Run,
+        units: Units,
+        from_s: float | None,
+        to_s: float | None,
+        report: Callable[[float], None],
+    ) -> Selection:
+        """Columns of the times ``from_s ≤ t < to_s`` of the run's own time axis.
+
+        Raises `RunFileError` if there are none, or if SI is asked of a run without a rig.
+        """
+        if units == "si" and run.rig is None:
+            raise RunFileError(
+                f"{run.path} holds no rig that says how to scale its readings",
+                advice="Export the readings as they are: --raw.",
+            )
+        start = 0 if from_s is None else _column(run, from_s)
+        stop = run.n_samples if to_s is None else _column(run, to_s)
+        if start >= stop:
+            low, high = run.first_sample / run.rate_hz, (run.first_sample + run.n_samples) / run.rate_hz
+            raise RunFileError(
+                f"{run.path}: there are no samples in the time asked for",
+                advice=f"The run goes from {low:g} s to {high:g} s.",
+            )
+        return cls(run, units, start, stop, report)
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        return self.run.channel_ids
+
+    @property
+    def n_samples(self) -> int:
+        return self.stop - self.start
+
+    @property
+    def channel_units(self) -> tuple[str, ...]:
+        """Unit of each channel as exported."""
+        if self.units == "raw":
+            return self.run.header.reading_units
+        rig = self.run.rig
+        assert rig is not None
+        return tuple(rig.channel(channel_id).si_unit for channel_id in self.ids)
+
+    def values(self, ids: tuple[str, ...], start: int, stop: int) -> NDArray[np.float64]:
+        """(len(ids), stop − start) of columns counted from the run's first."""
+        return self.run.readings(ids, start, stop) if self.units == "raw" else self.run.si(ids, start, stop)
+
+    def pieces(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """(times (m,), values (n_channels, m)) from beginning to end."""
+        for start in range(self.start, self.stop, PIECE_SAMPLES):
+            stop = min(start + PIECE_SAMPLES, self.stop)
+            yield self.run.time_s(start, stop), self.values(self.ids, start, stop)
+            self.report((stop - self.start) / self.n_samples)
+
+    def channel_pieces(self, channel_id: str) -> Iterator[NDArray[np.float64]]:
+        """One channel from beginning to end."""
+        for start in range(self.start, self.stop, PIECE_SAMPLES):
+            yield self.values((channel_id,), start, min(start + PIECE_SAMPLES, self.stop))[0]
+
+    def channel_metadata(self, channel_id: str) -> dict[str, Any]:
+        """What is known of a channel, JSON-able."""
+        header, rig = self.run.header, self.run.rig
+        known: dict[str, Any] = {"time_offset_s": header.time_offset_s(channel_id)}
+        if rig is not None and channel_id in rig.channel_ids:
+            channel = rig.channel(channel_id)
+            known |= {
+                "family": channel.family,
+                "physical_channel": channel.physical_channel,
+                "position_m": list(channel.position_m),
+                "axis": channel.axis,
+                "sensitivity": channel.sensitivity,
+                "sensitivity_unit": channel.sensitivity_unit,
+                "offset": channel.offset,
+                "tare": header.tare.get(channel_id, 0.0),
+                "polarity": channel.polarity,
+                "certificate": channel.certificate.number,
+                "certificate_due": channel.certificate.due.isoformat(),
+            }
+            if channel.anchor_m is not None:
+                known["anchor_m"] = list(channel.anchor_m)
+        return known
+
+    def metadata(self) -> dict[str, Any]:
+        """What is known of the run, JSON-able: who, when, events and gaps within the selection."""
+        run = self.run
+        first, last = run.first_sample + self.start, run.first_sample + self.stop
+        return {
+            "run_id": run.header.run_id,
+            "test": run.header.test,
+            "specimen": run.header.specimen,
+            "rig_name": run.header.rig_name,
+            "rate_hz": run.rate_hz,
+            "first_sample": first,
+            "n_samples": self.n_samples,
+            "start_utc_ns": run.header.start_utc_ns,
+            "raw_sha256": run.attributes.raw_sha256,
+            "values": "readings of the NI channels"
+            if self.units == "raw"
+            else "SI, offset and tare taken off",
+            "events": [
+                {"sample": e.sample, "kind": e.kind, "text": e.text}
+                for e in run.events
+                if first <= e.sample < last
+            ],
+            "gaps": [
+                {"first_sample": g.first_sample, "n_samples": g.n_samples, "reason": g.reason}
+                for g in run.gaps
+                if g.first_sample < last and g.end > first
+            ],
+        }
+
+
+def _column(run: Run, time_s: float) -> int:
+    if not np.isfinite(time_s):
+        raise RunFileError(f"{time_s} is no time")
+    # A time that names a sample must give that sample in spite of rounding.
+    sample = int(np.ceil(np.round(time_s * run.rate_hz, 6)))
+    return min(max(sample - run.first_sample, 0), run.n_samples)

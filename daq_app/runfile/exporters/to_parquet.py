@@ -1,0 +1,34 @@
+"""Parquet: one column per channel, one row group per piece, metadata in the schema."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from daq_app.runfile.errors import RunFileError
+from daq_app.runfile.exporters.selection import Selection
+
+
+def write(path: Path, selection: Selection) -> None:
+    """Needs the optional package pyarrow; raises `RunFileError` where it is absent."""
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError as error:
+        raise RunFileError(
+            "Parquet needs the package pyarrow",
+            advice="Install it: pip install rocking-test-recorder[formats].",
+        ) from error
+    fields = [pa.field("time_s", pa.float64(), nullable=False, metadata={"unit": "s"})]
+    for channel_id, unit in zip(selection.ids, selection.channel_units, strict=True):
+        known = json.dumps(selection.channel_metadata(channel_id))
+        fields.append(
+            pa.field(channel_id, pa.float64(), nullable=False, metadata={"unit": unit, "channel": known})
+        )
+    metadata = {key: json.dumps(value) for key, value in selection.metadata().items()}
+    schema = pa.schema(fields, metadata=metadata)
+    # Float columns of noise gain nothing from a dictionary; BYTE_STREAM_SPLIT is Parquet's shuffle.
+    options = {"compression": "zstd", "use_dictionary": False, "use_byte_stream_split": True}
+    with pq.ParquetWriter(path, schema, **options) as writer:
+        for times, values in selection.pieces():
+            writer.write_table(pa.table([times, *values], schema=schema))
