@@ -18,9 +18,9 @@ from drivers.protocol import Block, DeviceInfo, DriverError, Opened
 from drivers.stream import TaskStream
 from drivers.tasks import commit, create_task, log_to_tdms, read_ranges
 
-_HOUSEKEEPING_S = 0.1
-"""Backlog, position and overloads are asked for this often: three round trips a task, not at each read
-when reads come fast."""
+_HOUSEKEEPING_S = 0.08
+"""Backlog and overloads are asked for this often: two round trips a task, at each read at the real rate
+but not when reads come fast. The position is asked for at every read."""
 _REPLY_MARGIN_S = 2.0
 """How much longer than the read's own time-out we wait for the server's reply."""
 _CATCH_UP_READS = 10
@@ -122,6 +122,7 @@ class NidaqmxDriver:
         by_role = sorted(self._streams, key=lambda stream: stream.planned.role == "master")
         try:
             for stream in by_role:
+                stream.begin()
                 stream.task.start()
         except Exception as error:
             self.stop()
@@ -141,10 +142,9 @@ class NidaqmxDriver:
                 self._connection.limit_calls_to(left + _REPLY_MARGIN_S)
                 stream.fill(wanted, left)
             self._connection.limit_calls_to()
+            self._check_positions()
             self._housekeeping()
         except Exception as error:
-            # After any trouble the position is checked at the next read, before its block is handed out.
-            self._last_housekeeping = 0.0
             out_of_step = isinstance(error, _OutOfStepError)
             partial = None if out_of_step else self._block(min(s.n_pending for s in self._streams))
             raise translate(error, doing="reading", partial=partial) from error
@@ -179,13 +179,8 @@ class NidaqmxDriver:
         self._backlog = max(0, self._backlog - n_samples)
         return block
 
-    def _housekeeping(self) -> None:
-        now = time.monotonic()
-        if now - self._last_housekeeping < _HOUSEKEEPING_S:
-            return
-        self._last_housekeeping = now
-        overloaded: list[str] = []
-        backlog = []
+    def _check_positions(self) -> None:
+        """Raise unless what has just been read is what followed: replies can be lost or exchanged."""
         for stream in self._streams:
             at = stream.device_position()
             if at != stream.position:
@@ -194,7 +189,16 @@ class NidaqmxDriver:
                     advice="Reading goes on at the right sample; if it happens often, restart the server",
                     recoverable=True,
                 )
-            backlog.append(stream.total_acquired() - at)
+
+    def _housekeeping(self) -> None:
+        now = time.monotonic()
+        if now - self._last_housekeeping < _HOUSEKEEPING_S:
+            return
+        self._last_housekeeping = now
+        overloaded: list[str] = []
+        backlog = []
+        for stream in self._streams:
+            backlog.append(stream.total_acquired() - stream.position)
             overloaded.extend(stream.overloaded())
         # Counted before this read's block is handed out, so that `_block` subtracts it once.
         self._backlog = max(backlog) + min(stream.n_pending for stream in self._streams)
@@ -269,7 +273,7 @@ class NidaqmxDriver:
         """Stop the clock: the master first, so that the slaves get no further edge."""
         self._connection.limit_calls_to(_CLOSE_LIMIT_S)
         for stream in sorted(self._streams, key=lambda stream: stream.planned.role != "master"):
-            with contextlib.suppress(ni_errors.Error), warnings.catch_warnings():
+            with contextlib.suppress(Exception), warnings.catch_warnings():
                 # NI warns that a continuous task was stopped before it was done: that is what stopping is.
                 warnings.simplefilter("ignore", ni_errors.DaqWarning)
                 stream.task.stop()
@@ -281,11 +285,21 @@ class NidaqmxDriver:
 
     def _close_tasks(self) -> None:
         self._connection.limit_calls_to(_CLOSE_LIMIT_S)
-        for stream in self._streams:
-            with contextlib.suppress(ni_errors.Error), warnings.catch_warnings():
-                warnings.simplefilter("ignore", ni_errors.DaqWarning)
-                stream.task.close()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ni_errors.DaqWarning)
+            for stream in self._streams:
+                self._clear(stream)
         self._streams = []
+
+    def _clear(self, stream: TaskStream) -> None:
+        """Clear the task. One that is left on a device server keeps its reservation for ever, so a task
+        whose way was cut is looked for once more."""
+        try:
+            stream.task.close()
+        except Exception:
+            if self._connection.is_remote:
+                with contextlib.suppress(Exception):
+                    self._connection.attach_task(stream.planned.name).close()
 
     def _opened_plan(self) -> TaskPlan:
         if self._plan is None or not self._streams:

@@ -13,6 +13,9 @@ from daq_app.config.plan import PlannedTask
 from drivers.protocol import DriverError
 from drivers.tasks import virtual_name
 
+_SURE_SAMPLES = 200
+"""Counters that moved by more than this while they were asked for prove nothing."""
+
 
 class TaskStream:
     """Reads one task. Samples wait here until every task of the plan has delivered them."""
@@ -27,6 +30,7 @@ class TaskStream:
         """Index of the next sample to ask the device for."""
         self._sought = False
         self._overload_supported = True
+        self._position_is_absolute = True
         self.attach(task)
 
     def attach(self, task: Task) -> None:
@@ -102,7 +106,21 @@ class TaskStream:
 
     def device_position(self) -> int:
         """Where the device believes that reading stands."""
-        return int(self.task.in_stream.curr_read_pos)
+        at = int(self.task.in_stream.curr_read_pos)
+        if at == self.position or not self._position_is_absolute:
+            return self.position
+        # Some device might count within its buffer; then the two other counters still agree with us.
+        before = self.available()
+        total = self.total_acquired()
+        after = self.available()
+        if after - before < _SURE_SAMPLES and total - after <= self.position <= total - before:
+            self._position_is_absolute = False
+            return self.position
+        return at
+
+    def available(self) -> int:
+        """Samples per channel that wait in the device's buffer."""
+        return int(self.task.in_stream.avail_samp_per_chan)
 
     def overloaded(self) -> tuple[str, ...]:
         """Ids of overloaded channels; empty where the module cannot tell."""
@@ -126,6 +144,14 @@ class TaskStream:
         self.task.in_stream.offset = position
         self.position = position
         self._sought = True
+
+    def begin(self) -> None:
+        """The task is about to start: its samples count from 0."""
+        self._pending.clear()
+        self.n_pending = 0
+        self.position = 0
+        if self._sought:
+            self._read_onwards()
 
     def _read_onwards(self) -> None:
         self.task.in_stream.relative_to = ReadRelativeTo.CURRENT_READ_POSITION

@@ -1,0 +1,318 @@
+"""What the nidaqmx driver does when hardware, server or network fail: kept samples, clear words, no lies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from daq_app.config import PlannedChannel
+from daq_app.config.plan import PlannedTask, TaskPlan
+from drivers import Block, Driver, DriverError, open_driver
+from drivers.error_advice import BY_CODE, BY_GRPC_STATUS, advice_for
+
+Laboratories = Callable[..., Any]
+
+
+def started(lab: Any) -> Driver:
+    driver = open_driver(lab.connection)
+    driver.open(lab.plan)
+    driver.start()
+    return driver
+
+
+def assert_true_samples(lab: Any, block: Block) -> None:
+    """Every sample of channel 0 is the one that its index says."""
+    samples = block.first_sample + np.arange(block.n_samples)
+    expected = 0.01 + 0.01 * samples / lab.plan.rate_hz
+    assert np.abs(block.readings[0] - expected).max() < 4e-4
+
+
+def read_through(driver: Driver, lab: Any, until: int) -> tuple[list[Block], list[DriverError]]:
+    """Read as the acquisition does: keep partial data, try again, recover."""
+    blocks: list[Block] = []
+    errors: list[DriverError] = []
+    while not blocks or blocks[-1].first_sample + blocks[-1].n_samples < until:
+        try:
+            blocks.append(driver.read(2.0))
+        except DriverError as error:
+            errors.append(error)
+            assert len(errors) < 50, error
+            if error.partial is not None:
+                blocks.append(error.partial)
+            if error.recoverable:
+                driver.recover()
+            elif not error.retryable:
+                raise
+    for block in blocks:
+        assert_true_samples(lab, block)
+    return blocks, errors
+
+
+def lost(blocks: list[Block]) -> int:
+    end = 0
+    missing = 0
+    for block in blocks:
+        assert block.first_sample >= end
+        missing += block.first_sample - end
+        end = block.first_sample + block.n_samples
+    return missing
+
+
+def test_a_device_that_is_missing_is_named_with_those_that_are_there(laboratory: Laboratories) -> None:
+    lab = laboratory()
+    lab.break_something("module_removed", "cDAQ1Mod3")
+    driver = open_driver(lab.connection)
+    with pytest.raises(DriverError) as caught:
+        driver.open(lab.plan)
+        driver.start()
+        driver.read(1.0)
+    assert "cDAQ1Mod3" in str(caught.value)
+    assert caught.value.code in (-200220, -201003, -200324)
+    driver.close()
+    assert lab.open_tasks == 0
+
+
+def test_a_device_that_another_program_holds(laboratory: Laboratories) -> None:
+    lab = laboratory()
+    lab.break_something("reserved", "cDAQ1Mod2")
+    driver = open_driver(lab.connection)
+    with pytest.raises(DriverError) as caught:
+        driver.open(lab.plan)
+    assert caught.value.code == -50103
+    assert "reserved" in str(caught.value)
+    assert "Close the other program" in caught.value.advice
+    assert lab.open_tasks == 0, "a failed open must leave nothing reserved"
+    lab.mend()
+    driver.open(lab.plan)  # the same driver can try again
+    driver.close()
+
+
+def test_two_drivers_cannot_share_the_hardware_and_do_not_attach_to_each_other(
+    laboratory: Laboratories,
+) -> None:
+    lab = laboratory()
+    first = started(lab)
+    second = open_driver(lab.connection)
+    with pytest.raises(DriverError) as caught:
+        second.open(lab.plan)
+    assert caught.value.code == -50103
+    assert first.read(1.0).first_sample == 0
+    first.close()
+    second.close()
+
+
+def test_overwritten_samples_are_a_gap_of_the_right_length(laboratory: Laboratories) -> None:
+    lab = laboratory()
+    driver = started(lab)
+    blocks, _ = read_through(driver, lab, 2000)
+    lab.let_time_pass(lab.rig.acquisition.buffer_s + 3.0)
+    more, errors = read_through(driver, lab, 2000 + 4000 * 30)
+    assert [error.code for error in errors] == [-200279]
+    assert errors[0].recoverable
+    # 3 s were overwritten; a margin of the buffer is given up so that the rest can be fetched in peace.
+    assert 3 * 4000 <= lost(blocks + more) <= 3 * 4000 + lab.plan.tasks[0].buffer_samples // 20 + 1000
+    driver.close()
+
+
+def test_a_long_deafness_within_the_buffer_costs_nothing_and_is_caught_up_in_large_reads(
+    laboratory: Laboratories,
+) -> None:
+    lab = laboratory()
+    driver = started(lab)
+    read_through(driver, lab, 2000)
+    lab.let_time_pass(15.0)
+    blocks, errors = read_through(driver, lab, 2000 + 15 * 4000)
+    assert not errors
+    assert max(block.n_samples for block in blocks) > lab.plan.read_samples
+    assert blocks[-1].backlog_samples < 2 * lab.plan.read_samples * 10
+    driver.close()
+
+
+@pytest.mark.parametrize("part", ["array", "message"])
+def test_a_reply_cut_short_is_read_again_and_never_passed_on(laboratory: Laboratories, part: str) -> None:
+    lab = laboratory()
+    driver = started(lab)
+    before, _ = read_through(driver, lab, 2000)
+    lab.break_something("reply_cut_short", part=part)
+    after, errors = read_through(driver, lab, 6000)
+    assert len(errors) == 1
+    assert errors[0].recoverable
+    assert lost(before + after) == 0
+    driver.close()
+
+
+def test_replies_out_of_order_are_noticed_and_read_again(laboratory: Laboratories) -> None:
+    lab = laboratory()
+    driver = started(lab)
+    before, _ = read_through(driver, lab, 2000)
+    lab.break_something("reply_out_of_order")
+    after, errors = read_through(driver, lab, 8000)
+    assert errors
+    assert lost(before + after) == 0
+    driver.close()
+
+
+def test_a_read_that_times_out_hands_over_what_had_come(laboratory: Laboratories) -> None:
+    lab = laboratory()
+    driver = started(lab)
+    driver.read(1.0)
+    lab.break_something("read_timeout", samples=123.0)
+    with pytest.raises(DriverError) as caught:
+        driver.read(1.0)
+    assert caught.value.code == -200284
+    assert caught.value.retryable
+    assert caught.value.partial is not None
+    assert caught.value.partial.n_samples == 123
+    assert_true_samples(lab, caught.value.partial)
+    assert_true_samples(lab, driver.read(1.0))
+    driver.close()
+
+
+def test_a_short_read_of_one_of_two_tasks_keeps_the_rows_together(laboratory: Laboratories) -> None:
+    lab = laboratory("fr1-pxie")
+    driver = started(lab)
+    driver.read(1.0)
+    slave = next(task.name for task in lab.plan.tasks if task.role == "slave")
+    name = next(name for name in lab.bench.tasks if name.endswith(slave))
+    lab.break_something("read_timeout", name, samples=50.0)
+    with pytest.raises(DriverError) as caught:
+        driver.read(1.0)
+    assert caught.value.retryable
+    assert caught.value.partial is not None and caught.value.partial.n_samples == 50
+    block = driver.read(1.0)
+    assert block.first_sample == lab.plan.read_samples + 50
+    row = next(item.rig_index for task in lab.plan.tasks if task.role == "slave" for item in task.channels)
+    expected = 0.01 * (row + 1) + 0.01 * (block.first_sample + np.arange(block.n_samples)) / block_rate(lab)
+    assert np.abs(block.readings[row] - expected).max() < 1e-3
+    driver.close()
+
+
+def block_rate(lab: Any) -> float:
+    return float(lab.plan.rate_hz)
+
+
+def test_a_server_that_is_gone_is_told_and_can_be_tried_again(laboratory: Laboratories) -> None:
+    lab = laboratory()
+    driver = started(lab)
+    driver.read(1.0)
+    lab.stop()
+    with pytest.raises(DriverError) as caught:
+        driver.read(1.0)
+    assert caught.value.recoverable
+    assert "cannot be reached" in str(caught.value)
+    with pytest.raises(DriverError) as again:
+        driver.recover()
+    assert again.value.recoverable
+    driver.close()  # must not hang
+
+
+def test_a_server_that_was_restarted_has_forgotten_the_task(laboratory: Laboratories) -> None:
+    lab = laboratory()
+    driver = started(lab)
+    driver.read(1.0)
+    with lab.bench.changed:
+        lab.bench.reset()
+    with pytest.raises(DriverError) as caught:
+        driver.read(1.0)
+        driver.recover()
+    assert not caught.value.recoverable
+    assert "start" in caught.value.advice.lower()
+    driver.close()
+
+
+def test_no_server_at_all(laboratory: Laboratories) -> None:
+    lab = laboratory()
+    lab.stop()
+    driver = open_driver(lab.connection)
+    with pytest.raises(DriverError) as caught:
+        driver.open(lab.plan)
+    assert "cannot be reached" in str(caught.value)
+    driver.close()
+
+
+def test_without_ni_daqmx_the_local_connection_says_what_to_install(laboratory: Laboratories) -> None:
+    lab = laboratory()
+    driver = open_driver("local")
+    with pytest.raises(DriverError) as caught:
+        driver.open(lab.plan)
+    assert "not installed" in str(caught.value)
+    assert "--connection simulated" in caught.value.advice
+
+
+@pytest.mark.parametrize(
+    "connection", ["", "usb", "grpc://", "grpc://host", "grpc://host:99999", "grpc://a b:1", "http://x:1"]
+)
+def test_a_connection_that_is_none(connection: str) -> None:
+    with pytest.raises(DriverError, match="no way to the hardware"):
+        open_driver(connection)
+
+
+def test_plain_text_beyond_this_machine_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DAQ_APP_ALLOW_PLAIN_GRPC", raising=False)
+    with pytest.raises(DriverError, match="without encryption"):
+        open_driver("grpc://192.0.2.7:31763")
+    monkeypatch.setenv("DAQ_APP_ALLOW_PLAIN_GRPC", "1")
+    open_driver("grpc://192.0.2.7:31763").close()
+
+
+def test_replies_above_four_megabytes_arrive(laboratory: Laboratories) -> None:
+    lab = laboratory()
+    big = TaskPlan(lab.plan.tasks, lab.plan.rate_hz, lab.plan.channel_ids, read_samples=16_000)
+    driver = open_driver(lab.connection)
+    driver.open(big)
+    driver.start()
+    block = driver.read(10.0)
+    assert block.readings.nbytes > 4 * 2**20
+    assert_true_samples(lab, block)
+    driver.close()
+
+
+def test_a_channel_that_the_module_lacks_is_told_as_such(laboratory: Laboratories) -> None:
+    lab = laboratory()
+    first = lab.plan.tasks[0].channels[0]
+    wrong = first.channel.model_copy(update={"physical_channel": "cDAQ1Mod1/ai99"})
+    channels = (PlannedChannel(wrong, 0, 0.0, 0.0), *lab.plan.tasks[0].channels[1:])
+    task = PlannedTask("broken", channels, 4000.0, 4000.0, "master", buffer_samples=80_000)
+    driver = open_driver(lab.connection)
+    with pytest.raises(DriverError) as caught:
+        driver.open(TaskPlan((task,), 4000.0, lab.plan.channel_ids, 400))
+    assert caught.value.code == -200170
+    assert "does not exist" in str(caught.value)
+    assert lab.open_tasks == 0
+    driver.close()
+
+
+def test_the_native_second_recorder_writes_only_while_asked(laboratory: Laboratories, tmp_path: Path) -> None:
+    lab = laboratory()
+    driver = open_driver(lab.connection, backup_folder=tmp_path)
+    driver.open(lab.plan)
+    driver.start()
+    driver.read(1.0)
+    (path,) = driver.start_backup("FR1-L3-2")
+    first = driver.read(1.0)
+    second = driver.read(1.0)
+    driver.stop_backup()
+    driver.read(1.0)
+    driver.close()
+    from nptdms import TdmsFile
+
+    with TdmsFile.open(path) as file:
+        (group,) = file.groups()
+        kept = group.channels()[0][:]
+    expected = np.concatenate([first.readings[0], second.readings[0]])
+    assert np.allclose(kept, expected, atol=1e-9)
+
+
+def test_every_error_the_operator_will_meet_has_its_sentence() -> None:
+    listed = [-200279, -200284, -200220, -50103, -200170, -200431, -200077, -201003]
+    for code in listed:
+        assert code in BY_CODE
+    for advice in [*BY_CODE.values(), *BY_GRPC_STATUS.values(), advice_for(-88900), advice_for(-1)]:
+        assert advice.what[0].isupper() and not advice.what.endswith(".")
+        assert advice.do[0].isupper() and not advice.do.endswith(".")
+    assert advice_for(-88705).recoverable
+    assert "UNAVAILABLE" in BY_GRPC_STATUS
