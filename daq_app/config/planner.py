@@ -169,9 +169,7 @@ def _clock_problems(members: list[_Member], file: str) -> list[Problem]:
 
 def _common_rate(groups: Mapping[_GroupKey, list[_Member]], requested_hz: float) -> float:
     products = {member.device.product.name: member.device.product for g in groups.values() for member in g}
-    own_clock = [product for product in products.values() if not product.external_clock]
-    # Cards that can take a clock from outside follow those that cannot.
-    return catalogue.coerce_rate(own_clock or list(products.values()), requested_hz)
+    return catalogue.coerce_rate(list(products.values()), requested_hz)
 
 
 def _tasks(groups: Mapping[_GroupKey, list[_Member]], rig: Rig, rate: float) -> tuple[PlannedTask, ...]:

@@ -427,6 +427,13 @@ def test_a_fault_of_the_defaults_is_reported_once(fr1: Tables, problems: Ask) ->
     assert problem.right == "Did you mean `sensitivity`?"
 
 
+def test_a_fault_that_some_channels_share_is_reported_once(fr1: Tables, problems: Ask) -> None:
+    for name in ("WP-1", "WP-2"):
+        channel(fr1, name)["sensitivity_unit"] = "V/g"
+    (problem,) = problems(fr1)
+    assert problem.key == "channels (WP-1, WP-2: 2 channels).sensitivity_unit"
+
+
 def test_a_channel_overrides_its_familys_defaults(fr1: Tables, problems: Ask) -> None:
     channel(fr1, "LV-A01").update(
         sensitivity=0.1, offset=0.0, excitation={"value": 12.0}, range_si=[-0.01, 0.08]
