@@ -16,6 +16,8 @@ from rich.console import Console
 from rich.text import Text
 
 from daq_app.config import ConfigError, Problem
+from daq_app.runfile.errors import RunFileError
+from drivers.protocol import DriverError
 
 EXIT_FAILED: Final = 1
 EXIT_BAD_INPUT: Final = 2
@@ -44,10 +46,6 @@ def reported() -> Iterator[None]:
 
     Exceptions that nobody expected pass through: they are bugs and want a traceback.
     """
-    # Imported here: `daq-app config check` needs neither drivers nor HDF5.
-    from daq_app.runfile.errors import RunFileError
-    from drivers.protocol import DriverError
-
     try:
         yield
     except ConfigError as error:
@@ -65,3 +63,9 @@ def reported() -> Iterator[None]:
     except BrokenPipeError:
         # The reader of our output (head, less) has gone: nothing is wrong here.
         raise typer.Exit(0) from None
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        print_paragraph(
+            "Error", f"{where}{error.strerror or error}. Check the path, its rights and free space"
+        )
+        raise typer.Exit(EXIT_BAD_INPUT) from None

@@ -1,5 +1,6 @@
 """Channel-configuration layer: rig model, hardware catalogue, planner."""
 
+from daq_app.config.connection import Connection, parse_connection
 from daq_app.config.errors import ConfigError, Problem
 from daq_app.config.loader import load_rig, parse_rig
 from daq_app.config.plan import PlannedChannel, PlannedTask, PlanNote, TaskPlan
@@ -10,6 +11,7 @@ from daq_app.config.scaling import Scaling
 __all__ = [
     "Channel",
     "ConfigError",
+    "Connection",
     "PlanNote",
     "PlannedChannel",
     "PlannedTask",
@@ -18,6 +20,7 @@ __all__ = [
     "Scaling",
     "TaskPlan",
     "load_rig",
+    "parse_connection",
     "parse_rig",
     "plan_tasks",
 ]
