@@ -15,7 +15,13 @@ from daq_app.monitor.shapes import draw_shape
 from daq_app.monitor.theme import DARK, Colours, font
 
 Index = QModelIndex | QPersistentModelIndex
-HEADINGS = ("Verdict", "Channel", "Value at rest", "Noise / expected", "Hum / expected", "Pull", "What to do")
+HEADINGS = ("Verdict", "Channel", "What to do", "At rest", "Noise", "Hum", "Pull")
+TIPS = {
+    4: "rms noise over the expected figure",
+    5: "mains hum over the expected noise",
+    6: "measured over expected change in the pull test",
+}
+_FINDING = 2
 SHAPES = {Verdict.GO: "tick", Verdict.CAUTION: "triangle", Verdict.NO_GO: "cross"}
 WORDS = {Verdict.GO: "Go", Verdict.CAUTION: "Look", Verdict.NO_GO: "No-go"}
 TONES = {Verdict.GO: "good", Verdict.CAUTION: "warning", Verdict.NO_GO: "bad"}
@@ -49,31 +55,36 @@ class CheckModel(QAbstractTableModel):
         return 0 if parent is not None and parent.isValid() else len(HEADINGS)
 
     def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:
-        if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
-            return HEADINGS[section]
-        return None
+        if orientation is not Qt.Orientation.Horizontal:
+            return None
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return TIPS.get(section)
+        if role == Qt.ItemDataRole.TextAlignmentRole and section > _FINDING:
+            return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        return HEADINGS[section] if role == Qt.ItemDataRole.DisplayRole else None
 
     def data(self, index: Index, role: int = 0) -> Any:
         name, unit, check = self._rows[index.row()]
         if role == _VERDICT_ROLE:
-            return check.verdict if check is not None and index.column() == 0 else None
+            # As text: Qt hands enumerations of text back as text.
+            return check.verdict.value if check is not None and index.column() == 0 else None
         if role == Qt.ItemDataRole.ToolTipRole and check is not None:
             return check.text or "Nothing is wrong."
-        if role == Qt.ItemDataRole.TextAlignmentRole and 2 <= index.column() <= 5:
+        if role == Qt.ItemDataRole.TextAlignmentRole and index.column() > _FINDING:
             return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         if role != Qt.ItemDataRole.DisplayRole:
             return None
         if check is None:
-            return ["not checked", name, DASH, DASH, DASH, DASH, ""][index.column()]
+            return ["not checked", name, "", DASH, DASH, DASH, DASH][index.column()]
         shown, factor = shown_unit(unit)
         cells = (
             WORDS[check.verdict],
             name,
-            number(check.mean_si * factor, 2, shown),
-            number(check.noise_si / check.expected_noise_si, 2),
-            number(check.hum_si / check.expected_noise_si, 2),
-            DASH if check.pull_ratio is None else number(check.pull_ratio, 2),
             check.text,
+            number(check.mean_si * factor, 2, shown),
+            number(check.noise_si / check.expected_noise_si, 1) + " ×",
+            number(check.hum_si / check.expected_noise_si, 1) + " ×",
+            DASH if check.pull_ratio is None else number(check.pull_ratio, 2) + " ×",
         )
         return cells[index.column()]
 
@@ -86,10 +97,11 @@ class VerdictDelegate(QStyledItemDelegate):
         self.colours = DARK
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
-        verdict = index.data(_VERDICT_ROLE)
-        if not isinstance(verdict, Verdict):
+        told = index.data(_VERDICT_ROLE)
+        if told is None:
             super().paint(painter, option, index)
             return
+        verdict = Verdict(told)
         rect = QRectF(option.rect)
         colour = QColor(str(getattr(self.colours, TONES[verdict])))
         side = min(15.0, rect.height() - 6)
@@ -124,10 +136,10 @@ class CheckTable(QTableView):
         self.setWordWrap(False)
         header = self.horizontalHeader()
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        for column, width in enumerate((92, 84, 108, 124, 120, 56)):
+        for column, width in {0: 96, 1: 84, 3: 108, 4: 72, 5: 64, 6: 68}.items():
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.Interactive)
             self.setColumnWidth(column, width)
-        header.setSectionResizeMode(len(HEADINGS) - 1, QHeaderView.ResizeMode.Stretch)
+        header.setSectionResizeMode(_FINDING, QHeaderView.ResizeMode.Stretch)
 
     def show_check(self, rig: Rig | None, check: SensorCheck | None) -> None:
         """Take over a check and show its top."""

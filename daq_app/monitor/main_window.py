@@ -26,15 +26,18 @@ from PySide6.QtWidgets import (
 )
 
 from daq_app.acquisition.messages import EventMessage, Reply, State, StateMessage
+from daq_app.campaign.plan import Campaign
 from daq_app.config import ConfigError, parse_rig
 from daq_app.monitor.actions import ActionBar
 from daq_app.monitor.background import Background
+from daq_app.monitor.campaign_page import CampaignPage
 from daq_app.monitor.header import Header
 from daq_app.monitor.health_bar import HealthBar
 from daq_app.monitor.link import Link
 from daq_app.monitor.live_page import LivePage
 from daq_app.monitor.notices import NoticeLine
 from daq_app.monitor.prepare_page import PreparePage, Zero
+from daq_app.monitor.replay_page import ReplayPage
 from daq_app.monitor.session import Session
 from daq_app.monitor.settings import TYPE_SIZES, WindowSettings
 from daq_app.monitor.theme import THEMES, Colours, apply_theme
@@ -61,6 +64,7 @@ class MainWindow(QMainWindow):
         self._last_frame_s = math.nan
         self._rig_text = ""
         self._state_before: State | None = None
+        self._runs_folder: Path | None = None
 
         self.header = Header(self.session)
         self.notices = NoticeLine()
@@ -68,7 +72,14 @@ class MainWindow(QMainWindow):
         self.health = HealthBar(self.session)
         self.live = LivePage(self.session, settings.alarm_levels)
         self.prepare = PreparePage(self.session, self.background)
-        self.pages: dict[str, QWidget] = {"Prepare": self.prepare, "Live": self.live}
+        self.campaign = CampaignPage(self.background)
+        self.replay = ReplayPage(self.background)
+        self.pages: dict[str, QWidget] = {
+            "Prepare": self.prepare,
+            "Live": self.live,
+            "Campaign": self.campaign,
+            "Replay": self.replay,
+        }
         self._build()
         self.restyle()
         self._connect()
@@ -102,6 +113,7 @@ class MainWindow(QMainWindow):
             button = QPushButton(name)
             button.setCheckable(True)
             button.setProperty("role", "nav")
+            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # reached by its key
             button.setToolTip(f"Ctrl+{number}")
             button.setShortcut(f"Ctrl+{number}")
             button.clicked.connect(lambda _checked=False, p=page: self.show_page(p))
@@ -115,6 +127,7 @@ class MainWindow(QMainWindow):
         ):
             button = QPushButton(text)
             button.setProperty("role", "nav")
+            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             button.setToolTip(f"{tip}  ({key})")
             button.setShortcut(key)
             button.clicked.connect(act)
@@ -143,7 +156,11 @@ class MainWindow(QMainWindow):
         layout.addLayout(middle, 1)
         layout.addWidget(footer)
         self.setCentralWidget(central)
-        self.splitters = {"live_upper": self.live.upper, "live_whole": self.live.whole}
+        self.splitters = {
+            "live_upper": self.live.upper,
+            "live_whole": self.live.whole,
+            "replay": self.replay.splitter,
+        }
         self.show_page(self.prepare)
 
     def _connect(self) -> None:
@@ -151,6 +168,10 @@ class MainWindow(QMainWindow):
         self.prepare.tare_wanted.connect(lambda: self._request("tare"))
         self.prepare.told.connect(self.notices.tell)
         self.prepare.card.changed.connect(self._on_choice)
+        self.campaign.told.connect(self.notices.tell)
+        self.campaign.take.connect(self._take)
+        self.campaign.run_chosen.connect(lambda name: self.open_run(Path(name)))
+        self.replay.told.connect(self.notices.tell)
         QShortcut(QKeySequence("T"), self.live).activated.connect(self.live.theory_button.toggle)
         QShortcut(QKeySequence("C"), self.live).activated.connect(self.live.strips_button.toggle)
 
@@ -200,6 +221,8 @@ class MainWindow(QMainWindow):
             self.session.set_rig(rig, rate_hz or rig.acquisition.rate_hz)
             self.prepare.set_rig(rig)
             self.setWindowTitle(f"{rig.name} – Rocking-test recorder")
+        folder = str(about.get("folder", ""))
+        self._runs_folder = Path(folder) if folder else None
         self.prepare.planned_rate_hz = float(about.get("planned_rate_hz", 0.0) or 0.0)
         if "tare" in about:
             self.prepare.set_zero(Zero(dict(about["tare"]), dict(about.get("tare_record", {}))))
@@ -240,6 +263,8 @@ class MainWindow(QMainWindow):
 
     def _on_saved(self, run: Path) -> None:
         """A run has just been closed."""
+        self.campaign.scan()
+        self.replay.open(run)
 
     def _on_slow(self) -> None:
         self.header.refresh(self.colours)
@@ -284,8 +309,32 @@ class MainWindow(QMainWindow):
         self._request("arm", {"test": choice.name, "notes": f"{notes}\n{looked}".strip()})
 
     def next_test(self) -> None:
-        """Propose the next test of the campaign."""
+        """Take the next test of the campaign."""
+        if self.campaign.status is None:
+            self.show_page(self.prepare)
+            self.notices.tell("info", "No campaign is open: type the name of the next test.")
+            return
+        self.campaign.take_next()
+
+    def _take(self, name: str, ratio: float) -> None:
+        self.prepare.card.propose(name, ratio)
         self.show_page(self.prepare)
+
+    def open_run(self, path: Path) -> None:
+        """Show a run on the replay page."""
+        self.show_page(self.replay)
+        self.replay.open(path)
+
+    def set_campaign(self, campaign: Campaign, folder: Path | None = None) -> None:
+        """Follow a campaign; the runs lie in `folder`, else where the acquisition puts them."""
+        where = folder or self._runs_folder
+        if where is None:
+            self.notices.tell(
+                "warning", "The folder of the runs is not known: the campaign cannot be followed."
+            )
+            return
+        rig = self.session.rig
+        self.campaign.set_campaign(campaign, where, rig.specimen.name if rig is not None else "")
 
     def _request(self, name: str, arguments: Mapping[str, float | str] | None = None) -> None:
         if self.link is not None:

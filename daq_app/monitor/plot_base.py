@@ -8,6 +8,7 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtGui import QColor
 
 from daq_app.monitor.theme import Colours, font
 
@@ -90,7 +91,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]
         return item
 
 
-def line_pen(colour: str, *, dashed: bool = False, width: int = LINE_WIDTH) -> Any:
+def line_pen(colour: str | QColor, *, dashed: bool = False, width: int = LINE_WIDTH) -> Any:
     """A pen for curves."""
     style = Qt.PenStyle.DashLine if dashed else Qt.PenStyle.SolidLine
     return pg.mkPen(colour, width=width, style=style)

@@ -80,21 +80,27 @@ class PullGauge(QWidget):
         width, height = self.width(), self.height()
         left = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
         right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        top = QRectF(0, 0, width, height * 0.36)
+        # The figure fills what room there is: it is read from beside the winch.
+        large = max(26.0, min(64.0, min(height * 0.16, width * 0.12)))
+        words = max(13.0, min(24.0, large * 0.45))
+        line = 1.5 * large
+        top = QRectF(0, 0, width, line)
         painter.setPen(QColor(colours.text))
-        painter.setFont(font(30, bold=True))
+        painter.setFont(font(large, bold=True))
         painter.drawText(top, left, number(abs(tilt) / alpha, 3))
         painter.setPen(QColor(colours.muted))
         painter.setFont(font(11))
-        detail = f"{number(tilt * 1e3, 1, 'mrad')}" if math.isfinite(tilt) else DASH
+        detail = number(tilt * 1e3, 1, "mrad") if math.isfinite(tilt) else DASH
         painter.drawText(top, right, f"θ/α by tiltmeters\n{detail}")
-        bar = QRectF(1, height * 0.42, width - 2, max(14.0, height * 0.14))
+        bar = QRectF(1, line + 8, width - 2, max(14.0, min(44.0, height * 0.13)))
         full = max(0.5, 1.25 * self.target_ratio) if math.isfinite(self.target_ratio) else 0.5
         self._paint_bar(painter, bar, abs(tilt) / alpha, full)
         advice = self.advice
         painter.setPen(QColor(str(getattr(colours, advice.role))))
-        painter.setFont(font(14, bold=True))
-        painter.drawText(QRectF(0, height * 0.76, width, height * 0.24), left, advice.words)
+        painter.setFont(font(words, bold=True))
+        below = QRectF(0, bar.bottom() + 24, width, height - bar.bottom() - 24)
+        wrap = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap
+        painter.drawText(below, int(wrap), advice.words)
         painter.end()
 
     def _paint_bar(self, painter: QPainter, bar: QRectF, ratio: float, full: float) -> None:

@@ -167,13 +167,13 @@ def _stylesheet(c: Colours, base: float) -> str:
     QPushButton[role="nav"] {{ background: transparent; border: none; border-left: 4px solid transparent;
         border-radius: 0; text-align: left; padding: 10px 10px; color: {c.muted}; font-weight: 600; }}
     QPushButton[role="nav"]:hover {{ color: {c.text}; }}
-    QPushButton[role="nav"]:focus {{ color: {c.text}; border-left-color: {c.line}; }}
     QPushButton[role="nav"]:checked {{ color: {c.text}; background: {c.raised};
         border-left: 4px solid {c.accent}; }}
     QPushButton[role="flat"] {{ background: transparent; border: 1px solid {c.line}; padding: 2px 8px; }}
     QPushButton[role="flat"]:checked {{ background: {c.raised}; color: {c.text}; border-color: {c.accent}; }}
     QTableView {{ background: {c.surface}; border: 1px solid {c.line}; border-radius: 6px;
         gridline-color: {c.line}; selection-background-color: {c.raised}; selection-color: {c.text}; }}
+    QTableView::item {{ padding: 0 6px; }}
     QHeaderView::section {{ background: {c.surface}; color: {c.muted}; border: none;
         border-bottom: 1px solid {c.line}; padding: 5px 8px; font-weight: 600; }}
     QTableView QTableCornerButton::section {{ background: {c.surface}; border: none; }}

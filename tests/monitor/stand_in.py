@@ -159,7 +159,17 @@ class StandIn:
             state = self.state(end_s)
             if state is not shown or number % 10 == 0:
                 shown = state
-                messages.append((StateMessage(state=state, test="FR1-L3-2", sample=first + self.block), None))
+                messages.append(
+                    (
+                        StateMessage(
+                            state=state,
+                            test="FR1-L3-2",
+                            sample=first + self.block,
+                            since_sample=round(self.upright_s * self.rate_hz),
+                        ),
+                        None,
+                    )
+                )
             readings = self.block_readings(first)
             heading = BlockMessage(
                 first_sample=first,
@@ -194,7 +204,7 @@ class StandIn:
     def health(self, time_s: float) -> HealthMessage:
         recording = time_s >= self.upright_s
         samples = round(time_s * self.rate_hz)
-        safe = round((time_s - self.upright_s - 0.1) * self.rate_hz)
+        safe = round((time_s - 0.1) * self.rate_hz)
         return HealthMessage(
             sample=samples,
             acknowledged_sample=max(0, safe) if recording else 0,
@@ -203,7 +213,7 @@ class StandIn:
             buffer_samples=80000,
             gaps=0,
             lost_samples=0,
-            file_bytes=max(0, safe) * 41 * 8,
+            file_bytes=max(0, safe - round(self.upright_s * self.rate_hz)) * 41 * 8,
             free_bytes=84_000_000_000,
             block_to_disk_ms_p99=7.0,
         )
