@@ -66,26 +66,31 @@ class Arc:
 
 @dataclass(frozen=True, slots=True)
 class _Basis:
-    """Columns on x ∈ [−1, 1], x = (t − centre)/half_s."""
+    """Columns on x ∈ [−1, 1], x = (t − centre)/half length, scaled to reach about 1."""
 
     kappa: float
     powers: tuple[int, ...]
 
-    def values(self, x: Floats, derivative: int = 0) -> Floats:
-        """(points, columns) of the d-th derivative by x; columns scaled to reach about 1."""
+    def design(self, x: Floats) -> Floats:
+        """(points, columns)"""
         k = self.kappa
-        c, s = np.cosh(k * x), np.sinh(k * x)
-        even, odd = math.cosh(k) - 1.0, math.sinh(k)
-        if derivative == 0:
-            columns = [np.ones_like(x), (c - 1.0) / even, s / odd, *(x**n for n in self.powers)]
-        elif derivative == 1:
-            columns = [np.zeros_like(x), k * s / even, k * c / odd]
-            columns += [n * x ** (n - 1) for n in self.powers]
-        else:
-            columns = [np.zeros_like(x), k * k * c / even, k * k * s / odd]
-            columns += [n * (n - 1) * x ** (n - 2) for n in self.powers]
-        stacked: Floats = np.stack(columns, axis=-1)
+        stacked: Floats = np.empty((x.size, 3 + len(self.powers)))
+        stacked[:, 0] = 1.0
+        stacked[:, 1] = (np.cosh(k * x) - 1.0) / (math.cosh(k) - 1.0)
+        stacked[:, 2] = np.sinh(k * x) / math.sinh(k)
+        for column, n in enumerate(self.powers, start=3):
+            stacked[:, column] = x**n
         return stacked
+
+    def rows(self, x: float) -> tuple[Floats, Floats, Floats]:
+        """Value, first and second derivative by x of every column at one place."""
+        k = self.kappa
+        c, s = math.cosh(k * x), math.sinh(k * x)
+        even, odd = math.cosh(k) - 1.0, math.sinh(k)
+        value = [1.0, (c - 1.0) / even, s / odd, *(x**n for n in self.powers)]
+        slope = [0.0, k * s / even, k * c / odd, *(n * x ** (n - 1) for n in self.powers)]
+        curve = [0.0, k * k * c / even, k * k * s / odd, *(n * (n - 1) * x ** (n - 2) for n in self.powers)]
+        return np.array(value), np.array(slope), np.array(curve)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,26 +177,25 @@ def _averaged(
 
 def _best_fit(x: Floats, y: Floats, kappa: float) -> _Fit:
     """The candidate with the smallest BIC."""
-    fits = [_fit(x, y, _Basis(kappa, powers)) for powers in _POWERS if x.size >= 3 * (len(powers) + 3)]
+    full = _Basis(kappa, _POWERS[-1]).design(x)
+    fits = []
+    for powers in _POWERS:
+        if x.size >= 3 * (len(powers) + 3):
+            columns = [0, 1, 2, *(3 + _POWERS[-1].index(n) for n in powers)]
+            fits.append(_fit(full[:, columns], y, _Basis(kappa, powers)))
     return min(fits, key=lambda fit: fit.score)
 
 
-def _fit(x: Floats, y: Floats, basis: _Basis) -> _Fit:
-    design = basis.values(x)
+def _fit(design: Floats, y: Floats, basis: _Basis) -> _Fit:
     q, triangle = np.linalg.qr(design)
-    coefficients = np.linalg.solve(triangle, q.T @ y)
+    inverse = np.linalg.inv(triangle)
+    coefficients = inverse @ (q.T @ y)
     residual = y - design @ coefficients
     square = float(residual @ residual)
-    degrees = x.size - coefficients.size
-    inverse = np.linalg.inv(triangle)
+    degrees = y.size - coefficients.size
     covariance = inverse @ inverse.T * (square / degrees)
-    score = x.size * math.log(max(square, 1e-300) / x.size) + coefficients.size * math.log(x.size)
-    return _Fit(basis, coefficients, covariance, math.sqrt(square / x.size), score)
-
-
-def _row(fit: _Fit, x: float, derivative: int) -> Floats:
-    row: Floats = fit.basis.values(np.array([x]), derivative)[0]
-    return row
+    score = y.size * math.log(max(square, 1e-300) / y.size) + coefficients.size * math.log(y.size)
+    return _Fit(basis, coefficients, covariance, math.sqrt(square / y.size), score)
 
 
 def _crossing(
@@ -200,42 +204,41 @@ def _crossing(
     """x of the zero near `guess`, its sigma, the signed speed there (1/s) and its sigma."""
     x = guess
     for _ in range(8):
-        slope = float(_row(fit, x, 1) @ fit.coefficients)
-        if slope == 0.0:
+        value, slope, curve = fit.basis.rows(x)
+        speed = float(slope @ fit.coefficients)
+        if speed == 0.0:
             return None
-        step = float(_row(fit, x, 0) @ fit.coefficients) / slope
+        step = float(value @ fit.coefficients) / speed
+        if abs(step) < 1e-10:
+            break
         x -= step
         if abs(x - guess) > 0.25:
             return None
-        if abs(step) < 1e-10:
-            break
-    value, slope_row = _row(fit, x, 0), _row(fit, x, 1)
-    slope = float(slope_row @ fit.coefficients)
-    curvature = float(_row(fit, x, 2) @ fit.coefficients)
+    curvature = float(curve @ fit.coefficients)
     # The speed is read where the fit crosses zero: its error counts through the shift of that place.
-    gradient = slope_row - curvature / slope * value
-    shift = math.hypot(math.sqrt(float(value @ fit.covariance @ value)), zero_sigma) / abs(slope)
+    gradient = slope - curvature / speed * value
+    shift = math.hypot(math.sqrt(float(value @ fit.covariance @ value)), zero_sigma) / abs(speed)
     own = float(gradient @ fit.covariance @ gradient)
-    sigma = math.hypot(math.sqrt(max(own, 0.0)), curvature / slope * zero_sigma)
-    return x, shift, slope / half_s, sigma / half_s
+    sigma = math.hypot(math.sqrt(max(own, 0.0)), curvature / speed * zero_sigma)
+    return x, shift, speed / half_s, sigma / half_s
 
 
 def _peak(fit: _Fit) -> tuple[float, float, float] | None:
     """x, value and sigma of the extremum between the impacts."""
-    grid = np.linspace(-0.9, 0.9, 37)
-    slopes = fit.basis.values(grid, 1) @ fit.coefficients
-    turns = np.flatnonzero(slopes[:-1] * slopes[1:] <= 0.0)
-    if turns.size == 0:
-        return None
-    at = turns[np.argmin(np.abs(grid[turns]))]
-    x = float(grid[at] - slopes[at] * (grid[at + 1] - grid[at]) / (slopes[at + 1] - slopes[at] or 1.0))
-    for _ in range(4):
-        curvature = float(_row(fit, x, 2) @ fit.coefficients)
+    grid = np.linspace(-0.9, 0.9, 13)
+    size = np.abs(fit.basis.design(grid) @ fit.coefficients)
+    x = float(grid[int(np.argmax(size))])
+    for _ in range(12):
+        _, slope, curve = fit.basis.rows(x)
+        curvature = float(curve @ fit.coefficients)
         if curvature == 0.0:
+            return None
+        step = float(slope @ fit.coefficients) / curvature
+        x -= min(max(step, -0.3), 0.3)
+        if abs(step) < 1e-9:
             break
-        x -= float(_row(fit, x, 1) @ fit.coefficients) / curvature
     if not abs(x) < 1.0:
         return None
-    row = _row(fit, x, 0)
+    row = fit.basis.rows(x)[0]
     sigma = math.sqrt(float(row @ fit.covariance @ row))
     return x, float(row @ fit.coefficients), sigma

@@ -86,6 +86,10 @@ class WireGeometry:
         step = 1e-6
         return np.asarray((self.shortening(step) - self.shortening(-step))[:, 0] / (2 * step))
 
+    def shortening_per_shift(self) -> Floats:
+        """(wires,) ds/du for a small shift u of the whole wall towards +x: the wire's direction."""
+        return np.asarray((self.anchor_m - self.position_m)[:, 0] / self.length0_m)
+
     def rotation_of_each(self, shortening_m: Floats) -> Floats:
         """(wires, n) rotation that each wire alone shows; NaN where no rotation explains the reading."""
         positive = shortening_m * np.sign(self.lever_m)[:, None] >= 0.0

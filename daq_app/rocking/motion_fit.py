@@ -1,0 +1,187 @@
+"""r by a fit of the whole motion: exact Housner rocking to the recorded rotation, all at once.
+
+Free: θ0, release time, p, α, the zero of the rotation and r; p and α are held to their nominal
+values by 5 % and 10 %. Where r scatters from impact to impact, each impact has its own deviation,
+held to zero by that scatter: the standard error of the mean r then says so.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from daq_app.rocking.housner import FreeRocking, free_rocking
+
+Floats = NDArray[np.float64]
+
+_P_PRIOR, _ALPHA_PRIOR, _ZERO_PRIOR_RAD = 0.05, 0.10, 5e-4
+_POINT_S = 0.008
+_SMALLEST_SHARE = 0.02
+"""The motion is fitted until its peaks fall below this share of the first."""
+_FIXED = 6
+
+
+@dataclass(frozen=True, slots=True)
+class MotionFit:
+    """Result of the fit; standard errors include the misfit (scaled by its χ² where above 1)."""
+
+    r: float
+    standard_error: float
+    p_rad_s: float
+    sigma_p_rad_s: float
+    alpha_rad: float
+    sigma_alpha_rad: float
+    theta0_rad: float
+    release_s: float
+    zero_rad: float
+    restitutions: tuple[float, ...]
+    """r of each impact of the fitted span."""
+    impacts: int
+    residual_rad: float
+    """rms of what the model leaves."""
+    noise_rad: float
+    """rms expected of a perfect model at the fitted points."""
+
+    @property
+    def explains_the_motion(self) -> bool:
+        """Whether the misfit is no more than twice the noise."""
+        return self.residual_rad < 2.0 * self.noise_rad
+
+
+def fit_motion(
+    time_s: Floats,
+    rotation_rad: Floats,
+    *,
+    release_s: float,
+    theta0_rad: float,
+    impacts_s: list[float],
+    peaks_rad: list[float],
+    r: float,
+    scatter: float | None,
+    noise_rad: float,
+    p_rad_s: float,
+    alpha_rad: float,
+) -> MotionFit | None:
+    """Fit the rotation (n,) from release to the last half-cycle worth it; None with too few impacts.
+
+    `r`, `impacts_s`, `peaks_rad` (release first) start the fit; `noise_rad` is the rms of one sample.
+    `scatter` is the relative standard deviation of r from impact to impact (at least 0.0003 is
+    allowed for); None says that r is the same at every impact.
+    """
+    count = _span(peaks_rad, len(impacts_s))
+    if count < 2 or not 0.0 < r <= 1.0:
+        return None
+    stop = impacts_s[count - 1] + 0.5 * (
+        impacts_s[count] - impacts_s[count - 1] if count < len(impacts_s) else 0.0
+    )
+    t, y, sigma = _points(time_s, rotation_rad, release_s - 0.1, stop, noise_rad)
+    if t.size < 4 * _FIXED:
+        return None
+    spread = None if scatter is None else max(scatter, 3e-4)
+    side = 1.0 if theta0_rad > 0 else -1.0
+    problem = _Problem(t, y, sigma, release_s, abs(theta0_rad), side, p_rad_s, alpha_rad, math.log(r), spread)
+    # Later half-cycles join once the earlier ones are in phase.
+    x = np.zeros(_FIXED)
+    spans = sorted({min(3, count), min(7, count), count})
+    for span in spans:
+        end = impacts_s[span] if span < len(impacts_s) else stop
+        x = np.concatenate((x, np.zeros(_FIXED + (0 if spread is None else span) - x.size)))
+        result = least_squares(
+            problem.residual, x, args=(span, min(end, stop)), x_scale="jac", method="trf", max_nfev=25
+        )
+        x = result.x
+    return _result(problem, result.x, result.jac, result.fun, count, sigma)
+
+
+def _span(peaks_rad: list[float], impacts: int) -> int:
+    floor = _SMALLEST_SHARE * abs(peaks_rad[0])
+    large = [n for n in range(1, min(len(peaks_rad), impacts)) if abs(peaks_rad[n]) >= floor]
+    return max(large, default=0) if large else 0
+
+
+def _points(
+    time_s: Floats, rotation_rad: Floats, start_s: float, stop_s: float, noise_rad: float
+) -> tuple[Floats, Floats, float]:
+    """Averages over 8 ms and their noise."""
+    low, high = np.searchsorted(time_s, [start_s, stop_s])
+    size = max(1, round(_POINT_S * (time_s.size - 1) / (time_s[-1] - time_s[0])))
+    groups = int(high - low) // size
+    t = time_s[low : low + groups * size].reshape(groups, size).mean(axis=1)
+    y = rotation_rad[low : low + groups * size].reshape(groups, size).mean(axis=1)
+    good = np.isfinite(y)
+    return t[good], y[good], noise_rad / math.sqrt(size)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Residuals in units of their sigma; parameters are scaled deviations from the start."""
+
+    time_s: Floats
+    rotation_rad: Floats
+    sigma: float
+    release_s: float
+    theta0: float
+    side: float
+    p: float
+    alpha: float
+    log_r: float
+    spread: float | None
+    """None: r is the same at every impact."""
+
+    def motion(self, x: Floats, impacts: int) -> FreeRocking:
+        alpha = self.alpha * math.exp(min(max(_ALPHA_PRIOR * x[3], -0.5), 0.5))
+        theta0 = min(max(self.theta0 + 1e-3 * x[0], 1e-3), 0.97 * alpha)
+        mean = self.log_r + 0.01 * x[5]
+        deviations = np.zeros(1) if self.spread is None else self.spread * x[_FIXED:]
+        rs = np.minimum(np.exp(mean + deviations), 1.0)
+        return free_rocking(
+            self.side * theta0,
+            rs,
+            self.p * math.exp(_P_PRIOR * x[2]),
+            alpha,
+            release_s=self.release_s + 0.01 * x[1],
+            smallest_peak_rad=0.0,
+            max_impacts=impacts + 1,
+        )
+
+    def residual(self, x: Floats, span: int, stop_s: float) -> Floats:
+        inside = self.time_s <= stop_s
+        model = self.motion(x, span).at(self.time_s[inside])[0] + _ZERO_PRIOR_RAD * x[4]
+        priors = np.concatenate((x[2:5], x[_FIXED:]))
+        return np.concatenate(((model - self.rotation_rad[inside]) / self.sigma, priors))
+
+
+def _result(
+    problem: _Problem, x: Floats, jacobian: Floats, residual: Floats, count: int, sigma: float
+) -> MotionFit | None:
+    data = residual[: residual.size - 3 - (x.size - _FIXED)]
+    excess = max(1.0, float(data @ data) / max(data.size - _FIXED, 1))
+    # Data rows are weakened by what the model leaves; priors keep their weight.
+    scaled = jacobian.copy()
+    scaled[: data.size] /= math.sqrt(excess)
+    try:
+        covariance = np.linalg.inv(scaled.T @ scaled)
+    except np.linalg.LinAlgError:
+        return None
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    motion = problem.motion(x, count)
+    r = math.exp(problem.log_r + 0.01 * float(x[5]))
+    return MotionFit(
+        r=r,
+        standard_error=r * 0.01 * float(deviations[5]),
+        p_rad_s=motion.p_rad_s,
+        sigma_p_rad_s=motion.p_rad_s * _P_PRIOR * float(deviations[2]),
+        alpha_rad=motion.alpha_rad,
+        sigma_alpha_rad=motion.alpha_rad * _ALPHA_PRIOR * float(deviations[3]),
+        theta0_rad=motion.side * float(motion.peaks_rad[0]),
+        release_s=motion.release_s,
+        zero_rad=_ZERO_PRIOR_RAD * float(x[4]),
+        restitutions=tuple(float(value) for value in motion.restitution[:count]),
+        impacts=count,
+        residual_rad=float(np.sqrt(np.mean(data**2))) * sigma,
+        noise_rad=sigma,
+    )

@@ -1,0 +1,124 @@
+"""A recorded test as the analysis sees it: SI values on demand, known time offsets, the rig."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.config.rig import Family, Rig
+
+Floats = NDArray[np.float64]
+
+
+class HeaderLike(Protocol):
+    """What the analysis needs of a run's header."""
+
+    @property
+    def run_id(self) -> str: ...
+    @property
+    def test(self) -> str: ...
+    @property
+    def tare(self) -> Mapping[str, float]: ...
+    def time_offset_s(self, channel_id: str) -> float: ...
+
+
+class RunLike(Protocol):
+    """What the analysis needs of an opened run."""
+
+    @property
+    def header(self) -> HeaderLike: ...
+    @property
+    def rate_hz(self) -> float: ...
+    @property
+    def first_sample(self) -> int: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def channel_ids(self) -> tuple[str, ...]: ...
+    def si(self, ids: Sequence[str] | None = None, start: int = 0, stop: int | None = None) -> Floats: ...
+
+
+@dataclass(frozen=True)
+class TestRecord:
+    """One recording: everything from arming to the end, rows by channel id."""
+
+    __test__ = False  # not a test class, whatever its name begins with
+
+    rig: Rig
+    rate_hz: float
+    n_samples: int
+    channel_ids: tuple[str, ...]
+    """Channels that the recording has; a channel of the rig may be missing."""
+    load: Callable[[tuple[str, ...]], Floats]
+    """SI values (len(ids), n_samples) of channels, NaN in gaps."""
+    first_sample: int = 0
+    time_offsets_s: Mapping[str, float] = field(default_factory=dict)
+    """Sample k of a channel shows the instant k / rate + this; 0 where not listed."""
+    tared: bool = True
+    """Whether zeros were taken with the wall upright before the test."""
+    label: str = ""
+
+    @classmethod
+    def from_array(
+        cls,
+        rig: Rig,
+        rate_hz: float,
+        si: Floats,
+        *,
+        channel_ids: Sequence[str] | None = None,
+        first_sample: int = 0,
+        time_offsets_s: Mapping[str, float] | None = None,
+        tared: bool = True,
+        label: str = "",
+    ) -> TestRecord:
+        """A record in memory: `si` (n_channels, n) in the order of `channel_ids` (the rig's if not given)."""
+        ids = tuple(channel_ids) if channel_ids is not None else rig.channel_ids
+        if si.ndim != 2 or si.shape[0] != len(ids):
+            raise ValueError(f"{len(ids)} channels need an array with as many rows, not of shape {si.shape}")
+        row = {channel_id: index for index, channel_id in enumerate(ids)}
+
+        def load(wanted: tuple[str, ...]) -> Floats:
+            return si[[row[channel_id] for channel_id in wanted]]
+
+        return cls(
+            rig, rate_hz, si.shape[1], ids, load, first_sample, dict(time_offsets_s or {}), tared, label
+        )
+
+    @classmethod
+    def from_run(cls, run: RunLike, rig: Rig) -> TestRecord:
+        """A record on an opened run, which must stay open while it is analysed."""
+
+        def load(wanted: tuple[str, ...]) -> Floats:
+            return run.si(wanted)
+
+        return cls(
+            rig=rig,
+            rate_hz=run.rate_hz,
+            n_samples=run.n_samples,
+            channel_ids=run.channel_ids,
+            load=load,
+            first_sample=run.first_sample,
+            time_offsets_s={cid: run.header.time_offset_s(cid) for cid in run.channel_ids},
+            tared=bool(run.header.tare),
+            label=run.header.test or run.header.run_id,
+        )
+
+    def family(self, family: Family, axis: str | None = None) -> tuple[str, ...]:
+        """Ids of the recorded channels of a family (and sensitive axis), rig order."""
+        recorded = set(self.channel_ids)
+        return tuple(
+            channel.id
+            for channel in self.rig.of_family(family)
+            if channel.id in recorded and (axis is None or channel.axis == axis)
+        )
+
+    def offset_s(self, channel_id: str) -> float:
+        return self.time_offsets_s.get(channel_id, 0.0)
+
+    def time_s(self, offset_s: float = 0.0) -> Floats:
+        """(n,) absolute sample index / rate, plus an offset."""
+        return np.asarray((self.first_sample + np.arange(self.n_samples)) / self.rate_hz + offset_s)

@@ -1,0 +1,213 @@
+"""From a record to the signals that everything else works on, aligned in time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.rocking.fusion import Fused, fuse
+from daq_app.rocking.joint import BaseJoint, JointMotion
+from daq_app.rocking.kinematics import RotationGeometry
+from daq_app.rocking.motion import MotionSettings
+from daq_app.rocking.phases import PhaseDetector, PhaseEvent, PhaseSettings
+from daq_app.rocking.record import TestRecord
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Rotation, tilt, joint and acceleration of a record; arrays (n,) or (channels, n)."""
+
+    record: TestRecord
+    geometry: RotationGeometry
+    settings: MotionSettings
+    phase_settings: PhaseSettings
+    time_s: Floats
+    """Instants that the rotation shows: the wires' known offsets included."""
+    wires_m: Floats
+    tilts_rad: Floats
+    openings_m: Floats
+    rotation_rad: Floats
+    """From the wires; NaN in gaps."""
+    bridged_rad: Floats
+    """The same, gaps filled with the last value: for filters."""
+    excluded_share: dict[str, float]
+    """Share of the record in which each wire was left out."""
+    noise_rad: float
+    joint: JointMotion | None
+    lvdt_noise_rad: float
+    fused: Fused | None
+    acceleration: Floats
+    acceleration_offsets_s: tuple[float, ...] = field(default=())
+
+    @property
+    def first_s(self) -> float:
+        """Sample 0 of the record, without offsets."""
+        return self.record.first_sample / self.record.rate_hz
+
+    def zeroed(self, rest: slice) -> Signals:
+        """The same with every sensor's zero taken from the samples of a rest."""
+        return _combine(
+            self.record,
+            self.geometry,
+            _zero(self.wires_m, rest),
+            _zero(self.tilts_rad, rest),
+            _zero(self.openings_m, rest),
+            self.acceleration,
+            self.acceleration_offsets_s,
+        )
+
+
+@dataclass(frozen=True)
+class TestTimes:
+    """What the phase detector found in a record."""
+
+    __test__ = False  # not a test class, whatever its name begins with
+
+    events: tuple[PhaseEvent, ...]
+    release_s: float | None
+    """Of the last release that led to impacts; on the time base of the rotation."""
+    hold_rad: float
+    impacts_s: tuple[float, ...]
+    rest_s: float | None
+    rest: slice | None
+    """Samples of the rest after the test, up to 2 s."""
+
+
+def read_signals(record: TestRecord) -> Signals:
+    """Read and combine. `ValueError` where the record lacks the wires."""
+    ids = record.family("wire")
+    if len(ids) < 2:
+        raise ValueError(
+            f"rotation needs at least two wire potentiometers; the record has {', '.join(ids) or 'none'}"
+        )
+    wires = set(ids)
+    kept = tuple(c for c in record.rig.channels if c.family != "wire" or c.id in wires)
+    rig = record.rig.model_copy(update={"channels": kept})
+    frame = PhaseSettings.from_rig(rig, record.rate_hz, 0.0).frame_samples
+    geometry = RotationGeometry.from_rig(rig, frame_samples=frame)
+    accelerometers = record.family("accelerometer")
+    empty = np.empty((0, record.n_samples))
+    tilts, lvdts = record.family("tiltmeter", "x"), record.family("lvdt")
+    return _combine(
+        record,
+        geometry,
+        record.load(ids),
+        record.load(tilts) if tilts else empty,
+        record.load(lvdts) if lvdts else empty,
+        record.load(accelerometers) if accelerometers else empty,
+        tuple(record.offset_s(channel_id) for channel_id in accelerometers),
+    )
+
+
+def _combine(
+    record: TestRecord,
+    geometry: RotationGeometry,
+    wires_m: Floats,
+    tilts_rad: Floats,
+    openings_m: Floats,
+    acceleration: Floats,
+    acceleration_offsets_s: tuple[float, ...],
+) -> Signals:
+    combined = geometry.rotation(wires_m)
+    rotation = combined.rotation_rad
+    offset = geometry.time_offset_s(record.time_offsets_s)
+    noise = _white_noise(rotation)
+    specimen = record.rig.specimen
+    joint, lvdt_noise, fused = None, math.nan, None
+    lvdts = record.family("lvdt")
+    try:
+        base = BaseJoint.from_rig(record.rig, lvdts)
+    except ValueError:
+        base = None  # too few LVDTs for a profile: said in the quality notes
+    if base is not None:
+        joint = base.motion(openings_m)
+        lag = float(np.mean([record.offset_s(channel_id) for channel_id in lvdts])) - offset
+        joint = replace(joint, rotation_rad=_shifted(joint.rotation_rad, lag * record.rate_hz))
+        lvdt_noise = _white_noise(joint.rotation_rad)
+        fused = fuse(rotation, joint.rotation_rad, noise, max(lvdt_noise, 1e-7))
+    bad = ~np.isfinite(rotation)
+    index = np.maximum.accumulate(np.where(bad, 0, np.arange(rotation.size)))
+    first = float(rotation[~bad][0]) if not bad.all() else 0.0
+    bridged = np.where(np.isfinite(rotation[index]), rotation[index], first)
+    return Signals(
+        record=record,
+        geometry=geometry,
+        settings=MotionSettings(record.rate_hz, specimen.p_rad_s, specimen.alpha0_rad),
+        phase_settings=PhaseSettings.from_rig(record.rig, record.rate_hz, geometry.rotation_noise_rad()),
+        time_s=record.time_s(offset),
+        wires_m=wires_m,
+        tilts_rad=tilts_rad,
+        openings_m=openings_m,
+        rotation_rad=rotation,
+        bridged_rad=bridged,
+        excluded_share={
+            name: float(share)
+            for name, share in zip(geometry.wires.ids, combined.excluded.mean(axis=1), strict=True)
+            if share > 0
+        },
+        noise_rad=noise,
+        joint=joint,
+        lvdt_noise_rad=lvdt_noise,
+        fused=fused,
+        acceleration=acceleration,
+        acceleration_offsets_s=acceleration_offsets_s,
+    )
+
+
+def find_phases(signals: Signals) -> TestTimes:
+    """Run the online detector over the whole record."""
+    record = signals.record
+    detector = PhaseDetector(signals.phase_settings, record.first_sample)
+    events = tuple(detector.process(signals.bridged_rad, signals.tilts_rad))
+    offset = float(signals.time_s[0]) - signals.first_s if signals.time_s.size else 0.0
+
+    def seconds(event: PhaseEvent) -> float:
+        return event.sample / record.rate_hz + offset
+
+    releases = [k for k, event in enumerate(events) if event.kind == "release"]
+    followed = [k for k in releases if any(e.kind == "impact" for e in events[k:])]
+    start = followed[-1] if followed else (releases[-1] if releases else len(events))
+    impacts = tuple(seconds(event) for event in events[start:] if event.kind == "impact")
+    rests = [event for event in events[start:] if event.kind == "rest"]
+    rest = None
+    if rests:
+        first = max(math.ceil(rests[0].sample) - record.first_sample, 0)
+        stop = min(first + round(2.0 * record.rate_hz), record.n_samples)
+        rest = slice(first, stop) if stop - first >= 0.2 * record.rate_hz else None
+    return TestTimes(
+        events=events,
+        release_s=seconds(events[start]) if start < len(events) else None,
+        hold_rad=detector.theta0_rad,
+        impacts_s=impacts,
+        rest_s=seconds(rests[0]) if rests else None,
+        rest=rest,
+    )
+
+
+def _zero(values: Floats, rest: slice) -> Floats:
+    if not values.size:
+        return values
+    return np.asarray(values - np.nan_to_num(np.nanmedian(values[:, rest], axis=1))[:, None])
+
+
+def _white_noise(signal: Floats) -> float:
+    """rms of white noise from second differences (motion falls away), robust to impacts."""
+    second = np.diff(signal, 2)
+    second = second[np.isfinite(second)]
+    if second.size < 100:
+        return math.nan
+    # Median absolute deviation to standard deviation; a second difference has variance 6.
+    return float(np.median(np.abs(second - np.median(second)))) * 1.4826 / math.sqrt(6.0)
+
+
+def _shifted(signal: Floats, samples: float) -> Floats:
+    """Value at each instant of a signal whose samples were taken `samples` later (|samples| small)."""
+    if samples == 0.0:
+        return signal
+    whole = np.arange(signal.size)
+    return np.asarray(np.interp(whole - samples, whole, signal))
