@@ -13,6 +13,8 @@ _WINDOW = 4000
 
 def derive(contents: JournalContents) -> tuple[DerivedData | None, str]:
     """Derived data, and a sentence where there are none (empty otherwise). Never raises."""
+    if contents.n_samples == 0:
+        return None, ""
     rig = rig_of(contents.header)
     if rig is None:
         return None, "The run's rig file is not understood, so nothing was derived"

@@ -1,6 +1,6 @@
 """``python -m daq_app.acquisition.finalise_worker``: makes run files, one JSON line per job and answer.
 
-Jobs: ``{"job": "finalise", "journal": PATH, "out": PATH}`` and ``{"job": "recover", "folder": PATH}``. The
+Jobs: ``{"job": "finalise", "journal": PATH, "out": PATH}`` and ``{"job": "recover", "journal": PATH}``. The
 process ends at once when its standard input closes, that is, when its parent dies: a half-made run
 file is a ``.tmp`` beside an untouched journal, and the next start makes it again.
 """
@@ -28,8 +28,12 @@ def finalise_job(journal: Path, out: Path) -> Finished:
 
     try:
         with read_journal(journal) as contents:
+            empty = contents.n_samples == 0
             derived, trouble = derive(contents)
             damaged = bool(contents.damage)
+        if empty:
+            _put_away(journal)
+            return Finished(True, "It ended before its first sample, so there is no run")
         finalise(journal, out, derived, keep_journal=damaged)
     except RunFileError as error:
         return Finished(False, f"The run file could not be made: {error} The journal is kept: {journal}")
@@ -41,36 +45,33 @@ def finalise_job(journal: Path, out: Path) -> Finished:
     return Finished(True, f"Saved as {out.name}{trouble and f'. {trouble}'}", str(out))
 
 
-def recover_job(folder: Path) -> Finished:
-    """Make runs of all orphan journals; `data` lists what was done."""
+def _put_away(journal: Path) -> None:
+    """Its run is proven, or it is empty; under its own name it would be read again at every start."""
+    journal.replace(journal.with_suffix(".journal-recovered"))
+
+
+def recover_job(journal: Path) -> Finished:
+    """Make the run of an orphan journal. No text where there was nothing to do."""
     from daq_app.runfile import recover
 
-    done = [found for found in recover(folder) if found.outcome not in ("saved already", "in use")]
-    for found in done:
-        if found.outcome == "recovered":
-            # Proven by `recover`; under its own name it would be read again at every start.
-            found.journal.replace(found.journal.with_suffix(".journal-recovered"))
-    told = [
-        {
-            "outcome": found.outcome,
-            "text": found.text,
-            "run": str(found.run or ""),
-            "journal": str(found.journal),
-        }
-        for found in done
-    ]
-    return Finished(not any(f.outcome == "failed" for f in done), "", "", {"recoveries": told})
+    (found,) = recover(journal)
+    if found.outcome == "in use":
+        return Finished(True, "")
+    if found.outcome in ("recovered", "saved already", "empty"):
+        _put_away(journal)
+    text = "" if found.outcome == "saved already" else found.text
+    return Finished(found.outcome != "failed", text, str(found.run or ""))
 
 
 def _do(job: dict[str, str]) -> Finished:
     match job:
         case {"job": "finalise", "journal": journal, "out": out}:
             return finalise_job(Path(journal), Path(out))
-        case {"job": "recover", "folder": folder}:
+        case {"job": "recover", "journal": journal}:
             try:
-                return recover_job(Path(folder))
+                return recover_job(Path(journal))
             except Exception as error:
-                return Finished(False, f"Recovery of {folder} failed ({type(error).__name__}: {error})")
+                return Finished(False, f"Recovery of {journal} failed ({type(error).__name__}: {error})")
     return Finished(False, f"There is no job like {job}")
 
 

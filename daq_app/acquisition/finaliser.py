@@ -13,7 +13,6 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Any
 
 from daq_app.acquisition.guarded import end_guarded, start_guarded
 
@@ -28,7 +27,6 @@ class Finished:
     text: str
     """For the operator."""
     path: str = ""
-    data: dict[str, Any] | None = None
 
 
 class Finaliser(threading.Thread):
@@ -40,7 +38,7 @@ class Finaliser(threading.Thread):
         self._worker: subprocess.Popen[str] | None = None
 
     def submit(self, job: dict[str, str], then: Callable[[Finished], None] | None = None) -> Future[Finished]:
-        """Do ``{"job": "finalise", "journal": …, "out": …}`` or ``{"job": "recover", "folder": …}``.
+        """Do ``{"job": "finalise", "journal": …, "out": …}`` or ``{"job": "recover", "journal": …}``.
 
         `then` is called on the finaliser's thread. The answer says of failures what to do; it never raises.
         """
@@ -75,11 +73,10 @@ class Finaliser(threading.Thread):
             answer = _exchange(self._worker, job)
             if answer is not None:
                 return answer
-        what = job.get("journal") or job.get("folder", "")
         return Finished(
             False,
-            f"The process that makes run files ended twice. {what} is untouched: run `daq-app recover` on "
-            "its folder",
+            f"The process that makes run files ended twice. {job['journal']} is untouched: run "
+            "`daq-app recover` on its folder",
         )
 
 

@@ -9,7 +9,6 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from daq_app.acquisition.client import AcquisitionClient
 from daq_app.acquisition.options import READY

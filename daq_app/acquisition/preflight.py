@@ -19,7 +19,7 @@ _HOLD_ALLOWANCE_S: Final = 600.0
 """Time between arming and release that a pull by hand may take."""
 LOW_SPACE_BYTES: Final = 200 * 2**20
 """Below this while running the operator hears of it."""
-_NAME: Final = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,59}$")
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,59}")
 
 
 def needed_bytes(rig: Rig, rate_hz: float) -> int:
@@ -45,7 +45,7 @@ def check_space(folder: Path, rig: Rig, rate_hz: float) -> None:
 
 def check_name(test: str) -> str:
     """A test's name that can be part of a file's name. Raises `RequestRefused`."""
-    if not _NAME.match(test):
+    if not _NAME.fullmatch(test):
         raise RequestRefused(
             f"'{test[:60]}' is no name of a test: letters, digits, '-', '_' and '.', for instance FR1-L3-2"
         )

@@ -15,6 +15,7 @@ from concurrent.futures import Future
 from contextlib import ExitStack
 
 from daq_app.acquisition.desk import Answer, Desk, DeskError
+from daq_app.acquisition.finaliser import Finaliser
 from daq_app.acquisition.hardware import driver_maker
 from daq_app.acquisition.items import RequestRefused
 from daq_app.acquisition.messages import Command, Reply
@@ -40,6 +41,9 @@ class Process:
         self._token = os.environ.get("DAQ_APP_TOKEN") or secrets.token_urlsafe(24)
         self._desk = Desk(options.bind, self._handle, self._token, options.keys)
         stack.callback(self._desk.close)
+        finaliser = Finaliser()
+        finaliser.start()
+        stack.callback(finaliser.close)
         self.session = Session(
             SessionSettings(
                 rig=rig,
@@ -51,6 +55,7 @@ class Process:
                 spare_folder=options.spare,
             ),
             self._desk.publisher,
+            finaliser,
         )
         self._unattended = Unattended(self.session, options.test, options.notes) if options.test else None
         self._interrupted = False

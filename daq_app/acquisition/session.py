@@ -31,7 +31,7 @@ from daq_app.acquisition.recorder import Recorded, Recorder
 from daq_app.acquisition.watchdog import Watchdog
 from daq_app.config.plan import TaskPlan
 from daq_app.config.rig import Rig
-from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX
+from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX, find_journals
 from drivers import Driver, DriverError, Opened
 
 _T = TypeVar("_T")
@@ -54,10 +54,11 @@ class SessionSettings:
 class Session:
     """Call everything from the main thread; the threads inside talk through queues."""
 
-    def __init__(self, settings: SessionSettings, publisher: Publisher) -> None:
+    def __init__(self, settings: SessionSettings, publisher: Publisher, finaliser: Finaliser) -> None:
         self._settings = settings
         self._publisher = publisher
-        self.finaliser = Finaliser()
+        self._finaliser = finaliser
+        self._jobs: list[Future[Finished]] = []
         self.recorder = Recorder(self._forward, self._announce, self._hand_over, settings.spare_folder)
         self.analyst = Analyst(
             settings.rig, publisher, self.recorder.inbox.put, release_within_s=settings.release_within_s
@@ -72,21 +73,23 @@ class Session:
 
     def start(self) -> None:
         """Start the threads, recover what an earlier session left behind, and begin to sample."""
-        self.finaliser.start()
         self.recorder.start()
         self.analyst.start()
-        job = {"job": "recover", "folder": str(self._settings.folder)}
-        self.finaliser.submit(job, self._tell_recovery)
+        # Listed now: what this session will record is none of them.
+        for journal in find_journals(self._settings.folder):
+            job = {"job": "recover", "journal": str(journal)}
+            self._jobs.append(self._finaliser.submit(job, self._tell_recovery))
         self.preview()
 
     def close(self) -> None:
-        """Stop sampling, close and save what is open, end the threads."""
+        """Stop sampling, close what is open, wait until it is saved, end the threads."""
         if self._reader is not None:
             self._reader.request_stop()
             self._reader.join()
         self.recorder.inbox.put(None)
         self.recorder.join()
-        self.finaliser.close()
+        for job in self._jobs:
+            job.result()
         self.analyst.inbox.put(None)
         self.analyst.join()
 
@@ -127,7 +130,7 @@ class Session:
         self.analyst.inbox.put(Closed(recorded.journal, recorded.end))
         out = recorded.journal.with_suffix(RUN_SUFFIX)
         job = {"job": "finalise", "journal": str(recorded.journal), "out": str(out)}
-        self.finaliser.submit(job, lambda finished: self._tell_saved(recorded, finished))
+        self._jobs.append(self._finaliser.submit(job, lambda done: self._tell_saved(recorded, done)))
 
     def _tell_saved(self, recorded: Recorded, finished: Finished) -> None:
         """On the finaliser's thread."""
@@ -146,19 +149,17 @@ class Session:
 
     def _tell_recovery(self, finished: Finished) -> None:
         """On the finaliser's thread."""
-        for found in (finished.data or {}).get("recoveries", []):
-            failed = found["outcome"] == "failed"
-            self._say(
-                EventMessage(
-                    kind="recovered" if not failed else "unrecovered",
-                    sample=0,
-                    text=f"Left by an earlier session: {found['text']}",
-                    severity="error" if failed else "warning",
-                    data={"run": found["run"], "journal": found["journal"], "outcome": found["outcome"]},
-                )
+        if not finished.text:
+            return
+        self._say(
+            EventMessage(
+                kind="recovered" if finished.ok else "unrecovered",
+                sample=0,
+                text=f"Left by an earlier session: {finished.text}",
+                severity="warning" if finished.ok else "error",
+                data={"run": finished.path},
             )
-        if not finished.ok and finished.text:
-            self._say(EventMessage(kind="unrecovered", sample=0, text=finished.text, severity="error"))
+        )
 
     # -- requests --------------------------------------------------------------------------------
 

@@ -1,0 +1,129 @@
+"""`daq-app run` and `daq-app simulate`: take a test, or make one without real time."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+from rich.console import Console
+
+from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, reported
+
+LEVELS: Final = {"L1": 0.15, "L2": 0.25, "L3": 0.35, "L4": 0.40}
+"""Release rotation over alpha of each level of the campaign (Table 3.2)."""
+_LEVEL_IN_NAME: Final = re.compile(r"(?:^|-)(L[1-4])(?:-|$)")
+
+
+def register(app: typer.Typer) -> None:
+    """Add ``run`` and ``simulate``."""
+    app.command("run", epilog="Example: daq-app run configs/fr1.toml --test FR1-L3-2 --headless --out runs")(
+        run
+    )
+    app.command(
+        "simulate", epilog="Example: daq-app simulate configs/fr1.toml --level L3 --r 0.9 --out run.h5"
+    )(simulate)
+
+
+def level_of(test: str) -> str | None:
+    """``L3`` of ``FR1-L3-2``; None where the name holds no level."""
+    match = _LEVEL_IN_NAME.search(test)
+    return match[1] if match else None
+
+
+RigFile = Annotated[Path, typer.Argument(help="Rig file.", metavar="RIG.toml", show_default=False)]
+
+
+def run(
+    rig: RigFile,
+    test: Annotated[str, typer.Option(help="Name of the test, for instance FR1-L3-2.", show_default=False)],
+    out: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("runs"),
+    headless: Annotated[bool, typer.Option("--headless", help="No window; figures in the terminal.")] = False,
+    connection: Annotated[
+        str | None,
+        typer.Option(help="local, grpc://HOST:PORT, simulated or replay:RUN.h5.", show_default="rig file"),
+    ] = None,
+    speed: Annotated[str, typer.Option(help="Time factor of a simulated device or replay.")] = "1",
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of the simulated wall.", show_default="rig file")
+    ] = None,
+    notes: Annotated[str, typer.Option(help="Kept in the run.")] = "",
+    release_within: Annotated[
+        float, typer.Option(metavar="S", help="Longest wait for the release.")
+    ] = 1800.0,
+    spare: Annotated[
+        Path | None, typer.Option(help="Folder on another disk, to go on in if the first fails.")
+    ] = None,
+    backup: Annotated[
+        Path | None, typer.Option(help="Folder for TDMS files that the NI driver itself writes as well.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the results as JSON on stdout.")] = False,
+) -> None:
+    """Take one release test: zero, arm, hold, release, rest, and the table of r.
+
+    The wall is zeroed upright and armed at once; pull it to its rotation and release it. Ctrl-C ends the
+    test and keeps what was recorded. Exit code 0: complete; 1: the run is not a complete test;
+    2: bad input; 3: hardware; 130: interrupted.
+    """
+    from daq_app.cli.run_follow import RunOptions, follow_run
+    from daq_app.cli.run_results import as_document, results_table
+
+    level = level_of(test)
+    options = RunOptions(
+        rig=rig,
+        test=test,
+        out=out,
+        connection=connection,
+        speed=speed,
+        seed=seed,
+        theta0_over_alpha=LEVELS[level] if level else None,
+        notes=notes,
+        release_within_s=release_within,
+        spare=spare,
+        backup=backup,
+        window=not headless,
+    )
+    console = Console(stderr=as_json)
+    with reported():
+        ended = follow_run(options, console)
+    if ended.run is not None:
+        with reported():
+            if as_json:
+                typer.echo(json.dumps(as_document(ended.run, ended.outcome), indent=1))
+            else:
+                console.print(results_table(ended.run))
+    if ended.text:
+        print_paragraph("Error" if ended.exit_code != EXIT_FAILED else "Incomplete", ended.text)
+    raise typer.Exit(ended.exit_code)
+
+
+def simulate(
+    rig: RigFile,
+    out: Annotated[Path, typer.Option(help="Run file to write.", show_default=False)],
+    level: Annotated[str, typer.Option(help="L1 to L4: release rotation 0.15 to 0.40 of alpha.")] = "L3",
+    r: Annotated[
+        float | None, typer.Option(help="Coefficient of restitution.", show_default="rig file")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of noise and scatter.", show_default="rig file")
+    ] = None,
+    test: Annotated[
+        str | None, typer.Option(help="Name of the test.", show_default="SPECIMEN-LEVEL-1")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the results as JSON on stdout.")] = False,
+) -> None:
+    """Write the run of a simulated test without real time, through the same sensors and modules."""
+    from daq_app.cli.run_results import as_document, results_table
+    from daq_app.cli.run_simulate import simulate_run
+
+    if level not in LEVELS:
+        print_paragraph("Error", f"{level} is no level. There are {', '.join(LEVELS)}")
+        raise typer.Exit(EXIT_BAD_INPUT)
+    with reported():
+        simulate_run(rig, out, level=level, theta0_over_alpha=LEVELS[level], r=r, seed=seed, test=test)
+        if as_json:
+            typer.echo(json.dumps(as_document(out, "complete"), indent=1))
+        else:
+            Console().print(results_table(out))

@@ -1,0 +1,267 @@
+"""A whole test of a wall as readings, a driver that hands it out on demand, and sessions on it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from daq_app.acquisition.client import AcquisitionClient
+from daq_app.acquisition.desk import Desk
+from daq_app.acquisition.finaliser import Finaliser
+from daq_app.acquisition.messages import EventMessage, Message, Reply, State, StateMessage
+from daq_app.acquisition.reader import Patience
+from daq_app.acquisition.session import Session, SessionSettings
+from daq_app.config import Rig, Scaling, TaskPlan, load_rig, plan_tasks
+from daq_app.rocking import RotationGeometry, free_rocking
+from drivers import Block, DriverError, Opened
+
+RATE_HZ = 4000.0
+UPRIGHT_S, PULL_S, HOLD_S = 4.0, 1.0, 6.0
+RESTITUTION = 0.7
+THETA0_SHARE = 0.35
+TOKEN = "let me command"
+
+
+@dataclass(frozen=True)
+class WallTest:
+    """Readings (n_channels, n) of upright, pull, hold, release, rocking, rest; and when they happen."""
+
+    readings: NDArray[np.float64]
+    release_sample: int
+    rest_sample: int
+    theta0_rad: float
+
+    @property
+    def n_samples(self) -> int:
+        return int(self.readings.shape[1])
+
+
+@pytest.fixture(scope="session")
+def rig(configs: Path) -> Rig:
+    loaded = load_rig(configs / "fr1.toml")
+    quick = loaded.acquisition.model_copy(update={"post_rest_s": 0.5, "max_duration_s": 20.0})
+    return loaded.model_copy(update={"acquisition": quick})
+
+
+@pytest.fixture(scope="session")
+def rig_text(configs: Path) -> str:
+    return (configs / "fr1.toml").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="session")
+def plan(rig: Rig) -> TaskPlan:
+    return plan_tasks(rig)
+
+
+@pytest.fixture(scope="session")
+def wall_test(rig: Rig) -> WallTest:
+    specimen = rig.specimen
+    theta0 = THETA0_SHARE * specimen.alpha0_rad
+    motion = free_rocking(theta0, RESTITUTION, specimen.p_rad_s, specimen.alpha0_rad, smallest_peak_rad=1e-5)
+    last_s = float(motion.impacts_s[-1])
+    release_s = UPRIGHT_S + PULL_S + HOLD_S
+    time_s = np.arange(int((release_s + last_s + 4.0) * RATE_HZ)) / RATE_HZ
+    rotation = np.interp(time_s, [UPRIGHT_S, UPRIGHT_S + PULL_S], [0.0, theta0])
+    after = time_s >= release_s
+    since = time_s[after] - release_s
+    rotation[after] = np.where(since < last_s, motion.at(np.minimum(since, last_s - 1e-9))[0], 0.0)
+    si = np.random.default_rng(7).normal(size=(len(rig.channels), time_s.size))
+    si *= np.array([channel.noise_si for channel in rig.channels])[:, None]
+    wires = RotationGeometry.from_rig(rig).wires
+    for name, shortening in zip(wires.ids, wires.shortening(rotation), strict=True):
+        si[rig.channel_ids.index(name)] += shortening
+    for row, channel in enumerate(rig.channels):
+        if channel.family == "tiltmeter" and channel.axis == "x":
+            si[row] += rotation
+    readings = Scaling.of(rig.channels).to_readings(si)
+    return WallTest(readings, round(release_s * RATE_HZ), round((release_s + last_s) * RATE_HZ), theta0)
+
+
+class StageDriver:
+    """A driver that plays a `WallTest` up to the sample that the test allows, and fails on cue."""
+
+    def __init__(self, wall: WallTest) -> None:
+        self._wall = wall
+        self._changed = threading.Condition()
+        self._allowed = 0
+        self._next = 0
+        self._cues: list[tuple[int, DriverError, int]] = []
+        self._recovering: list[DriverError] = []
+        self.plan: TaskPlan | None = None
+        self.opened = 0
+        self.closed = 0
+
+    def let(self, until: int) -> None:
+        """Allow reading up to that sample."""
+        with self._changed:
+            self._allowed = max(self._allowed, until)
+            self._changed.notify_all()
+
+    def fail_at(self, sample: int, error: DriverError, *, lose: int = 0) -> None:
+        """Raise `error` when reading reaches `sample`; `lose` samples are gone then."""
+        self._cues.append((sample, error, lose))
+
+    def fail_recovery(self, *errors: DriverError) -> None:
+        """What the next recoveries raise."""
+        self._recovering.extend(errors)
+
+    def open(self, plan: TaskPlan) -> Opened:
+        self.plan = plan
+        self.opened += 1
+        return Opened(RATE_HZ, dict.fromkeys(plan.channel_ids, (-10.0, 10.0)), 80_000, (), "staged in a test")
+
+    def start(self) -> None:
+        self._next = 0
+
+    def read(self, timeout_s: float) -> Block:
+        assert self.plan is not None
+        if self._cues and self._next >= self._cues[0][0]:
+            _, error, lose = self._cues.pop(0)
+            self._next += lose
+            raise error
+        stop = self._next + self.plan.read_samples
+        with self._changed:
+            if not self._changed.wait_for(lambda: self._allowed >= stop, timeout_s):
+                raise DriverError("No samples", advice="Wait", retryable=True)
+        readings = self._wall.readings[:, self._next : stop]
+        block = Block(self._next, np.ascontiguousarray(readings), time.time_ns(), 0)
+        self._next += block.n_samples
+        if block.n_samples == 0:
+            raise DriverError("The stage is empty", advice="End the test")
+        return block
+
+    def recover(self) -> None:
+        if self._recovering:
+            raise self._recovering.pop(0)
+
+    def stop(self) -> None:
+        pass
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+@dataclass
+class Live:
+    """A session with its driver and one viewer that may command."""
+
+    driver: StageDriver
+    session: Session
+    client: AcquisitionClient
+    folder: Path
+    heard: list[Message] = field(default_factory=list)
+
+    def ask(self, name: str, **arguments: float | str) -> Reply:
+        return self.client.request(name, timeout_s=20.0, **arguments)
+
+    def wait_for(self, right: Callable[[Message], bool], timeout_s: float = 30.0) -> Message:
+        """Listen until a message is the right one; all are kept in `heard`."""
+        deadline = time.monotonic() + timeout_s
+        while time.monotonic() < deadline:
+            received = self.client.receive(0.5)
+            if received is not None:
+                self.heard.append(received.message)
+                if right(received.message):
+                    return received.message
+        raise AssertionError(f"not heard within {timeout_s} s; last: {self.heard[-5:]}")
+
+    def wait_for_state(self, *states: State) -> StateMessage:
+        message = self.wait_for(lambda m: isinstance(m, StateMessage) and m.state in states)
+        assert isinstance(message, StateMessage)
+        return message
+
+    def wait_for_event(self, kind: str, **data: str) -> EventMessage:
+        def right(message: Message) -> bool:
+            return (
+                isinstance(message, EventMessage)
+                and message.kind == kind
+                and all(message.data.get(key) == value for key, value in data.items())
+            )
+
+        message = self.wait_for(right)
+        assert isinstance(message, EventMessage)
+        return message
+
+    def zero_and_arm(self, test: str = "FR1-L3-1") -> Path:
+        """Take the zero upright, arm, and return the journal's path."""
+        self.driver.let(3200)
+        taken: list[Reply] = []
+        asking = threading.Thread(target=lambda: taken.append(self._ask_apart("tare")))
+        asking.start()
+        while asking.is_alive():  # the zero needs samples from after the request
+            self.driver.let(self.driver._allowed + 400)
+            asking.join(0.02)
+        assert taken[0].ok, taken[0].text
+        reply = self.ask("arm", test=test)
+        assert reply.ok, reply.text
+        return Path(str(reply.data["journal"]))
+
+    def _ask_apart(self, name: str) -> Reply:
+        with AcquisitionClient(self.client._address, TOKEN, topics=()) as client:
+            return client.request(name, timeout_s=20.0)
+
+
+@pytest.fixture(scope="session")
+def finaliser() -> Iterator[Finaliser]:
+    """One warm worker for all tests."""
+    made = Finaliser()
+    made.start()
+    yield made
+    made.close()
+
+
+Lives = Callable[..., Live]
+
+
+@pytest.fixture
+def live(
+    rig: Rig, rig_text: str, plan: TaskPlan, wall_test: WallTest, tmp_path: Path, finaliser: Finaliser
+) -> Iterator[Lives]:
+    """Make a session on a staged driver; ended with the test."""
+    ends: list[Callable[[], None]] = []
+
+    def make(folder: Path | None = None, driver: StageDriver | None = None, **settings: Any) -> Live:
+        stage = driver or StageDriver(wall_test)
+        where = folder or tmp_path / "runs"
+        where.mkdir(exist_ok=True)
+        settings.setdefault("patience", Patience(read_timeout_s=0.05, retry_pause_s=0.01))
+        session: Session | None = None
+        desk = Desk("tcp://127.0.0.1:0", lambda command: _handle(session, desk, command), TOKEN)
+        session = Session(
+            SessionSettings(rig, rig_text, plan, where, lambda: stage, **settings), desk.publisher, finaliser
+        )
+        serving = threading.Thread(target=lambda: desk.serve(session.tick, 0.05))
+        serving.start()
+        client = AcquisitionClient(desk.addresses.commands, TOKEN)
+        session.start()
+
+        def end() -> None:
+            session.close()
+            desk.stop()
+            serving.join()
+            client.close()
+            desk.close()
+
+        ends.append(end)
+        made = Live(stage, session, client, where)
+        made.wait_for_state(State.PREVIEWING, State.FAILED)
+        return made
+
+    yield make
+    for end in ends:
+        end()
+
+
+def _handle(session: Session | None, desk: Desk, command: Any) -> Any:
+    if command.name == "hello":
+        return Reply(ok=True, data={"publisher": desk.addresses.publisher})
+    assert session is not None
+    return session.handle(command)
