@@ -1,0 +1,169 @@
+"""Analyses every run of a campaign folder on all cores and gathers what the report needs."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from daq_app.campaign.names import TestName
+from daq_app.campaign.status import RecordedTest, TestVerdict
+from daq_app.campaign.summary import MethodResult, TestSummary
+from daq_app.config import Rig
+from daq_app.rocking.analysis import AnalysisOptions, analyse_record
+from daq_app.rocking.record import TestRecord
+from daq_app.rocking.results import Series, TestAnalysis
+from daq_app.runfile import RunFileError, open_run
+
+_KEYS = {"CRT": "crt", "EAV": "eav"}
+_SHOWN_RATE_HZ = 200.0
+"""Rate of the histories in figures: at 4000 Hz a picture would weigh megabytes and look the same."""
+_BEFORE_S = 0.3
+
+Progress = Callable[[int, int, str], None]
+"""Called with (done, total, name of the test just analysed)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A run that could not be analysed, and why."""
+
+    test: str
+    path: Path
+    reason: str
+
+
+def collect(
+    recorded: Sequence[RecordedTest],
+    *,
+    options: AnalysisOptions | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> tuple[list[TestSummary], list[Failure]]:
+    """Analyse all run files among `recorded`, in the order given.
+
+    Ctrl-C ends it cleanly: `KeyboardInterrupt` once the workers have stopped.
+    """
+    options = options or AnalysisOptions()
+    jobs = [test for test in recorded if test.path is not None and test.verdict is not TestVerdict.LOST]
+    count = min(workers or os.cpu_count() or 1, max(len(jobs), 1))
+    answers: dict[int, TestSummary | Failure] = {}
+    # Spawned, not forked: the parent may hold threads (a window, a reader), which a fork would break.
+    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
+        pending = {pool.submit(summarise_run, test, options): index for index, test in enumerate(jobs)}
+        try:
+            open_jobs = set(pending)
+            while open_jobs:
+                done, open_jobs = wait(open_jobs, return_when=FIRST_COMPLETED)
+                for future in done:
+                    answers[pending[future]] = future.result()
+                    if progress:
+                        progress(len(answers), len(jobs), str(jobs[pending[future]].name))
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    ordered = [answers[index] for index in sorted(answers)]
+    summaries = [answer for answer in ordered if isinstance(answer, TestSummary)]
+    return summaries, [answer for answer in ordered if isinstance(answer, Failure)]
+
+
+def summarise_run(test: RecordedTest, options: AnalysisOptions) -> TestSummary | Failure:
+    """Analyse one run file. Whatever is wrong with it comes back as a `Failure`, in words."""
+    assert test.path is not None
+    try:
+        with open_run(test.path) as run:
+            if run.rig is None:
+                return Failure(str(test.name), test.path, "the run does not say which rig it was made with")
+            analysis = analyse_record(TestRecord.from_run(run, run.rig), options)
+            if not analysis.found:
+                return Failure(str(test.name), test.path, "; ".join(note.text for note in analysis.notes))
+            return summarise(test, run.rig, analysis)
+    except (RunFileError, ValueError) as error:
+        return Failure(str(test.name), test.path, str(error))
+
+
+def summarise(test: RecordedTest, rig: Rig, analysis: TestAnalysis) -> TestSummary:
+    """One analysed test as the report sees it; the release is made positive."""
+    assert test.path is not None
+    name: TestName = test.name
+    cycles = analysis.half_cycles
+    peaks = [abs(cycle.peak_rad) for cycle in cycles]
+    last = next((n for n, peak in enumerate(peaks) if not math.isfinite(peak)), len(peaks))
+    warnings = [note.text for note in analysis.notes if note.severity == "warning"]
+    good = test.verdict is not TestVerdict.BAD
+    reasons = tuple(filter(None, [test.reason])) if not good else tuple(warnings)
+    return TestSummary(
+        test=str(name),
+        specimen=name.specimen,
+        level=name.level,
+        repetition=name.repetition,
+        run=test.path.name,
+        alpha_rad=rig.specimen.alpha0_rad,
+        p_rad_s=analysis.theory.p_rad_s,
+        r_max=analysis.theory.r_max,
+        theta0_rad=analysis.theta0_rad * analysis.side,
+        impacts_s=tuple(cycle.start_s - analysis.release_s for cycle in cycles[1:]),
+        peaks_rad=tuple(peaks[:last]),
+        periods_s=_periods(analysis),
+        methods=_methods(analysis),
+        good=good,
+        reasons=reasons,
+        **_history(analysis.series, analysis),
+    )
+
+
+def _periods(analysis: TestAnalysis) -> tuple[float, ...]:
+    """T_n = twice the half-cycle after impact n, for n = 1, 2, …, up to the first that is not known."""
+    found: list[float] = []
+    for cycle in analysis.half_cycles[1:]:
+        if not math.isfinite(cycle.duration_s):
+            break
+        found.append(2.0 * cycle.duration_s)
+    return tuple(found)
+
+
+def _methods(analysis: TestAnalysis) -> dict[str, MethodResult]:
+    methods: dict[str, MethodResult] = {}
+    for label, key in _KEYS.items():
+        estimate = analysis.estimates[key]
+        if estimate.r is None or estimate.standard_error is None:
+            continue
+        bias = analysis.bias.get(key)
+        methods[label] = MethodResult(
+            r=estimate.r,
+            standard_error=estimate.standard_error,
+            bias=bias.mean if bias else 0.0,
+            bias_standard_error=bias.standard_error if bias else 0.0,
+            points=tuple((point.impact, point.r) for point in estimate.points),
+        )
+    if analysis.fit is not None and analysis.fit.explains_the_motion:
+        bias = analysis.bias.get("fit")
+        methods["fit"] = MethodResult(
+            r=analysis.fit.r,
+            standard_error=analysis.fit.standard_error,
+            bias=bias.mean if bias else 0.0,
+            bias_standard_error=bias.standard_error if bias else 0.0,
+        )
+    return methods
+
+
+def _history(series: Series | None, analysis: TestAnalysis) -> dict[str, np.ndarray]:
+    """Rotation and velocity from just before the release to just after rest, thinned."""
+    if series is None:
+        empty = np.empty(0)
+        return {"time_s": empty, "rotation_rad": empty, "velocity_rad_s": empty}
+    end = analysis.rest_s if math.isfinite(analysis.rest_s) else float(series.time_s[-1])
+    first, last = np.searchsorted(series.time_s, [analysis.release_s - _BEFORE_S, end + _BEFORE_S])
+    step = max(1, round(analysis.rate_hz / _SHOWN_RATE_HZ))
+    pick = slice(int(first), int(last), step)
+    return {
+        "time_s": series.time_s[pick] - analysis.release_s,
+        "rotation_rad": series.rotation_rad[pick] * analysis.side,
+        "velocity_rad_s": series.velocity_rad_s[pick] * analysis.side,
+    }
