@@ -15,11 +15,11 @@ from daq_app.campaign.plan import load_campaign
 from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.status import CampaignStatus, PlaceState
 from daq_app.campaign.verdicts import give_verdict
+from daq_app.cli.campaign_report import DEFAULT_PLAN, report
 from daq_app.cli.errors import reported
 from daq_app.config import ConfigError, Problem
 from daq_app.runfile import open_run
 
-_PLAN = Path("configs/campaigns/costa.toml")
 _PlanOption = Annotated[Path, typer.Option("--plan", help="Campaign file (TOML).")]
 
 
@@ -38,10 +38,11 @@ def register(app: typer.Typer) -> None:
         "verdict",
         epilog='Example: daq-app campaign verdict runs/FR1-L3-2.h5 bad --reason "hit a rope"',
     )(verdict)
+    group.command("report", epilog="Example: daq-app campaign report runs --out report")(report)
     app.add_typer(group, name="campaign")
 
 
-def plan(file: Annotated[Path, typer.Argument(help="Campaign file (TOML).")] = _PLAN) -> None:
+def plan(file: Annotated[Path, typer.Argument(help="Campaign file (TOML).")] = DEFAULT_PLAN) -> None:
     """Show every test of a campaign in its order, with its level."""
     with reported():
         campaign = load_campaign(file)
@@ -56,7 +57,7 @@ def plan(file: Annotated[Path, typer.Argument(help="Campaign file (TOML).")] = _
 
 def status(
     folder: Annotated[Path, typer.Argument(help="Folder of the runs.")],
-    plan_file: _PlanOption = _PLAN,
+    plan_file: _PlanOption = DEFAULT_PLAN,
     specimen: Annotated[str, typer.Option(help="Only this specimen, for instance FR1.")] = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:

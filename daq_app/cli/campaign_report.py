@@ -1,0 +1,123 @@
+"""`daq-app campaign report`: from run files to Table 4.1 and Figures 4.1 to 4.4."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from daq_app.campaign import collect as gathering
+from daq_app.campaign.plan import load_campaign
+from daq_app.campaign.recorded import read_recorded
+from daq_app.campaign.status import CampaignStatus
+from daq_app.campaign.summary import TestSummary
+from daq_app.campaign.tables import RestitutionRow, table_4_1
+from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
+from daq_app.rocking.analysis import AnalysisOptions
+
+DEFAULT_PLAN = Path("configs/campaigns/costa.toml")
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(help="Folder of the runs.", metavar="DIR")],
+    plan_file: Annotated[Path, typer.Option("--plan", help="Campaign file (TOML).")] = DEFAULT_PLAN,
+    out: Annotated[Path | None, typer.Option(help="Folder of the report.", show_default="DIR/report")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="all cores")] = None,
+    bias_runs: Annotated[
+        int, typer.Option(min=0, help="Simulated tests behind each method's bias; 0 leaves it out.")
+    ] = 12,
+    as_json: Annotated[bool, typer.Option("--json", help="Print Table 4.1 as JSON.")] = False,
+) -> None:
+    """Analyse every run of a campaign: HTML and PDF report, figures as SVG, every number as CSV.
+
+    Runs with a bad verdict are shown and left out of the means. Exit code 1 when runs could not be analysed.
+    """
+    with reported():
+        from daq_app.campaign.report import write_report
+
+        campaign = load_campaign(plan_file)
+        recorded = read_recorded(folder)
+        status = CampaignStatus(campaign, recorded)
+        with _progress() as advance:
+            tests, failures = gathering.collect(
+                recorded,
+                options=AnalysisOptions(bias_runs=bias_runs),
+                workers=workers,
+                progress=advance,
+            )
+        for failure in failures:
+            print_paragraph("Not analysed", f"{failure.test} ({failure.path}): {failure.reason}")
+        if not tests:
+            print_paragraph("Error", f"no run in {folder} could be analysed; nothing was written")
+            raise typer.Exit(EXIT_FAILED)
+        target = out or folder / "report"
+        made = time.strftime("%Y-%m-%d %H:%M", time.localtime())
+        footer = f"Made {made} from {len(recorded)} recorded tests in {folder.name}."
+        write_report(target, campaign.name, status, tests, footer)
+        _print(table_4_1(tests), tests, target, as_json)
+    if failures:
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _print(rows: list[RestitutionRow], tests: list[TestSummary], target: Path, as_json: bool) -> None:
+    if as_json:
+        document = [
+            {
+                "specimen": row.specimen,
+                "method": row.method,
+                "tests": row.mean.tests,
+                "r": row.mean.mean,
+                "low95": row.mean.low95,
+                "high95": row.mean.high95,
+                "scatter": row.mean.scatter,
+                "r_corrected": row.corrected.mean,
+                "r_corrected_low95": row.corrected.low95,
+                "r_corrected_high95": row.corrected.high95,
+                "r_max": row.r_max,
+                "ratio": row.ratio,
+            }
+            for row in rows
+        ]
+        typer.echo(json.dumps({"report": str(target / "report.html"), "table_4_1": document}, indent=1))
+        return
+    console = Console()
+    table = Table(title="Table 4.1: coefficient of restitution", title_justify="left")
+    for column in ("specimen", "estimator", "tests", "mean", "95 % interval", "r/r_max", "bias-corrected"):
+        table.add_column(column, justify="left" if column in ("specimen", "estimator") else "right")
+    for row in rows:
+        interval = f"{row.mean.low95:.4f} … {row.mean.high95:.4f}"
+        corrected = f"{row.corrected.mean:.4f}"
+        cells = (str(row.mean.tests), f"{row.mean.mean:.4f}", interval, f"{row.ratio:.3f}", corrected)
+        table.add_row(row.specimen, row.method, *cells)
+    console.print(table)
+    left_out = [test.test for test in tests if not test.good]
+    if left_out:
+        console.print(f"Left out of the means: {', '.join(left_out)}", highlight=False, markup=False)
+    console.print(f"Report: {target / 'report.html'}", highlight=False, markup=False, soft_wrap=True)
+
+
+@contextmanager
+def _progress() -> Iterator[gathering.Progress]:
+    """A bar on stderr, so that `--json` stays clean on stdout."""
+    columns = (
+        TextColumn("analysing"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.description}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=None)
+
+        def advance(done: int, total: int, name: str) -> None:
+            bar.update(task, completed=done, total=total, description=name)
+
+        yield advance
