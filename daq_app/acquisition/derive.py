@@ -1,14 +1,35 @@
-"""Derived signals and results of a run, from its journal: rotation, velocity, θ0, impacts, r."""
+"""Derived signals and results of a run, from its journal: rotation, velocity, θ0, impacts, r, quality."""
 
 from __future__ import annotations
 
-import numpy as np
+import math
+from typing import Any, Final
 
-from daq_app.rocking.live import Estimate, LiveAnalyser
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.config.rig import Rig
+from daq_app.config.scaling import Scaling
+from daq_app.rocking.analysis import AnalysisOptions, analyse_record
+from daq_app.rocking.live import LiveAnalyser
+from daq_app.rocking.record import TestRecord
+from daq_app.rocking.results import Series, TestAnalysis
 from daq_app.runfile import DerivedData, DerivedSignal, JournalContents
 from daq_app.runfile.source import rig_of
 
-_WINDOW = 4000
+Floats = NDArray[np.float64]
+
+_WINDOW: Final = 4000
+_OPTIONS: Final = AnalysisOptions(fit=False, bias_runs=0)
+"""What takes long (simulated bias, fit of the whole motion) waits for `daq-app analyse`."""
+_SIGNALS: Final = {
+    "rotation_rad": ("rotation", "rad", "rotation of the wall from the wire potentiometers"),
+    "velocity_rad_s": ("velocity", "rad/s", "angular velocity, filtered derivative of rotation"),
+    "best_rotation_rad": ("rotation_fused", "rad", "rotation of the wall from wires and LVDTs"),
+    "neutral_axis_m": ("neutral_axis", "m", "x of zero opening of the base joint"),
+    "contact_m": ("contact_length", "m", "length of the base joint in contact"),
+    "twist_rad_per_m": ("twist", "rad/m", "change of the joint's rotation along the wall's length"),
+}
 
 
 def derive(contents: JournalContents) -> tuple[DerivedData | None, str]:
@@ -16,25 +37,92 @@ def derive(contents: JournalContents) -> tuple[DerivedData | None, str]:
     if contents.n_samples == 0:
         return None, ""
     rig = rig_of(contents.header)
-    if rig is None:
+    if rig is None or rig.channel_ids != contents.header.channel_ids:
         return None, "The run's rig file is not understood, so nothing was derived"
-    header = contents.header
     try:
-        analyser = LiveAnalyser(rig, header.rate_hz, header.tare)
-        rotations, velocities = [], []
-        estimate: Estimate | None = None
-        for first, window in contents.windows(_WINDOW):
-            result = analyser.process(first, window)
-            rotations.append(result.rotation_rad)
-            velocities.append(result.velocity_rad_s)
-            estimate = result.estimate or estimate
+        analysis = analyse_record(_record(contents, rig), _OPTIONS)
+        online = _online(contents, rig)
     except Exception as error:
         return None, f"The analysis failed ({type(error).__name__}: {error}); the readings are complete"
-    signals = {
-        "rotation": DerivedSignal(np.concatenate(rotations), "rad", "rotation of the wall about its base"),
-        "velocity": DerivedSignal(np.concatenate(velocities), "rad/s", "angular velocity"),
+    results: dict[str, Any] = {"analysis": analysis.as_dict(), "online": online}
+    quality = _quality(contents, analysis)
+    if quality is not None:
+        results["quality"] = quality
+    return DerivedData(contents.first_sample, _signals(analysis.series), results=results), ""
+
+
+def _record(contents: JournalContents, rig: Rig) -> TestRecord:
+    header = contents.header
+    row = {channel_id: index for index, channel_id in enumerate(header.channel_ids)}
+
+    def load(wanted: tuple[str, ...]) -> Floats:
+        """Some channels of the whole run; the journal is walked through once for each call."""
+        rows = [row[channel_id] for channel_id in wanted]
+        scaling = Scaling.of([rig.channel(channel_id) for channel_id in wanted], header.tare)
+        si = np.empty((len(rows), contents.n_samples))
+        for first, window in contents.windows(_WINDOW):
+            start = first - contents.first_sample
+            si[:, start : start + window.shape[1]] = scaling.to_si(window[rows])
+        return si
+
+    return TestRecord(
+        rig=rig,
+        rate_hz=header.rate_hz,
+        n_samples=contents.n_samples,
+        channel_ids=header.channel_ids,
+        load=load,
+        first_sample=contents.first_sample,
+        time_offsets_s={channel_id: header.time_offset_s(channel_id) for channel_id in header.channel_ids},
+        tared=bool(header.tare),
+        label=header.test or header.run_id,
+    )
+
+
+def _online(contents: JournalContents, rig: Rig) -> dict[str, Any] | None:
+    """What the causal analyser makes of the same samples: it is what the operator saw."""
+    analyser = LiveAnalyser(rig, contents.header.rate_hz, contents.header.tare)
+    estimate = None
+    for first, window in contents.windows(_WINDOW):
+        estimate = analyser.process(first, window).estimate or estimate
+    return None if estimate is None else _plain(estimate.as_message())
+
+
+def _plain(value: Any) -> Any:
+    """NaN (a half-cycle that could not be fitted) becomes None: JSON has no NaN."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _signals(series: Series | None) -> dict[str, DerivedSignal]:
+    if series is None:
+        return {}
+    return {
+        name: DerivedSignal(getattr(series, attribute), unit, long_name)
+        for attribute, (name, unit, long_name) in _SIGNALS.items()
     }
-    results: dict[str, object] = {"filter": analyser.velocity_filter.statement}
-    if estimate is not None:
-        results = {**results, "estimate": estimate.as_message(), "alpha_rad": rig.specimen.alpha0_rad}
-    return DerivedData(contents.first_sample, signals, results=results), ""
+
+
+def _quality(contents: JournalContents, analysis: TestAnalysis) -> dict[str, Any] | None:
+    """Whether this run is a whole test; None for one that was never released."""
+    kinds = {event.kind for event in contents.events}
+    ends = [event for event in contents.events if event.kind == "end"]
+    outcome = str(ends[-1].data.get("outcome", "")) if ends else "cut off"
+    if outcome == "aborted" or not (analysis.found or kinds & {"released", "rocking", "at_rest"}):
+        return None
+    reasons = []
+    if contents.gaps:
+        reasons.append(f"{contents.lost_samples} samples are missing in {len(contents.gaps)} gap(s)")
+    if outcome != "complete":
+        reasons.append({"timeout": "the wall did not come to rest in time"}.get(outcome, f"it was {outcome}"))
+    if contents.damage:
+        reasons.append(f"the journal is damaged: {contents.damage[0]}")
+    if not analysis.found:
+        reasons.append("no release and impact were found")
+    reasons += sorted({event.text for event in contents.events if event.kind == "overload"})
+    hard = bool(contents.gaps or contents.damage or outcome != "complete" or not analysis.found)
+    return {"verdict": "bad" if hard else "good", "reasons": reasons}

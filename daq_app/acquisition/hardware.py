@@ -6,8 +6,10 @@ import argparse
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 from daq_app.acquisition.simulated import SimulatedServer
+from daq_app.config.rig import Rig
 from daq_app.runfile import RunFileError, open_run
 from drivers import Driver, DriverError, ReplayDriver, open_driver
 
@@ -32,8 +34,24 @@ def driver_maker(
     return (lambda: open_driver(connection, backup_folder=backup)), connection
 
 
+def planned_truth(connection: str, rig: Rig, options: argparse.Namespace) -> dict[str, Any] | None:
+    """What a simulated run is made from, as far as it is known at arming; None for a real one."""
+    if connection != "simulated":
+        return None
+    simulation = rig.simulation
+    return {
+        "simulated": True,
+        "restitution": simulation.restitution,
+        "restitution_scatter": simulation.restitution_scatter,
+        "planned_theta0_over_alpha": options.theta0_over_alpha,
+        "seed": simulation.seed if options.seed is None else options.seed,
+        "semi_rigid": simulation.semi_rigid,
+        "effects": simulation.effects,
+    }
+
+
 def _server_options(options: argparse.Namespace) -> list[str]:
-    chosen = ["--speed", str(options.speed)]
+    chosen = ["--speed", str(options.speed), "--wall", "commanded"]
     if options.seed is not None:
         chosen += ["--seed", str(options.seed)]
     if options.theta0_over_alpha is not None:

@@ -16,7 +16,7 @@ from contextlib import ExitStack
 
 from daq_app.acquisition.desk import Answer, Desk, DeskError
 from daq_app.acquisition.finaliser import Finaliser
-from daq_app.acquisition.hardware import driver_maker
+from daq_app.acquisition.hardware import driver_maker, planned_truth
 from daq_app.acquisition.items import RequestRefused
 from daq_app.acquisition.messages import Command, Reply
 from daq_app.acquisition.options import READY, parse
@@ -36,6 +36,7 @@ class Process:
     def __init__(self, options: argparse.Namespace, rig: Rig, plan: TaskPlan, stack: ExitStack) -> None:
         connection = options.connection or rig.hardware.connection
         make_driver, self._connection = driver_maker(connection, options, stack)
+        self._simulated = connection == "simulated"
         self._rig = rig
         self._rig_text = options.rig.read_text(encoding="utf-8")
         self._token = os.environ.get("DAQ_APP_TOKEN") or secrets.token_urlsafe(24)
@@ -53,6 +54,7 @@ class Process:
                 make_driver=make_driver,
                 release_within_s=options.release_within,
                 spare_folder=options.spare,
+                truth=planned_truth(connection, rig, options),
             ),
             self._desk.publisher,
             finaliser,
@@ -121,6 +123,7 @@ class Process:
             "channel_ids": list(self._rig.channel_ids),
             "rate_hz": opened.rate_hz if opened else 0.0,
             "connection": self._connection,
+            "simulated": self._simulated,
             "folder": str(self._folder.resolve()),
             "pid": os.getpid(),
             "state": self.session.analyst.state_message().model_dump(mode="json"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -48,6 +47,8 @@ class SessionSettings:
     make_driver: Callable[[], Driver]
     release_within_s: float = 1800.0
     spare_folder: Path | None = None
+    truth: dict[str, Any] | None = None
+    """What a simulated wall is made from; goes into every run."""
     patience: Patience = field(default_factory=Patience)
 
 
@@ -177,7 +178,7 @@ class Session:
         self._reader.start()
         return "Sampling begins"
 
-    def arm(self, test: str, notes: str = "", truth: dict[str, Any] | None = None) -> Future[Path]:
+    def arm(self, test: str, notes: str = "") -> Future[Path]:
         """Record from now on as `test`. Raises `RequestRefused`; the future gives the journal's path."""
         settings = self._settings
         check_name(test)
@@ -197,7 +198,7 @@ class Session:
             self.analyst.tare,
             test=test,
             notes=notes,
-            truth=truth,
+            truth=settings.truth,
         )
         begin = Begin(settings.folder / f"{header.run_id}{JOURNAL_SUFFIX}", header)
         self.recorder.inbox.put(begin)
@@ -215,25 +216,14 @@ class Session:
             case "preview":
                 return Reply(ok=True, text=self.preview())
             case "arm":
-                return _reply_of(self.arm(*_arm_arguments(command.arguments)), _armed)
+                test, notes = (str(command.arguments.get(name, "")) for name in ("test", "notes"))
+                return _reply_of(self.arm(test, notes[:20_000]), _armed)
             case "tare" | "abort" | "stop" | "marker" | "note":
                 return _reply_of(self.ask(command.name, dict(command.arguments)), _answered)
         raise RequestRefused(
             f"There is no command '{command.name[:40]}'. There are hello, preview, tare, arm, abort, stop, "
             "marker, note and shutdown"
         )
-
-
-def _arm_arguments(arguments: dict[str, float | str]) -> tuple[str, str, dict[str, Any] | None]:
-    truth: dict[str, Any] | None = None
-    if text := str(arguments.get("truth", "")):
-        try:
-            truth = json.loads(text)
-        except ValueError as error:
-            raise RequestRefused(f"truth is no JSON ({error})") from error
-        if not isinstance(truth, dict):
-            raise RequestRefused("truth must be a JSON object")
-    return str(arguments.get("test", "")), str(arguments.get("notes", ""))[:20_000], truth
 
 
 def _armed(journal: Path) -> Reply:

@@ -24,7 +24,6 @@ class Unattended:
     session: Session
     test: str
     notes: str = ""
-    truth: dict[str, Any] | None = None
     exit_code: int | None = None
     text: str = ""
     """Why it could not be done; for the operator."""
@@ -63,7 +62,7 @@ class Unattended:
         error = self._tare.exception()
         if error is None:
             try:
-                self._arm = self.session.arm(self.test, self.notes, self.truth)
+                self._arm = self.session.arm(self.test, self.notes)
             except RequestRefused as refused:
                 self._fail(str(refused), code=2)
         elif time.monotonic() - self._since_s > _ZERO_LIMIT_S:

@@ -9,6 +9,7 @@ import typer
 
 _GROUPS: Final = (
     "daq_app.cli.config_commands",
+    "daq_app.cli.record_commands",
     "daq_app.cli.campaign_commands",
     "daq_app.cli.theory_commands",
     "daq_app.cli.run_file_commands",

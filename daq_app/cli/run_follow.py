@@ -17,6 +17,8 @@ from daq_app.acquisition.launcher import AcquisitionDied, AcquisitionProcess
 from daq_app.acquisition.messages import EventMessage, State, StateMessage
 from daq_app.cli.errors import EXIT_FAILED, EXIT_HARDWARE, EXIT_INTERRUPTED
 from daq_app.cli.run_view import RunView
+from daq_app.cli.simulated_hand import SimulatedHand
+from daq_app.config import parse_rig
 
 _QUIET_S = 0.25
 
@@ -115,6 +117,10 @@ def _follow(
     interrupts = _Interrupts(client)
     previous = signal.signal(signal.SIGINT, interrupts)
     outcome, run, stopping = "", "", False
+    hand = None
+    if client.about.get("simulated"):
+        rig = parse_rig(str(client.about["rig_text"]), str(options.rig))
+        hand = SimulatedHand(str(client.about["connection"]), rig, options.theta0_over_alpha)
     try:
         with RunView(console, options.test, client.about) as view:
             while process.process.poll() is None:
@@ -126,6 +132,11 @@ def _follow(
                 if received is None:
                     continue
                 view.take(received.message)
+                if hand is not None:
+                    hand.take(received.message)
+                    if hand.trouble:
+                        view.say(hand.trouble, "bold red")
+                        hand.trouble = ""
                 match received.message:
                     case StateMessage(state=State.SAVED, run_path=path) if path:
                         run = path
@@ -133,6 +144,8 @@ def _follow(
                         outcome, run = str(data.get("outcome", "")), str(data.get("run", "")) or run
     finally:
         signal.signal(signal.SIGINT, previous)
+        if hand is not None:
+            hand.close()
     code = process.wait()
     if stopping:
         code = EXIT_INTERRUPTED

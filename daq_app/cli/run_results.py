@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
+from rich.text import Text
 
 from daq_app.runfile import Run, open_run
 
@@ -20,7 +20,6 @@ def as_document(path: Path, outcome: str) -> dict[str, Any]:
 def _document(run: Run, outcome: str) -> dict[str, Any]:
     lost = sum(gap.n_samples for gap in run.gaps)
     results = run.derived.results if run.derived is not None else {}
-    estimate = _plain(results.get("estimate"))
     document: dict[str, Any] = {
         "run": str(run.path),
         "run_id": run.header.run_id,
@@ -33,30 +32,16 @@ def _document(run: Run, outcome: str) -> dict[str, Any]:
         "lost_samples": lost,
         "gaps": len(run.gaps),
         "truth": run.header.truth,
-        "estimate": None,
+        "analysis": results.get("analysis"),
+        "online": results.get("online"),
+        "quality": results.get("quality"),
     }
-    if isinstance(estimate, dict):
-        alpha = _plain(results.get("alpha_rad"))
-        theta0 = estimate.get("theta0_rad")
-        share = theta0 / alpha if isinstance(alpha, float) and isinstance(theta0, float) else None
-        document["estimate"] = {**estimate, "alpha_rad": alpha, "theta0_over_alpha": share}
     return document
 
 
 def _outcome(run: Run) -> str:
     ends = [event for event in run.events if event.kind == "end"]
     return str(ends[-1].data.get("outcome", "")) if ends else "cut off"
-
-
-def _plain(value: Any) -> Any:
-    """NaN (a half-cycle that could not be fitted) becomes None: JSON has no NaN."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return value
 
 
 def results_table(path: Path) -> Table:
@@ -74,26 +59,32 @@ def results_table(path: Path) -> Table:
         f"at {document['rate_hz']:g} Hz",
     )
     table.add_row("lost", "none" if not lost else f"[bold red]{lost} samples in {document['gaps']} gap(s)[/]")
-    estimate = document["estimate"]
-    if estimate is None:
-        table.add_row("r", "no release was found in this run")
+    analysis = document["analysis"]
+    if not analysis or not analysis["found"]:
+        table.add_row("r", "no release with an impact was found in this run")
         return table
-    share = estimate["theta0_over_alpha"]
-    theta0 = estimate["theta0_rad"]
-    if theta0 is not None and share is not None:
-        table.add_row("θ0", f"{1e3 * theta0:.2f} mrad, θ0/α = {abs(share):.4f}")
-    table.add_row("impacts", str(len(estimate["impact_samples"])))
-    for method in ("eav", "crt"):
-        table.add_row(f"r {method.upper()}", _r_text(estimate, method))
-    table.add_row("r max", f"{estimate['r_max']:.4f}  (1.2)")
+    theory, online = analysis["theory"], document["online"] or {}
+    table.add_row(
+        "θ0", f"{1e3 * analysis['theta0_rad']:.2f} mrad, θ0/α = {analysis['theta0_over_alpha']:.4f}"
+    )
+    table.add_row("impacts", str(len(analysis["half_cycles"]) - 1))
+    for method, formula in (("eav", "(4.4)"), ("crt", "(4.5)")):
+        live = online.get(f"{method}_mean")
+        shown = f"  online {live:.4f}" if live is not None else ""
+        text = _r_text(analysis["estimates"][method], theory["r_max"])
+        table.add_row(f"r {method.upper()}", f"{text}{shown}  {formula}")
+    table.add_row("r max", f"{theory['r_max']:.4f}  (1.2)")
+    quality = document["quality"]
+    if quality:
+        style = "bold green" if quality["verdict"] == "good" else "bold red"
+        reasons = f": {'; '.join(quality['reasons'])}" if quality["reasons"] else ""
+        table.add_row("verdict", Text.assemble((quality["verdict"], style), reasons))
     return table
 
 
-def _r_text(estimate: dict[str, Any], method: str) -> str:
-    mean, error = estimate[f"{method}_mean"], estimate[f"{method}_standard_error"]
-    points = len(estimate[method])
+def _r_text(estimate: dict[str, Any], r_max: float) -> str:
+    mean, error, points = estimate["r"], estimate["standard_error"], len(estimate["points"])
     if mean is None:
         return f"–  ({points} values: too few)"
     spread = f" ± {error:.4f}" if error is not None else ""
-    formula = {"eav": "4.4", "crt": "4.5"}[method]
-    return f"{mean:.4f}{spread}  ({points} values, r/r_max {mean / estimate['r_max']:.3f})  ({formula})"
+    return f"{mean:.4f}{spread}  ({points} values, r/r_max {mean / r_max:.3f})"

@@ -9,11 +9,13 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import psutil
 
 from daq_app.config.catalogue import UnknownProduct
 from daq_app.config.errors import ConfigError
 from daq_app.config.loader import load_rig
+from daq_app.config.rig import Rig
 from sim_hardware.daqmx_server.bench import Bench
 from sim_hardware.daqmx_server.clock import BenchClock, PacedClock, SteppedClock
 from sim_hardware.daqmx_server.inventory import Inventory
@@ -47,6 +49,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--seed", type=int, help="seed of noise and scatter; default: the rig's")
     parser.add_argument("--theta0-over-alpha", type=float, metavar="X", help="release rotation over alpha")
+    parser.add_argument(
+        "--wall",
+        choices=("scripted", "commanded"),
+        default="scripted",
+        help="pulled and released by the rig file's times, or by commands of the control service",
+    )
     parser.add_argument("--finite", choices=("real", "instant"), default="real", help="clock of finite tasks")
     parser.add_argument("--parent-pid", type=int, help="end when this process has ended")
     return parser
@@ -59,13 +67,22 @@ def build_bench(arguments: argparse.Namespace) -> Bench:
     return Bench(Inventory.from_rig(rig), _wall(rig, arguments), clock, arguments.finite)
 
 
-def _wall(rig: object, arguments: argparse.Namespace) -> SignalSource:
+def _wall(rig: Rig, arguments: argparse.Namespace) -> SignalSource:
     from sim_hardware.virtual_rig import VirtualRig  # compiles its kernel: only once it is wanted
 
     wall: SignalSource = VirtualRig.from_rig(
-        rig, seed=arguments.seed, theta0_over_alpha=arguments.theta0_over_alpha
+        rig,
+        seed=arguments.seed,
+        theta0_over_alpha=arguments.theta0_over_alpha,
+        scripted=arguments.wall == "scripted",
     )
     return wall
+
+
+def _warm_up(bench: Bench) -> None:
+    """Let the wall load its compiled kernels now: a second of it would be a minute of the bench at speed 60."""
+    terminals = tuple(name for device in bench.present() for name in device.physical_channels)
+    bench.source.volts(terminals, np.linspace(0.0, 0.01, 11))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -76,6 +93,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (ConfigError, UnknownProduct, OSError, RuntimeError) as error:
         print(f"daqmx_server: {error}", file=sys.stderr)
         return 2
+    _warm_up(server.bench)
     ended = threading.Event()
     for name in ("SIGINT", "SIGTERM", "SIGBREAK"):
         if hasattr(signal, name):
