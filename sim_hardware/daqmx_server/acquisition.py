@@ -34,6 +34,10 @@ class StartRule(Protocol):
 
     def __call__(self, now_s: float) -> SampleTimes | None: ...
 
+    def disturbed(self) -> None:
+        """What has been made ahead of now is no longer right."""
+        ...
+
 
 class Run:
     """State of a running (or finished, not yet stopped) acquisition. All under the bench's lock."""
@@ -51,7 +55,7 @@ class Run:
         self.read_position = 0
         self.failure: DaqmxError | None = None
         self.aborted = False
-        self._start_rule = start_rule
+        self.start_rule = start_rule
         self._make_sampler = make_sampler
         self._ref_search = ref_search
         self._arrived = arrived
@@ -65,7 +69,7 @@ class Run:
     def look(self, now_s: float) -> None:
         """Find out what has happened by now: start trigger, reference trigger."""
         if self.times is None:
-            self.times = self._start_rule(now_s)
+            self.times = self.start_rule(now_s)
             if self.times is not None:
                 self.sampler = self._make_sampler(self.times)
         if self.times is not None and self._ref_sample is None and self._ref_search is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 from threading import Condition, RLock
 from typing import TYPE_CHECKING, Literal
 
@@ -37,6 +38,7 @@ class Bench:
         self.clock = clock
         self.finite = finite
         self.faults = FaultBoard(clock.now, self._volts_at)
+        self.helper = ThreadPoolExecutor(1, thread_name_prefix="samples ahead")
         self.tasks: dict[str, Task] = {}
         self._owners: dict[str, str] = {}
         self._edges: dict[str, list[float]] = {}

@@ -7,11 +7,12 @@ registration has been made; until then it does not go on to start the task.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, TypeGuard
 
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 from nidaqmx.constants import EveryNSamplesEventType, Signal
 
+from sim_hardware.daqmx_server.acquisition import Run
 from sim_hardware.daqmx_server.bench import Bench
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.requests import fields_of
@@ -52,19 +53,25 @@ class EventStream:
             self.bench.changed.wait(_LISTEN_S)
         return self.open
 
-    def wait_for_count(self, count: int) -> bool:
-        """Wait until `count` samples have been acquired; False if the run ended before."""
+    def _follows(self, run: Run | None) -> TypeGuard[Run]:
+        """Whether the stream is open and that run still goes on."""
+        return self.open and run is not None and self.task.run is run and run.failure is None
+
+    def wait_for_count(self, count: int, interval: int) -> bool:
+        """Wait until `count` samples have been acquired; False if the run ended before.
+
+        Where time moves with the readers, the samples of the event before must have been read.
+        """
         run = self.task.run
         clock = self.bench.clock
         forever = clock.deadline(-1)
-        while self.open and run is not None and self.task.run is run and run.failure is None:
+        while self._follows(run):
             if run.acquired(clock.now()) >= count:
                 return True
             last = run.last_sample()
-            if last is not None and last < count:
+            unread = self.bench.readers_drive_time and run.read_position < count - interval
+            if unread or (last is not None and last < count):
                 self.bench.changed.wait(_LISTEN_S)
-            elif self.bench.readers_drive_time and run.available(clock.now()) > 0:
-                self.bench.changed.wait(_LISTEN_S)  # time moves with the reader: let it read first
             else:
                 clock.wait(self.bench.changed, run.time_of_count(count), forever)
         return False
@@ -90,7 +97,7 @@ def every_n_samples(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
             number = 0
             while True:
                 with bench.changed:
-                    if not stream.wait_for_count((number + 1) * interval):
+                    if not stream.wait_for_count((number + 1) * interval, interval):
                         break
                 number += 1
                 yield event
@@ -168,7 +175,7 @@ def signal(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
             count = 0
             while True:
                 with bench.changed:
-                    if not stream.wait_for_count(count + 1):
+                    if not stream.wait_for_count(count + 1, 1):
                         break
                 count += 1
                 yield event

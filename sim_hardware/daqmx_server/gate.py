@@ -59,5 +59,5 @@ class Gate:
             with self._bench.changed:
                 killed = self._bench.faults.active("server_killed")
             if killed is not None:
-                self._bench.clear_faults(killed.number)
                 self._kill()
+                return

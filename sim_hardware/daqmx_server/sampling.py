@@ -1,12 +1,14 @@
 """When samples are taken, and what the converters see then.
 
-Nothing is generated in advance of need and nothing is stored: a sample is a function of its index,
-so a block may be read in any pieces, twice, or late, and is the same.
+Nothing is stored: a sample is a function of its index, so a block may be read in any pieces, twice,
+or late, and is the same. Samples are made in chunks, the next one ahead of need; when the world is
+changed by a command, a fresh sampler takes over and what was made ahead is forgotten.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -42,7 +44,7 @@ class SampleTimes:
     def at(self, index: NDArray[np.int64]) -> NDArray[np.float64]:
         """Instant of each sample; inf where the clock has stopped for good."""
         if len(self._times) == 1 and self._moving[0]:
-            return self.first_s + index / self.rate_hz
+            return self.first_s + index / float(self._rates[0])
         piece = np.clip(np.searchsorted(self._counts, index, side="right") - 1, 0, None)
         rates = self._rates[piece]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -89,9 +91,17 @@ class Sampler:
     """Codes of a task's inputs by sample index."""
 
     def __init__(
-        self, source: SignalSource, distortion: Distortion, inputs: Sequence[Input], times: SampleTimes
+        self,
+        source: SignalSource,
+        distortion: Distortion,
+        inputs: Sequence[Input],
+        times: SampleTimes,
+        helper: Executor | None = None,
     ) -> None:
+        """`helper` makes the next chunk while this one is read."""
         self._source = source
+        self._helper = helper
+        self._ahead: tuple[int, Future[NDArray[np.int32]]] | None = None
         self._distortion = distortion
         self._inputs = tuple(inputs)
         self.times = times
@@ -116,17 +126,29 @@ class Sampler:
         pieces = []
         while start < stop:
             number = start // self._chunk
-            if self._cache is None or self._cache[0] != number:
-                self._cache = (number, self._make(number * self._chunk, (number + 1) * self._chunk))
+            chunk = self._chunk_codes(number)
             first = number * self._chunk
             end = min(stop, first + self._chunk)
-            pieces.append(self._cache[1][:, start - first : end - first])
+            pieces.append(chunk[:, start - first : end - first])
             start = end
         if not pieces:
             return np.empty((len(self._inputs), 0), dtype=np.int32)
         return pieces[0] if len(pieces) == 1 else np.concatenate(pieces, axis=1)
 
-    def _make(self, start: int, stop: int) -> NDArray[np.int32]:
+    def _chunk_codes(self, number: int) -> NDArray[np.int32]:
+        if self._cache is not None and self._cache[0] == number:
+            return self._cache[1]
+        if self._ahead is not None and self._ahead[0] == number:
+            codes = self._ahead[1].result()
+        else:
+            codes = self._make(number)
+        self._cache = (number, codes)
+        if self._helper is not None:
+            self._ahead = (number + 1, self._helper.submit(self._make, number + 1))
+        return codes
+
+    def _make(self, number: int) -> NDArray[np.int32]:
+        start, stop = number * self._chunk, (number + 1) * self._chunk
         instants = self.times.at(np.arange(start, stop))
         taken = int(np.searchsorted(instants, np.inf))
         volts = np.zeros((len(self._inputs), stop - start))

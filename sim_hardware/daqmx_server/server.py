@@ -181,4 +181,5 @@ class DaqmxServer:
         with self.bench.changed:
             self.bench.reset()
         self.gate.stop()
+        self.bench.helper.shutdown(wait=False, cancel_futures=True)
         self._server.stop(grace_s).wait()

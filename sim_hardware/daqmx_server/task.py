@@ -51,6 +51,7 @@ class Task:
         self.overloads_reported: tuple[str, ...] = ()
         self.events: set[str] = set()
         self.cleared = False
+        self._stale = True
         self.exchange: int | None = None
         self.resume: int | None = None
         self._explicit = State.UNVERIFIED
@@ -63,14 +64,14 @@ class Task:
         if self.state is State.RUNNING:
             raise DaqmxError(Code.PROPERTY_WHILE_RUNNING)
         self._scaling = None
-        if self.state < State.RESERVED:
-            self.state = State.UNVERIFIED
+        self._stale = True
 
     def add_channels(self, channels: list[VirtualChannel]) -> None:
         if self.state is State.RUNNING:
             raise DaqmxError(Code.TASK_RUNNING)
         self.unreserve()
         self._scaling = None
+        self._stale = True
         self.channels += channels
 
     def channel(self, name: str) -> VirtualChannel:
@@ -143,8 +144,10 @@ class Task:
 
     def advance(self, target: State) -> None:
         """Go through the states up to the target, none left out."""
-        if target >= State.VERIFIED and self.state < State.VERIFIED:
+        if target >= State.VERIFIED and (self._stale or self.state < State.VERIFIED):
             self.verify()
+            self._stale = False
+            self.state = max(self.state, State.VERIFIED)
         if target >= State.RESERVED and self.state < State.RESERVED:
             self.check_devices()
             self.bench.reserve(self.devices, self.name)
@@ -166,13 +169,15 @@ class Task:
             and self.timing.mode != AcquisitionType.FINITE.value
         ):
             raise DaqmxError(Code.REF_TRIGGER_WHEN_CONTINUOUS)
-        self.state = State.VERIFIED
+        for which in ("START", "REF"):
+            if self.trigger[f"{which}_TRIG_TYPE"] in (triggers.ANALOG, triggers.WINDOW):
+                self._trigger_channel(triggers.source_of(self.trigger, which))
 
     def check_devices(self) -> None:
         """Raise if a device of the task has gone; a run that loses one has failed for good."""
-        for channel in self.channels:
+        for device in {channel.device.name: channel.device for channel in self.channels}.values():
             try:
-                self.bench.check_access(channel.device)
+                self.bench.check_access(device)
             except DaqmxError as error:
                 if self.run is not None and self.run.failure is None:
                     self.run.failure = error
@@ -276,7 +281,10 @@ class Task:
 
     def disturbed(self) -> None:
         """The world or its faults have changed: samples ahead of now are made afresh."""
-        if self.run is not None and self.run.times is not None:
+        if self.run is None:
+            return
+        self.run.start_rule.disturbed()
+        if self.run.times is not None:
             self.run.retime(self.timing.clock_from(self.run.times.first_s, self.run.times.rate_hz))
 
     def make_sampler(self, times: SampleTimes) -> Sampler:
@@ -284,7 +292,7 @@ class Task:
             Input(channel.physical, channel.converter, offset)
             for channel, offset in zip(self.channels, self.timing.time_offsets_s(), strict=True)
         ]
-        return Sampler(self.bench.source, self.bench.faults, inputs, times)
+        return Sampler(self.bench.source, self.bench.faults, inputs, times, self.bench.helper)
 
     @property
     def scaling(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -334,7 +342,6 @@ class Task:
         assert plan.pretrigger is not None
         if self.trigger["REF_TRIG_TYPE"] == triggers.DIGITAL:
             return ReferenceSearch(plan.pretrigger, edge=lambda after: self.bench.first_edge(source, after))
-        self._trigger_channel(source)
         condition = triggers.Condition.of(self.trigger, "REF")
 
         def readings(run: Run, start: int, stop: int) -> NDArray[np.float64]:

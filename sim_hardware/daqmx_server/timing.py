@@ -147,8 +147,16 @@ class _OwnClock:
         self._search: CrossingSearch | None = None
         if self._kind in (triggers.ANALOG, triggers.WINDOW):
             self._search = CrossingSearch(triggers.Condition.of(task.trigger, "START"), 0)
-            self._times = task.timing.clock_from(armed_s, task.timing.rate_hz)
-            self._sampler = task.make_sampler(self._times)
+            self._listen()
+
+    def disturbed(self) -> None:
+        if self._search is not None:
+            self._listen()
+
+    def _listen(self) -> None:
+        """An analogue trigger looks at its channel at the rate of the acquisition to come."""
+        self._times = self._task.timing.clock_from(self._armed_s, self._task.timing.rate_hz)
+        self._sampler = self._task.make_sampler(self._times)
 
     def __call__(self, now_s: float) -> SampleTimes | None:
         instant = self._trigger_instant(now_s)
@@ -179,6 +187,9 @@ class _SharedClock:
     def __init__(self, task: Task, armed_s: float) -> None:
         self._task = task
         self._armed_s = armed_s
+
+    def disturbed(self) -> None:
+        """The master's clock is disturbed by itself."""
 
     def __call__(self, now_s: float) -> SampleTimes | None:
         master = self._task.timing.source_task()

@@ -80,7 +80,7 @@ class CrossingSearch:
         return None
 
 
-def source_of(settings: Mapping[str, Any], which: Which) -> str:
+def source_of(settings: Mapping[str, Any], which: str) -> str:
     """Channel or terminal that the configured trigger listens to."""
     prefix = {DIGITAL: "DIG_EDGE", ANALOG: "ANLG_EDGE", WINDOW: "ANLG_WIN"}[settings[f"{which}_TRIG_TYPE"]]
     return str(settings.get(f"{prefix}_{which}_TRIG_SRC", ""))

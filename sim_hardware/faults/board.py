@@ -162,6 +162,8 @@ class FaultBoard:
         volts[during] = distort(entry.fault, entry.start_s, entry.held_v, times_s[during], volts[during])
 
     def _of(self, kind: str, targets: Sequence[str]) -> list[Entry]:
+        if not self._entries:
+            return []
         wanted = {target.lower() for target in targets}
         return [
             entry

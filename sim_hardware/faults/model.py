@@ -82,7 +82,7 @@ _COMMON: Final = ("kind", "target", "at_s", "at_sample", "for_s")
 
 
 def fault_from(table: Mapping[str, Any]) -> Fault:
-    """A fault of a plain table (script or command). `ValueError` says what is wrong and what would be right."""
+    """A fault of a plain table (script or command). `ValueError` says what is wrong, what is right."""
     name = str(table.get("kind", ""))
     kind = KINDS.get(name)
     if kind is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 
 import grpc
@@ -59,6 +60,8 @@ class Rig:
     server: DaqmxServer
     channel: grpc.Channel
     control: SimControl
+    killed: threading.Event
+    """Set in place of the death that the fault ``server_killed`` brings."""
 
     def options(self, name: str = "") -> GrpcSessionOptions:
         return GrpcSessionOptions(self.channel, name)
@@ -99,10 +102,11 @@ def inventory() -> Inventory:
 def make_rig(speed: float = float("inf"), finite: str = "real", source: object = None) -> Rig:
     clock = SteppedClock() if speed == float("inf") else PacedClock(speed)
     bench = Bench(inventory(), source or TestSignals(), clock, finite)  # type: ignore[arg-type]
-    server = DaqmxServer(bench)
+    killed = threading.Event()
+    server = DaqmxServer(bench, kill=killed.set)
     server.start()
     channel = grpc.insecure_channel(server.address, options=[("grpc.max_receive_message_length", -1)])
-    return Rig(bench, server, channel, SimControl(server.address))
+    return Rig(bench, server, channel, SimControl(server.address), killed)
 
 
 def continuous(task: nidaqmx.Task, rate_hz: float = 4000.0) -> None:

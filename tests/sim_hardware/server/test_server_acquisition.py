@@ -217,7 +217,7 @@ def test_on_demand_reads(rig: Rig) -> None:
 
 
 def test_read_variants_agree(rig: Rig) -> None:
-    """F64, single-channel reader, scalars, 16- and 32-bit codes, raw bytes and waveforms hold the same samples."""
+    """F64, single-channel reader, scalars, integer codes, raw bytes and waveforms hold the same samples."""
     with rig.task() as task:
         task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0", min_val=-1, max_val=1)
         continuous(task, 1000.0)
@@ -347,6 +347,7 @@ def test_stop_ends_a_waiting_read(start_rig: Callable[..., Rig]) -> None:
     with rig.task("waiting") as task, ThreadPoolExecutor(1) as pool:
         task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
         continuous(task, 1000.0)
+        task.in_stream.auto_start = False
         task.start()
         waiting = pool.submit(task.read, 1_000_000, 60.0)
         while not rig.is_waiting("waiting"):
