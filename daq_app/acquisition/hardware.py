@@ -18,20 +18,21 @@ _REPLAY = "replay:"
 
 def driver_maker(
     connection: str, options: argparse.Namespace, stack: ExitStack
-) -> tuple[Callable[[], Driver], str]:
-    """How to make a driver for `connection`, and the connection it comes to.
+) -> tuple[Callable[[], Driver], Callable[[], str]]:
+    """How to make a driver for `connection`, and how to learn what the connection comes to.
 
-    A simulated server or a run that is replayed is opened here and closed with `stack`. Raises `DriverError`.
+    A simulated server is started here (both answers wait for it), a run that is replayed is opened;
+    both end with `stack`. Raises `DriverError`.
     """
     if connection == "simulated":
         server = stack.enter_context(SimulatedServer(options.rig, _server_options(options)))
-        return (lambda: open_driver(server.connection)), server.connection
+        return (lambda: open_driver(server.connection)), (lambda: server.connection)
     if connection.startswith(_REPLAY):
-        return _replay(Path(connection.removeprefix(_REPLAY)), options, stack), connection
+        return _replay(Path(connection.removeprefix(_REPLAY)), options, stack), (lambda: connection)
     backup: Path | None = options.backup
     # Checks the address now rather than in the reader's thread.
     open_driver(connection).close()
-    return (lambda: open_driver(connection, backup_folder=backup)), connection
+    return (lambda: open_driver(connection, backup_folder=backup)), (lambda: connection)
 
 
 def planned_truth(connection: str, rig: Rig, options: argparse.Namespace) -> dict[str, Any] | None:

@@ -20,9 +20,7 @@ from daq_app.acquisition.hardware import driver_maker, planned_truth
 from daq_app.acquisition.items import RequestRefused
 from daq_app.acquisition.messages import Command, Reply
 from daq_app.acquisition.options import READY, parse
-from daq_app.acquisition.session import Session, SessionSettings
 from daq_app.acquisition.session_file import SessionFile, remove_session_file, write_session_file
-from daq_app.acquisition.unattended import Unattended
 from daq_app.config import ConfigError, Rig, TaskPlan, load_rig, plan_tasks
 from daq_app.runfile import FolderLock, RunFileError
 from drivers import DriverError
@@ -37,6 +35,10 @@ class Process:
         connection = options.connection or rig.hardware.connection
         make_driver, self._connection = driver_maker(connection, options, stack)
         self._simulated = connection == "simulated"
+        # Loaded while a simulated server starts: the analysis takes seconds to load, and so does it.
+        from daq_app.acquisition.session import Session, SessionSettings
+        from daq_app.acquisition.unattended import Unattended
+
         self._rig = rig
         self._rig_text = options.rig.read_text(encoding="utf-8")
         self._token = os.environ.get("DAQ_APP_TOKEN") or secrets.token_urlsafe(24)
@@ -122,7 +124,7 @@ class Process:
             "rig_text": self._rig_text,
             "channel_ids": list(self._rig.channel_ids),
             "rate_hz": opened.rate_hz if opened else 0.0,
-            "connection": self._connection,
+            "connection": self._connection() if opened else "",
             "simulated": self._simulated,
             "folder": str(self._folder.resolve()),
             "pid": os.getpid(),

@@ -23,7 +23,7 @@ class SimulatedServer:
     """``sim_hardware.daqmx_server`` in its own process."""
 
     def __init__(self, rig_file: Path, options: Sequence[str] = ()) -> None:
-        """Start the server and wait until it listens. Raises `DriverError` with what it said if not."""
+        """Start the server; it needs some seconds, which the caller may use (see `connection`)."""
         self._process = start_guarded(
             "sim_hardware.daqmx_server", ["--port", "0", "--config", str(rig_file), *options]
         )
@@ -31,6 +31,13 @@ class SimulatedServer:
         self._port = 0
         self._ready = threading.Event()
         threading.Thread(target=self._listen, name="simulated-server", daemon=True).start()
+
+    @property
+    def connection(self) -> str:
+        """What to give to `drivers.open_driver`; waits until the server listens.
+
+        Raises `DriverError` with what it said if it does not.
+        """
         self._ready.wait(_START_LIMIT_S)
         if not self._port:
             self.close()
@@ -39,10 +46,6 @@ class SimulatedServer:
                 f"The simulated device server did not start ({said})",
                 advice="Start it by hand to see why: python -m sim_hardware.daqmx_server --config RIG.toml",
             )
-
-    @property
-    def connection(self) -> str:
-        """What to give to `drivers.open_driver`."""
         return f"grpc://127.0.0.1:{self._port}"
 
     @property

@@ -117,10 +117,8 @@ def _follow(
     interrupts = _Interrupts(client)
     previous = signal.signal(signal.SIGINT, interrupts)
     outcome, run, stopping = "", "", False
-    hand = None
-    if client.about.get("simulated"):
-        rig = parse_rig(str(client.about["rig_text"]), str(options.rig))
-        hand = SimulatedHand(str(client.about["connection"]), rig, options.theta0_over_alpha)
+    hand: SimulatedHand | None = None
+    rig = parse_rig(str(client.about["rig_text"]), str(options.rig))
     try:
         with RunView(console, options.test, client.about) as view:
             while process.process.poll() is None:
@@ -132,6 +130,9 @@ def _follow(
                 if received is None:
                     continue
                 view.take(received.message)
+                if hand is None and client.about.get("simulated") and view.state is State.ARMED:
+                    connection = str(client.request("hello").data["connection"])
+                    hand = SimulatedHand(connection, rig, options.theta0_over_alpha)
                 if hand is not None:
                     hand.take(received.message)
                     if hand.trouble:

@@ -32,11 +32,32 @@ def _document(run: Run, outcome: str) -> dict[str, Any]:
         "lost_samples": lost,
         "gaps": len(run.gaps),
         "truth": run.header.truth,
-        "analysis": results.get("analysis"),
-        "online": results.get("online"),
+        "results": _results(results.get("analysis"), results.get("online")),
         "quality": results.get("quality"),
     }
     return document
+
+
+def _results(analysis: Any, online: Any) -> dict[str, Any] | None:
+    """The figures of a test in brief; `daq-app analyse` gives all. None where nothing was released."""
+    if not isinstance(analysis, dict) or not analysis.get("found"):
+        return None
+    estimates = analysis["estimates"]
+    return {
+        "theta0_rad": analysis["theta0_rad"],
+        "theta0_over_alpha": analysis["theta0_over_alpha"],
+        "impacts": len(analysis["half_cycles"]) - 1,
+        "r_max": analysis["theory"]["r_max"],
+        "r": {
+            method: {
+                "r": estimates[method]["r"],
+                "standard_error": estimates[method]["standard_error"],
+                "values": len(estimates[method]["points"]),
+                "online": (online or {}).get(f"{method}_mean"),
+            }
+            for method in ("eav", "crt")
+        },
+    }
 
 
 def _outcome(run: Run) -> str:
@@ -59,21 +80,16 @@ def results_table(path: Path) -> Table:
         f"at {document['rate_hz']:g} Hz",
     )
     table.add_row("lost", "none" if not lost else f"[bold red]{lost} samples in {document['gaps']} gap(s)[/]")
-    analysis = document["analysis"]
-    if not analysis or not analysis["found"]:
+    results = document["results"]
+    if results is None:
         table.add_row("r", "no release with an impact was found in this run")
-        return table
-    theory, online = analysis["theory"], document["online"] or {}
-    table.add_row(
-        "θ0", f"{1e3 * analysis['theta0_rad']:.2f} mrad, θ0/α = {analysis['theta0_over_alpha']:.4f}"
-    )
-    table.add_row("impacts", str(len(analysis["half_cycles"]) - 1))
-    for method, formula in (("eav", "(4.4)"), ("crt", "(4.5)")):
-        live = online.get(f"{method}_mean")
-        shown = f"  online {live:.4f}" if live is not None else ""
-        text = _r_text(analysis["estimates"][method], theory["r_max"])
-        table.add_row(f"r {method.upper()}", f"{text}{shown}  {formula}")
-    table.add_row("r max", f"{theory['r_max']:.4f}  (1.2)")
+    else:
+        theta0, share = results["theta0_rad"], results["theta0_over_alpha"]
+        table.add_row("θ0", f"{1e3 * theta0:.2f} mrad, θ0/α = {share:.4f}")
+        table.add_row("impacts", str(results["impacts"]))
+        for method, formula in (("eav", "(4.4)"), ("crt", "(4.5)")):
+            table.add_row(f"r {method.upper()}", _r_text(results["r"][method], results["r_max"], formula))
+        table.add_row("r max", f"{results['r_max']:.4f}  (1.2)")
     quality = document["quality"]
     if quality:
         style = "bold green" if quality["verdict"] == "good" else "bold red"
@@ -82,9 +98,10 @@ def results_table(path: Path) -> Table:
     return table
 
 
-def _r_text(estimate: dict[str, Any], r_max: float) -> str:
-    mean, error, points = estimate["r"], estimate["standard_error"], len(estimate["points"])
+def _r_text(estimate: dict[str, Any], r_max: float, formula: str) -> str:
+    mean, error, online = estimate["r"], estimate["standard_error"], estimate["online"]
     if mean is None:
-        return f"–  ({points} values: too few)"
+        return f"–  ({estimate['values']} values: too few)"
     spread = f" ± {error:.4f}" if error is not None else ""
-    return f"{mean:.4f}{spread}  ({points} values, r/r_max {mean / r_max:.3f})"
+    live = f", online {online:.4f}" if online is not None else ""
+    return f"{mean:.4f}{spread}  ({estimate['values']} values, r/r_max {mean / r_max:.3f}{live})  {formula}"

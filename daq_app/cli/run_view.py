@@ -42,7 +42,7 @@ class RunView:
         self._console = console
         self._test = test
         self._rate_hz = float(about.get("rate_hz") or 0.0)
-        self._state = State.IDLE
+        self.state = State.IDLE
         self.last_text = ""
         """The newest sentence of the state."""
         self._health: HealthMessage | None = None
@@ -88,8 +88,8 @@ class RunView:
             self._live.update(self._panel())
 
     def _on_state(self, message: StateMessage) -> None:
-        if message.state is not self._state or message.text != self.last_text:
-            self._state, self.last_text = message.state, message.text
+        if message.state is not self.state or message.text != self.last_text:
+            self.state, self.last_text = message.state, message.text
             if self._live is None:
                 at = f"{message.since_sample / self._rate_hz:8.2f} s  " if self._rate_hz else ""
                 self.say(f"{at}{message.state.value}: {message.text}")
@@ -106,7 +106,7 @@ class RunView:
 
     def _panel(self) -> Panel:
         heading = Text.assemble(
-            (self._state.value.replace("_", " ").upper(), _STYLE.get(self._state, "cyan")),
+            (self.state.value.replace("_", " ").upper(), _STYLE.get(self.state, "cyan")),
             f"  {self.last_text}",
         )
         parts: list[Text | Table] = [heading, self._bar(), self._figures()]
