@@ -40,6 +40,7 @@ class Process:
         from daq_app.acquisition.unattended import Unattended
 
         self._rig = rig
+        self._plan_rate_hz = plan.rate_hz
         self._rig_text = options.rig.read_text(encoding="utf-8")
         self._token = os.environ.get("DAQ_APP_TOKEN") or secrets.token_urlsafe(24)
         self._desk = Desk(options.bind, self._handle, self._token, options.keys)
@@ -124,6 +125,9 @@ class Process:
             "rig_text": self._rig_text,
             "channel_ids": list(self._rig.channel_ids),
             "rate_hz": opened.rate_hz if opened else 0.0,
+            "planned_rate_hz": self._plan_rate_hz,
+            "tare": self.session.analyst.tare.readings,
+            "tare_record": self.session.analyst.tare.record,
             "connection": self._connection() if opened else "",
             "simulated": self._simulated,
             "folder": str(self._folder.resolve()),
