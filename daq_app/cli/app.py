@@ -8,9 +8,11 @@ from typing import Final
 import typer
 
 _GROUPS: Final = (
+    "daq_app.cli.monitor_commands",
     "daq_app.cli.config_commands",
     "daq_app.cli.record_commands",
     "daq_app.cli.campaign_commands",
+    "daq_app.cli.analyse_commands",
     "daq_app.cli.theory_commands",
     "daq_app.cli.run_file_commands",
 )
@@ -21,7 +23,6 @@ def build_app() -> typer.Typer:
     """The whole command tree."""
     app = typer.Typer(
         name="daq-app",
-        no_args_is_help=True,
         rich_markup_mode="rich",
         pretty_exceptions_enable=False,
         help="Record, watch and analyse free-rocking tests of masonry walls.",

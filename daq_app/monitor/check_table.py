@@ -48,6 +48,10 @@ class CheckModel(QAbstractTableModel):
             self._rows.sort(key=lambda row: _ORDER[row[2].verdict] if row[2] is not None else 3)
         self.endResetModel()
 
+    def check_of(self, row: int) -> ChannelCheck | None:
+        """The check in a row; None before a check."""
+        return self._rows[row][2] if 0 <= row < len(self._rows) else None
+
     def rowCount(self, parent: Index | None = None) -> int:
         return 0 if parent is not None and parent.isValid() else len(self._rows)
 

@@ -27,6 +27,7 @@ from PySide6.QtWidgets import (
 
 from daq_app.acquisition.messages import EventMessage, Reply, State, StateMessage
 from daq_app.campaign.plan import Campaign
+from daq_app.campaign.verdicts import give_verdict
 from daq_app.config import ConfigError, parse_rig
 from daq_app.monitor.actions import ActionBar
 from daq_app.monitor.background import Background
@@ -38,9 +39,11 @@ from daq_app.monitor.live_page import LivePage
 from daq_app.monitor.notices import NoticeLine
 from daq_app.monitor.prepare_page import PreparePage, Zero
 from daq_app.monitor.replay_page import ReplayPage
-from daq_app.monitor.session import Session
+from daq_app.monitor.result_page import ResultPage
+from daq_app.monitor.session import RECORDING, Session
 from daq_app.monitor.settings import TYPE_SIZES, WindowSettings
 from daq_app.monitor.theme import THEMES, Colours, apply_theme
+from daq_app.runfile import RunFileError, open_run
 
 FRAME_MS: Final = 22
 SLOW_MS: Final = 160
@@ -51,13 +54,17 @@ _QUIET_EVENTS: Final = frozenset({"impact", "marker", "armed", "tare"})
 class MainWindow(QMainWindow):
     """Everything on screen. `link` None: a window for looking at runs only."""
 
-    def __init__(self, link: Link | None, settings: WindowSettings) -> None:
+    def __init__(self, link: Link | None, settings: WindowSettings, *, started_here: bool = False) -> None:
+        """`started_here`: this window started the acquisition and ends it again when nothing is recorded."""
         super().__init__()
+        self._started_here = started_here
         self.setWindowTitle("Rocking-test recorder")
         self.link = link
         self.settings = settings
         self.session = Session()
         self.background = Background(self)
+        self._analyses = Background(self)
+        """Its own queue: an analysis takes seconds, a sensor check must not wait for it."""
         self.colours: Colours = THEMES[settings.theme]
         self.longest_stall_s = 0.0
         """Longest time between two frames so far: how long the window was deaf at worst."""
@@ -65,6 +72,8 @@ class MainWindow(QMainWindow):
         self._rig_text = ""
         self._state_before: State | None = None
         self._runs_folder: Path | None = None
+        self._released = False
+        """Whether the wall was let go since the last arming: an aborted arming has no result."""
 
         self.header = Header(self.session)
         self.notices = NoticeLine()
@@ -74,10 +83,12 @@ class MainWindow(QMainWindow):
         self.prepare = PreparePage(self.session, self.background)
         self.campaign = CampaignPage(self.background)
         self.replay = ReplayPage(self.background)
+        self.result = ResultPage(self._analyses)
+        live_pages: dict[str, QWidget] = {"Prepare": self.prepare, "Live": self.live}
         self.pages: dict[str, QWidget] = {
-            "Prepare": self.prepare,
-            "Live": self.live,
+            **(live_pages if link is not None else {}),
             "Campaign": self.campaign,
+            "Result": self.result,
             "Replay": self.replay,
         }
         self._build()
@@ -161,7 +172,10 @@ class MainWindow(QMainWindow):
             "live_whole": self.live.whole,
             "replay": self.replay.splitter,
         }
-        self.show_page(self.prepare)
+        if self.link is None:
+            for part in (self.header, footer):
+                part.hide()  # nothing is live here, so nothing may look as if it were
+        self.show_page(self.prepare if self.link is not None else self.replay)
 
     def _connect(self) -> None:
         self.actions_bar.ordered.connect(self._on_order)
@@ -172,11 +186,17 @@ class MainWindow(QMainWindow):
         self.campaign.take.connect(self._take)
         self.campaign.run_chosen.connect(lambda name: self.open_run(Path(name)))
         self.replay.told.connect(self.notices.tell)
+        self.result.told.connect(self.notices.tell)
+        self.result.replay.connect(lambda name: self.open_run(Path(name)))
+        self.result.judge.connect(self._judge)
+        self.result.next_wanted.connect(self.next_test)
         QShortcut(QKeySequence("T"), self.live).activated.connect(self.live.theory_button.toggle)
         QShortcut(QKeySequence("C"), self.live).activated.connect(self.live.strips_button.toggle)
 
     def show_page(self, page: QWidget) -> None:
-        """Bring a page to the front."""
+        """Bring a page to the front; one that this window does not have stays away."""
+        if page not in self.pages.values():
+            return
         self.stack.setCurrentWidget(page)
         button = self._nav.button(list(self.pages.values()).index(page))
         if button is not None:
@@ -190,8 +210,8 @@ class MainWindow(QMainWindow):
         assert isinstance(app, QApplication)
         self.colours = THEMES[self.settings.theme]
         apply_theme(app, self.colours, self.settings.type_size)
-        for page in self.pages.values():
-            page.restyle(self.colours)  # type: ignore[attr-defined]
+        for page in (self.prepare, self.live, self.campaign, self.result, self.replay):
+            page.restyle(self.colours)
         self.notices.restyle(self.colours)
 
     def toggle_theme(self) -> None:
@@ -221,6 +241,9 @@ class MainWindow(QMainWindow):
             self.session.set_rig(rig, rate_hz or rig.acquisition.rate_hz)
             self.prepare.set_rig(rig)
             self.setWindowTitle(f"{rig.name} – Rocking-test recorder")
+        rig = self.session.rig
+        simulated = rig is not None and rig.hardware.connection == "simulated"
+        self.prepare.wall.set_address(str(about.get("connection", "")) if simulated else "")
         folder = str(about.get("folder", ""))
         self._runs_folder = Path(folder) if folder else None
         self.prepare.planned_rate_hz = float(about.get("planned_rate_hz", 0.0) or 0.0)
@@ -254,6 +277,10 @@ class MainWindow(QMainWindow):
         if before is message.state:
             return
         if message.state is State.ARMED:
+            self._released = False
+        if message.state in (State.RELEASED, State.ROCKING):
+            self._released = True
+        if message.state is State.ARMED:
             self.show_page(self.live)
         if message.state is State.PREVIEWING and before in (State.IDLE, None) and self.link is not None:
             self.link.request("hello")
@@ -264,7 +291,27 @@ class MainWindow(QMainWindow):
     def _on_saved(self, run: Path) -> None:
         """A run has just been closed."""
         self.campaign.scan()
+        if not run.is_file():
+            self.notices.tell("info", f"The run is saved on the recording machine: {run}")
+            return
         self.replay.open(run)
+        if self._released:
+            self.show_page(self.result)
+            self.result.open(run)
+
+    def _judge(self, name: str, verdict: str) -> None:
+        """The operator's verdict on the result that is shown."""
+        run = Path(name)
+        reason = "rejected on the result page" if verdict == "bad" else ""
+        try:
+            with open_run(run) as opened:
+                run_id = opened.header.run_id
+            give_verdict(run.parent, run_id, "bad" if verdict == "bad" else "good", reason)
+        except (RunFileError, ConfigError, OSError) as error:
+            self.notices.tell("error", str(error))
+            return
+        self.result.open(run)
+        self.campaign.scan()
 
     def _on_slow(self) -> None:
         self.header.refresh(self.colours)
@@ -359,8 +406,12 @@ class MainWindow(QMainWindow):
         self._slow_timer.stop()
         self.settings.save_layout(self, self.splitters)
         if self.link is not None:
+            idle = self.session.current_state not in RECORDING | {State.SAVING}
+            if self._started_here and idle:
+                self.link.request("shutdown")  # refused if a test was armed this very moment
             self.link.close()
         self.background.finish()
+        self._analyses.finish(0)
         super().closeEvent(event)
 
 

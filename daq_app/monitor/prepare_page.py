@@ -28,6 +28,7 @@ from daq_app.monitor.session import RECORDING, Session
 from daq_app.monitor.shapes import Sign
 from daq_app.monitor.test_card import TestCard
 from daq_app.monitor.theme import DARK, Colours, font
+from daq_app.monitor.wall_card import WallCard
 
 REST_S = 3.0
 """How much of the still wall the check looks at."""
@@ -62,6 +63,8 @@ class PreparePage(QWidget):
         self.card = TestCard()
         self.gauge = PullGauge(session)
         self.table = CheckTable()
+        self.wall = WallCard(background)
+        self.wall.told.connect(self.told)
         self._sign = Sign(30)
         self._verdict = QLabel("Not checked")
         self._verdict.setFont(font(19, bold=True))
@@ -72,6 +75,10 @@ class PreparePage(QWidget):
         self.tare_button = QPushButton("Zero  Ctrl+0")
         self._zero_text = role_label("", "muted")
         self._zero_text.setWordWrap(True)
+        self._detail = role_label("", "muted")
+        self._detail.setWordWrap(True)
+        self._detail.setMinimumHeight(36)
+        self.table.selectionModel().selectionChanged.connect(lambda *_: self._show_detail())
         self._build()
         for button, key, act in (
             (self.check_button, "F2", self.run_check),
@@ -91,6 +98,7 @@ class PreparePage(QWidget):
         left.addWidget(self._card(self._zero_row()))
         left.addWidget(role_label("4  Arm, then pull to the target", "heading"))
         left.addWidget(self._card(self.gauge), 1)
+        left.addWidget(self.wall)
         holder = QWidget()
         holder.setLayout(left)
         left.setContentsMargins(0, 0, 0, 0)
@@ -110,6 +118,7 @@ class PreparePage(QWidget):
         right.addWidget(role_label("3  Check the sensors", "heading"))
         right.addWidget(self._card(banner))
         right.addWidget(self.table, 1)
+        right.addWidget(self._detail)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(10, 8, 10, 8)
         layout.setSpacing(12)
@@ -147,6 +156,7 @@ class PreparePage(QWidget):
         self._rest_readings = None
         self.table.show_check(rig, None)
         self._show_verdict()
+        self._show_zero()
 
     def set_zero(self, zero: Zero) -> None:
         """The tare in force has changed."""
@@ -218,8 +228,17 @@ class PreparePage(QWidget):
     def _show_check(self, check: SensorCheck) -> None:
         self.check = check
         self.table.show_check(self._session.rig, check)
+        self.table.selectRow(0)
+        self._show_detail()
         self._show_verdict()
         self.checked.emit()
+
+    def _show_detail(self) -> None:
+        """The whole sentence on the chosen channel, which the table may have to cut."""
+        rows = self.table.selectionModel().selectedRows()
+        check = self.table.check_model.check_of(rows[0].row()) if rows else None
+        text = "" if check is None else f"{check.channel_id}: {check.text or 'nothing is wrong.'}"
+        self._detail.setText(text)
 
     def _show_verdict(self) -> None:
         check = self.check
@@ -274,7 +293,7 @@ class PreparePage(QWidget):
         self._zero_text.setText(" ".join(parts))
 
     def _on_choice(self) -> None:
-        self.gauge.target_ratio = self.card.choice.target_ratio
+        self.gauge.target_ratio = self.wall.target_ratio = self.card.choice.target_ratio
         self.gauge.update()
 
     def _tell(self, severity: Severity, text: str) -> None:
