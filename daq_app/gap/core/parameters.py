@@ -77,14 +77,14 @@ class Parameter:
 
 
 def signed(name: str, reach: float, unit: str = "", meaning: str = "", *, per_run: bool = False) -> Parameter:
-    """A strength of either sign: prior N(0, (reach/2)²), bounded at 2·reach."""
+    """A strength of either sign: prior N(0, (reach/2)²), bounded at 6·reach."""
     return Parameter(
         name,
         0.0,
         reach / 2,
         unit,
-        -2 * reach,
-        2 * reach,
+        -6 * reach,
+        6 * reach,
         meaning=meaning,
         per_run=per_run,
         starts=(-reach / 4, reach / 4),
@@ -94,14 +94,14 @@ def signed(name: str, reach: float, unit: str = "", meaning: str = "", *, per_ru
 def positive(
     name: str, reach: float, unit: str = "", meaning: str = "", *, per_run: bool = False
 ) -> Parameter:
-    """A strength that cannot be negative: half-normal prior of scale reach/2, bounded at 2·reach."""
+    """A strength that cannot be negative: half-normal prior of scale reach/2, bounded at 6·reach."""
     return Parameter(
         name,
         0.0,
         reach / 2,
         unit,
         0.0,
-        2 * reach,
+        6 * reach,
         meaning=meaning,
         per_run=per_run,
         starts=(reach / 20, reach / 2),

@@ -1,0 +1,155 @@
+"""The rocking wall as a model of the core: the simulator's own half-cycles from the measured peaks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from daq_app.gap.core import Parameter, Prediction, Run, Scatter
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model import sensor_response as response
+from daq_app.gap.rocking_model.records import Survey
+from daq_app.gap.rocking_model.run_features import RockingRun
+from daq_app.gap.rocking_model.vector import kernel_vector, restitution_of
+from sim_hardware.dynamics import shooting
+
+SCATTER_R = "scatter of r"
+SCATTER_TIME = "scatter of times"
+SCATTER_SENSOR = "scatter of sensors"
+
+
+class RockingModel:
+    """Housner's block with refitted α, p, r, b and sensor calibrations; effects by the simulator's names.
+
+    The peaks of a run are taken as measured. From each, the simulator gives the fall to the next
+    impact and, backwards, the rise since the one before; the speeds on both sides of an impact then
+    say what r was. Scatter of r thus enters one feature per impact and never accumulates.
+    """
+
+    name = "free rocking"
+    scatters = (
+        Scatter(SCATTER_R, 0.004, 0.7, 0.02, "1", "relative scatter of r from impact to impact"),
+        Scatter(SCATTER_TIME, 3e-5, 1.0, 1e-3, "s", "what half-cycle times scatter by beyond sensor noise"),
+        Scatter(
+            SCATTER_SENSOR, 1.0, 1.0, 12.0, "1", "repeatability of sensor coefficients, in their own units"
+        ),
+    )
+
+    def __init__(self, survey: Survey) -> None:
+        self.survey = survey
+
+    @property
+    def nuisance(self) -> tuple[Parameter, ...]:
+        s = self.survey
+        tolerance = 0.003
+        return (
+            Parameter(
+                "alpha", s.alpha_rad, s.alpha_tolerance * s.alpha_rad, "rad", 0.02, 0.6, meaning="slenderness"
+            ),
+            Parameter(
+                "p", s.p_rad_s, s.p_tolerance * s.p_rad_s, "rad/s", 0.5, 6.0, meaning="frequency parameter"
+            ),
+            Parameter("r", 0.97 * s.r_max, 0.04, "1", 0.5, 1.0, meaning="velocity restitution"),
+            Parameter(
+                "half_base",
+                s.half_base_m,
+                s.half_base_tolerance_m,
+                "m",
+                0.02,
+                2.0,
+                meaning="half width of the base",
+            ),
+            Parameter(
+                "face_a", 0.0, tolerance / math.sqrt(12), "1", meaning="calibration of the LVDTs at x < 0"
+            ),
+            Parameter(
+                "face_b", 0.0, tolerance / math.sqrt(12), "1", meaning="calibration of the LVDTs at x > 0"
+            ),
+            Parameter("cal_wire", 0.0, tolerance / math.sqrt(5), "1", meaning="calibration of the wires"),
+            Parameter(
+                "cal_tiltmeter", 0.0, tolerance / math.sqrt(2), "1", meaning="calibration of the tiltmeters"
+            ),
+            Parameter(
+                "cal_accelerometer", 0.0, tolerance / 2, "1", meaning="calibration of the accelerometers"
+            ),
+            Parameter("tilt_response", 0.0, 0.01, "s", meaning="error of the tiltmeters' time constant"),
+            Parameter("base_follow", 0.0, 8e-3, "m/rad", meaning="translation from wire calibrations"),
+            Parameter("twist_follow", 0.0, 2e-3, "1/m", meaning="twist from LVDT calibrations"),
+            Parameter("mount_height", 0.0, 0.05, "m", meaning="height of the LVDTs' points above the joint"),
+            Parameter("wire_even", 0.0, 5e-3, "1/rad", meaning="even part from wire anchors"),
+        )
+
+    def local_nuisance(self, run: Run) -> tuple[Parameter, ...]:
+        return (Parameter("zero", 0.0, 5e-5, "rad", meaning="rotation at which the wall stands upright"),)
+
+    def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
+        assert isinstance(run, RockingRun)
+        n = len(run.features)
+        predicted = np.empty(n)
+        loading_r, loading_t, loading_s = np.zeros(n), np.zeros(n), np.zeros(n)
+        count = len(run.timings)
+        predicted[:count], peaks, slopes = self._swings(run, values)
+        loading_t[:count] = 1.0
+        last = count + run.peaks.size
+        predicted[count:last] = peaks
+        loading_r[count:last] = 1.0 / slopes
+        predicted[last:], loading_s[last:] = response.block_coefficients(run, values)
+        loadings = {SCATTER_R: loading_r, SCATTER_TIME: loading_t, SCATTER_SENSOR: loading_s}
+        return Prediction(predicted, loadings, run.block_loadings)
+
+    def _swings(
+        self, run: RockingRun, values: Mapping[str, float]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Times (T,), log peaks (P,) and d ln speed / d ln peak (P,)."""
+        key, vector, clock = kernel_vector(run, values)
+        true, levels = response.true_rotations(run, values)
+        table = self._half_cycles(run, vector, true, levels, key)
+        count = levels.shape[1]
+        first = shooting.FIRST_CROSSING
+        fall, rise = table[:, first : first + count], table[:, first + count : first + 2 * count]
+        speeds_out, speeds_in = table[:, shooting.SPEED_OUT], table[:, shooting.SPEED_IN]
+        pause = response.pause_at_impact(values, speeds_out)
+        times = np.empty(len(run.timings))
+        for i, timing in enumerate(run.timings):
+            ta = self._from_peak(fall, rise, timing.ka, timing.a, count)
+            tb = self._from_peak(fall, rise, timing.kb, timing.b, count)
+            times[i] = tb - ta
+            if timing.ka != timing.kb:
+                k = timing.ka
+                times[i] += table[k, shooting.FALL_S] + pause[k] + table[k + 1, shooting.RISE_S]
+        times = times / clock + response.free_times(run, values)
+        k = run.peaks
+        before = k - 1
+        r = restitution_of(run, values, speeds_out[before], np.sign(true[before]), before)
+        excess = (
+            np.log(np.maximum(speeds_in[k], 1e-12))
+            - np.log(np.maximum(speeds_out[before], 1e-12))
+            - np.log(r)
+        )
+        size = np.abs(true[k])
+        stiffness = vector[1] ** 2 * np.sin(np.maximum(vector[0] - size, 0.01))
+        slopes = size * stiffness / np.maximum(speeds_in[k], 1e-9) ** 2
+        measured = np.log(np.abs(run.swings.peak_rad[k]))
+        return times, measured - excess / slopes, slopes
+
+    @staticmethod
+    def _from_peak(fall: FloatArray, rise: FloatArray, k: int, place: int, count: int) -> float:
+        """Time of a crossing from its own peak (negative in the rise)."""
+        return float(fall[k, place]) if place < count else -float(rise[k, place - count])
+
+    @staticmethod
+    def _half_cycles(
+        run: RockingRun, vector: FloatArray, true: FloatArray, levels: FloatArray, key: bytes
+    ) -> FloatArray:
+        """The simulator's half-cycles; remembered for the last parameters, since many do not move them."""
+        known = run.cache.get("key")
+        if known is not None and known.tobytes() == key:
+            return run.cache["table"]
+        table = np.empty((true.size, shooting.FIRST_CROSSING + 2 * levels.shape[1]))
+        side = 1.0 if run.swings.peak_rad[0] > 0 else -1.0
+        shooting.half_cycles(vector, run.swings.peak_s, true, levels, side, True, table)
+        run.cache["key"] = np.frombuffer(key, dtype=np.uint8).astype(np.uint8)  # type: ignore[assignment]
+        run.cache["table"] = table
+        return table

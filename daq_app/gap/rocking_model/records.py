@@ -1,0 +1,159 @@
+"""Runs as the rocking model takes them: engineering units in memory, from a run file or from elsewhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from daq_app.config.rig import Channel, Family, Specimen
+from daq_app.gap.core import CannotDiagnose
+from daq_app.gap.core.features import FloatArray
+from daq_app.runfile import open_run
+
+Vector3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """What the diagnosis needs to know of a channel."""
+
+    id: str
+    family: Family
+    position_m: Vector3
+    anchor_m: Vector3 | None = None
+    axis: str = "x"
+    range_si: tuple[float, float] = (-math.inf, math.inf)
+    noise_si: float = 0.0
+    time_constant_s: float = 0.0
+    ac_coupled: bool = False
+
+    @classmethod
+    def from_channel(cls, channel: Channel) -> Sensor:
+        return cls(
+            channel.id,
+            channel.family,
+            channel.position_m,
+            channel.anchor_m,
+            channel.axis,
+            (channel.range_si[0], channel.range_si[1]),
+            channel.noise_si,
+            channel.time_constant_s,
+            channel.measurement == "iepe",
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """The specimen as it was surveyed: nominal values and how far the truth may lie from them."""
+
+    name: str
+    alpha_rad: float
+    p_rad_s: float
+    half_base_m: float
+    height_m: float
+    alpha_tolerance: float = 0.03
+    """Relative prior sd of α (the height of the centre of mass is hard to survey)."""
+    p_tolerance: float = 0.02
+    half_base_tolerance_m: float = 1e-3
+
+    @classmethod
+    def from_specimen(cls, specimen: Specimen) -> Survey:
+        p = math.sqrt(specimen.weight_n * specimen.r0_m / specimen.rotational_inertia_kg_m2)
+        return cls(specimen.name, specimen.alpha0_rad, p, specimen.base_width_m / 2, specimen.height_m)
+
+    @property
+    def r_max(self) -> float:
+        """1 − 3/2 sin²α of a rectangular block (Eqn 1.2)."""
+        return 1.0 - 1.5 * math.sin(self.alpha_rad) ** 2
+
+
+@dataclass(frozen=True, slots=True)
+class GapRun:
+    """One recorded test in engineering units.
+
+    `channels`: shape (c, n), SI, in the order of `sensors`; NaN in gaps. `time_offset_s`: shape
+    (c,), sample time of a channel after the sample clock.
+    """
+
+    name: str
+    level: str
+    rate_hz: float
+    sensors: tuple[Sensor, ...]
+    channels: FloatArray
+    survey: Survey
+    time_offset_s: FloatArray = field(default_factory=lambda: np.zeros(0))
+    impacts_before: float = 0.0
+
+    def indices(self, family: Family, axis: str | None = None) -> list[int]:
+        """Places of the channels of a family (and axis)."""
+        return [
+            i
+            for i, sensor in enumerate(self.sensors)
+            if sensor.family == family and (axis is None or sensor.axis == axis)
+        ]
+
+    def aligned(self, index: int) -> FloatArray:
+        """A channel at the instants of the sample clock, shape (n,)."""
+        values = self.channels[index]
+        offset = self.time_offset_s[index] if self.time_offset_s.size else 0.0
+        if offset == 0.0:
+            return values
+        k = np.arange(values.size, dtype=float)
+        shifted: FloatArray = np.interp(k, k + offset * self.rate_hz, values)
+        return shifted
+
+
+def load_run(path: Path) -> GapRun:
+    """A run file of this product. Raises `CannotDiagnose` where its rig lacks what is needed."""
+    with open_run(path) as run:
+        rig = run.rig
+        ids = list(run.channel_ids)
+        channels = [rig.channel(name) for name in ids]
+        offsets = np.array([_offset(run.header.plan, name) for name in ids])
+        name = run.header.test or path.stem
+        return GapRun(
+            name=name,
+            level=level_of(name),
+            rate_hz=float(run.rate_hz),
+            sensors=tuple(Sensor.from_channel(channel) for channel in channels),
+            channels=np.asarray(run.si(ids), dtype=float),
+            survey=Survey.from_specimen(rig.specimen),
+            time_offset_s=offsets,
+        )
+
+
+def level_of(test: str) -> str:
+    """``FR1-L3-2`` → ``L3``; the whole name where there is no level in it."""
+    parts = [part for part in test.split("-") if part[:1] == "L" and part[1:].isdigit()]
+    return parts[0] if parts else test
+
+
+def _offset(plan: dict[str, object], channel: str) -> float:
+    """Time offset of a channel in a run's task plan; 0 where the plan does not say."""
+    entries = plan.get("channels", [])
+    if isinstance(entries, Sequence):
+        for entry in entries:
+            if isinstance(entry, dict) and entry.get("id", entry.get("channel_id")) == channel:
+                return float(entry.get("time_offset_s", 0.0))
+    return 0.0
+
+
+def check_consistent(runs: Sequence[GapRun]) -> None:
+    """Refuse runs that do not belong together."""
+    if not runs:
+        raise CannotDiagnose("There is no run to diagnose.", "Give at least one recorded run.")
+    names = {run.survey.name for run in runs}
+    if len(names) > 1:
+        raise CannotDiagnose(
+            f"The runs are of different specimens: {', '.join(sorted(names))}.",
+            "Diagnose each specimen by itself.",
+        )
+    ids = {tuple(sensor.id for sensor in run.sensors) for run in runs}
+    if len(ids) > 1:
+        raise CannotDiagnose(
+            "The runs were recorded with different channels.", "Diagnose each rig by itself."
+        )

@@ -1,0 +1,151 @@
+"""From channels to motion: the joint's rotation from the LVDTs, the wall's from the wires, and noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.core import CannotDiagnose
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.records import GapRun
+
+TAIL_S = 0.3
+"""The wall stands at rest at the end of a record; this much of it is the zero of every channel."""
+HOLD_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Rotation:
+    """Rotation of a family with its noise.
+
+    `theta`: shape (n,), rad. `lift`: opening of the joint at the middle of the base, m. `twist`:
+    change of rotation along the length, rad/m. `noise_rad`: rms of one sample. `used`: channels.
+    """
+
+    theta: FloatArray
+    lift: FloatArray
+    twist: FloatArray
+    noise_rad: float
+    used: tuple[str, ...]
+    left_out: tuple[str, ...]
+    valid: NDArray[np.bool_]
+    """Samples at which no used channel is at the end of its range, shape (n,)."""
+
+    @property
+    def whole(self) -> bool:
+        """Whether the rotation is known at every sample."""
+        return bool(self.valid.all())
+
+
+def zeroed(run: GapRun, index: int) -> FloatArray:
+    """A channel less its mean at the end of the record."""
+    values = run.aligned(index)
+    tail = values[-max(int(TAIL_S * run.rate_hz), 1) :]
+    return values - float(np.nanmean(tail))
+
+
+def sample_noise(values: FloatArray, rate_hz: float) -> float:
+    """Rms noise of one sample from second differences while the wall is held."""
+    held = values[: int(HOLD_S * rate_hz)]
+    second = held[2:] - 2 * held[1:-1] + held[:-2]
+    return float(np.sqrt(np.mean(second**2) / 6.0)) + 1e-12
+
+
+def joint_rotation(run: GapRun) -> Rotation:
+    """θ from the openings of the base joint: opening = u_z − x sin θ − (twist) x y, per sample.
+
+    Channels that disagree with the plane through the others are left out; samples at which a
+    channel reaches its declared range are marked.
+    """
+    chosen = run.indices("lvdt")
+    data = {i: zeroed(run, i) for i in chosen}
+    left_out = [i for i in chosen if not np.all(np.isfinite(data[i]))]
+    clipped = {i: _clipped(run.aligned(i), run.sensors[i].range_si) for i in chosen}
+    while True:
+        used = [i for i in chosen if i not in left_out]
+        faces = {np.sign(run.sensors[i].position_m[0]) for i in used}
+        if len(used) < 6 or len(faces) < 2:
+            raise CannotDiagnose(
+                f"Run {run.name}: only {len(used)} LVDTs are usable.",
+                "Check their ranges and wiring; the rotation of the joint needs both faces.",
+            )
+        x = np.array([run.sensors[i].position_m[0] for i in used])
+        y = np.array([run.sensors[i].position_m[1] for i in used])
+        design = np.column_stack([np.ones_like(x), -x, -x * y])
+        values = np.array([data[i] for i in used])
+        plane = np.linalg.pinv(design) @ values
+        misfit = values - design @ plane
+        valid = ~np.any([clipped[i] for i in used], axis=0)
+        worst = _outlier(used, misfit[:, valid], values)
+        if worst is None:
+            break
+        left_out.append(worst)
+    theta = np.arcsin(np.clip(plane[1], -0.9, 0.9))
+    return Rotation(
+        theta,
+        plane[0],
+        plane[2],
+        sample_noise(theta, run.rate_hz),
+        tuple(run.sensors[i].id for i in used),
+        tuple(run.sensors[i].id for i in left_out),
+        valid,
+    )
+
+
+def _clipped(values: FloatArray, limits: tuple[float, float]) -> NDArray[np.bool_]:
+    """Samples at which a channel is at its declared range, with a little room on either side in time."""
+    if not np.all(np.isfinite(limits)):
+        return np.zeros(values.size, dtype=bool)
+    margin = 0.002 * (limits[1] - limits[0])
+    at_end = (values >= limits[1] - margin) | (values <= limits[0] + margin)
+    return np.asarray(np.convolve(at_end, np.ones(81), "same") > 0) if at_end.any() else at_end
+
+
+def _outlier(used: list[int], misfit: FloatArray, values: FloatArray) -> int | None:
+    """The channel that disagrees most with the others, if it does so grossly."""
+    rms = np.sqrt(np.mean(misfit**2, axis=1))
+    size = float(np.sqrt(np.mean(values**2)))
+    limit = max(6.0 * float(np.median(rms)), 0.02 * size)
+    k = int(np.argmax(rms))
+    return used[k] if rms[k] > limit and len(used) > 6 else None
+
+
+def wire_reading(
+    theta: FloatArray,
+    point: tuple[float, float, float],
+    anchor: tuple[float, float, float],
+    half_base: float,
+    pivot_shift: float = 0.0,
+) -> FloatArray:
+    """Shortening of a wire from a wall point to its anchor for a sharp-edged wall rotated by `theta`, m."""
+    side = np.where(theta >= 0, 1.0, -1.0)
+    pivot = side * (half_base - pivot_shift)
+    sin, cos = np.sin(theta), np.cos(theta)
+    x = pivot + (point[0] - pivot) * cos + point[2] * sin
+    z = -(point[0] - pivot) * sin + point[2] * cos
+    now = np.sqrt((anchor[0] - x) ** 2 + (anchor[1] - point[1]) ** 2 + (anchor[2] - z) ** 2)
+    before = float(np.linalg.norm(np.subtract(anchor, point)))
+    shortening: FloatArray = before - now
+    return shortening
+
+
+def wall_rotation(run: GapRun) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
+    """θ of each wire (w, n), their heights (w,), and their ids; clipped wires are left out.
+
+    Each reading is turned into a rotation by the wire's real geometry about the nominal edges.
+    """
+    grid = np.linspace(-0.15, 0.15, 1201)
+    rows, heights, names = [], [], []
+    for i in run.indices("wire"):
+        sensor = run.sensors[i]
+        raw = run.aligned(i)
+        if sensor.anchor_m is None or not np.all(np.isfinite(raw)) or _clipped(raw, sensor.range_si).any():
+            continue
+        table = wire_reading(grid, sensor.position_m, sensor.anchor_m, run.survey.half_base_m)
+        direction = 1.0 if table[-1] > table[0] else -1.0
+        rows.append(np.interp(direction * zeroed(run, i), direction * table, grid))
+        heights.append(sensor.position_m[2])
+        names.append(sensor.id)
+    return np.array(rows), np.array(heights), tuple(names)

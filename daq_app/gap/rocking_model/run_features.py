@@ -1,0 +1,172 @@
+"""All features of one run, put together for the core."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.core import FeatureSet, Label
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model import swings as sw
+from daq_app.gap.rocking_model.records import GapRun, Survey
+from daq_app.gap.rocking_model.rotation import Rotation, joint_rotation, sample_noise, wall_rotation
+from daq_app.gap.rocking_model.sensor_blocks import Block, Grid, blocks_of, make_grid
+
+_SMALLEST_LOADING = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """One time feature: crossing `b` of half-cycle `kb` minus crossing `a` of half-cycle `ka`.
+
+    A crossing is (half-cycle, place); places below F are of the fall, others of the rise.
+    """
+
+    ka: int
+    a: int
+    kb: int
+    b: int
+
+
+@dataclass(frozen=True, slots=True)
+class RockingRun:
+    """A run as the core sees it, with what the rocking model needs to predict its features."""
+
+    name: str
+    level: str
+    features: FeatureSet
+    survey: Survey
+    swings: sw.Swings
+    timings: tuple[Timing, ...]
+    peaks: NDArray[np.intp]
+    """Half-cycles whose peak is a feature (all but the first)."""
+    blocks: tuple[Block, ...]
+    grid: Grid
+    reference: str
+    """``lvdt`` or ``wire``: the family whose rotation the dynamics features come from."""
+    impacts_before: float
+    wire_height_m: float
+    """Height at which a displacement of all wires looks like one rotation."""
+    block_loadings: FloatArray
+    """(n, k): measurement covariance of the blocks as loadings."""
+    notes: tuple[str, ...] = ()
+    cache: dict[str, FloatArray] = field(default_factory=dict, compare=False)
+
+
+def extract(run: GapRun) -> RockingRun:
+    """Features of a run. Raises `CannotDiagnose` where it holds no rocking motion."""
+    joint = joint_rotation(run)
+    reference, theta, noise, notes = _reference(run, joint)
+    swings = sw.find_swings(theta, noise, run.rate_hz, run.name)
+    grid = make_grid(theta, joint.valid, swings, run.rate_hz)
+    blocks = tuple(blocks_of(run, joint, grid, swings, reference).values())
+    values, sds, labels, timings = _times(swings, reference)
+    peaks = np.arange(1, swings.peak_s.size)
+    amplitude, order = swings.peak_rad, swings.peak_s / max(swings.peak_s[-1], 1e-9)
+    for k in peaks:
+        values.append(float(np.log(abs(amplitude[k]))))
+        relative = [swings.peak_sd[j] / abs(amplitude[j]) for j in (k, k - 1)]
+        sds.append(float(np.hypot(*relative)))
+        labels.append(
+            Label(reference, "peak", "log peak after impact", "1", float(amplitude[k - 1]), float(order[k]))
+        )
+    first = len(values)
+    for block in blocks:
+        for name, unit, value, variance in zip(
+            block.names, block.units, block.values, np.diag(block.covariance), strict=True
+        ):
+            values.append(float(value))
+            sds.append(_SMALLEST_LOADING * float(np.sqrt(variance)) + 1e-15)
+            labels.append(Label(block.family, "run", name, unit, float(abs(amplitude[0])), 0.5))
+    loadings = _block_loadings(blocks, first, len(values))
+    features = FeatureSet(np.array(values), np.array(sds), tuple(labels))
+    return RockingRun(
+        run.name,
+        run.level,
+        features,
+        run.survey,
+        swings,
+        tuple(timings),
+        peaks,
+        blocks,
+        grid,
+        reference,
+        run.impacts_before,
+        _wire_height(run),
+        loadings,
+        notes,
+    )
+
+
+def _reference(run: GapRun, joint: Rotation) -> tuple[str, FloatArray, float, tuple[str, ...]]:
+    """The rotation that the dynamics are read from: LVDTs, or wires where the LVDTs reach their range."""
+    notes = tuple(f"{run.name}: {name} left out, it disagrees with its family." for name in joint.left_out)
+    if joint.whole:
+        return "lvdt", joint.theta, joint.noise_rad, notes
+    rows, heights, _ = wall_rotation(run)
+    if len(rows) == 0:
+        return "lvdt", joint.theta, joint.noise_rad, (*notes, f"{run.name}: LVDTs reach their range.")
+    theta = np.average(rows, axis=0, weights=heights**2)
+    note = f"{run.name}: LVDTs reach their range; its motion is read from the wires."
+    return "wire", theta, sample_noise(theta, run.rate_hz), (*notes, note)
+
+
+def _times(swings: sw.Swings, reference: str) -> tuple[list[float], list[float], list[Label], list[Timing]]:
+    """Time features of all half-cycles: parts of the fall and rise, over the top, across the impact."""
+    values: list[float] = []
+    sds: list[float] = []
+    labels: list[Label] = []
+    timings: list[Timing] = []
+    count = swings.levels.shape[1]
+    last = max(swings.peak_s[-1], 1e-9)
+
+    def crossing(k: int, place: int) -> tuple[float, float]:
+        if place < count:
+            return float(swings.fall_s[k, place]), float(swings.fall_sd[k, place])
+        return float(swings.rise_s[k, place - count]), float(swings.rise_sd[k, place - count])
+
+    def add(observable: str, phase: str, ka: int, a: int, kb: int, b: int) -> None:
+        (ta, sa), (tb, sb) = crossing(ka, a), crossing(kb, b)
+        if not np.isfinite(ta + tb + sa + sb):
+            return
+        values.append(tb - ta)
+        sds.append(float(np.hypot(sa, sb)))
+        labels.append(
+            Label(
+                reference, phase, observable, "s", float(swings.peak_rad[ka]), float(swings.peak_s[ka] / last)
+            )
+        )
+        timings.append(Timing(ka, a, kb, b))
+
+    for k in range(swings.peak_s.size):
+        places = len(sw.RELEASE_FRACTIONS) if k == 0 else len(sw.FRACTIONS)
+        for j in range(1, places):
+            phase = "release" if k == 0 else "swing"
+            add(f"fall time {j}" if k else f"first fall time {j}", phase, k, j - 1, k, j)
+        if k > 0:
+            for j in range(1, places):
+                add(f"rise time {j}", "swing", k, count + j, k, count + j - 1)
+            add("time over the top", "peak", k, count, k, 0)
+        if k + 1 < swings.peak_s.size:
+            add("time across the impact", "impact", k, places - 1, k + 1, count + len(sw.FRACTIONS) - 1)
+    return values, sds, labels, timings
+
+
+def _wire_height(run: GapRun) -> float:
+    heights = np.array([run.sensors[i].position_m[2] for i in run.indices("wire")])
+    return float(np.sum(heights**2) / np.sum(heights)) if heights.size else 1.0
+
+
+def _block_loadings(blocks: tuple[Block, ...], first: int, n: int) -> FloatArray:
+    columns = []
+    row = first
+    for block in blocks:
+        k = len(block.names)
+        matrix = np.zeros((n, k))
+        jitter = 1e-12 * np.diag(np.diag(block.covariance))
+        matrix[row : row + k] = np.linalg.cholesky(block.covariance + jitter)
+        columns.append(matrix)
+        row += k
+    return np.hstack(columns) if columns else np.zeros((n, 0))

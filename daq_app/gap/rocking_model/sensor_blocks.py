@@ -1,0 +1,312 @@
+"""What each sensor family says beyond the reference rotation: small regressions with full covariance.
+
+For every family the difference between what it shows and what the reference rotation implies is
+explained by a few shapes (gain, lag, a step with the moment, drift …). A hypothesis predicts the
+same coefficients by passing its own difference through the same regression.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, lfilter, sosfiltfilt
+
+from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.rotation import Rotation, wall_rotation, wire_reading, zeroed
+from daq_app.gap.rocking_model.swings import Swings
+
+GRID_HZ = 200.0
+"""Regressions run on averages over 5 ms."""
+SMOOTH_HZ = 30.0
+POLYNOMIAL_DEGREE = 8
+SMALLEST_GRID_RAD = 8e-4
+MASK_S = 0.05
+"""Accelerations near an impact are left out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Reference motion on the coarse grid, shape (m,): s from release, rad, rad/s, rad/s²."""
+
+    time_s: FloatArray
+    theta: FloatArray
+    omega: FloatArray
+    alpha: FloatArray
+    near_impact: NDArray[np.bool_]
+    valid: NDArray[np.bool_]
+    last_impact_s: float
+    """Last impact up to which the derivatives are trusted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Coefficients of one family in one run, with the regression that made them.
+
+    `values` (k,), `covariance` (k, k), `projection` (k, m'): coefficients = projection @ series on
+    the samples `pick` of the grid.
+    """
+
+    family: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+    projection: FloatArray
+    pick: NDArray[np.bool_]
+
+    def coefficients(self, series: FloatArray) -> FloatArray:
+        """What the regression makes of a difference given on the whole grid."""
+        found: FloatArray = self.projection @ series[self.pick]
+        return found
+
+
+def coarse(values: FloatArray, rate_hz: float) -> FloatArray:
+    """Averages over the grid's intervals; shape (n,) → (m,)."""
+    step = round(rate_hz / GRID_HZ)
+    m = values.size // step
+    found: FloatArray = values[: m * step].reshape(m, step).mean(axis=1)
+    return found
+
+
+def make_grid(theta: FloatArray, valid: NDArray[np.bool_], swings: Swings, rate_hz: float) -> Grid:
+    """Reference motion with its derivatives.
+
+    Between impacts the rotation is a polynomial fitted to all samples of the half-cycle: a filter
+    that keeps the impacts sharp leaves far too much noise in the second derivative, and noise in an
+    explanatory variable biases every coefficient.
+    """
+    n = theta.size
+    smooth = sosfiltfilt(butter(4, SMOOTH_HZ, fs=rate_hz, output="sos"), theta)
+    omega, alpha = np.zeros(n), np.zeros(n)
+    release = round(swings.release_s * rate_hz)
+    crossings = _impact_samples(theta, smooth, release)
+    ends = [release, *crossings]
+    smooth[:release] = swings.peak_rad[0]
+    guard = int(0.004 * rate_hz)
+    for start, stop in itertools.pairwise(ends):
+        inside = np.arange(start + (0 if start == release else guard), stop - guard)
+        if inside.size < 60:
+            continue
+        x = np.linspace(-1.0, 1.0, inside.size)
+        fitted = np.polynomial.chebyshev.Chebyshev.fit(x, theta[inside], POLYNOMIAL_DEGREE, domain=[-1, 1])
+        whole = np.arange(start, stop)
+        position = 2.0 * (whole - inside[0]) / (inside[-1] - inside[0]) - 1.0
+        scale = 2.0 * rate_hz / (inside[-1] - inside[0])
+        smooth[whole] = fitted(position)
+        omega[whole] = fitted.deriv(1)(position) * scale
+        alpha[whole] = fitted.deriv(2)(position) * scale**2
+    time_s = coarse(np.arange(n) / rate_hz, rate_hz) - swings.release_s
+    impact_s = np.array(crossings) / rate_hz - swings.release_s
+    distance = np.abs(time_s[:, None] - impact_s[None, :]).min(axis=1) if impact_s.size else time_s + 1e9
+    good = coarse(valid.astype(float), rate_hz) > 0.999
+    parts = [coarse(v, rate_hz) for v in (smooth, omega, alpha)]
+    last = impact_s[-1] if impact_s.size else 0.0
+    return Grid(time_s, parts[0], parts[1], parts[2], distance < MASK_S, good, float(last))
+
+
+def _impact_samples(theta: FloatArray, smooth: FloatArray, release: int) -> list[int]:
+    """Samples at which the rotation passes zero, until half-cycles become too short to see."""
+    found: list[int] = []
+    signs = np.sign(smooth)
+    for k in np.flatnonzero(np.diff(signs) != 0):
+        if k <= release:
+            continue
+        if found and (k - found[-1] < 100 or np.abs(smooth[found[-1] : k]).max() < SMALLEST_GRID_RAD):
+            break
+        # The smoothed record rounds the corner; the crossing itself is read from the raw one nearby.
+        window = slice(max(k - 60, 0), k + 60)
+        t = np.arange(-60, k + 60 - max(k - 60, 0) - 60)
+        slope, level = np.polyfit(t, theta[window], 1)
+        found.append(int(k + np.clip(-level / slope, -40, 40)) if slope else int(k))
+    return found
+
+
+def first_order(values: FloatArray, time_constant_s: float, rate_hz: float = GRID_HZ) -> FloatArray:
+    """Response of a slow sensor that starts in balance."""
+    if time_constant_s <= 0:
+        return values
+    a = np.exp(-1.0 / (time_constant_s * rate_hz))
+    # The input is linear between samples: exact discretisation of the ramp response.
+    b0 = 1.0 - (1.0 - a) * time_constant_s * rate_hz
+    b1 = (1.0 - a) * time_constant_s * rate_hz - a
+    state = np.array([values[0] - b0 * values[0]])
+    found: FloatArray = lfilter([b0, b1], [1.0, -a], values, zi=state)[0]
+    return found
+
+
+def moment_shape(theta: FloatArray, alpha: float) -> FloatArray:
+    """Overturning moment over its largest value: sgn θ · sin(α − |θ|)/sin α, rounded over a milliradian."""
+    shape: FloatArray = np.tanh(theta / 5e-4) * np.sin(alpha - np.abs(theta)) / np.sin(alpha)
+    return shape
+
+
+def regress(
+    family: str,
+    difference: FloatArray,
+    columns: dict[str, tuple[FloatArray, str]],
+    pick: NDArray[np.bool_],
+) -> Block | None:
+    """Least squares of a difference on named shapes; None with too few samples."""
+    if pick.sum() < 20 * len(columns):
+        return None
+    design = np.column_stack([column[pick] for column, _ in columns.values()])
+    scale = np.sqrt(np.mean(design**2, axis=0)) + 1e-300
+    scaled = np.linalg.pinv(design / scale, rcond=1e-8)
+    projection = scaled / scale[:, None]
+    values = projection @ difference[pick]
+    residual = difference[pick] - design @ values
+    fraction = max(independent_fraction(residual), 0.01)
+    variance = float(residual @ residual) / max(residual.size - len(columns), 1) / fraction
+    covariance = variance * projection @ projection.T
+    names = tuple(columns)
+    return Block(family, names, tuple(u for _, u in columns.values()), values, covariance, projection, pick)
+
+
+def blocks_of(run: GapRun, joint: Rotation, grid: Grid, swings: Swings, reference: str) -> dict[str, Block]:
+    """All blocks that the run's channels allow, by name."""
+    rocking = (grid.time_s > -0.2) & (grid.time_s < swings.rest_s - swings.release_s + 0.2)
+    pick = rocking & grid.valid
+    found: dict[str, Block | None] = {
+        "wire": _wire_block(run, joint, grid, pick, reference),
+        "tiltmeter": _tilt_block(run, grid, rocking),
+        "accelerometer": _acceleration_block(
+            run, grid, rocking & (grid.time_s > 0.05) & (grid.time_s < grid.last_impact_s) & ~grid.near_impact
+        ),
+        "base": _translation_block(run, grid, swings, rocking),
+    }
+    if reference == "lvdt":
+        found["joint"] = _lift_block(run, joint, grid, pick)
+        found["twist"] = _twist_block(run, joint, grid, pick)
+    return {name: block for name, block in found.items() if block is not None}
+
+
+def _wire_block(
+    run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_], reference: str
+) -> Block | None:
+    rows, heights, _ = wall_rotation(run)
+    if len(rows) == 0:
+        return None
+    theta = np.average(rows, axis=0, weights=heights**2)
+    compared = coarse(theta, run.rate_hz) - (
+        coarse(joint.theta, run.rate_hz) if reference == "wire" else grid.theta
+    )
+    return regress("wire", compared, rotation_columns(grid, run.survey.alpha_rad), pick)
+
+
+def rotation_columns(grid: Grid, alpha: float) -> dict[str, tuple[FloatArray, str]]:
+    """Shapes in which two measures of the rotation can differ."""
+    return {
+        "zero": (np.ones_like(grid.theta), "rad"),
+        "gain": (grid.theta, "1"),
+        "lag": (-grid.omega, "s"),
+        "even harmonic": (grid.theta**2, "1/rad"),
+        "step with moment": (moment_shape(grid.theta, alpha), "rad"),
+        "drift": (grid.time_s, "rad/s"),
+    }
+
+
+def _tilt_block(run: GapRun, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:
+    chosen = [i for i in run.indices("tiltmeter", "x") if np.all(np.isfinite(run.channels[i]))]
+    if not chosen:
+        return None
+    slow = run.sensors[chosen[0]].time_constant_s
+    measured = np.mean([coarse(zeroed(run, i), run.rate_hz) for i in chosen], axis=0)
+    expected = first_order(grid.theta, slow)
+    # A tiltmeter is at rest only some time constants after the wall: its own last value is no zero.
+    columns = {
+        "zero": (np.ones_like(expected), "rad"),
+        "gain": (expected, "1"),
+        "lag": (-np.gradient(expected, 1 / GRID_HZ), "s"),
+        "drift": (grid.time_s, "rad/s"),
+    }
+    wide = pick | (grid.time_s <= 0)
+    return regress("tiltmeter", measured - expected, columns, wide)
+
+
+def _acceleration_block(run: GapRun, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:
+    chosen = [
+        i
+        for i in run.indices("accelerometer", "x")
+        if np.all(np.isfinite(run.channels[i])) and not run.sensors[i].ac_coupled
+    ]
+    if not chosen:
+        return None
+    low_pass = butter(4, SMOOTH_HZ, fs=run.rate_hz, output="sos")
+    measured = coarse(sosfiltfilt(low_pass, np.mean([zeroed(run, i) for i in chosen], axis=0)), run.rate_hz)
+    height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))
+    x = float(np.mean([run.sensors[i].position_m[0] for i in chosen]))
+    arm = x - np.sign(grid.theta) * run.survey.half_base_m
+    gravity, inertia = -9.81 * np.sin(grid.theta), height * grid.alpha
+    expected = gravity + inertia - grid.omega**2 * arm
+    columns = {
+        "zero": (np.ones_like(expected), "m/s²"),
+        "gain of gravity": (gravity, "1"),
+        "gain of inertia": (inertia, "1"),
+        "lag": (-np.gradient(expected, 1 / GRID_HZ), "s"),
+    }
+    return regress("accelerometer", measured - expected, columns, pick)
+
+
+def _lift_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:
+    size = np.abs(grid.theta)
+    expected = run.survey.half_base_m * np.sin(size)
+    columns = {
+        "zero": (np.ones_like(size), "m"),
+        "pivot": (size, "m"),
+        "pivot left against right": (grid.theta, "m"),
+        "pivot with rotation": (size**2, "m/rad"),
+        "contact length": (np.sqrt(size), "m"),
+        "drift": (grid.time_s, "m/s"),
+    }
+    return regress("joint", coarse(joint.lift, run.rate_hz) - expected, columns, pick & ~grid.near_impact)
+
+
+def _twist_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:
+    columns = {
+        "zero": (np.ones_like(grid.theta), "rad/m"),
+        "follows rotation": (grid.theta, "1/m"),
+        "drift": (grid.time_s, "rad/m/s"),
+    }
+    return regress("twist", coarse(joint.twist, run.rate_hz), columns, pick)
+
+
+def slip_shape(time_s: FloatArray, impact_s: FloatArray, speeds: FloatArray) -> FloatArray:
+    """Sum of the signed approach speeds of the impacts so far, less its last value (the zero is at rest)."""
+    steps = np.concatenate([[0.0], np.cumsum(speeds)])
+    shape: FloatArray = steps[np.searchsorted(impact_s, time_s)] - steps[-1]
+    return shape
+
+
+def _translation_block(run: GapRun, grid: Grid, swings: Swings, pick: NDArray[np.bool_]) -> Block | None:
+    """Movement of the base along x, from wires at several heights."""
+    _, heights, names = wall_rotation(run)
+    if len(set(np.round(heights, 2))) < 2:
+        return None
+    chosen = [i for i in run.indices("wire") if run.sensors[i].id in names]
+    shift = []
+    for i in chosen:
+        sensor = run.sensors[i]
+        assert sensor.anchor_m is not None
+        ideal = wire_reading(grid.theta, sensor.position_m, sensor.anchor_m, run.survey.half_base_m)
+        shift.append(coarse(zeroed(run, i), run.rate_hz) - ideal)
+    design = np.column_stack([np.ones_like(heights), heights])
+    moved = (np.linalg.pinv(design) @ np.array(shift))[0]
+    impact_s, speeds = impacts_of(grid)
+    columns = {
+        "zero": (np.ones_like(grid.theta), "m"),
+        "slip per speed": (slip_shape(grid.time_s, impact_s, speeds), "m s/rad"),
+        "follows rotation": (grid.theta, "m/rad"),
+        "drift": (grid.time_s, "m/s"),
+    }
+    return regress("base", moved, columns, pick)
+
+
+def impacts_of(grid: Grid) -> tuple[FloatArray, FloatArray]:
+    """Times (s from release) and signed approach speeds of the impacts, from the reference motion."""
+    change = np.flatnonzero((np.diff(np.sign(grid.theta)) != 0) & (grid.time_s[:-1] > 0))
+    lead = np.clip(change - 5, 0, None)
+    return grid.time_s[change], grid.omega[lead]

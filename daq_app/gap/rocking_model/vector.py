@@ -1,0 +1,66 @@
+"""From the core's named values to the simulator's parameter vector."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.run_features import RockingRun
+from sim_hardware.dynamics import parameters as par
+from sim_hardware.dynamics.effects import MOTION_EFFECTS
+
+TOLERANCE = 1e-10
+"""Local error of the integrator, relative to the half-cycle: times good to nanoseconds."""
+_INDEX = {
+    f"{spec.name}.{p.name}": p.index for spec in MOTION_EFFECTS for p in spec.parameters if p.index >= 0
+}
+_DEFAULTS = {
+    spec.name: [(p.index, p.default) for p in spec.parameters if p.default is not None and p.index >= 0]
+    for spec in MOTION_EFFECTS
+}
+PROBE_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45)
+"""Knots of the free r(v), rad/s."""
+
+
+def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> tuple[bytes, FloatArray, float]:
+    """(key, vector, clock factor): the key names everything that the half-cycles depend on."""
+    vector = np.zeros(par.N_PARAMETERS)
+    alpha = values["alpha"]
+    vector[par.ALPHA], vector[par.P] = alpha, values["p"]
+    vector[par.R0] = values["half_base"] / math.sin(alpha)
+    vector[par.RESTITUTION] = values["r"]
+    vector[par.TOLERANCE] = TOLERANCE
+    vector[par.REST_AMPLITUDE] = par.REST_AMPLITUDE_RAD
+    vector[par.DURATION] = 1e9
+    vector[par.IMPACTS_BEFORE] = run.impacts_before
+    for key, value in values.items():
+        index = _INDEX.get(key)
+        if index is not None:
+            name = key.rpartition(".")[0]
+            for other, default in _DEFAULTS[name]:
+                if vector[other] == 0.0:
+                    vector[other] = default
+            vector[index] = value
+    measured = [v for k, v in values.items() if k in ("zero", "face_a", "face_b") or "@" in k]
+    dynamic = vector.copy()
+    dynamic[[par.RESTITUTION, par.R_SLOPE, par.R_ASYMMETRY, par.CRUSH_R]] = 0.0
+    key = dynamic.tobytes() + np.asarray(measured, dtype=float).tobytes()
+    return key, vector, 1.0 + values.get("clock.error", 0.0)
+
+
+def restitution_of(
+    run: RockingRun, values: Mapping[str, float], speeds: FloatArray, sides: FloatArray, impacts: FloatArray
+) -> FloatArray:
+    """r of each impact, as the simulator's impact rule has it, plus the free form of the probe."""
+    r = values["r"] + values.get("restitution_slope.k", 0.0) * (speeds - 0.2)
+    r = r + sides * values.get("restitution_asymmetry.d", 0.0)
+    if "free_restitution.k0" in values:
+        knots = [values[f"free_restitution.k{i}"] for i in range(len(PROBE_SPEEDS))]
+        r = r + np.interp(speeds, PROBE_SPEEDS, knots) + sides * values["free_restitution.side"]
+        r = r + values["free_restitution.order"] * impacts / 10.0
+    r = r * (1.0 - values.get("restitution_wear.loss", 0.0) * 0.01 * (run.impacts_before + impacts))
+    found: FloatArray = np.clip(r, 0.05, 1.2)
+    return found
