@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -12,7 +12,9 @@ from rich.table import Table
 
 from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, reported
 from daq_app.config import load_rig
-from daq_app.rocking import RigidBlock, exact_period, theory
+
+if TYPE_CHECKING:
+    from daq_app.rocking.block import RigidBlock
 
 _LEVELS = (0.15, 0.25, 0.35, 0.40)
 
@@ -73,6 +75,9 @@ def _block(
     length: float | None,
 ) -> tuple[RigidBlock, tuple[float, float] | None]:
     """The block, and the joint's (strength in Pa, length in m) where both are known."""
+    # Imported here, as below: `daq-app --help` should not load SciPy.
+    from daq_app.rocking.block import RigidBlock
+
     specimen = load_rig(rig).specimen if rig is not None else None
     strength = mortar_mpa * 1e6 if mortar_mpa is not None else None
     if specimen is not None:
@@ -105,6 +110,8 @@ def _block(
 def _compute(
     block: RigidBlock, joint: tuple[float, float] | None, phis: list[float], r: float | None, impacts: int
 ) -> dict[str, Any]:
+    from daq_app.rocking import exact_period, theory
+
     p, alpha = block.p_rad_s, block.alpha0_rad
     used = block.r_max_rectangular if r is None else r
     result: dict[str, Any] = {

@@ -5,12 +5,15 @@ block = RigidBlock(weight_n=51300, r0_m=1.525, inertia_kg_m2=16107, alpha0_rad=0
 block.p_rad_s, block.r_max, period(0.35, block.p_rad_s)
 """
 
+from daq_app.rocking.analysis import AnalysisOptions, analyse_record
 from daq_app.rocking.block import RigidBlock, SemiRigid
 from daq_app.rocking.estimators import RestitutionEstimate, RestitutionPoint
 from daq_app.rocking.housner import FreeRocking, exact_period, free_rocking
 from daq_app.rocking.kinematics import RotationGeometry, WireRotation
 from daq_app.rocking.live import Estimate, LiveAnalyser, LiveResult
 from daq_app.rocking.phases import Phase, PhaseDetector, PhaseEvent, PhaseSettings
+from daq_app.rocking.record import TestRecord
+from daq_app.rocking.results import TestAnalysis
 from daq_app.rocking.theory import (
     amplitude_after,
     energy,
@@ -29,6 +32,7 @@ from daq_app.rocking.theory import (
 from daq_app.rocking.velocity import VelocityFilter, VelocityStream
 
 __all__ = [
+    "AnalysisOptions",
     "Estimate",
     "FreeRocking",
     "LiveAnalyser",
@@ -42,10 +46,13 @@ __all__ = [
     "RigidBlock",
     "RotationGeometry",
     "SemiRigid",
+    "TestAnalysis",
+    "TestRecord",
     "VelocityFilter",
     "VelocityStream",
     "WireRotation",
     "amplitude_after",
+    "analyse_record",
     "energy",
     "energy_after",
     "exact_period",

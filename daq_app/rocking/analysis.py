@@ -181,6 +181,7 @@ def _fit(
         theta0_rad=track.theta0_rad,
         impacts_s=track.impacts_s,
         peaks_rad=track.peaks_rad,
+        speeds_rad_s=track.speeds_before_rad_s,
         r=_typical_r(estimates),
         scatter=max(estimates["eav"].scatter, estimates["crt"].scatter),
         noise_rad=signals.noise_rad,

@@ -109,6 +109,7 @@ def _one(wanted: BiasSettings, rng: np.random.Generator, *, with_fit: bool) -> d
             theta0_rad=track.theta0_rad,
             impacts_s=track.impacts_s,
             peaks_rad=track.peaks_rad,
+            speeds_rad_s=track.speeds_before_rad_s,
             r=found["crt"] or wanted.r,
             scatter=None,
             noise_rad=wanted.noise_rad,

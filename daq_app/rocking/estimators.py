@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import stdtrit
 
 from daq_app.rocking import theory
 from daq_app.rocking.housner import exact_energy
@@ -60,7 +60,7 @@ class RestitutionEstimate:
         """95 % confidence interval (Student t)."""
         if self.r is None or self.standard_error is None or self.degrees_of_freedom < 1:
             return None
-        reach = float(stats.t.ppf(0.975, self.degrees_of_freedom)) * self.standard_error
+        reach = float(stdtrit(self.degrees_of_freedom, 0.975)) * self.standard_error
         return self.r - reach, self.r + reach
 
 

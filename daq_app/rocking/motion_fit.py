@@ -23,6 +23,7 @@ _POINT_S = 0.008
 _SMALLEST_SHARE = 0.02
 """The motion is fitted until its peaks fall below this share of the first."""
 _FIXED = 6
+_SOFT = 100.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +61,7 @@ def fit_motion(
     theta0_rad: float,
     impacts_s: list[float],
     peaks_rad: list[float],
+    speeds_rad_s: list[float],
     r: float,
     scatter: float | None,
     noise_rad: float,
@@ -68,7 +70,8 @@ def fit_motion(
 ) -> MotionFit | None:
     """Fit the rotation (n,) from release to the last half-cycle worth it; None with too few impacts.
 
-    `r`, `impacts_s`, `peaks_rad` (release first) start the fit; `noise_rad` is the rms of one sample.
+    `r`, `impacts_s`, `peaks_rad` (release first) and `speeds_rad_s` (at the impacts) start the fit;
+    `noise_rad` is the rms of one sample.
     `scatter` is the relative standard deviation of r from impact to impact (at least 0.0003 is
     allowed for); None says that r is the same at every impact.
     """
@@ -84,15 +87,15 @@ def fit_motion(
     spread = None if scatter is None else max(scatter, 3e-4)
     side = 1.0 if theta0_rad > 0 else -1.0
     problem = _Problem(t, y, sigma, release_s, abs(theta0_rad), side, p_rad_s, alpha_rad, math.log(r), spread)
-    # Later half-cycles join once the earlier ones are in phase.
+    start = np.zeros(0) if spread is None else _deviations(speeds_rad_s, count, math.log(r)) / spread
     x = np.zeros(_FIXED)
-    spans = sorted({min(3, count), min(7, count), count})
-    for span in spans:
+    # Where r is one number, later half-cycles join once the earlier ones are in phase; where every
+    # impact has its own, the speeds put all of them in phase from the start.
+    for span in sorted({min(4, count), count}) if spread is None else [count]:
+        x = np.concatenate((x, start[x.size - _FIXED : span]))
         end = impacts_s[span] if span < len(impacts_s) else stop
-        x = np.concatenate((x, np.zeros(_FIXED + (0 if spread is None else span) - x.size)))
-        result = least_squares(
-            problem.residual, x, args=(span, min(end, stop)), x_scale="jac", method="trf", max_nfev=25
-        )
+        arguments = (span, min(end, stop))
+        result = least_squares(problem.residual, x, args=arguments, x_scale="jac", method="trf", max_nfev=60)
         x = result.x
     return _result(problem, result.x, result.jac, result.fun, count, sigma)
 
@@ -101,6 +104,15 @@ def _span(peaks_rad: list[float], impacts: int) -> int:
     floor = _SMALLEST_SHARE * abs(peaks_rad[0])
     large = [n for n in range(1, min(len(peaks_rad), impacts)) if abs(peaks_rad[n]) >= floor]
     return max(large, default=0) if large else 0
+
+
+def _deviations(speeds_rad_s: list[float], count: int, log_r: float) -> Floats:
+    """ln r of single impacts about `log_r`, from the speeds at neighbouring impacts; 0 where unknown."""
+    speeds = np.abs(np.asarray(speeds_rad_s, dtype=np.float64))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = np.log(speeds[1:] / speeds[:-1]) - log_r
+    found = np.where(np.isfinite(found), np.clip(found, -0.2, 0.2), 0.0)
+    return np.concatenate((found, np.zeros(count)))[:count]
 
 
 def _points(
@@ -137,7 +149,8 @@ class _Problem:
         theta0 = min(max(self.theta0 + 1e-3 * x[0], 1e-3), 0.97 * alpha)
         mean = self.log_r + 0.01 * x[5]
         deviations = np.zeros(1) if self.spread is None else self.spread * x[_FIXED:]
-        rs = np.minimum(np.exp(mean + deviations), 1.0)
+        # r stays below 1 without a corner at which the fit could get stuck: −ln(1 + e^(−100 ln r))/100.
+        rs = np.exp(-np.logaddexp(0.0, -_SOFT * (mean + deviations)) / _SOFT)
         return free_rocking(
             self.side * theta0,
             rs,
@@ -150,7 +163,12 @@ class _Problem:
 
     def residual(self, x: Floats, span: int, stop_s: float) -> Floats:
         inside = self.time_s <= stop_s
-        model = self.motion(x, span).at(self.time_s[inside])[0] + _ZERO_PRIOR_RAD * x[4]
+        motion = self.motion(x, span)
+        model = motion.at(self.time_s[inside])[0]
+        # A point is a mean over `_POINT_S`: of a parabola that is its middle plus θ̈ h²/24.
+        free = self.time_s[inside] > motion.release_s
+        bend = -(motion.p_rad_s**2) * np.sin(motion.alpha_rad * np.sign(model) - model) * free
+        model = model + bend * _POINT_S**2 / 24.0 + _ZERO_PRIOR_RAD * x[4]
         priors = np.concatenate((x[2:5], x[_FIXED:]))
         return np.concatenate(((model - self.rotation_rad[inside]) / self.sigma, priors))
 
