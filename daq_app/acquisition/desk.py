@@ -86,6 +86,9 @@ class Desk:
         self._stopping = False
         self._waiting: list[tuple[list[bytes], Future[Reply]]] = []
         try:
+            # The library takes a port above 65535 modulo 65536; this raises ValueError.
+            if urlsplit(bind).scheme != "tcp" or urlsplit(bind).port is None:
+                raise DeskError(f"Cannot listen on {bind}: write it as tcp://127.0.0.1:0 (0: any free port)")
             if not is_loopback(bind) and keys is None:
                 raise DeskError(
                     f"{bind} can be reached from other machines, and no keys were given. Bind to "

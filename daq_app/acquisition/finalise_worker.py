@@ -85,7 +85,7 @@ def main() -> None:
     """Serve until the parent goes."""
     # Reading and drawing come first; a run file may take a second longer.
     with contextlib.suppress(psutil.Error, OSError, AttributeError):
-        psutil.Process().nice(psutil.BELOW_NORMAL_PRIORITY_CLASS if sys.platform == "win32" else 10)
+        psutil.Process().nice(psutil.BELOW_NORMAL_PRIORITY_CLASS if sys.platform == "win32" else 5)
     answers = sys.stdout
     sys.stdout = sys.stderr  # whatever a library prints must not be taken for an answer
     jobs: queue.SimpleQueue[str] = queue.SimpleQueue()

@@ -98,6 +98,7 @@ class StageDriver:
         self.plan: TaskPlan | None = None
         self.opened = 0
         self.closed = 0
+        self.refuse_to_open: DriverError | None = None
 
     def let(self, until: int) -> None:
         """Allow reading up to that sample."""
@@ -114,6 +115,8 @@ class StageDriver:
         self._recovering.extend(errors)
 
     def open(self, plan: TaskPlan) -> Opened:
+        if self.refuse_to_open is not None:
+            raise self.refuse_to_open
         self.plan = plan
         self.opened += 1
         return Opened(RATE_HZ, dict.fromkeys(plan.channel_ids, (-10.0, 10.0)), 80_000, (), "staged in a test")

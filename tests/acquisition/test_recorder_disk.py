@@ -1,0 +1,252 @@
+"""The recorder when the disk fails it: real journals, with the system calls under them made to fail."""
+
+from __future__ import annotations
+
+import errno
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from daq_app.acquisition.items import Arrived, Begin, End, Item, RequestRefused
+from daq_app.acquisition.messages import EventMessage
+from daq_app.acquisition.recorder import Recorded, Recorder
+from daq_app.runfile import RunHeader, read_journal
+from drivers import Block
+
+N_CHANNELS = 4
+
+
+class Disk:
+    """Stands between the journal and the system; fails on command."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.full = False
+        self.broken = False
+        self.flush_takes = threading.Event()
+        self.flush_takes.set()
+        write, fsync = os.write, os.fsync
+
+        def failing_write(fd: int, data: Any) -> int:
+            if self.full:
+                raise OSError(errno.ENOSPC, "No space left on device")
+            if self.broken:
+                raise OSError(errno.EIO, "Input/output error")
+            return write(fd, data)
+
+        def slow_fsync(fd: int) -> None:
+            if not self.flush_takes.wait(10.0):
+                raise OSError(errno.EIO, "Input/output error")
+            fsync(fd)
+
+        monkeypatch.setattr("os.write", failing_write)
+        for name in ("fsync", "fdatasync"):
+            if hasattr(os, name):
+                monkeypatch.setattr(f"os.{name}", slow_fsync)
+
+
+class Bench:
+    """A recorder with everything it says and hands over."""
+
+    def __init__(self, folder: Path, spare: Path | None = None) -> None:
+        self.folder = folder
+        self.forwarded: list[Item] = []
+        self.said: list[EventMessage] = []
+        self.handed: list[Recorded] = []
+        self.changed = threading.Condition()
+        self.recorder = Recorder(
+            self._note(self.forwarded), self._note(self.said), self._note(self.handed), spare
+        )
+        self.recorder.start()
+
+    def _note(self, where: list[Any]) -> Callable[[Any], None]:
+        def note(what: Any) -> None:
+            with self.changed:
+                where.append(what)
+                self.changed.notify_all()
+
+        return note
+
+    def until(self, right: Callable[[], bool], timeout_s: float = 10.0) -> None:
+        deadline = time.monotonic() + timeout_s
+        with self.changed:
+            while not right():
+                assert time.monotonic() < deadline, (self.said, self.recorder.status)
+                self.changed.wait(0.05)
+
+    def begin(self, name: str = "run") -> Path:
+        header = RunHeader(
+            run_id=name,
+            channel_ids=tuple(f"C{n}" for n in range(N_CHANNELS)),
+            reading_units=("V",) * N_CHANNELS,
+            rate_hz=4000.0,
+        )
+        done: Future[Path] = Future()
+        self.recorder.inbox.put(Begin(self.folder / f"{name}.journal", header, done))
+        return done.result(10.0)
+
+    def blocks(self, first: int, count: int) -> None:
+        for n in range(first, first + count):
+            self.recorder.inbox.put(Arrived(Block(n * 100, readings(n * 100), 0, 0), time.perf_counter()))
+
+    def end(self) -> Recorded:
+        self.recorder.inbox.put(End("complete", 0, "done"))
+        self.until(lambda: bool(self.handed))
+        return self.handed[-1]
+
+    def heard(self, severity: str, words: str) -> bool:
+        return any(e.severity == severity and words in e.text for e in self.said)
+
+
+def readings(first: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    return np.arange(first, first + 100.0) + 1000.0 * np.arange(N_CHANNELS)[:, None]
+
+
+def contents(journal: Path) -> dict[int, float]:
+    """Sample → reading of the first channel."""
+    found: dict[int, float] = {}
+    with read_journal(journal) as opened:
+        for first, window in opened.windows(1000):
+            for offset, value in enumerate(window[0]):
+                if not np.isnan(value):
+                    found[first + offset] = value
+    return found
+
+
+@pytest.fixture
+def disk(monkeypatch: pytest.MonkeyPatch) -> Disk:
+    return Disk(monkeypatch)
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Callable[..., Bench]]:
+    made: list[Bench] = []
+
+    def make(spare: Path | None = None) -> Bench:
+        made.append(Bench(tmp_path, spare))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.recorder.inbox.put(None)
+        one.recorder.join()
+
+
+def test_blocks_are_in_the_journal_before_anybody_else_sees_them(bench: Callable[..., Bench]) -> None:
+    lab = bench()
+    journal = lab.begin()
+    sizes: list[int] = []
+    forward = lab.recorder._forward
+
+    def spy(item: Item) -> None:
+        if isinstance(item, Arrived):
+            sizes.append(journal.stat().st_size)
+        forward(item)
+
+    lab.recorder._forward = spy
+    lab.blocks(0, 5)
+    lab.until(lambda: len(sizes) == 5)
+    grown = np.diff([0, *sizes])
+    assert (grown[1:] > 100 * N_CHANNELS * 8).all()
+
+
+def test_a_full_disk_costs_nothing_once_there_is_room_again(bench: Callable[..., Bench], disk: Disk) -> None:
+    lab = bench()
+    journal = lab.begin()
+    lab.blocks(0, 5)
+    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    disk.full = True
+    lab.blocks(5, 20)
+    lab.until(lambda: lab.heard("error", "full"))
+    lab.until(lambda: lab.recorder.status.waiting_bytes == 20 * 100 * N_CHANNELS * 8)
+    assert lab.recorder.status.acknowledged_sample == 500
+    disk.full = False
+    lab.until(lambda: lab.recorder.status.acknowledged_sample == 2500)
+    lab.until(lambda: lab.heard("info", "takes data again"))
+    assert lab.end().end.outcome == "complete"
+    assert contents(journal) == {n: float(n) for n in range(2500)}
+
+
+def test_a_slow_disk_is_told_and_costs_nothing(bench: Callable[..., Bench], disk: Disk) -> None:
+    lab = bench()
+    journal = lab.begin()
+    disk.flush_takes.clear()
+    lab.blocks(0, 10)
+    lab.until(lambda: lab.heard("error", "not confirmed"))
+    assert lab.recorder.status.acknowledged_sample == 0
+    disk.flush_takes.set()
+    lab.until(lambda: lab.recorder.status.acknowledged_sample == 1000)
+    assert lab.recorder.latency.worst_ms > 300.0
+    lab.end()
+    assert contents(journal) == {n: float(n) for n in range(1000)}
+
+
+def test_a_broken_disk_moves_the_recording_to_the_spare_folder(
+    bench: Callable[..., Bench], disk: Disk, tmp_path: Path
+) -> None:
+    lab = bench(tmp_path / "spare")
+    journal = lab.begin()
+    lab.blocks(0, 5)
+    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    disk.broken = True
+    first_folder = str(journal)
+
+    def heal_elsewhere() -> bool:
+        """The spare disk is well: only writes to the first journal fail."""
+        return lab.recorder.status.journal is not None and str(lab.recorder.status.journal) != first_folder
+
+    threading.Timer(0.3, lambda: setattr(disk, "broken", False)).start()
+    lab.blocks(5, 1)
+    lab.until(lambda: heal_elsewhere() or not lab.recorder.status.recording)
+    if lab.recorder.status.recording:
+        lab.blocks(6, 10)
+        recorded = lab.end()
+        assert recorded.journal.parent == tmp_path / "spare"
+        found = {**contents(journal), **contents(recorded.journal)}
+        assert found == {n: float(n) for n in range(1600)}
+
+
+def test_when_no_disk_takes_it_the_operator_hears_what_was_lost(
+    bench: Callable[..., Bench], disk: Disk
+) -> None:
+    lab = bench()
+    journal = lab.begin()
+    lab.blocks(0, 5)
+    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    disk.broken = True
+    lab.blocks(5, 3)
+    lab.until(lambda: bool(lab.handed))
+    assert lab.handed[0].end.outcome == "failed"
+    assert "could not be kept" in lab.handed[0].end.text
+    disk.broken = False
+    assert contents(journal) == {n: float(n) for n in range(500)}
+
+
+def test_a_second_arming_and_a_bad_folder_are_refused(bench: Callable[..., Bench], tmp_path: Path) -> None:
+    lab = bench()
+    lab.begin()
+    with pytest.raises(RequestRefused, match="already"):
+        lab.begin("other")
+    lab.end()
+    with pytest.raises(RequestRefused, match="exists already"):
+        lab.begin()
+    lab.folder = tmp_path / "not there"
+    with pytest.raises(RequestRefused, match="cannot be created"):
+        lab.begin("third")
+
+
+def test_ending_the_process_closes_the_journal_in_good_order(tmp_path: Path) -> None:
+    lab = Bench(tmp_path)
+    journal = lab.begin()
+    lab.blocks(0, 7)
+    lab.recorder.inbox.put(None)
+    lab.recorder.join()
+    with read_journal(journal) as opened:
+        assert opened.closed
+        assert opened.n_samples == 700
