@@ -19,6 +19,8 @@ from sim_hardware.signals import SignalSource
 if TYPE_CHECKING:
     from sim_hardware.daqmx_server.task import Task
 
+_SKEW_MARGIN_S = 1e-3
+"""Multiplexers look at their last channel this long after the sample clock at most."""
 FiniteClock = Literal["real", "instant"]
 
 
@@ -116,7 +118,7 @@ class Bench:
     def command(self, name: str, arguments: dict[str, float | str]) -> dict[str, object]:
         """Act on the world now; what had been sampled stays as it was."""
         self.clock.power_on()
-        self.source.advance(self.clock.now())
+        self.source.advance(self.clock.now() + _SKEW_MARGIN_S)
         answer = self.source.command(name, arguments)
         self.world_changed()
         return answer

@@ -19,7 +19,9 @@ from daq_app.config.rig import Rig
 from sim_hardware.daqmx_server.bench import Bench
 from sim_hardware.daqmx_server.clock import BenchClock, PacedClock, SteppedClock
 from sim_hardware.daqmx_server.inventory import Inventory
+from sim_hardware.daqmx_server.max_export import load_max_export
 from sim_hardware.daqmx_server.server import DaqmxServer
+from sim_hardware.faults.script import load_faults
 from sim_hardware.signals import SignalSource
 
 _PARENT_POLL_S = 0.5
@@ -34,37 +36,54 @@ def _speed(text: str) -> float:
     return value
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    options = argparse.ArgumentParser(
         prog="python -m sim_hardware.daqmx_server",
         description="Simulated NI-DAQmx device server (gRPC, loopback only) with a rocking wall wired to it.",
         epilog="example: python -m sim_hardware.daqmx_server --port 0 --config configs/fr1.toml --speed 10",
     )
-    parser.add_argument("--port", type=int, default=0, help="TCP port; 0 lets the system choose")
-    parser.add_argument(
+    options.add_argument("--port", type=int, default=0, help="TCP port; 0 lets the system choose")
+    options.add_argument(
         "--config", type=Path, required=True, metavar="RIG.toml", help="rig: hardware and wall"
     )
-    parser.add_argument(
+    options.add_argument(
         "--speed", type=_speed, default=1.0, help="time factor, or max: time moves with the reads"
     )
-    parser.add_argument("--seed", type=int, help="seed of noise and scatter; default: the rig's")
-    parser.add_argument("--theta0-over-alpha", type=float, metavar="X", help="release rotation over alpha")
-    parser.add_argument(
+    options.add_argument("--seed", type=int, help="seed of noise and scatter; default: the rig's")
+    options.add_argument("--theta0-over-alpha", type=float, metavar="X", help="release rotation over alpha")
+    options.add_argument(
         "--wall",
         choices=("scripted", "commanded"),
         default="scripted",
         help="pulled and released by the rig file's times, or by commands of the control service",
     )
-    parser.add_argument("--finite", choices=("real", "instant"), default="real", help="clock of finite tasks")
-    parser.add_argument("--parent-pid", type=int, help="end when this process has ended")
-    return parser
+    options.add_argument(
+        "--max-export", type=Path, metavar="FILE.ini", help="take the devices from NI MAX, not from the rig"
+    )
+    options.add_argument("--faults", type=Path, metavar="FILE", help="script of faults (TOML or JSON)")
+    options.add_argument(
+        "--finite", choices=("real", "instant"), default="real", help="clock of finite tasks"
+    )
+    options.add_argument("--parent-pid", type=int, help="end when this process has ended")
+    return options
 
 
 def build_bench(arguments: argparse.Namespace) -> Bench:
-    """Inventory, wall and clock from the command line. Raises `ConfigError` or `UnknownProduct`."""
+    """Inventory, wall, clock and faults from the command line.
+
+    Raises `ConfigError`, `UnknownProduct`, or `ValueError` for a wall that makes no sense.
+    """
     rig = load_rig(arguments.config)
+    export = arguments.max_export
+    inventory = Inventory.from_rig(rig) if export is None else load_max_export(export)
     clock: BenchClock = SteppedClock() if arguments.speed == float("inf") else PacedClock(arguments.speed)
-    return Bench(Inventory.from_rig(rig), _wall(rig, arguments), clock, arguments.finite)
+    bench = Bench(inventory, _wall(rig, arguments), clock, arguments.finite)
+    faults = load_faults(arguments.faults) if arguments.faults is not None else []
+    with bench.changed:
+        for fault in faults:
+            bench.add_fault(fault)
+    return bench
 
 
 def _wall(rig: Rig, arguments: argparse.Namespace) -> SignalSource:
@@ -80,17 +99,17 @@ def _wall(rig: Rig, arguments: argparse.Namespace) -> SignalSource:
 
 
 def _warm_up(bench: Bench) -> None:
-    """Let the wall load its compiled kernels now: a second of it would be a minute of the bench at speed 60."""
+    """Load the wall's compiled kernels now: at speed 60 a second of it would be a minute of the bench."""
     terminals = tuple(name for device in bench.present() for name in device.physical_channels)
     bench.source.volts(terminals, np.linspace(0.0, 0.01, 11))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Serve until a signal, or until the parent has gone. Exit code 2 for a bad configuration."""
-    arguments = _parser().parse_args(argv)
+    arguments = parser().parse_args(argv)
     try:
         server = DaqmxServer(build_bench(arguments), arguments.port)
-    except (ConfigError, UnknownProduct, OSError, RuntimeError) as error:
+    except (ConfigError, UnknownProduct, ValueError, OSError, RuntimeError) as error:
         print(f"daqmx_server: {error}", file=sys.stderr)
         return 2
     _warm_up(server.bench)
