@@ -1,4 +1,4 @@
-"""`daq-app verify`, `daq-app recover`, `daq-app export`: runs and journals on disk."""
+"""`daq-app verify`, `recover`, `export`, `import`: runs and journals on disk, and foreign files."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from rich.table import Table
 from rich.text import Text
 
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
+from daq_app.config import parse_rig
+from daq_app.config.toml_file import read_text
 from daq_app.runfile import Recovery, VerifyReport, recover, verify
 from daq_app.runfile.exporters import ExportFormat, export_run
+from daq_app.runfile.importers import import_file, load_import_map
 
 
 def register(app: typer.Typer) -> None:
@@ -25,6 +28,10 @@ def register(app: typer.Typer) -> None:
     app.command("export", epilog="Example: daq-app export runs/FR1-L3-2.h5 --format mat --out exported/")(
         export_command
     )
+    app.command(
+        "import",
+        epilog="Example: daq-app import old/test7.lvm --rig configs/fr1.toml --map old/map.toml --out runs",
+    )(import_command)
 
 
 def verify_command(
@@ -153,3 +160,38 @@ def export_command(
             report=lambda fraction: progress.update(task, completed=fraction),
         )
     typer.echo(f"{path}: written, {path.stat().st_size / 1e6:.1f} MB")
+
+
+def import_command(
+    file: Annotated[Path, typer.Argument(help="TDMS, LVM, CSV, MAT or NPZ file.", metavar="FILE")],
+    rig: Annotated[Path, typer.Option("--rig", help="Rig file of the test.")],
+    map_: Annotated[
+        Path | None,
+        typer.Option("--map", help="Which column is which channel (TOML); without it, names must agree."),
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", help="Folder of runs, or the run file to write.")] = Path(),
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Turn a recording of another program into a run.
+
+    What the file says that cannot be true (units, increments, lengths) is reported and not believed;
+    where it matters, the import is refused and says what to put into the map.
+    """
+    with reported():
+        rig_text = read_text(rig)
+        import_map = load_import_map(map_) if map_ else None
+        report = import_file(file, parse_rig(rig_text, str(rig)), rig_text, out, import_map)
+    if as_json:
+        document = {
+            "run": str(report.run),
+            "n_samples": report.n_samples,
+            "rate_hz": report.rate_hz,
+            "channels": list(report.channel_ids),
+            "doubts": list(report.doubts),
+        }
+        typer.echo(json.dumps(document, ensure_ascii=False))
+        return
+    for doubt in report.doubts:
+        print_paragraph("Doubtful", doubt, style="bold yellow")
+    size = f"{len(report.channel_ids)} channels, {report.n_samples} samples at {report.rate_hz:g} Hz"
+    typer.echo(f"{report.run}: {size}")

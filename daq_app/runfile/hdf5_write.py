@@ -111,7 +111,7 @@ def _write_samples(file: h5py.File, source: RunSource, scaling: RunScaling, writ
         time_s = (first + np.arange(window.shape[1])) / header.rate_hz
         writer.put(raw_time, start, time_s)
         writer.put(si_time, start, time_s)
-        si_window = scaling.to_si(window).astype("<f4")
+        si_window = scaling.stored_si(window)
         for row, dataset in enumerate(raw):
             writer.put(dataset, start, window[row])
             digests[row].update(window[row].data)

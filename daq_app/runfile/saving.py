@@ -99,7 +99,7 @@ def compare_run(path: Path, source: RunSource) -> None:
         pairs_si = [(row, si[channel_id]) for row, channel_id in enumerate(scaling.channels)]
         for first, window in source.windows(chunk):
             part = slice(first - source.first_sample, first - source.first_sample + window.shape[1])
-            si_window = scaling.to_si(window).astype("<f4")
+            si_window = scaling.stored_si(window)
             same = all(
                 np.array_equal(dataset[part].view(np.int64), window[row].view(np.int64))
                 for row, dataset in pairs_raw

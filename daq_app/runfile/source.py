@@ -64,6 +64,11 @@ class RunScaling:
         """(n_channels, m) readings to (len(rows), m) SI."""
         return self.scaling.to_si(window[list(self.rows)])
 
+    def stored_si(self, window: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Engineering units as the run file keeps them: SI in single precision."""
+        with np.errstate(over="ignore"):  # what single precision cannot hold becomes infinite
+            return self.to_si(window).astype("<f4")
+
 
 def rig_of(header: RunHeader) -> Rig | None:
     """The rig a run was made with; None where its text is absent or of a version not understood.

@@ -175,7 +175,7 @@ def _sample_problems(run: Run) -> list[str]:
             digest.update(np.ascontiguousarray(row).data)
         missing = _missing(run, start, stop)
         gaps_wrong |= not bool(np.isnan(window[:, missing]).all())
-        si = scaling.to_si(window).astype("<f4")
+        si = scaling.stored_si(window)
         for index, channel_id in enumerate(scaling.channels):
             stored = run.stored_si(channel_id, start, stop)
             if stored is None or not np.array_equal(stored, si[index], equal_nan=True):

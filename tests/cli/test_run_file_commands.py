@@ -80,3 +80,23 @@ def test_export_writes_what_was_asked(app: typer.Typer, folder: Path) -> None:
     assert cli.invoke(app, ["export", run, *options]).exit_code == 2
     assert cli.invoke(app, ["export", run, *options, "--overwrite"]).exit_code == 0
     assert cli.invoke(app, ["export", run, "--format", "xls"]).exit_code == 2
+
+
+def test_import_reports_doubts_and_faults(app: typer.Typer, tmp_path: Path, configs: Path) -> None:
+    cli = CliRunner()
+    (tmp_path / "old.csv").write_text("t,K1 (V),K2\n0,0.1,5\n0.01,0.2,5\n0.02,0.3,5\n")
+    (tmp_path / "map.toml").write_text(
+        '[run]\ntest = "FR1-L1-4"\n[channels.WP-1]\nfrom = "K1"\n[channels.AC-1]\nfrom = "K2"\nunit = "V"\n'
+    )
+    common = ["import", str(tmp_path / "old.csv"), "--rig", str(configs / "fr1.toml"), "--out", str(tmp_path)]
+    refused = cli.invoke(app, common)
+    assert refused.exit_code == 2 and "'K1', 'K2'" in refused.stderr and "Traceback" not in refused.output
+    done = cli.invoke(app, [*common, "--map", str(tmp_path / "map.toml")])
+    assert done.exit_code == 0, done.output
+    assert "AC-1 never changes" in done.stderr and "2 channels, 3 samples at 100 Hz" in done.stdout
+    assert cli.invoke(app, ["verify", str(tmp_path / "FR1-L1-4.h5")]).exit_code == 0
+    again = cli.invoke(app, [*common, "--map", str(tmp_path / "map.toml")])
+    assert again.exit_code == 2 and "exists already" in again.stderr
+    (tmp_path / "map.toml").write_text("[chanels.WP-1]\nfrom = 'K1'\n")
+    wrong = cli.invoke(app, [*common, "--map", str(tmp_path / "map.toml")])
+    assert wrong.exit_code == 2 and "channels" in wrong.stderr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -42,6 +43,8 @@ def write(path: Path, selection: Selection) -> None:
             }
             channels.append({"id": channel_id, "variable": names[channel_id], "unit": unit, "known": known})
             selection.report((number + 1) / len(selection.ids))
+        listing = [{key: row[key] for key in ("id", "variable", "unit")} for row in channels]
+        _put(file, "channels_json", json.dumps(listing))  # for programs that read no structures
         _put(file, "channels", _records(channels, ("id", "variable", "unit", "known")))
 
 
@@ -60,7 +63,7 @@ def _records(rows: list[dict[str, Any]], fields: tuple[str, ...]) -> object:
 def _variable_names(ids: tuple[str, ...]) -> dict[str, str]:
     """MATLAB identifiers, each used once."""
     names: dict[str, str] = {}
-    used = {"run", "time_s", "channels"}
+    used = {"run", "time_s", "channels", "channels_json"}
     for channel_id in ids:
         stem = re.sub(r"\W", "_", channel_id, flags=re.ASCII)
         stem = (stem if stem[0].isalpha() else f"ch_{stem}")[:56]
