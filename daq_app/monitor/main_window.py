@@ -241,9 +241,7 @@ class MainWindow(QMainWindow):
             self.session.set_rig(rig, rate_hz or rig.acquisition.rate_hz)
             self.prepare.set_rig(rig)
             self.setWindowTitle(f"{rig.name} – Rocking-test recorder")
-        rig = self.session.rig
-        simulated = rig is not None and rig.hardware.connection == "simulated"
-        self.prepare.wall.set_address(str(about.get("connection", "")) if simulated else "")
+        self.prepare.wall.set_address(str(about.get("connection", "")) if about.get("simulated") else "")
         folder = str(about.get("folder", ""))
         self._runs_folder = Path(folder) if folder else None
         self.prepare.planned_rate_hz = float(about.get("planned_rate_hz", 0.0) or 0.0)

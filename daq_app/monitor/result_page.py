@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl, Signal
@@ -36,11 +37,15 @@ def analyse(run: Path) -> Result:
     if saved is not None and run.with_suffix(".result.pdf").exists():
         return saved
     process = start_guarded("daq_app.campaign.result", [str(run)])
+    late = threading.Timer(_LIMIT_S, process.kill)
+    late.start()
     try:
-        said, _ = process.communicate(timeout=_LIMIT_S)
-        if process.returncode:
+        assert process.stdout is not None
+        said = process.stdout.read()  # to its end; `communicate` would close its input, which ends it
+        if process.wait():
             raise NoResult(said.strip() or f"The analysis of {run.name} ended without a word.")
     finally:
+        late.cancel()
         end_guarded(process)
     made = load_result(run)
     if made is None:
