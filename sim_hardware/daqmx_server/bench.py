@@ -12,11 +12,13 @@ import numpy as np
 from sim_hardware.daqmx_server.clock import BenchClock, SteppedClock
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory import Device, Inventory, module_device
+from sim_hardware.daqmx_server.routing import edges_of, plain
 from sim_hardware.faults.board import FaultBoard
 from sim_hardware.faults.model import Fault
 from sim_hardware.signals import SignalSource
 
 if TYPE_CHECKING:
+    from sim_hardware.daqmx_server.scales import CustomScale
     from sim_hardware.daqmx_server.task import Task
 
 _SKEW_MARGIN_S = 1e-3
@@ -42,8 +44,9 @@ class Bench:
         self.faults = FaultBoard(clock.now, self._volts_at)
         self.helper = ThreadPoolExecutor(1, thread_name_prefix="samples ahead")
         self.tasks: dict[str, Task] = {}
+        self.scales: dict[str, CustomScale] = {}
         self._owners: dict[str, str] = {}
-        self._edges: dict[str, list[float]] = {}
+        self._edges: dict[str, list[tuple[float, bool]]] = {}
         self._swapped: dict[str, Device] = {}
         self._epoch_s = time.time()
 
@@ -100,14 +103,26 @@ class Bench:
             elif entry is None and name in self._swapped:
                 self.inventory.devices[name] = self._swapped.pop(name)
 
-    def reserve(self, devices: list[str], owner: str) -> None:
-        """All or nothing; −50103 where somebody else has one of them."""
+    def reserve(self, devices: list[str], owner: str, timed: bool) -> None:
+        """All or nothing; −50103 where somebody else has a device, or the chassis no timing engine left."""
         for device in devices:
             other = self._owners.get(device, owner) != owner
             if other or self.faults.active("reserved", device):
                 raise DaqmxError(Code.RESOURCE_RESERVED, f"Device: {device}")
+        if timed:
+            self._check_engines(devices, owner)
         for device in devices:
             self._owners[device] = owner
+
+    def _check_engines(self, devices: list[str], owner: str) -> None:
+        inventory = self.inventory
+        for host in {inventory.host_of(inventory.device(device)) for device in devices}:
+            engines = inventory.device(host).timing_engines
+            modules = [device.name for device in inventory.devices.values() if device.chassis == host]
+            others = {self._owners[name] for name in modules if name in self._owners} - {owner}
+            used = sum(self.tasks[name].is_buffered for name in others if name in self.tasks)
+            if engines is not None and used >= engines:
+                raise DaqmxError(Code.RESOURCE_RESERVED, f"Device: {host}\nResource: AI timing engine")
 
     def release(self, owner: str) -> None:
         self._owners = {resource: name for resource, name in self._owners.items() if name != owner}
@@ -143,17 +158,17 @@ class Bench:
     def _volts_at(self, terminal: str, time_s: float) -> float:
         return float(self.source.volts((terminal,), np.array([time_s]))[0, 0])
 
-    def digital_edge(self, terminal: str, time_s: float) -> None:
-        """A rising edge at a terminal such as ``/cDAQ1/PFI0``."""
-        self._edges.setdefault(terminal.lower().strip("/"), []).append(time_s)
+    def digital_edge(self, terminal: str, time_s: float, rising: bool = True) -> None:
+        """An edge at a terminal such as ``/cDAQ1/PFI0``."""
+        self._edges.setdefault(plain(terminal), []).append((time_s, rising))
         self.changed.notify_all()
 
-    def first_edge(self, terminal: str, after_s: float) -> float | None:
-        """First edge at the terminal at or after the instant: commanded, or routed from another task."""
-        wanted = terminal.lower().strip("/")
-        seen = [t for t in self._edges.get(wanted, ()) if t >= after_s]
+    def first_edge(self, terminal: str, after_s: float, rising: bool = True) -> float | None:
+        """First edge at the terminal at or after the instant: commanded, or a pulse of another task."""
+        wanted = plain(terminal)
+        seen = [t for t, up in self._edges.get(wanted, ()) if t >= after_s and up is rising]
         for task in self.tasks.values():
-            seen += [t for t in task.signal_times(wanted) if t >= after_s - 1e-12]
+            seen += [t for t in edges_of(task, wanted) if t >= after_s - 1e-12]
         return min(seen, default=None)
 
     def reset(self) -> None:

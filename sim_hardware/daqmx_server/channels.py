@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from nidaqmx.constants import (
     AccelSensitivityUnits,
@@ -23,6 +25,9 @@ from daq_app.config.products import Product
 from sim_hardware.daqmx_server.converter import Converter
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory import Device, Inventory, channel_list
+
+if TYPE_CHECKING:
+    from sim_hardware.daqmx_server.scales import CustomScale
 
 _G: Final = 9.80665
 _INCH_M: Final = 0.0254
@@ -121,6 +126,8 @@ class VirtualChannel:
     kind: ChannelKind
     created_with: dict[str, Any] = field(default_factory=dict)
     attributes: dict[str, Any] = field(default_factory=dict)
+    scale: CustomScale | None = None
+    """Custom scale of the readings."""
 
     @property
     def settable(self) -> frozenset[str]:
@@ -141,8 +148,15 @@ class VirtualChannel:
         return self.kind.measurement
 
     @property
+    def hold_s(self) -> float:
+        """Period of a converter that is slower than the task; 0 for one that keeps up."""
+        return 1.0 / self.product.max_rate_hz if self.product.converter == "slow" else 0.0
+
+    @property
     def unit_name(self) -> str:
         """Unit of the readings, as NI's waveforms name it."""
+        if self.scale is not None:
+            return self.scale.scaled_units
         units = next(
             (
                 self.attributes[name]
@@ -188,7 +202,16 @@ class VirtualChannel:
             float(attributes[f"{prefix}_SENSITIVITY"])
             * _SI_PER_SENSITIVITY[attributes[f"{prefix}_SENSITIVITY_UNITS"]]
         )
-        return _UNITS_PER_SI[attributes[f"{prefix}_UNITS"]] / electrical_per_si
+        units = self.scale.pre_scaled_units if self.scale else attributes[f"{prefix}_UNITS"]
+        return _UNITS_PER_SI[units] / electrical_per_si
+
+    @property
+    def limits_electrical(self) -> tuple[float, float]:
+        """The smallest and largest value expected (AI.Min, AI.Max), in the electrical quantity."""
+        low, high = float(self.attributes["AI_MIN"]), float(self.attributes["AI_MAX"])
+        if self.scale is not None:
+            low, high = sorted((self.scale.inverse(low), self.scale.inverse(high)))
+        return low / self.unit_per_electrical, high / self.unit_per_electrical
 
     @property
     def volts_per_electrical(self) -> float:
@@ -198,19 +221,16 @@ class VirtualChannel:
     @property
     def input_range_v(self) -> tuple[float, float]:
         """Smallest range of the module that holds what was asked for; −200077 if none does."""
-        to_volts = self.volts_per_electrical / self.unit_per_electrical
-        low = float(self.attributes["AI_MIN"]) * to_volts
-        high = float(self.attributes["AI_MAX"]) * to_volts
-        try:
+        low, high = (limit * self.volts_per_electrical for limit in self.limits_electrical)
+        with contextlib.suppress(ValueError):
             return catalogue.coerce_range(self.product, low, high)
-        except ValueError:
-            pass
         widest = self.product.ranges_v[-1]
-        name, asked = ("DAQmx_AI_Max", high) if high > widest[1] else ("DAQmx_AI_Min", low)
+        end = "Max" if high > widest[1] else "Min"
+        per_volt = 1.0 if self.scale else self.unit_per_electrical / self.volts_per_electrical
         raise DaqmxError(
             Code.INVALID_VALUE,
-            f"Property: {name}\nRequested Value: {asked / to_volts}\n"
-            f"Maximum Value: {widest[1] / to_volts}\nMinimum Value: {widest[0] / to_volts}",
+            f"Property: DAQmx_AI_{end}\nRequested Value: {self.attributes[f'AI_{end.upper()}']}\n"
+            f"Maximum Value: {widest[1] * per_volt}\nMinimum Value: {widest[0] * per_volt}",
             f"Channel Name: {self.name}",
         )
 
@@ -249,14 +269,31 @@ class VirtualChannel:
         )
 
 
+def _scale_of(scales: Mapping[str, CustomScale], fields: dict[str, Any]) -> CustomScale | None:
+    """The custom scale a call asks for: −200447 if its units do not say so, −200378 if it is unknown."""
+    name = fields.get("custom_scale_name", "")
+    if fields.get("units") != VoltageUnits.FROM_CUSTOM_SCALE.value:
+        if name:
+            raise DaqmxError(Code.UNITS_NOT_CUSTOM, f"Custom Scale Name: {name}")
+        return None
+    if name not in scales:
+        raise DaqmxError(Code.SCALE_UNKNOWN, f"Custom Scale Name: {name}")
+    return scales[name]
+
+
 def create_channels(
-    inventory: Inventory, rpc: str, fields: dict[str, Any], existing: set[str]
+    inventory: Inventory,
+    scales: Mapping[str, CustomScale],
+    rpc: str,
+    fields: dict[str, Any],
+    existing: set[str],
 ) -> list[VirtualChannel]:
     """The virtual channels that one ``CreateAI…Chan`` call asks for."""
     physical = channel_list(fields["physical_channel"])
     if not physical:
         raise DaqmxError(Code.PHYSICAL_CHANNEL_UNKNOWN, "Physical Channel Name: (none)")
     kind = KINDS.get(rpc)
+    scale = _scale_of(scales, fields)
     out: list[VirtualChannel] = []
     for name, terminal in zip(_names(fields["name_to_assign_to_channel"], physical), physical, strict=True):
         device, number = inventory.physical_channel(terminal)
@@ -271,7 +308,7 @@ def create_channels(
             raise DaqmxError(Code.CHANNEL_ALREADY_IN_TASK, f"Channel Name: {name}")
         attributes = {kind.attributes[key]: value for key, value in fields.items() if key in kind.attributes}
         channel = VirtualChannel(
-            name, f"{device.name}/ai{number}", device, number, kind, attributes, dict(attributes)
+            name, f"{device.name}/ai{number}", device, number, kind, dict(attributes), attributes, scale
         )
         if float(attributes["AI_MIN"]) >= float(attributes["AI_MAX"]):
             raise DaqmxError(Code.MIN_NOT_BELOW_MAX, f"Channel Name: {name}")

@@ -27,7 +27,10 @@ def run_command(bench: Bench, name: str, arguments: dict[str, Any]) -> dict[str,
             }
         if name == "digital_edge":
             bench.clock.power_on()
-            bench.digital_edge(str(arguments["terminal"]), bench.clock.now())
+            edge = str(arguments.get("edge", "rising"))
+            if edge not in ("rising", "falling"):
+                raise ValueError(f"an edge is rising or falling, not {edge!r}")
+            bench.digital_edge(str(arguments["terminal"]), bench.clock.now(), edge == "rising")
             return {"time_s": bench.clock.now()}
         if name == "fault":
             return {"number": bench.add_fault(fault_from(arguments)), "time_s": bench.clock.now()}

@@ -56,7 +56,14 @@ class Code(IntEnum):
     SCALAR_OF_MANY = -200523
     EVERY_N_NOT_FOR_INPUT = -200965
     SIGNAL_EVENT_UNSUPPORTED = -200987
-    INVALID_SCALE = -200447
+    UNITS_NOT_CUSTOM = -200447
+    SCALE_UNKNOWN = -200378
+    SCALE_ZERO_SLOPE = -200409
+    SCALE_PRE_SCALED_EQUAL = -200602
+    SCALE_SCALED_EQUAL = -200603
+    SCALE_NO_COEFFICIENTS = -200404
+    SCALE_TABLE_LENGTHS = -200350
+    NO_SYNC = -201426
 
 
 _TEXT: Final[dict[int, str]] = {
@@ -169,7 +176,19 @@ _TEXT: Final[dict[int, str]] = {
     ),
     Code.DUPLICATE_TASK: ("Task name specified conflicts with an existing task name."),
     Code.TASK_NOT_IN_MAX: ("Specified task is not in the Data Neighborhood of NI MAX."),
-    Code.INVALID_SCALE: ("Scale specified is invalid or does not exist."),
+    Code.UNITS_NOT_CUSTOM: (
+        "A custom scale is given, but the units of the channel are not From Custom Scale."
+    ),
+    Code.SCALE_UNKNOWN: "Custom scale specified does not exist.",
+    Code.SCALE_ZERO_SLOPE: "Slope of a linear scale cannot be zero.",
+    Code.SCALE_PRE_SCALED_EQUAL: "Minimum and maximum of the pre-scaled values cannot be equal.",
+    Code.SCALE_SCALED_EQUAL: "Minimum and maximum of the scaled values cannot be equal.",
+    Code.SCALE_NO_COEFFICIENTS: "Coefficients of the polynomial scale are not specified.",
+    Code.SCALE_TABLE_LENGTHS: "Table scale has different numbers of pre-scaled and scaled values.",
+    Code.NO_SYNC: (
+        "Devices of this task cannot be synchronized: they have no clock in common. Use devices of "
+        "one chassis, or of chassis on one time-synchronized network."
+    ),
 }
 
 

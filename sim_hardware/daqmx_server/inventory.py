@@ -34,6 +34,8 @@ class Device:
     is_chassis: bool = False
     bus: BusType = BusType.UNKNOWN
     category: ProductCategory = ProductCategory.UNKNOWN
+    networked: bool = False
+    """A chassis that shares its time with others over the network."""
     timing_engines: int | None = None
     """AI tasks that a chassis can time at once."""
 
@@ -102,15 +104,16 @@ def cdaq_chassis(name: str, product: ChassisProduct | str, serial: int = 0, numb
     """The device of a cDAQ chassis; one that the catalogue lacks has three timing engines."""
     known = product if isinstance(product, ChassisProduct) else catalogue.CHASSIS.get(product)
     product_name = product if isinstance(product, str) else product.name
-    networked = re.search(r"9184|9185|9188|9189|9191", product_name) is not None
+    ethernet = re.search(r"9184|9185|9188|9189|9191", product_name) is not None
     return Device(
         name,
         product_name,
         serial=serial,
         product_number=number,
         is_chassis=True,
-        bus=BusType.TCPIP if networked else BusType.USB,
+        bus=BusType.TCPIP if ethernet else BusType.USB,
         category=ProductCategory.COMPACT_DAQ_CHASSIS,
+        networked=known is not None and known.network_synchronised,
         timing_engines=known.ai_timing_engines if known else 3,
     )
 

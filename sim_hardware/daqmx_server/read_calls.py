@@ -52,7 +52,7 @@ def read_f64(bench: Bench, request: Any) -> bytes:
     fields = fields_of(request)
     task = bench.task(request.task.name)
     got = read(task, fields["num_samps_per_chan"], fields["timeout"], fields["array_size_in_samps"])
-    values = _layout(task.readings(got.codes, got.rows), fields["fill_mode"])
+    values = _layout(task.scan.readings(got.codes, got.rows), fields["fill_mode"])
     spoiled = bench.faults.take("reply_cut_short", task.name)
     if spoiled is None:
         return encode_f64(values, got.status, got.count)
@@ -67,7 +67,7 @@ def read_scalar(bench: Bench, request: Any) -> Any:
     got = read(task, 1, request.timeout)
     if got.status or len(got.codes) != 1:
         raise DaqmxError(got.status or Code.SCALAR_OF_MANY)
-    return pb.ReadAnalogScalarF64Response(value=float(task.readings(got.codes, got.rows)[0, 0]))
+    return pb.ReadAnalogScalarF64Response(value=float(task.scan.readings(got.codes, got.rows)[0, 0]))
 
 
 def _timestamp(utc_s: float) -> Any:
@@ -113,7 +113,7 @@ def read_waveforms(bench: Bench, request: Any) -> Any:
     task = bench.task(request.task.name)
     got = read(task, request.num_samps_per_chan, request.timeout)
     reply = pb.ReadAnalogWaveformsResponse(status=got.status, samps_per_chan_read=got.count)
-    for values, channel in zip(task.readings(got.codes, got.rows), _chosen(task, got), strict=True):
+    for values, channel in zip(task.scan.readings(got.codes, got.rows), _chosen(task, got), strict=True):
         waveform = reply.waveforms.add(dt=1.0 / task.timing.rate_hz if task.is_buffered else 0.0)
         waveform.y_data.extend(values.tolist())
         waveform.t0.CopyFrom(_timestamp(bench.utc_s(got.first_time_s)))

@@ -222,6 +222,6 @@ def _note_overloads(task: Task, codes: NDArray[np.int32], rows: list[int] | None
     for values, row in zip(codes, chosen, strict=True):
         channel = task.channels[row]
         if channel.overload_detection and values.size:
-            low, high = channel.converter.code_limits
+            low, high = task.scan.limits(row)
             if values.min() <= low or values.max() >= high:
                 task.overloads.add(channel.name)

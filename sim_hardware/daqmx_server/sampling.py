@@ -75,6 +75,8 @@ class Input:
     converter: Converter
     time_offset_s: float
     """Skew minus input delay: sample k shows the instant ``time of k + time_offset_s``."""
+    hold_s: float = 0.0
+    """A slow converter's own period: between its conversions it repeats the last one."""
 
 
 class Distortion(Protocol):
@@ -105,12 +107,12 @@ class Sampler:
         self._distortion = distortion
         self._inputs = tuple(inputs)
         self.times = times
-        groups: dict[float, list[int]] = {}
+        groups: dict[tuple[float, float], list[int]] = {}
         for row, entry in enumerate(self._inputs):
-            groups.setdefault(entry.time_offset_s, []).append(row)
+            groups.setdefault((entry.time_offset_s, entry.hold_s), []).append(row)
         self._groups = [
-            (offset, np.array(rows), tuple(self._inputs[row].terminal for row in rows))
-            for offset, rows in groups.items()
+            (offset, hold, np.array(rows), tuple(self._inputs[row].terminal for row in rows))
+            for (offset, hold), rows in groups.items()
         ]
         steps = np.array([entry.converter.step for entry in self._inputs])
         middles = np.array([entry.converter.middle for entry in self._inputs])
@@ -152,8 +154,10 @@ class Sampler:
         instants = self.times.at(np.arange(start, stop))
         taken = int(np.searchsorted(instants, np.inf))
         volts = np.zeros((len(self._inputs), stop - start))
-        for offset, rows, terminals in self._groups:
+        for offset, hold, rows, terminals in self._groups:
             times = instants[:taken] + offset
+            if hold:
+                times = np.floor(times / hold + 1e-9) * hold
             ideal = self._source.volts(terminals, times)
             volts[rows, :taken] = self._distortion.distort(terminals, times, ideal)
         np.subtract(volts, self._middle, out=volts)

@@ -20,6 +20,7 @@ from sim_hardware.daqmx_server.errors import DaqmxError
 from sim_hardware.daqmx_server.events import STREAMS
 from sim_hardware.daqmx_server.gate import Gate
 from sim_hardware.daqmx_server.read_calls import read_handlers
+from sim_hardware.daqmx_server.scales import ScaleGroup, scale_handlers
 from sim_hardware.daqmx_server.sessions import SessionError, session_handlers
 from sim_hardware.daqmx_server.task_attributes import EXPORT, READ, TIMING, TRIGGER, BufferGroup, TaskGroup
 
@@ -37,6 +38,7 @@ _GROUPS: Final[dict[str, AttributeGroup]] = {
     "Task": TaskGroup(),
     "SystemInfo": SystemGroup(),
     "Device": DeviceGroup(),
+    "Scale": ScaleGroup(),
     "PhysicalChan": PhysicalChannelGroup(),
 }
 
@@ -93,7 +95,7 @@ def _stream(
 
 def daqmx_handler(bench: Bench, gate: Gate) -> grpc.GenericRpcHandler:
     """NI's NiDAQmx service; calls without a handler answer UNIMPLEMENTED by themselves."""
-    handlers = attribute_handlers(_GROUPS) | session_handlers() | read_handlers()
+    handlers = attribute_handlers(_GROUPS) | session_handlers() | scale_handlers() | read_handlers()
     methods: dict[str, grpc.RpcMethodHandler] = {}
     for method in _SERVICE.methods:
         request_type: Any = getattr(nidaqmx_pb2, method.input_type.name)

@@ -160,7 +160,7 @@ def _create_handler(rpc: str) -> Handler:
     def create(bench: Bench, request: Any) -> Any:
         task = bench.task(request.task.name)
         existing = {channel.name for channel in task.channels}
-        task.add_channels(create_channels(bench.inventory, rpc, fields_of(request), existing))
+        task.add_channels(create_channels(bench.inventory, bench.scales, rpc, fields_of(request), existing))
         return reply()
 
     return create

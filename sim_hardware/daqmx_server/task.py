@@ -15,7 +15,8 @@ from sim_hardware.daqmx_server.bench import Bench
 from sim_hardware.daqmx_server.channels import VirtualChannel
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory import channel_list
-from sim_hardware.daqmx_server.sampling import Input, Sampler, SampleTimes
+from sim_hardware.daqmx_server.sampling import Sampler, SampleTimes
+from sim_hardware.daqmx_server.scan import Scan
 from sim_hardware.daqmx_server.tdms_log import TdmsLog
 from sim_hardware.daqmx_server.timing import TaskTiming
 
@@ -55,7 +56,7 @@ class Task:
         self.exchange: int | None = None
         self.resume: int | None = None
         self._explicit = State.UNVERIFIED
-        self._scaling: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+        self._scan: Scan | None = None
 
     # --- configuration ------------------------------------------------------------------------
 
@@ -63,14 +64,14 @@ class Task:
         """Before any change of settings: not while running, and what was verified is so no more."""
         if self.state is State.RUNNING:
             raise DaqmxError(Code.PROPERTY_WHILE_RUNNING)
-        self._scaling = None
+        self._scan = None
         self._stale = True
 
     def add_channels(self, channels: list[VirtualChannel]) -> None:
         if self.state is State.RUNNING:
             raise DaqmxError(Code.TASK_RUNNING)
         self.unreserve()
-        self._scaling = None
+        self._scan = None
         self._stale = True
         self.channels += channels
 
@@ -150,7 +151,7 @@ class Task:
             self.state = max(self.state, State.VERIFIED)
         if target >= State.RESERVED and self.state < State.RESERVED:
             self.check_devices()
-            self.bench.reserve(self.devices, self.name)
+            self.bench.reserve(self.devices, self.name, timed=self.is_buffered)
             self.state = State.RESERVED
         if target >= State.COMMITTED and self.state < State.COMMITTED:
             self.state = State.COMMITTED
@@ -162,6 +163,7 @@ class Task:
         self.check_devices()
         for channel in self.channels:
             channel.verify()
+        self._check_mix()
         self.timing.verify()
         self.log.check()
         if (
@@ -172,6 +174,17 @@ class Task:
         for which in ("START", "REF"):
             if self.trigger[f"{which}_TRIG_TYPE"] in (triggers.ANALOG, triggers.WINDOW):
                 self._trigger_channel(triggers.source_of(self.trigger, which))
+
+    def _check_mix(self) -> None:
+        """Devices of several chassis need a common clock: a network, or the PXI backplane; −201426."""
+        devices = {channel.device.name: channel.device for channel in self.channels}.values()
+        hosts = {host: self.bench.inventory.devices.get(host) for host in self.hosts}
+        on_network = all(host is not None and host.is_chassis and host.networked for host in hosts.values())
+        on_backplane = len({device.category for device in devices}) == 1 and not any(
+            d.chassis for d in devices
+        )
+        if len(hosts) > 1 and not (on_network or on_backplane):
+            raise DaqmxError(Code.NO_SYNC, f"Device Names: {', '.join(self.devices)}")
 
     def check_devices(self) -> None:
         """Raise if a device of the task has gone; a run that loses one has failed for good."""
@@ -186,15 +199,22 @@ class Task:
     def start(self) -> None:
         if self.state is State.RUNNING:
             raise DaqmxError(Code.TASK_RUNNING)
-        self.advance(State.COMMITTED)
-        if self.is_buffered:
-            # A task that waits for another one's clock or edge does not set the world going by itself.
-            clock = self.bench.clock
-            self.run = self._make_run(clock.now() if self.timing.waits_for_others else clock.power_on())
-            self.run.look(self.bench.clock.now())
+        try:
+            self.advance(State.COMMITTED)
+            if self.is_buffered:
+                self._set_running()
+        except DaqmxError:
+            self._fall_back(self._explicit)
+            raise
         self.state = State.RUNNING
         self.auto_started = False
         self.bench.changed.notify_all()
+
+    def _set_running(self) -> None:
+        # A task that waits for another one's clock or edge does not set the world going by itself.
+        clock = self.bench.clock
+        self.run = self._make_run(clock.now() if self.timing.waits_for_others else clock.power_on())
+        self.run.look(clock.now())
 
     def stop(self) -> None:
         """Back to the state the client had put the task into before the start."""
@@ -208,9 +228,7 @@ class Task:
             self.run.aborted = True
         self.log.close()
         self.run = None
-        self.state = State.COMMITTED
-        if self._explicit < State.COMMITTED:
-            self._fall_back(self._explicit)
+        self._fall_back(self._explicit)
         self.bench.changed.notify_all()
 
     def abort(self) -> None:
@@ -287,32 +305,16 @@ class Task:
         if self.run.times is not None:
             self.run.retime(self.timing.clock_from(self.run.times.first_s, self.run.times.rate_hz))
 
-    def make_sampler(self, times: SampleTimes) -> Sampler:
-        inputs = [
-            Input(channel.physical, channel.converter, offset)
-            for channel, offset in zip(self.channels, self.timing.time_offsets_s(), strict=True)
-        ]
-        return Sampler(self.bench.source, self.bench.faults, inputs, times, self.bench.helper)
-
     @property
-    def scaling(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(gain, zero) of each channel: reading = code · gain + zero."""
-        if self._scaling is None:
-            converters = [channel.converter for channel in self.channels]
-            units = np.array([channel.unit_per_electrical for channel in self.channels])
-            gain = np.array([converter.step for converter in converters]) * units
-            zero = np.array([converter.middle for converter in converters]) * units
-            self._scaling = gain, zero
-        return self._scaling
+    def scan(self) -> Scan:
+        """Converters, instants and scaling of the channels."""
+        if self._scan is None:
+            self._scan = Scan(self.channels, self.timing.time_offsets_s())
+        return self._scan
 
-    def readings(self, codes: NDArray[np.int32], rows: list[int] | None = None) -> NDArray[np.float64]:
-        """Codes (channels × samples) in the channels' units."""
-        gain, zero = self.scaling
-        if rows is not None:
-            gain, zero = gain[rows], zero[rows]
-        values: NDArray[np.float64] = codes * gain[:, None]
-        values += zero[:, None]
-        return values
+    def make_sampler(self, times: SampleTimes) -> Sampler:
+        bench = self.bench
+        return Sampler(bench.source, bench.faults, self.scan.inputs, times, bench.helper)
 
     def log_read(self, codes: NDArray[np.int32], rows: list[int] | None, first: int) -> None:
         """Give a block that has been read to DAQmx's own recorder, if that is on."""
@@ -321,7 +323,7 @@ class Task:
             self.log.write(
                 [channel.name for channel in chosen],
                 [channel.unit_name for channel in chosen],
-                self.readings(codes, rows),
+                self.scan.readings(codes, rows),
                 first,
                 self.timing.rate_hz,
             )
@@ -329,7 +331,7 @@ class Task:
     def trigger_readings(self, sampler: Sampler, source: str, start: int, stop: int) -> NDArray[np.float64]:
         """Readings of the channel an analogue trigger listens to."""
         row = self.channels.index(self._trigger_channel(source))
-        return self.readings(sampler.codes(start, stop)[[row]], [row]).ravel()
+        return self.scan.readings(sampler.codes(start, stop)[[row]], [row]).ravel()
 
     def _trigger_channel(self, source: str) -> VirtualChannel:
         try:
@@ -341,7 +343,10 @@ class Task:
         source = triggers.source_of(self.trigger, "REF")
         assert plan.pretrigger is not None
         if self.trigger["REF_TRIG_TYPE"] == triggers.DIGITAL:
-            return ReferenceSearch(plan.pretrigger, edge=lambda after: self.bench.first_edge(source, after))
+            rising = triggers.is_rising(self.trigger, "REF")
+            return ReferenceSearch(
+                plan.pretrigger, edge=lambda after: self.bench.first_edge(source, after, rising)
+            )
         condition = triggers.Condition.of(self.trigger, "REF")
 
         def readings(run: Run, start: int, stop: int) -> NDArray[np.float64]:
@@ -351,30 +356,3 @@ class Task:
         return ReferenceSearch(
             plan.pretrigger, crossing=triggers.CrossingSearch(condition, plan.pretrigger), readings=readings
         )
-
-    def signal_times(self, terminal: str) -> list[float]:
-        """Instants at which this task drives the terminal: its own triggers, and exports."""
-        if self.run is None or self.run.times is None:
-            return []
-        out = []
-        if terminal in self._terminals_of("StartTrigger", "START_TRIG_OUTPUT_TERM"):
-            out.append(self.run.times.first_s)
-        if terminal in self._terminals_of("SampleClock", "SAMP_CLK_OUTPUT_TERM"):
-            out.append(self.run.times.first_s)
-        ref = self.run.ref_sample
-        if ref is not None and terminal in self._terminals_of("ReferenceTrigger", "REF_TRIG_OUTPUT_TERM"):
-            out.append(self.run.times.time_of(ref))
-        return out
-
-    def drives_clock(self, terminal: str) -> bool:
-        return terminal.lower().strip("/") in self._terminals_of("SampleClock", "SAMP_CLK_OUTPUT_TERM")
-
-    def _terminals_of(self, signal: str, export: str) -> set[str]:
-        out = {
-            f"{host}/{engine}/{signal}".lower()
-            for host in self.hosts
-            for engine in ("ai", "te0", "te1", "te2")
-        }
-        out |= {f"{device}/ai/{signal}".lower() for device in self.devices}
-        out |= {term.lower().strip("/") for term in channel_list(str(self.exported.get(export, "")))}
-        return out

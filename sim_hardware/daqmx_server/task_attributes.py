@@ -173,8 +173,7 @@ TIMING: Final = SettingsGroup(
         "SAMP_CLK_SRC": "",
         "SAMP_CLK_ACTIVE_EDGE": Edge.RISING.value,
         "REF_CLK_SRC": "",
-        "SYNC_PULSE_SRC": "",
-        "SYNC_PULSE_TYPE": 12552,
+        "AI_CONV_RATE": 0.0,
     },
     derived={
         "SAMP_CLK_RATE": _clocked(lambda task: task.timing.rate_hz, "SampClk_Rate"),
@@ -207,9 +206,8 @@ TRIGGER: Final = SettingsGroup(
     defaults={
         "START_TRIG_TYPE": triggers.NONE,
         "REF_TRIG_TYPE": triggers.NONE,
-        "PAUSE_TRIG_TYPE": None,
         "START_TRIG_DELAY": 0.0,
-        "START_TRIG_RETRIGGERABLE": False,
+        "START_TRIG_DELAY_UNITS": 10364,
         "REF_TRIG_PRETRIG_SAMPLES": 2,
         **{f"DIG_EDGE_{which}_TRIG_SRC": "" for which in ("START", "REF")},
         **{f"DIG_EDGE_{which}_TRIG_EDGE": Edge.RISING.value for which in ("START", "REF")},

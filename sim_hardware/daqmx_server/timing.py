@@ -5,18 +5,22 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
-from nidaqmx.constants import AcquisitionType, SampleTimingType
+from nidaqmx.constants import AcquisitionType, DigitalWidthUnits, SampleTimingType
 
 from daq_app.config import catalogue
+from daq_app.config.products import Product
 from sim_hardware.daqmx_server import triggers
 from sim_hardware.daqmx_server.acquisition import StartRule
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
+from sim_hardware.daqmx_server.routing import plain, terminals_of
 from sim_hardware.daqmx_server.sampling import SampleTimes
 from sim_hardware.daqmx_server.triggers import CrossingSearch
 
 if TYPE_CHECKING:
     from sim_hardware.daqmx_server.task import Task
 
+_RATE_OF_SLOW_MODULES_HZ = 100e3
+_FEWEST_SAMPLES = 2
 _OWN_CLOCKS = ("", "onboardclock")
 
 
@@ -65,9 +69,11 @@ class TaskTiming:
         limits = []
         for channel in self._task.channels:
             product, n = channel.product, counts[channel.device.name]
+            if product.converter == "slow":
+                continue  # it repeats its last value at any rate
             single = product.max_rate_hz
             limits.append(min(single, product.aggregate_rate_hz / n) if product.aggregate_rate_hz else single)
-        return min(limits, default=0.0)
+        return min(limits, default=_RATE_OF_SLOW_MODULES_HZ if counts else 0.0)
 
     @property
     def timebase_hz(self) -> float:
@@ -86,15 +92,39 @@ class TaskTiming:
         return self.source_is_foreign or self._task.trigger["START_TRIG_TYPE"] == triggers.DIGITAL
 
     def verify(self) -> None:
-        if self._task.is_buffered and self.rate_hz > self.max_rate_hz * (1 + 1e-9):
+        """Raise what NI-DAQmx raises for a clock that these channels cannot have."""
+        if not self._task.is_buffered:
+            return
+        if self.samples_per_channel < _FEWEST_SAMPLES and self.mode == AcquisitionType.FINITE.value:
+            raise DaqmxError(
+                Code.INVALID_VALUE,
+                f"Property: DAQmx_SampQuant_SampPerChan\nRequested Value: {self.samples_per_channel}\n"
+                f"Minimum Value: {_FEWEST_SAMPLES}",
+            )
+        if not self.rate_hz > 0:
+            raise DaqmxError(
+                Code.INVALID_VALUE, f"Property: DAQmx_SampClk_Rate\nRequested Value: {self.rate_hz}"
+            )
+        if self.rate_hz > self.max_rate_hz * (1 + 1e-9):
             raise DaqmxError(
                 Code.SAMPLE_RATE_TOO_HIGH,
                 f"Property: DAQmx_SampClk_Rate\nRequested Value: {self.rate_hz}\n"
                 f"Maximum Value: {self.max_rate_hz}",
             )
+        n_channels = max(Counter(c.device.name for c in self._task.channels).values())
+        period = self.convert_period_s()
+        fastest = max(c.product.min_convert_period_s for c in self._task.channels)
+        if period and not fastest * (1 - 1e-9) <= period <= (1 + 1e-9) / (self.rate_hz * n_channels):
+            raise DaqmxError(
+                Code.INVALID_VALUE,
+                f"Property: DAQmx_AIConv_Rate\nRequested Value: {1 / period}\n"
+                f"Maximum Value: {1 / fastest}\nMinimum Value: {self.rate_hz * n_channels}",
+            )
 
     def convert_period_s(self) -> float:
         """Time between the conversions of the first multiplexed device; 0 if there is none."""
+        if "AI_CONV_RATE" in self.settings:
+            return 1.0 / float(self.settings["AI_CONV_RATE"])
         devices = {c.device.name: c.product for c in self._task.channels}
         counts = Counter(c.device.name for c in self._task.channels)
         periods = catalogue.convert_periods_s(
@@ -105,7 +135,10 @@ class TaskTiming:
     def time_offsets_s(self) -> list[float]:
         """Per channel: multiplexer skew by place in the device's scan list, minus the converter's lag."""
         rate = self.rate_hz
-        skews = catalogue.task_skews_s([(c.device.name, c.product) for c in self._task.channels], rate)
+        scan = [(c.device.name, c.product) for c in self._task.channels]
+        skews = catalogue.task_skews_s(scan, rate)
+        if "AI_CONV_RATE" in self.settings:
+            skews = _skews_at(scan, 1.0 / float(self.settings["AI_CONV_RATE"]))
         return [
             skew - catalogue.input_delay_s(channel.product, rate)
             for skew, channel in zip(skews, self._task.channels, strict=True)
@@ -125,7 +158,7 @@ class TaskTiming:
             if (
                 other is not self._task
                 and not other.timing.source_is_foreign
-                and other.drives_clock(self.source)
+                and plain(self.source) in terminals_of(other, "SampleClock")
             ):
                 return other
         return None
@@ -135,6 +168,22 @@ class TaskTiming:
         if self.source_is_foreign:
             return _SharedClock(self._task, armed_s)
         return _OwnClock(self._task, armed_s)
+
+
+def _skews_at(scan: list[tuple[str, Product]], period_s: float) -> list[float]:
+    """Skews where the client has set the convert clock itself."""
+    seen: Counter[str] = Counter()
+    out = []
+    for device, product in scan:
+        out.append(seen[device] * period_s if product.converter == "multiplexed" else 0.0)
+        seen[device] += 1
+    return out
+
+
+def _start_edge(task: Task, after_s: float) -> float | None:
+    """The edge that a digital start trigger waits for, if it has come."""
+    source = triggers.source_of(task.trigger, "START")
+    return task.bench.first_edge(source, after_s, triggers.is_rising(task.trigger, "START"))
 
 
 class _OwnClock:
@@ -162,7 +211,10 @@ class _OwnClock:
         instant = self._trigger_instant(now_s)
         if instant is None:
             return None
-        first = instant + float(self._task.trigger.get("START_TRIG_DELAY", 0.0))
+        delay = float(self._task.trigger.get("START_TRIG_DELAY", 0.0))
+        if self._task.trigger.get("START_TRIG_DELAY_UNITS") == DigitalWidthUnits.SAMPLE_CLOCK_PERIODS.value:
+            delay /= self._task.timing.rate_hz
+        first = instant + delay
         rate = self._task.timing.rate_hz
         self._task.bench.faults.acquisition_started(first, rate)
         return self._task.timing.clock_from(first, rate)
@@ -172,7 +224,7 @@ class _OwnClock:
             return self._armed_s
         source = triggers.source_of(self._task.trigger, "START")
         if self._kind == triggers.DIGITAL:
-            return self._task.bench.first_edge(source, self._armed_s)
+            return _start_edge(self._task, self._armed_s)
         assert self._search is not None
         hit = self._search.find(
             lambda start, stop: self._task.trigger_readings(self._sampler, source, start, stop),
@@ -198,7 +250,7 @@ class _SharedClock:
         times = master.run.times
         armed = self._armed_s
         if self._task.trigger["START_TRIG_TYPE"] == triggers.DIGITAL:
-            edge = self._task.bench.first_edge(str(self._task.trigger["DIG_EDGE_START_TRIG_SRC"]), armed)
+            edge = _start_edge(self._task, armed)
             if edge is None:
                 return None
             armed = edge

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 import numpy as np
-from nidaqmx.constants import Slope, TriggerType, WindowTriggerCondition1
+from nidaqmx.constants import Edge, Slope, TriggerType, WindowTriggerCondition1
 from numpy.typing import NDArray
 
 Readings = Callable[[int, int], NDArray[np.float64]]
@@ -78,6 +78,11 @@ class CrossingSearch:
             self._armed = bool(self._armed or ready.any())
             self._next = end
         return None
+
+
+def is_rising(settings: Mapping[str, Any], which: Which) -> bool:
+    """Which edge of a digital trigger counts."""
+    return bool(settings.get(f"DIG_EDGE_{which}_TRIG_EDGE", Edge.RISING.value) == Edge.RISING.value)
 
 
 def source_of(settings: Mapping[str, Any], which: str) -> str:

@@ -1,0 +1,43 @@
+"""The scan list of a task: converters and instants of its channels, and readings of their codes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_hardware.daqmx_server.channels import VirtualChannel
+from sim_hardware.daqmx_server.sampling import Input
+
+
+class Scan:
+    """Settled when a task is verified: channels do not change while it runs."""
+
+    def __init__(self, channels: Sequence[VirtualChannel], time_offsets_s: Sequence[float]) -> None:
+        self._channels = tuple(channels)
+        converters = [channel.converter for channel in channels]
+        self.inputs = tuple(
+            Input(channel.physical, converter, offset, channel.hold_s)
+            for channel, converter, offset in zip(channels, converters, time_offsets_s, strict=True)
+        )
+        units = np.array([channel.unit_per_electrical for channel in channels])
+        self._gain = np.array([converter.step for converter in converters]) * units
+        self._zero = np.array([converter.middle for converter in converters]) * units
+        self._scaled = {row: c.scale for row, c in enumerate(channels) if c.scale is not None}
+
+    def readings(self, codes: NDArray[np.int32], rows: Sequence[int] | None = None) -> NDArray[np.float64]:
+        """Codes (channels × samples) in the channels' units."""
+        gain, zero = self._gain, self._zero
+        if rows is not None:
+            gain, zero = gain[list(rows)], zero[list(rows)]
+        values: NDArray[np.float64] = codes * gain[:, None]
+        values += zero[:, None]
+        for place, row in enumerate(range(len(self._channels)) if rows is None else rows):
+            if row in self._scaled:
+                values[place] = self._scaled[row].forward(values[place])
+        return values
+
+    def limits(self, row: int) -> tuple[int, int]:
+        """Codes at the rails."""
+        return self.inputs[row].converter.code_limits
