@@ -13,7 +13,7 @@ from daq_app.gap.core.decision import Material, Thresholds, decide
 from daq_app.gap.core.effects import Library
 from daq_app.gap.core.evidence import NULL, Ranked, credible_set, family_of, pair_candidates, rank
 from daq_app.gap.core.features import Run
-from daq_app.gap.core.fit import Fit, effects_of
+from daq_app.gap.core.fit import Fit, effects_of, frozen_columns
 from daq_app.gap.core.goodness import Goodness, check
 from daq_app.gap.core.held_out import GapSize, HeldOutRun, gap_size
 from daq_app.gap.core.likelihood import Covariance
@@ -24,6 +24,9 @@ from daq_app.gap.core.result import CannotDiagnose, Detection, Diagnosis, Estima
 from daq_app.gap.core.where import gap_map
 
 Hypothesis = tuple[str, ...]
+POLISHED = 6
+POLISH_REACH = 40.0
+"""The best six hypotheses within 40 in log evidence are fitted to the end with exact Jacobians."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,27 +99,59 @@ class _Study:
         self.fits: dict[Hypothesis, Fit] = {}
         self.probes: dict[Hypothesis, Fit] = {}
         self._goodness: dict[Hypothesis, Goodness] = {}
+        self._polished: set[Hypothesis] = set()
 
-    def _task(self, effects: Hypothesis, start: Fit | None) -> FitTask:
+    def _task(self, effects: Hypothesis, start: Fit | None, *, polish: bool) -> FitTask:
         known = start.known() if start else {}
         sigmas = start.sigmas if start else {}
-        return FitTask(effects_of(effects, self.library), known, sigmas)
+        again = start is not None and start.effects == effects
+        return FitTask(effects_of(effects, self.library), known, sigmas, polish, not again)
 
-    def _fit(self, hypotheses: Sequence[Hypothesis], starts: Sequence[Fit | None], text: str) -> list[Fit]:
-        tasks = [self._task(h, s) for h, s in zip(hypotheses, starts, strict=True)]
+    def _fit(
+        self,
+        hypotheses: Sequence[Hypothesis],
+        starts: Sequence[Fit | None],
+        text: str,
+        *,
+        polish: bool = True,
+    ) -> list[Fit]:
+        tasks = [self._task(h, s, polish=polish) for h, s in zip(hypotheses, starts, strict=True)]
         return self.workers.run(tasks, text)
 
     def fit_all(self) -> None:
         """Null, singles and probes; then pairs where they are wanted."""
         self.fits[NULL] = self._fit([NULL], [None], "without any effect")[0]
+        self.workers.frozen = frozen_columns(self.model, self.runs, self.fits[NULL])
         singles = [(effect.name,) for effect in self.library.named]
         probes = [(effect.name,) for effect in self.library.probes]
         both = singles + probes
-        found = self._fit(both, [self.fits[NULL]] * len(both), "single effects")
+        found = self._fit(both, [self.fits[NULL]] * len(both), "single effects", polish=False)
         for hypothesis, result in zip(both, found, strict=True):
             (self.fits if hypothesis in singles else self.probes)[hypothesis] = result
+        self._polish(self.fits)
+        self._polish(self.probes)
         if len(self.library.named) > 1 and self.options.pairs and self._pairs_wanted():
             self._fit_pairs()
+            self._polish(self.fits)
+
+    def _polish(self, fits: dict[Hypothesis, Fit]) -> None:
+        """Finish the fits that have a chance; the others keep their quick ones."""
+        if not fits:
+            return
+        best = max(f.log_evidence for f in fits.values())
+        order = sorted(fits, key=lambda h: -fits[h].log_evidence)
+        chosen = [h for h in order[:POLISHED] if fits[h].log_evidence > best - POLISH_REACH and h != NULL]
+        chosen = [h for h in chosen if h not in self._polished]
+        self._polished |= set(chosen)
+        for hypothesis, result in zip(
+            chosen, self._fit(chosen, [fits[h] for h in chosen], "the best once more"), strict=True
+        ):
+            if result.log_evidence > fits[hypothesis].log_evidence - 5.0:
+                result.starts, result.starts_agreeing = (
+                    fits[hypothesis].starts,
+                    fits[hypothesis].starts_agreeing,
+                )
+                fits[hypothesis] = result
 
     def _pairs_wanted(self) -> bool:
         """Pairs cost most of the time, and only help where singles leave something over."""
@@ -141,7 +176,9 @@ class _Study:
         for pair in candidates:
             known = [self.fits[(name,)] for name in pair]
             starts.append(max(known, key=lambda f: f.log_evidence))
-        for pair, result in zip(candidates, self._fit(candidates, starts, "pairs of effects"), strict=True):
+        for pair, result in zip(
+            candidates, self._fit(candidates, starts, "pairs of effects", polish=False), strict=True
+        ):
             self.fits[pair] = result
 
     def _ranked(self) -> list[Ranked]:

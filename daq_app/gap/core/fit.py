@@ -24,6 +24,7 @@ from daq_app.gap.core.problem import Linearised, Problem
 SCATTER_STEP = 0.05
 """Step of the differences in the logarithm of a scatter size."""
 _MAX_STARTS = 6
+Frozen = dict[tuple[str, int | None], FloatArray]
 _TOLERANCE = 1e-3
 """A change of the log posterior below this ends a search."""
 
@@ -79,6 +80,7 @@ class _Search:
         self.predictions = [problem.predict(i, u) for i in range(len(problem.runs))]
         self.lines: list[Linearised] = []
         self.damping = 1e-3
+        self.frozen: Frozen | None = None
         self.objective = self._objective(u, log_sigma)
 
     def sigmas(self, log_sigma: FloatArray) -> dict[str, float]:
@@ -101,7 +103,8 @@ class _Search:
 
     def linearise(self) -> None:
         self.lines = [
-            self.problem.linearise(i, self.u, prediction) for i, prediction in enumerate(self.predictions)
+            self.problem.linearise(i, self.u, prediction, self.frozen)
+            for i, prediction in enumerate(self.predictions)
         ]
 
     def normal_equations(self, log_sigma: FloatArray) -> tuple[FloatArray, FloatArray, float]:
@@ -216,8 +219,14 @@ def fit(
     known: Mapping[tuple[str, int | None], float] | None = None,
     sigmas: Mapping[str, float] | None = None,
     multistart: bool = True,
+    frozen: Frozen | None = None,
+    polish: bool = True,
 ) -> Fit:
     """Fit a hypothesis to runs.
+
+    `frozen` are columns of the Jacobian from the fit without the effect (`frozen_columns`): the
+    search uses them until its last steps. Without `polish` even those use them, which is good enough
+    to see that a hypothesis has no chance.
 
     `known` are unit coordinates to start from (usually the fit without the effect), `sigmas` the
     scatter sizes to start from. With `multistart` the effect's parameters are started from zero and
@@ -230,16 +239,37 @@ def fit(
     searches = [_Search(problem, u, start_sigma.copy()) for u in starts]
     # A start may lie where the model diverges; it is dropped as long as another one does not.
     searches = [s for s in searches if math.isfinite(s.objective)] or searches[:1]
-    if len(searches) > 1:
-        for search in searches:
-            search.run(rounds=1, steps=2)
-        searches.sort(key=lambda s: s.objective)
+    for search in searches:
+        search.frozen = frozen
+        if len(searches) > 1:
+            search.run(rounds=1, steps=3 if frozen else 2)
+    searches.sort(key=lambda s: s.objective)
     leaders = searches[:2]
-    converged = [search.run(rounds=6, steps=6) for search in leaders]
-    finals = [s.objective for s in leaders] + [s.objective for s in searches[2:]]
+    if frozen:
+        for search in leaders:
+            search.run(rounds=3, steps=5)
+        searches.sort(key=lambda s: s.objective)
+        leaders = searches[:1]
+    converged = []
+    for search in leaders:
+        if polish:
+            search.frozen = None
+        converged.append(search.run(rounds=6, steps=6))
+    finals = [s.objective for s in leaders] + [s.objective for s in searches[len(leaders) :]]
     best = int(np.argmin(finals[: len(leaders)]))
     agreeing = sum(1 for value in finals if value - finals[best] < 0.5)
     return _finish(leaders[best], converged[best], len(searches), agreeing)
+
+
+def frozen_columns(model: Model, runs: Sequence[Run], found: Fit, effects: Sequence[Effect] = ()) -> Frozen:
+    """Columns of the Jacobian at a fit, by (key, run index)."""
+    problem = Problem(model, runs, effects)
+    columns: Frozen = {}
+    for i in range(len(problem.runs)):
+        line = problem.linearise(i, found.u)
+        for k in problem.columns(i):
+            columns[(problem.unknowns[k].key, i)] = line.jacobian[:, k]
+    return columns
 
 
 def _starts(problem: Problem, base: FloatArray) -> list[FloatArray]:

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.features import Run
-from daq_app.gap.core.fit import Fit, fit
+from daq_app.gap.core.fit import Fit, Frozen, fit
 from daq_app.gap.core.held_out import HeldOutRun, score
 from daq_app.gap.core.model import Model
 
@@ -30,9 +30,11 @@ class FitTask:
     effects: tuple[Effect, ...]
     known: dict[tuple[str, int | None], float]
     sigmas: dict[str, float]
+    polish: bool = True
+    multistart: bool = True
 
-    def run(self, model: Model, runs: Sequence[Run]) -> Fit:
-        return fit(model, runs, self.effects, self.known, self.sigmas)
+    def run(self, model: Model, runs: Sequence[Run], frozen: Frozen | None = None) -> Fit:
+        return fit(model, runs, self.effects, self.known, self.sigmas, self.multistart, frozen, self.polish)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +45,7 @@ class ScoreTask:
     whole: Fit
     by: str
 
-    def run(self, model: Model, runs: Sequence[Run]) -> list[HeldOutRun]:
+    def run(self, model: Model, runs: Sequence[Run], frozen: Frozen | None = None) -> list[HeldOutRun]:
         return score(model, runs, self.effects, self.whole, self.by)
 
 
@@ -51,12 +53,12 @@ _STATE: dict[str, Any] = {}
 """In a worker process: the model and runs, sent once instead of with every task."""
 
 
-def _prepare(model: Model, runs: Sequence[Run]) -> None:
-    _STATE["model"], _STATE["runs"] = model, runs
+def _prepare(model: Model, runs: Sequence[Run], frozen: Frozen | None) -> None:
+    _STATE["model"], _STATE["runs"], _STATE["frozen"] = model, runs, frozen
 
 
 def _work(task: FitTask | ScoreTask) -> Any:
-    return task.run(_STATE["model"], _STATE["runs"])
+    return task.run(_STATE["model"], _STATE["runs"], _STATE["frozen"])
 
 
 @contextmanager
@@ -94,6 +96,8 @@ class Workers:
         self._progress = progress or (lambda done, total, text: None)
         self._cancelled = cancelled or (lambda: False)
         self._pool: ProcessPoolExecutor | None = None
+        self.frozen: Frozen | None = None
+        """Columns of the Jacobian without any effect; set before the first tasks on several cores."""
 
     def __enter__(self) -> Workers:
         return self
@@ -113,7 +117,7 @@ class Workers:
                     self._count,
                     mp_context=multiprocessing.get_context("spawn"),
                     initializer=_prepare,
-                    initargs=(self._model, self._runs),
+                    initargs=(self._model, self._runs, self.frozen),
                 )
                 futures = [self._pool.submit(_work, task) for task in listed]
         else:
@@ -126,7 +130,7 @@ class Workers:
         for done, task in enumerate(tasks):
             self._check()
             self._progress(done, len(tasks), text)
-            results.append(task.run(self._model, self._runs))
+            results.append(task.run(self._model, self._runs, self.frozen))
         self._progress(len(tasks), len(tasks), text)
         return results
 

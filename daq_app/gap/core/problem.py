@@ -78,11 +78,25 @@ class Problem:
     def predict(self, run: int, u: FloatArray) -> Prediction:
         return self.model.predict(self.runs[run], self.values(run, u))
 
-    def linearise(self, run: int, u: FloatArray, prediction: Prediction | None = None) -> Linearised:
-        """Residual and Jacobian of one run by central differences (one-sided at a bound)."""
+    def linearise(
+        self,
+        run: int,
+        u: FloatArray,
+        prediction: Prediction | None = None,
+        frozen: Mapping[tuple[str, int | None], FloatArray] | None = None,
+    ) -> Linearised:
+        """Residual and Jacobian of one run by central differences (one-sided at a bound).
+
+        `frozen` are columns known from another point, shape (n,) by (key, run): a search far from
+        its end takes them instead of computing them anew.
+        """
         here = prediction or self.predict(run, u)
         jacobian = np.zeros((here.features.size, len(self)))
         for k in self._columns[run]:
+            known = frozen.get((self.unknowns[k].key, run)) if frozen else None
+            if known is not None:
+                jacobian[:, k] = known
+                continue
             ahead, behind = min(u[k] + STEP, self.high[k]), max(u[k] - STEP, self.low[k])
             jacobian[:, k] = (self._at(run, u, k, ahead) - self._at(run, u, k, behind)) / (ahead - behind)
         return Linearised(self.runs[run].features.values - here.features, jacobian, here)

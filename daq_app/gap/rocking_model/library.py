@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 from daq_app.gap.core import Confusion, Effect, Library, Parameter
 from daq_app.gap.core.parameters import between, positive, signed
@@ -86,8 +85,6 @@ def _sensor_effects(known: set[str]) -> Iterable[Effect]:
                 parameter = signed(
                     "rate", reach, "rad/s" if family == "tiltmeter" else "m/s", "drift of the zero"
                 )
-            if name == "lag":
-                parameter = replace(parameter, low=-0.1)
             yield Effect(
                 f"{name}@{family}",
                 "sensor",
@@ -138,7 +135,7 @@ def _probes() -> Iterable[Effect]:
         "non-parametric",
         kind="probe",
     )
-    for family, count in (("wire", 6), ("accelerometer", 4), ("joint", 6), ("base", 4), ("tiltmeter", 4)):
+    for family, count in (("wire", 6), ("accelerometer", 3), ("joint", 6), ("base", 4), ("tiltmeter", 4)):
         kind = {"joint": "interface", "base": "contact"}.get(family, "sensor")
         yield Effect(
             f"free_{family}",

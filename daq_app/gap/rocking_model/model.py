@@ -33,7 +33,7 @@ class RockingModel:
         Scatter(SCATTER_R, 0.004, 0.7, 0.02, "1", "relative scatter of r from impact to impact"),
         Scatter(SCATTER_TIME, 3e-5, 1.0, 1e-3, "s", "what half-cycle times scatter by beyond sensor noise"),
         Scatter(
-            SCATTER_SENSOR, 1.0, 1.0, 12.0, "1", "repeatability of sensor coefficients, in their own units"
+            SCATTER_SENSOR, 0.5, 1.0, 4.0, "1", "repeatability of sensor coefficients, in their own units"
         ),
     )
 
@@ -75,6 +75,7 @@ class RockingModel:
                 "cal_accelerometer", 0.0, tolerance / 2, "1", meaning="calibration of the accelerometers"
             ),
             Parameter("tilt_response", 0.0, 0.01, "s", meaning="error of the tiltmeters' time constant"),
+            Parameter("onset", 0.0, 2.5e-3, "s", meaning="start of the ringing after the impact"),
             Parameter("base_follow", 0.0, 8e-3, "m/rad", meaning="translation from wire calibrations"),
             Parameter("twist_follow", 0.0, 2e-3, "1/m", meaning="twist from LVDT calibrations"),
             Parameter("mount_height", 0.0, 0.05, "m", meaning="height of the LVDTs' points above the joint"),
@@ -89,7 +90,7 @@ class RockingModel:
         n = len(run.features)
         predicted = np.empty(n)
         loading_r, loading_t, loading_s = np.zeros(n), np.zeros(n), np.zeros(n)
-        count = len(run.timings)
+        count = len(run.places)
         predicted[:count], peaks, slopes = self._swings(run, values)
         loading_t[:count] = 1.0
         last = count + run.peaks.size
@@ -108,17 +109,16 @@ class RockingModel:
         table = self._half_cycles(run, vector, true, levels, key)
         count = levels.shape[1]
         first = shooting.FIRST_CROSSING
-        fall, rise = table[:, first : first + count], table[:, first + count : first + 2 * count]
         speeds_out, speeds_in = table[:, shooting.SPEED_OUT], table[:, shooting.SPEED_IN]
         pause = response.pause_at_impact(values, speeds_out)
-        times = np.empty(len(run.timings))
-        for i, timing in enumerate(run.timings):
-            ta = self._from_peak(fall, rise, timing.ka, timing.a, count)
-            tb = self._from_peak(fall, rise, timing.kb, timing.b, count)
-            times[i] = tb - ta
-            if timing.ka != timing.kb:
-                k = timing.ka
-                times[i] += table[k, shooting.FALL_S] + pause[k] + table[k + 1, shooting.RISE_S]
+        # Crossings as times from their own peak: positive in the fall, negative in the rise.
+        crossings = table[:, first : first + 2 * count].copy()
+        crossings[:, count:] *= -1.0
+        places = run.places
+        times = crossings[places[:, 2], places[:, 3]] - crossings[places[:, 0], places[:, 1]]
+        across = run.across
+        k = places[across, 0]
+        times[across] += table[k, shooting.FALL_S] + pause[k] + table[k + 1, shooting.RISE_S]
         times = times / clock + response.free_times(run, values)
         k = run.peaks
         before = k - 1
@@ -135,21 +135,15 @@ class RockingModel:
         return times, measured - excess / slopes, slopes
 
     @staticmethod
-    def _from_peak(fall: FloatArray, rise: FloatArray, k: int, place: int, count: int) -> float:
-        """Time of a crossing from its own peak (negative in the rise)."""
-        return float(fall[k, place]) if place < count else -float(rise[k, place - count])
-
-    @staticmethod
     def _half_cycles(
         run: RockingRun, vector: FloatArray, true: FloatArray, levels: FloatArray, key: bytes
     ) -> FloatArray:
         """The simulator's half-cycles; remembered for the last parameters, since many do not move them."""
-        known = run.cache.get("key")
-        if known is not None and known.tobytes() == key:
-            return run.cache["table"]
+        if run.cache.get("key") == key:
+            known: FloatArray = run.cache["table"]
+            return known
         table = np.empty((true.size, shooting.FIRST_CROSSING + 2 * levels.shape[1]))
         side = 1.0 if run.swings.peak_rad[0] > 0 else -1.0
         shooting.half_cycles(vector, run.swings.peak_s, true, levels, side, True, table)
-        run.cache["key"] = np.frombuffer(key, dtype=np.uint8).astype(np.uint8)  # type: ignore[assignment]
-        run.cache["table"] = table
+        run.cache["key"], run.cache["table"] = key, table
         return table

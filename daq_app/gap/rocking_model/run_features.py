@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,22 +13,9 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import swings as sw
 from daq_app.gap.rocking_model.records import GapRun, Survey
 from daq_app.gap.rocking_model.rotation import Rotation, joint_rotation, sample_noise, wall_rotation
-from daq_app.gap.rocking_model.sensor_blocks import Block, Grid, blocks_of, make_grid
+from daq_app.gap.rocking_model.sensor_blocks import GRID_HZ, Block, Grid, blocks_of, coarse, make_grid
 
 _SMALLEST_LOADING = 1e-3
-
-
-@dataclass(frozen=True, slots=True)
-class Timing:
-    """One time feature: crossing `b` of half-cycle `kb` minus crossing `a` of half-cycle `ka`.
-
-    A crossing is (half-cycle, place); places below F are of the fall, others of the rise.
-    """
-
-    ka: int
-    a: int
-    kb: int
-    b: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +27,11 @@ class RockingRun:
     features: FeatureSet
     survey: Survey
     swings: sw.Swings
-    timings: tuple[Timing, ...]
+    places: NDArray[np.intp]
+    """(T, 4): each time feature is crossing `b` of half-cycle `kb` minus crossing `a` of half-cycle `ka`,
+    as (ka, a, kb, b); crossings below F are of the fall, the others of the rise."""
+    across: NDArray[np.intp]
+    """Time features that span an impact."""
     peaks: NDArray[np.intp]
     """Half-cycles whose peak is a feature (all but the first)."""
     blocks: tuple[Block, ...]
@@ -52,17 +44,17 @@ class RockingRun:
     block_loadings: FloatArray
     """(n, k): measurement covariance of the blocks as loadings."""
     notes: tuple[str, ...] = ()
-    cache: dict[str, FloatArray] = field(default_factory=dict, compare=False)
+    cache: dict[Any, Any] = field(default_factory=dict, compare=False)
 
 
 def extract(run: GapRun) -> RockingRun:
     """Features of a run. Raises `CannotDiagnose` where it holds no rocking motion."""
-    joint = joint_rotation(run)
+    run, joint = _from_hold(run)
     reference, theta, noise, notes = _reference(run, joint)
     swings = sw.find_swings(theta, noise, run.rate_hz, run.name)
     grid = make_grid(theta, joint.valid, swings, run.rate_hz)
     blocks = tuple(blocks_of(run, joint, grid, swings, reference).values())
-    values, sds, labels, timings = _times(swings, reference)
+    values, sds, labels, places = _times(swings, reference)
     peaks = np.arange(1, swings.peak_s.size)
     amplitude, order = swings.peak_rad, swings.peak_s / max(swings.peak_s[-1], 1e-9)
     for k in peaks:
@@ -88,7 +80,8 @@ def extract(run: GapRun) -> RockingRun:
         features,
         run.survey,
         swings,
-        tuple(timings),
+        places,
+        np.flatnonzero(places[:, 0] != places[:, 2]),
         peaks,
         blocks,
         grid,
@@ -98,6 +91,27 @@ def extract(run: GapRun) -> RockingRun:
         loadings,
         notes,
     )
+
+
+BEFORE_RELEASE_S = 1.0
+
+
+def _from_hold(run: GapRun) -> tuple[GapRun, Rotation]:
+    """The record from one second before the release on: the pull and the wait before are no test."""
+    joint = joint_rotation(run)
+    step = max(round(run.rate_hz / GRID_HZ), 1)
+    theta = np.abs(coarse(joint.theta, run.rate_hz))
+    largest = float(theta.max())
+    held = np.flatnonzero(theta > 0.98 * largest)
+    below = np.flatnonzero(theta < 0.5 * largest)
+    # The release ends the first stay near the largest rotation; a later peak never comes that high.
+    after = below[below > held[0]]
+    release = held[held < after[0]][-1] if after.size else held[-1]
+    start = int(release * step - BEFORE_RELEASE_S * run.rate_hz)
+    if start < 0.5 * run.rate_hz:
+        return run, joint
+    cut = replace(run, channels=np.ascontiguousarray(run.channels[:, start:]))
+    return cut, joint_rotation(cut)
 
 
 def _reference(run: GapRun, joint: Rotation) -> tuple[str, FloatArray, float, tuple[str, ...]]:
@@ -113,12 +127,14 @@ def _reference(run: GapRun, joint: Rotation) -> tuple[str, FloatArray, float, tu
     return "wire", theta, sample_noise(theta, run.rate_hz), (*notes, note)
 
 
-def _times(swings: sw.Swings, reference: str) -> tuple[list[float], list[float], list[Label], list[Timing]]:
+def _times(
+    swings: sw.Swings, reference: str
+) -> tuple[list[float], list[float], list[Label], NDArray[np.intp]]:
     """Time features of all half-cycles: parts of the fall and rise, over the top, across the impact."""
     values: list[float] = []
     sds: list[float] = []
     labels: list[Label] = []
-    timings: list[Timing] = []
+    places: list[tuple[int, int, int, int]] = []
     count = swings.levels.shape[1]
     last = max(swings.peak_s[-1], 1e-9)
 
@@ -138,20 +154,20 @@ def _times(swings: sw.Swings, reference: str) -> tuple[list[float], list[float],
                 reference, phase, observable, "s", float(swings.peak_rad[ka]), float(swings.peak_s[ka] / last)
             )
         )
-        timings.append(Timing(ka, a, kb, b))
+        places.append((ka, a, kb, b))
 
     for k in range(swings.peak_s.size):
-        places = len(sw.RELEASE_FRACTIONS) if k == 0 else len(sw.FRACTIONS)
-        for j in range(1, places):
+        used = len(sw.RELEASE_FRACTIONS) if k == 0 else len(sw.FRACTIONS)
+        for j in range(1, used):
             phase = "release" if k == 0 else "swing"
             add(f"fall time {j}" if k else f"first fall time {j}", phase, k, j - 1, k, j)
         if k > 0:
-            for j in range(1, places):
+            for j in range(1, used):
                 add(f"rise time {j}", "swing", k, count + j, k, count + j - 1)
             add("time over the top", "peak", k, count, k, 0)
         if k + 1 < swings.peak_s.size:
-            add("time across the impact", "impact", k, places - 1, k + 1, count + len(sw.FRACTIONS) - 1)
-    return values, sds, labels, timings
+            add("time across the impact", "impact", k, used - 1, k + 1, count + len(sw.FRACTIONS) - 1)
+    return values, sds, labels, np.array(places, dtype=np.intp)
 
 
 def _wire_height(run: GapRun) -> float:

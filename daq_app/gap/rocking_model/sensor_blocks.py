@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, lfilter, sosfiltfilt
+from scipy.signal import butter, lfilter, sosfilt, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.records import GapRun
@@ -25,6 +25,11 @@ SMOOTH_HZ = 30.0
 POLYNOMIAL_DEGREE = 8
 SMALLEST_GRID_RAD = 8e-4
 MASK_S = 0.05
+RING_HZ = 150.0
+ONSET_WINDOW_S = 0.06
+ONSETS = 16
+ONSET_ERROR_S = 4e-4
+"""How well the start of the ringing is defined at all."""
 """Accelerations near an impact are left out."""
 
 
@@ -38,8 +43,8 @@ class Grid:
     alpha: FloatArray
     near_impact: NDArray[np.bool_]
     valid: NDArray[np.bool_]
-    last_impact_s: float
-    """Last impact up to which the derivatives are trusted."""
+    impact_s: FloatArray
+    """Impacts as the reference rotation has them, s from release, up to where half-cycles can be told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +109,7 @@ def make_grid(theta: FloatArray, valid: NDArray[np.bool_], swings: Swings, rate_
     distance = np.abs(time_s[:, None] - impact_s[None, :]).min(axis=1) if impact_s.size else time_s + 1e9
     good = coarse(valid.astype(float), rate_hz) > 0.999
     parts = [coarse(v, rate_hz) for v in (smooth, omega, alpha)]
-    last = impact_s[-1] if impact_s.size else 0.0
-    return Grid(time_s, parts[0], parts[1], parts[2], distance < MASK_S, good, float(last))
+    return Grid(time_s, parts[0], parts[1], parts[2], distance < MASK_S, good, impact_s)
 
 
 def _impact_samples(theta: FloatArray, smooth: FloatArray, release: int) -> list[int]:
@@ -170,12 +174,14 @@ def blocks_of(run: GapRun, joint: Rotation, grid: Grid, swings: Swings, referenc
     """All blocks that the run's channels allow, by name."""
     rocking = (grid.time_s > -0.2) & (grid.time_s < swings.rest_s - swings.release_s + 0.2)
     pick = rocking & grid.valid
+    last = grid.impact_s[-1] if grid.impact_s.size else 0.0
     found: dict[str, Block | None] = {
         "wire": _wire_block(run, joint, grid, pick, reference),
         "tiltmeter": _tilt_block(run, grid, rocking),
         "accelerometer": _acceleration_block(
-            run, grid, rocking & (grid.time_s > 0.05) & (grid.time_s < grid.last_impact_s) & ~grid.near_impact
+            run, grid, rocking & (grid.time_s > 0.05) & (grid.time_s < last) & ~grid.near_impact
         ),
+        "impact marks": _impact_block(run, grid, swings),
         "base": _translation_block(run, grid, swings, rocking),
     }
     if reference == "lvdt":
@@ -246,9 +252,39 @@ def _acceleration_block(run: GapRun, grid: Grid, pick: NDArray[np.bool_]) -> Blo
         "zero": (np.ones_like(expected), "m/s²"),
         "gain of gravity": (gravity, "1"),
         "gain of inertia": (inertia, "1"),
-        "lag": (-np.gradient(expected, 1 / GRID_HZ), "s"),
     }
+    # No lag here: between impacts the specific force hardly changes. The impacts themselves tell it.
     return regress("accelerometer", measured - expected, columns, pick)
+
+
+def _impact_block(run: GapRun, grid: Grid, swings: Swings) -> Block | None:
+    """Onset of the ringing in the accelerometers after the reference rotation passes upright."""
+    chosen = [i for i in run.indices("accelerometer") if np.all(np.isfinite(run.channels[i]))]
+    if not chosen or grid.impact_s.size < 3:
+        return None
+    high_pass = butter(2, RING_HZ, "high", fs=run.rate_hz, output="sos")
+    energy = np.zeros(run.channels.shape[1])
+    for i in chosen:
+        energy += sosfilt(high_pass, run.aligned(i)) ** 2  # causal: nothing rings before the impact
+    level = np.sqrt(energy / len(chosen))
+    quiet = float(np.median(level[: int(0.5 * run.rate_hz)]))
+    half = int(ONSET_WINDOW_S * run.rate_hz)
+    delays = []
+    for time in grid.impact_s[:ONSETS]:
+        at = round((time + swings.release_s) * run.rate_hz)
+        window = level[max(at - half, 0) : at + half]
+        if window.size == 2 * half and window.max() > 8 * quiet:
+            onset = int(np.argmax(window > max(0.25 * window.max(), 5 * quiet)))
+            delays.append((onset - half) / run.rate_hz)
+    if len(delays) < 3:
+        return None
+    middle = float(np.median(delays))
+    spread = 1.48 * float(np.median(np.abs(np.array(delays) - middle)))
+    variance = 1.57 * spread**2 / len(delays) + ONSET_ERROR_S**2
+    projection = np.zeros((1, int(grid.valid.size)))
+    everywhere = np.ones(grid.valid.size, dtype=bool)
+    values, covariance = np.array([middle]), np.array([[variance]])
+    return Block("impact marks", ("onset",), ("s",), values, covariance, projection, everywhere)
 
 
 def _lift_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:
