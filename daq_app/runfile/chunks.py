@@ -74,23 +74,36 @@ def encode_chunk(values: NDArray[Any], chunk: int) -> bytes:
     return packed + fletcher32(packed).to_bytes(4, "little")
 
 
+_Job = tuple[tuple[h5py.Dataset, ...], int, "Future[bytes]"]
+
+
 class ChunkWriter:
     """Writes chunks that worker threads compress. All calls from one thread."""
 
     def __init__(self, pool: ThreadPoolExecutor) -> None:
         self._pool = pool
-        self._waiting: list[tuple[h5py.Dataset, int, Future[bytes]]] = []
+        self._waiting: list[_Job] = []
+        self._previous: list[_Job] = []
 
-    def put(self, dataset: h5py.Dataset, start: int, values: NDArray[Any]) -> None:
-        """Queue values for the chunk that starts at element `start`."""
-        chunk = dataset.chunks[0]
-        self._waiting.append((dataset, start, self._pool.submit(encode_chunk, values, chunk)))
+    def put(self, *datasets: h5py.Dataset, start: int, values: NDArray[Any]) -> None:
+        """Queue the chunk that starts at element `start`, the same for all `datasets`."""
+        job = self._pool.submit(encode_chunk, values, datasets[0].chunks[0])
+        self._waiting.append((datasets, start, job))
+
+    def end_window(self) -> None:
+        """Write the window before this one: the workers compress one while the next is prepared.
+
+        Called once per window, it bounds the memory to two of them.
+        """
+        for datasets, start, job in self._previous:
+            for dataset in datasets:
+                dataset.id.write_direct_chunk((start,), job.result())
+        self._previous, self._waiting = self._waiting, []
 
     def flush(self) -> None:
-        """Wait for all queued chunks and write them; called once per window, it bounds the memory."""
-        for dataset, start, done in self._waiting:
-            dataset.id.write_direct_chunk((start,), done.result())
-        self._waiting.clear()
+        """Wait for everything and write it."""
+        self.end_window()
+        self.end_window()
 
 
 @contextmanager

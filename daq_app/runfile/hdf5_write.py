@@ -109,16 +109,16 @@ def _write_samples(file: h5py.File, source: RunSource, scaling: RunScaling, writ
     for first, window in source.windows(chunk):
         start = first - source.first_sample
         time_s = (first + np.arange(window.shape[1])) / header.rate_hz
-        writer.put(raw_time, start, time_s)
-        writer.put(si_time, start, time_s)
+        writer.put(raw_time, si_time, start=start, values=time_s)
         si_window = scaling.stored_si(window)
         for row, dataset in enumerate(raw):
-            writer.put(dataset, start, window[row])
+            writer.put(dataset, start=start, values=window[row])
             digests[row].update(window[row].data)
             checks[row].append(zlib.crc32(window[row].data))
         for row, dataset in enumerate(si):
-            writer.put(dataset, start, si_window[row])
-        writer.flush()
+            writer.put(dataset, start=start, values=si_window[row])
+        writer.end_window()
+    writer.flush()
     hashes = [digest.hexdigest() for digest in digests]
     for dataset, value in zip(raw, hashes, strict=True):
         dataset.attrs["sha256"] = value
@@ -310,7 +310,9 @@ def _write_derived(file: h5py.File, derived: DerivedData, rate_hz: float, writer
     for start in range(0, n_samples, chunk):
         stop = min(start + chunk, n_samples)
         instants = (derived.first_sample + np.arange(start, stop) * derived.step) / rate_hz
-        writer.put(time, start, instants)
+        writer.put(time, start=start, values=instants)
         for name, signal in derived.signals.items():
-            writer.put(datasets[name], start, np.asarray(signal.values[start:stop], dtype="<f8"))
-        writer.flush()
+            values = np.asarray(signal.values[start:stop], dtype="<f8")
+            writer.put(datasets[name], start=start, values=values)
+        writer.end_window()
+    writer.flush()

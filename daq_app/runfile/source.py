@@ -62,7 +62,8 @@ class RunScaling:
 
     def to_si(self, window: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n_channels, m) readings to (len(rows), m) SI."""
-        return self.scaling.to_si(window[list(self.rows)])
+        known = window if len(self.rows) == len(window) else window[list(self.rows)]
+        return self.scaling.to_si(known)
 
     def stored_si(self, window: NDArray[np.float64]) -> NDArray[np.float32]:
         """Engineering units as the run file keeps them: SI in single precision."""
