@@ -15,7 +15,9 @@ from daq_app.campaign.plan import load_campaign
 from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.status import CampaignStatus, PlaceState
 from daq_app.campaign.verdicts import give_verdict
-from daq_app.cli.campaign_report import DEFAULT_PLAN, report
+from daq_app.cli.campaign_progress import DEFAULT_PLAN
+from daq_app.cli.campaign_report import report
+from daq_app.cli.campaign_simulate import simulate
 from daq_app.cli.errors import reported
 from daq_app.config import ConfigError, Problem
 from daq_app.runfile import open_run
@@ -39,6 +41,9 @@ def register(app: typer.Typer) -> None:
         epilog='Example: daq-app campaign verdict runs/FR1-L3-2.h5 bad --reason "hit a rope"',
     )(verdict)
     group.command("report", epilog="Example: daq-app campaign report runs --out report")(report)
+    group.command("simulate", epilog="Example: daq-app campaign simulate runs --r FR1=0.895 --seed 3")(
+        simulate
+    )
     app.add_typer(group, name="campaign")
 
 

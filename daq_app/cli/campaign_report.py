@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from daq_app.campaign import collect as gathering
@@ -20,10 +17,9 @@ from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.status import CampaignStatus
 from daq_app.campaign.summary import TestSummary
 from daq_app.campaign.tables import RestitutionRow, table_4_1
+from daq_app.cli.campaign_progress import DEFAULT_PLAN, progress_bar
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
 from daq_app.rocking.analysis import AnalysisOptions
-
-DEFAULT_PLAN = Path("configs/campaigns/costa.toml")
 
 
 def report(
@@ -46,7 +42,7 @@ def report(
         campaign = load_campaign(plan_file)
         recorded = read_recorded(folder)
         status = CampaignStatus(campaign, recorded)
-        with _progress() as advance:
+        with progress_bar("analysing") as advance:
             tests, failures = gathering.collect(
                 recorded,
                 options=AnalysisOptions(bias_runs=bias_runs),
@@ -102,22 +98,3 @@ def _print(rows: list[RestitutionRow], tests: list[TestSummary], target: Path, a
     if left_out:
         console.print(f"Left out of the means: {', '.join(left_out)}", highlight=False, markup=False)
     console.print(f"Report: {target / 'report.html'}", highlight=False, markup=False, soft_wrap=True)
-
-
-@contextmanager
-def _progress() -> Iterator[gathering.Progress]:
-    """A bar on stderr, so that `--json` stays clean on stdout."""
-    columns = (
-        TextColumn("analysing"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.description}"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=None)
-
-        def advance(done: int, total: int, name: str) -> None:
-            bar.update(task, completed=done, total=total, description=name)
-
-        yield advance
