@@ -49,9 +49,9 @@ class SensorChain:
         self._filters.forget_from(time_s)
 
     def states(self, scene: Scene, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n, N_STATE) of the wall (sim_hardware.sensors.layout)."""
+        """(N_STATE, n) of the wall (sim_hardware.sensors.layout)."""
         times = np.ascontiguousarray(times_s, dtype=np.float64)
-        states = np.empty((times.size, la.N_STATE))
+        states = np.empty((la.N_STATE, times.size))
         fill_states(times, scene.pieces, scene.events, scene.epochs, states)
         return states
 
@@ -106,7 +106,7 @@ class SensorChain:
         if np.any(rows[:, la.RW_TABLE] >= 0.0):
             tables, first = self._filters.tables(scene, float(seen.min()), float(seen.max()))
         states, height = self.states(scene, seen), scene.height_m
-        fill_electrical(rows, keys, instants, states, scene.events, height, tables, first, noisy, out)
+        fill_electrical(rows, keys, instants, seen, states, scene.events, height, tables, first, noisy, out)
 
     def _select(
         self, terminals: tuple[str, ...]

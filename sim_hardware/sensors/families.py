@@ -1,4 +1,8 @@
-"""The true quantity at each sensor, from the state of the wall: one function per family."""
+"""The true quantity at each sensor, from the states of the wall: one function per family.
+
+Each fills one sensor's row of the output; `row` is the sensor (layout RW_…), `states` (N_STATE, n)
+belong to the ascending instants `times`.
+"""
 
 from __future__ import annotations
 
@@ -13,98 +17,129 @@ from sim_hardware.sensors import layout as la
 
 
 @part
-def opening(row: NDArray[np.float64], s: NDArray[np.float64]) -> float:
+def fill_opening(row: NDArray[np.float64], states: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     """Vertical opening of the joint at (x, y), m: u_z − x sin θ; (b/2 − x) sin θ for a sharp edge."""
-    value = s[la.ST_UZ] - row[la.RW_X] * s[la.ST_SIN]
-    return float(value + s[la.ST_TWIST] * row[la.RW_Y] * (s[la.ST_PIVOT] - row[la.RW_X]))
+    x, y = row[la.RW_X], row[la.RW_Y]
+    for k in range(out.size):
+        value = states[la.ST_UZ, k] - x * states[la.ST_SIN, k]
+        out[k] = value + states[la.ST_TWIST, k] * y * (states[la.ST_PIVOT, k] - x)
 
 
 @part
-def shortening(row: NDArray[np.float64], height: float, s: NDArray[np.float64]) -> float:
+def fill_shortening(
+    row: NDArray[np.float64], height: float, states: NDArray[np.float64], out: NDArray[np.float64]
+) -> None:
     """|A − P₀| − |A − P| of a wire from its anchor to the wall point, m."""
     x, y, z = row[la.RW_X], row[la.RW_Y], row[la.RW_Z]
-    sin, cos = s[la.ST_SIN_TOTAL], s[la.ST_COS_TOTAL]
-    dx0, dy0, dz0 = x - row[la.RW_ANCHOR], y - row[la.RW_ANCHOR + 1], z - row[la.RW_ANCHOR + 2]
-    moved_x = x * (cos - 1.0) + z * sin + s[la.ST_UX] + s[la.ST_TWIST] * y * z - s[la.ST_YAW] * y
-    moved_x += s[la.ST_MODE] * (z / height) ** 2
-    moved_z = z * (cos - 1.0) - x * sin + s[la.ST_UZ]
-    moved_y = s[la.ST_YAW] * x
-    before = dx0 * dx0 + dy0 * dy0 + dz0 * dz0
-    change = moved_x * (2.0 * dx0 + moved_x) + moved_y * (2.0 * dy0 + moved_y)
-    change += moved_z * (2.0 * dz0 + moved_z)
-    # the difference of two roots without cancellation
-    return float(-change / (math.sqrt(before) + math.sqrt(before + change)))
+    dx, dy, dz = x - row[la.RW_ANCHOR], y - row[la.RW_ANCHOR + 1], z - row[la.RW_ANCHOR + 2]
+    before = dx * dx + dy * dy + dz * dz
+    length = math.sqrt(before)
+    bend = (z / height) ** 2
+    for k in range(out.size):
+        sin, versed = states[la.ST_SIN_TOTAL, k], 1.0 - states[la.ST_COS_TOTAL, k]
+        moved_x = z * sin - x * versed + states[la.ST_UX, k] + bend * states[la.ST_MODE, k]
+        moved_x += states[la.ST_TWIST, k] * y * z - states[la.ST_YAW, k] * y
+        moved_y = states[la.ST_YAW, k] * x
+        moved_z = states[la.ST_UZ, k] - z * versed - x * sin
+        change = moved_x * (2.0 * dx + moved_x) + moved_y * (2.0 * dy + moved_y)
+        change += moved_z * (2.0 * dz + moved_z)
+        # the difference of two roots without cancellation
+        out[k] = -change / (length + math.sqrt(before + change))
 
 
 @part
-def _transients(row: NDArray[np.float64], events: NDArray[np.float64], t: float, last: int) -> float:
-    """Velocity jumps of impacts spread over the contact, and the ringing that follows, m/s²."""
-    total = 0.0
-    axis = row[la.RW_AXIS]
-    i = last
-    while i >= 0:
-        e = events[i]
-        dt = t - e[la.EV_TIME]
-        if dt > la.RING_S:
-            break
-        if dt < la.PULSE_S and e[la.EV_SIDE] != 0.0:
-            jump = 0.0
-            if axis == la.AXIS_X:
-                jump = (e[la.EV_AFTER] - e[la.EV_BEFORE]) * row[la.RW_Z]
-            elif axis == la.AXIS_Z:
-                jump = -(e[la.EV_AFTER] - e[la.EV_BEFORE]) * row[la.RW_X]
-            total += jump / la.PULSE_S * (1.0 - math.cos(2.0 * math.pi * dt / la.PULSE_S))
-        for m in range(la.RW_RING, la.RW_RING + 6, 3):
-            total += e[la.EV_INTENSITY] * row[m] * math.exp(-dt * row[m + 2]) * math.sin(row[m + 1] * dt)
-        i -= 1
-    return total
+def fill_inclination(row: NDArray[np.float64], states: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    """Rotation at a tiltmeter before its slow response, rad; along y only its misalignment shows."""
+    share = 1.0 if row[la.RW_AXIS] == la.AXIS_X else row[la.RW_CROSS]
+    for k in range(out.size):
+        out[k] = share * (states[la.ST_TOTAL, k] + states[la.ST_TWIST, k] * row[la.RW_Y])
 
 
 @part
-def specific_force(
-    row: NDArray[np.float64], events: NDArray[np.float64], height: float, t: float, s: NDArray[np.float64]
-) -> float:
+def fill_specific_force(
+    row: NDArray[np.float64],
+    times: NDArray[np.float64],
+    events: NDArray[np.float64],
+    height: float,
+    states: NDArray[np.float64],
+    out: NDArray[np.float64],
+) -> None:
     """Acceleration less gravity along the wall-fixed axis, value upright at rest removed, m/s²."""
     x, y, z = row[la.RW_X], row[la.RW_Y], row[la.RW_Z]
-    arm = x - s[la.ST_PIVOT]
-    omega, alpha = s[la.ST_OMEGA], s[la.ST_ALPHA]
-    bend = (z / height) ** 2 * s[la.ST_MODE_ACC]
     axis = row[la.RW_AXIS]
-    value = 0.0
+    bend = (z / height) ** 2
+    for k in range(out.size):
+        arm = x - states[la.ST_PIVOT, k]
+        omega2, alpha = states[la.ST_OMEGA, k] ** 2, states[la.ST_ALPHA, k]
+        sin, cos = states[la.ST_SIN_TOTAL, k], states[la.ST_COS_TOTAL, k]
+        if axis == la.AXIS_X:
+            value = alpha * z - omega2 * arm - G_M_S2 * sin + bend * states[la.ST_MODE_ACC, k]
+            value += states[la.ST_TWIST_ACC, k] * y * z - states[la.ST_YAW_ACC, k] * y
+            out[k] = value + states[la.ST_GROUND, k] * cos
+        elif axis == la.AXIS_Z:
+            value = -alpha * arm - omega2 * z + G_M_S2 * (cos - 1.0)
+            out[k] = value + states[la.ST_GROUND, k] * sin
+        else:
+            out[k] = states[la.ST_YAW_ACC, k] * x
+    _add_transients(row, times, events, out)
+
+
+@part
+def _add_transients(
+    row: NDArray[np.float64],
+    times: NDArray[np.float64],
+    events: NDArray[np.float64],
+    out: NDArray[np.float64],
+) -> None:
+    """Velocity jumps of impacts spread over the contact, and the ringing that follows, m/s²."""
+    axis, n = row[la.RW_AXIS], times.size
+    if n == 0:
+        return
+    a1, w1, d1 = row[la.RW_RING], row[la.RW_RING + 1], row[la.RW_RING + 2]
+    a2, w2, d2 = row[la.RW_RING + 3], row[la.RW_RING + 4], row[la.RW_RING + 5]
+    reach = 0.0
     if axis == la.AXIS_X:
-        value = alpha * z - omega * omega * arm - G_M_S2 * s[la.ST_SIN_TOTAL] + bend
-        value += s[la.ST_TWIST_ACC] * y * z - s[la.ST_YAW_ACC] * y + s[la.ST_GROUND] * s[la.ST_COS_TOTAL]
+        reach = row[la.RW_Z]
     elif axis == la.AXIS_Z:
-        value = -alpha * arm - omega * omega * z + G_M_S2 * (s[la.ST_COS_TOTAL] - 1.0)
-        value += s[la.ST_GROUND] * s[la.ST_SIN_TOTAL]
-    else:
-        value = s[la.ST_YAW_ACC] * x
-    if s[la.ST_EVENT] >= 0.0:
-        value += _transients(row, events, t, int(s[la.ST_EVENT]))
-    return float(value)
+        reach = -row[la.RW_X]
+    for i in range(events.shape[0]):
+        start = events[i, la.EV_TIME]
+        if start + la.RING_S < times[0]:
+            continue
+        if start > times[n - 1]:
+            break
+        loud = events[i, la.EV_INTENSITY]
+        jump = 0.0
+        if events[i, la.EV_SIDE] != 0.0:
+            jump = (events[i, la.EV_AFTER] - events[i, la.EV_BEFORE]) * reach / la.PULSE_S
+        k = np.searchsorted(times, start)
+        while k < n and times[k] - start < la.RING_S:
+            dt = times[k] - start
+            ring = a1 * math.exp(-dt * d1) * math.sin(w1 * dt) + a2 * math.exp(-dt * d2) * math.sin(w2 * dt)
+            out[k] += loud * ring
+            if jump != 0.0 and dt < la.PULSE_S:
+                out[k] += jump * (1.0 - math.cos(2.0 * math.pi * dt / la.PULSE_S))
+            k += 1
 
 
 @part
-def inclination(row: NDArray[np.float64], s: NDArray[np.float64]) -> float:
-    """Rotation at a tiltmeter before its slow response, rad; along y only its misalignment shows."""
-    value = s[la.ST_TOTAL] + s[la.ST_TWIST] * row[la.RW_Y]
-    if row[la.RW_AXIS] != la.AXIS_X:
-        value *= row[la.RW_CROSS]
-    return float(value)
-
-
-@part
-def quantity(
-    row: NDArray[np.float64], events: NDArray[np.float64], height: float, t: float, s: NDArray[np.float64]
-) -> float:
+def fill_quantity(
+    row: NDArray[np.float64],
+    times: NDArray[np.float64],
+    events: NDArray[np.float64],
+    height: float,
+    states: NDArray[np.float64],
+    out: NDArray[np.float64],
+) -> None:
     """The true quantity, SI, before the sensor's own dynamics and faults."""
     family = row[la.RW_FAMILY]
     if family == la.LVDT:
-        return opening(row, s)
-    if family == la.WIRE:
-        return shortening(row, height, s)
-    if family == la.ACCELEROMETER:
-        return specific_force(row, events, height, t, s)
-    if family == la.TILTMETER:
-        return inclination(row, s)
-    return 0.0
+        fill_opening(row, states, out)
+    elif family == la.WIRE:
+        fill_shortening(row, height, states, out)
+    elif family == la.ACCELEROMETER:
+        fill_specific_force(row, times, events, height, states, out)
+    elif family == la.TILTMETER:
+        fill_inclination(row, states, out)
+    else:
+        out[:] = 0.0

@@ -106,7 +106,7 @@ class FilterBank:
 
     def _make(self, scene: Scene, chunk: int) -> NDArray[np.float64]:
         times: NDArray[np.float64] = (chunk * _CHUNK + np.arange(_CHUNK + 1.0)) * la.FILTER_DT_S
-        states = np.empty((times.size, la.N_STATE))
+        states = np.empty((la.N_STATE, times.size))
         fill_states(times, scene.pieces, scene.events, scene.epochs, states)
         inputs = np.empty((len(self._rows), times.size))
         fill_ideal(self._rows, times, states, scene.events, scene.height_m, inputs)

@@ -59,8 +59,7 @@ ST_TWIST_ACC: Final = 14
 ST_YAW: Final = 15
 ST_YAW_ACC: Final = 16
 ST_GROUND: Final = 17  # m/s²
-ST_EVENT: Final = 18  # index of the last event, −1 before the first
-N_STATE: Final = 19
+N_STATE: Final = 18
 
 # rows: one per sensor
 RW_FAMILY: Final = 0
@@ -114,7 +113,7 @@ HIGH_PASS: Final = 3  # first order, AC coupling
 
 PULSE_S: Final = 0.006
 """Duration of the contact at an impact: the velocity jump of a rigid wall is spread over a raised cosine."""
-RING_S: Final = 0.09
-"""After this the ringing of an impact is below a thousandth."""
+RING_S: Final = 0.06
+"""After this the ringing of an impact is lost in the noise."""
 FILTER_DT_S: Final = 1.0 / 4000.0
 """Grid on which dynamic responses are integrated."""

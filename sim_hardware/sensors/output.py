@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sim_hardware.jit import kernel, part
 from sim_hardware.sensors import layout as la
-from sim_hardware.sensors.families import quantity
+from sim_hardware.sensors.families import fill_quantity
 from sim_hardware.sensors.noise import deviate, share
 
 
@@ -26,31 +26,71 @@ def filtered(table: NDArray[np.float64], first: int, t: float) -> float:
 
 
 @part
-def distorted(row: NDArray[np.float64], value: float, t: float) -> float:
-    """Static faults: sag and misalignment of a wire, gain, offset, drift, hum."""
-    if row[la.RW_SAG] != 0.0:
-        dx, dy = row[la.RW_X] - row[la.RW_ANCHOR], row[la.RW_Y] - row[la.RW_ANCHOR + 1]
-        dz = row[la.RW_Z] - row[la.RW_ANCHOR + 2]
-        length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        value += row[la.RW_SAG] * (length**3 - (length - value) ** 3)
-    value = value * (row[la.RW_GAIN] + row[la.RW_QUADRATIC] * value)
-    value += row[la.RW_OFFSET] + row[la.RW_DRIFT] * t
-    if row[la.RW_HUM] != 0.0:
-        value += row[la.RW_HUM] * math.sin(row[la.RW_HUM_W] * t + row[la.RW_HUM_PHASE])
-    return float(value)
+def _respond(
+    row: NDArray[np.float64],
+    instants: NDArray[np.float64],
+    table: NDArray[np.float64],
+    first: int,
+    out: NDArray[np.float64],
+) -> None:
+    """Replace the true quantity by the sensor's response, or take the low-passed part away from it."""
+    high_pass = row[la.RW_FILTER] == la.HIGH_PASS
+    for k in range(out.size):
+        value = filtered(table, first, instants[k] - row[la.RW_DELAY])
+        out[k] = out[k] - value if high_pass else value
 
 
 @part
-def seen_at(row: NDArray[np.float64], key: np.uint64, t: float) -> float:
-    """Instant of the wall that a sample at `t` shows: clock error, drop-outs, delay."""
-    t = t * row[la.RW_CLOCK]
-    if t > row[la.RW_STUCK]:
-        t = row[la.RW_STUCK]
+def _distort(row: NDArray[np.float64], instants: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    """Faults that few sensors have: sag and misalignment of a wire, drift, hum."""
+    sag, quadratic, hum = row[la.RW_SAG], row[la.RW_QUADRATIC], row[la.RW_HUM]
+    dx, dy = row[la.RW_X] - row[la.RW_ANCHOR], row[la.RW_Y] - row[la.RW_ANCHOR + 1]
+    dz = row[la.RW_Z] - row[la.RW_ANCHOR + 2]
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    for k in range(out.size):
+        value = out[k]
+        if sag != 0.0:
+            value += sag * (length**3 - (length - value) ** 3)
+        value += quadratic * value * value + row[la.RW_DRIFT] * instants[k]
+        if hum != 0.0:
+            value += hum * math.sin(row[la.RW_HUM_W] * instants[k] + row[la.RW_HUM_PHASE])
+        out[k] = value
+
+
+@part
+def _seen_at(row: NDArray[np.float64], key: np.uint64, t: float) -> float:
+    """Instant of the wall that a sample at `t` shows: clock error, stuck sensor, drop-outs."""
+    t = min(t * row[la.RW_CLOCK], row[la.RW_STUCK])
     if row[la.RW_DROP_SHARE] > 0.0:
         k = np.int64(math.floor(t / row[la.RW_DROP_S]))
         if share(key ^ np.uint64(0x5851F42D4C957F2D), k) < row[la.RW_DROP_SHARE]:
             t = k * row[la.RW_DROP_S]
     return float(t)
+
+
+@part
+def _finish(
+    row: NDArray[np.float64],
+    key: np.uint64,
+    instants: NDArray[np.float64],
+    noisy: bool,
+    out: NDArray[np.float64],
+) -> None:
+    """Gain, zero, noise, steps, range of the sensor, and its electrical scale."""
+    gain, offset, noise = row[la.RW_GAIN], row[la.RW_OFFSET], row[la.RW_NOISE]
+    low, high, quantum = row[la.RW_LOW], row[la.RW_HIGH], row[la.RW_QUANTUM]
+    slope, zero = row[la.RW_SLOPE], row[la.RW_ZERO]
+    if noisy:
+        for k in range(out.size):
+            out[k] = out[k] * gain + offset + noise * deviate(key, instants[k])
+    else:
+        for k in range(out.size):
+            out[k] = out[k] * gain + offset
+    if quantum > 0.0:
+        for k in range(out.size):
+            out[k] = math.floor(out[k] / quantum + 0.5) * quantum
+    for k in range(out.size):
+        out[k] = min(max(out[k], low), high) * slope + zero
 
 
 @kernel
@@ -62,11 +102,9 @@ def fill_ideal(
     height: float,
     out: NDArray[np.float64],
 ) -> None:
-    """(rows, n) true quantities, SI, of states at `times`."""
+    """(rows, n) true quantities, SI, of the states at ascending `times`."""
     for i in range(rows.shape[0]):
-        row = rows[i]
-        for k in range(times.size):
-            out[i, k] = quantity(row, events, height, times[k], states[k])
+        fill_quantity(rows[i], times, events, height, states, out[i])
 
 
 @kernel
@@ -75,7 +113,7 @@ def fill_instants(
 ) -> None:
     """(n,) instants that a sensor's samples show, before delay."""
     for k in range(times.size):
-        out[k] = seen_at(row, key, times[k])
+        out[k] = _seen_at(row, key, times[k])
 
 
 @kernel
@@ -83,6 +121,7 @@ def fill_electrical(
     rows: NDArray[np.float64],
     keys: NDArray[np.uint64],
     instants: NDArray[np.float64],
+    seen: NDArray[np.float64],
     states: NDArray[np.float64],
     events: NDArray[np.float64],
     height: float,
@@ -93,27 +132,16 @@ def fill_electrical(
 ) -> None:
     """(rows, n) electrical values.
 
-    `instants` (n,) hold for all rows; `states` belong to ``instants − delay``, so rows of one call
-    share the delay.  `tables` (k, m, 2) holds the dynamic responses.
+    `instants` (n,) hold for all rows; `states` belong to `seen` = instants − delay, so rows of one
+    call share the delay.  `tables` (k, m, 2) holds the dynamic responses.
     """
     for i in range(rows.shape[0]):
-        row, key = rows[i], keys[i]
-        response, table = row[la.RW_FILTER], int(row[la.RW_TABLE])
-        slope, zero, noise = row[la.RW_SLOPE], row[la.RW_ZERO], row[la.RW_NOISE] if noisy else 0.0
-        low, high, quantum, delay = row[la.RW_LOW], row[la.RW_HIGH], row[la.RW_QUANTUM], row[la.RW_DELAY]
-        for k in range(instants.size):
-            t = instants[k]
-            seen = t - delay
-            value = 0.0
-            if response == la.NO_FILTER or response == la.HIGH_PASS:
-                value = quantity(row, events, height, seen, states[k])
-                if response == la.HIGH_PASS:
-                    value -= filtered(tables[table], table_first, seen)
-            else:
-                value = filtered(tables[table], table_first, seen)
-            value = distorted(row, value, t)
-            if noise > 0.0:
-                value += noise * deviate(key, t)
-            if quantum > 0.0:
-                value = math.floor(value / quantum + 0.5) * quantum
-            out[i, k] = min(max(value, low), high) * slope + zero
+        row, line, table = rows[i], out[i], int(rows[i, la.RW_TABLE])
+        if table < 0 or row[la.RW_FILTER] == la.HIGH_PASS:
+            fill_quantity(row, seen, events, height, states, line)
+        if table >= 0:
+            _respond(row, instants, tables[table], table_first, line)
+        curved = row[la.RW_SAG] != 0.0 or row[la.RW_QUADRATIC] != 0.0
+        if curved or row[la.RW_DRIFT] != 0.0 or row[la.RW_HUM] != 0.0:
+            _distort(row, instants, line)
+        _finish(row, keys[i], instants, noisy, line)

@@ -36,6 +36,13 @@ def blank_row() -> NDArray[np.float64]:
     return row
 
 
+def excitation_v(channel: Channel) -> float:
+    """Excitation to divide the sensor's volts by: native LVDTs are given per volt of excitation."""
+    if channel.measurement == "lvdt_native" and channel.sensitivity_unit != "mV/V/mm":
+        return channel.excitation.value or 1.0
+    return 1.0
+
+
 def sensor_row(channel: Channel, height_m: float, offset_scatter: float, seed: int) -> NDArray[np.float64]:
     """The row of one sensor: what the rig file says, plus what differs from sensor to sensor."""
     row = blank_row()
@@ -46,10 +53,9 @@ def sensor_row(channel: Channel, height_m: float, offset_scatter: float, seed: i
     if channel.anchor_m is not None:
         row[la.RW_ANCHOR : la.RW_ANCHOR + 3] = channel.anchor_m
     row[la.RW_AXIS] = _AXIS[channel.axis]
-    row[la.RW_SLOPE] = channel.polarity * channel.sensitivity_v_per_si
-    row[la.RW_ZERO] = channel.offset * (
-        1.0 if channel.measurement == "voltage" else channel.sensitivity_v_per_si
-    )
+    slope = channel.sensitivity_v_per_si / excitation_v(channel)
+    row[la.RW_SLOPE] = channel.polarity * slope
+    row[la.RW_ZERO] = channel.offset * (1.0 if channel.measurement == "voltage" else slope)
     row[la.RW_NOISE] = channel.noise_si
     low, high = channel.range_si
     iepe = channel.measurement == "iepe"

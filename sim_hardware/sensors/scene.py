@@ -93,7 +93,7 @@ class Scene:
     def _with_events(self, rows: NDArray[np.float64]) -> Scene:
         events = np.concatenate([self.events, rows])
         events = events[np.argsort(events[:, la.EV_TIME], kind="stable")]
-        march(events, self.epochs, 0)
+        march(events, self.epochs)
         return replace(self, events=events)
 
 
