@@ -77,7 +77,7 @@ def read(task: Task, asked: int, timeout_s: float, room: int | None = None) -> R
     if exchange is not None:
         exchange.done(task)
     first = task.bench.clock.now() if run.times is None else run.times.time_of(run.base + start)
-    _note_overloads(task, codes, rows)
+    task.overloads.update(task.scan.overloaded(codes, rows))
     task.log_read(codes, rows, start)
     _end_automatic(task, run)
     task.bench.changed.notify_all()
@@ -210,18 +210,7 @@ def _on_demand(task: Task, count: int, rows: list[int] | None) -> Reading:
     sampler = task.make_sampler(SampleTimes(now, max(task.timing.max_rate_hz, 1.0)))
     codes = sampler.codes(0, count)
     codes = codes if rows is None else codes[rows]
-    _note_overloads(task, codes, rows)
+    task.overloads.update(task.scan.overloaded(codes, rows))
     if task.auto_started:
         task.stop()
     return Reading(codes, rows, 0, now)
-
-
-def _note_overloads(task: Task, codes: NDArray[np.int32], rows: list[int] | None) -> None:
-    """Modules that detect overloads remember the channels that reached a rail."""
-    chosen = range(len(task.channels)) if rows is None else rows
-    for values, row in zip(codes, chosen, strict=True):
-        channel = task.channels[row]
-        if channel.overload_detection and values.size:
-            low, high = task.scan.limits(row)
-            if values.min() <= low or values.max() >= high:
-                task.overloads.add(channel.name)

@@ -24,6 +24,7 @@ class Scan:
         units = np.array([channel.unit_per_electrical for channel in channels])
         self._gain = np.array([converter.step for converter in converters]) * units
         self._zero = np.array([converter.middle for converter in converters]) * units
+        self._watched = frozenset(row for row, c in enumerate(channels) if c.overload_detection)
         self._scaled = {row: c.scale for row, c in enumerate(channels) if c.scale is not None}
 
     def readings(self, codes: NDArray[np.int32], rows: Sequence[int] | None = None) -> NDArray[np.float64]:
@@ -33,11 +34,20 @@ class Scan:
             gain, zero = gain[list(rows)], zero[list(rows)]
         values: NDArray[np.float64] = codes * gain[:, None]
         values += zero[:, None]
-        for place, row in enumerate(range(len(self._channels)) if rows is None else rows):
-            if row in self._scaled:
-                values[place] = self._scaled[row].forward(values[place])
+        if self._scaled:
+            for place, row in enumerate(range(len(self._channels)) if rows is None else rows):
+                if row in self._scaled:
+                    values[place] = self._scaled[row].forward(values[place])
         return values
 
-    def limits(self, row: int) -> tuple[int, int]:
-        """Codes at the rails."""
-        return self.inputs[row].converter.code_limits
+    def overloaded(self, codes: NDArray[np.int32], rows: Sequence[int] | None = None) -> list[str]:
+        """Names of the channels that reached a rail, among those whose module detects that."""
+        if not self._watched or not codes.shape[1]:
+            return []
+        out = []
+        for place, row in enumerate(range(len(self._channels)) if rows is None else rows):
+            if row in self._watched:
+                low, high = self.inputs[row].converter.code_limits
+                if codes[place].min() <= low or codes[place].max() >= high:
+                    out.append(self._channels[row].name)
+        return out
