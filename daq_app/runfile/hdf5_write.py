@@ -12,9 +12,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from daq_app.config import Channel
 from daq_app.runfile import layout
 from daq_app.runfile.chunks import ChunkWriter, chunk_samples, chunk_writer, create_chunked
+from daq_app.runfile.hdf5_channels import describe_channels
 from daq_app.runfile.model import RUN_FORMAT, RUN_FORMAT_VERSION, DerivedData, Event, Gap, to_json
 from daq_app.runfile.source import Provenance, RunScaling, RunSource, rig_of
 
@@ -35,7 +35,7 @@ def write_run(
     with h5py.File(path, "w", libver=("v108", "v108")) as file, chunk_writer() as writer:
         _write_texts(file, source)
         digest = _write_samples(file, source, scaling, writer)
-        _write_channels(file, source, scaling)
+        describe_channels(file, header, scaling)
         _write_events(file, source.events, header.rate_hz)
         _write_gaps(file, source.gaps, header.rate_hz)
         if derived is not None:
@@ -102,7 +102,6 @@ def _write_samples(file: h5py.File, source: RunSource, scaling: RunScaling, writ
     si = []
     for channel in scaling.channels.values():
         dataset = _create_signal(si_group, channel.id, si_time, chunk, "<f4", channel.si_unit)
-        dataset.attrs["long_name"] = _long_name(channel)
         si.append(dataset)
     digests = [hashlib.sha256() for _ in raw]
     checks: list[list[int]] = [[] for _ in raw]
@@ -123,7 +122,6 @@ def _write_samples(file: h5py.File, source: RunSource, scaling: RunScaling, writ
     for dataset, value in zip(raw, hashes, strict=True):
         dataset.attrs["sha256"] = value
     _write_checks(file, header.channel_ids, checks)
-    _describe_scaling(raw_group, si_group, source, scaling)
     return combined_sha256(hashes)
 
 
@@ -162,85 +160,6 @@ def _create_signal(
     dataset.dims[0].attach_scale(time)
     dataset.attrs["units"] = unit
     return dataset
-
-
-def _describe_scaling(
-    raw_group: h5py.Group, si_group: h5py.Group, source: RunSource, scaling: RunScaling
-) -> None:
-    """Attributes by which any program turns raw into SI: si = (raw − zero_reading) · si_per_reading."""
-    header = source.header
-    for index, channel in enumerate(scaling.channels.values()):
-        attributes: dict[str, Any] = {
-            "zero_reading": float(scaling.scaling.zero[index, 0]),
-            "si_per_reading": float(scaling.scaling.gain[index, 0]),
-            "si_units": channel.si_unit,
-            "offset": channel.offset,
-            "tare": header.tare.get(channel.id, 0.0),
-            "polarity": channel.polarity,
-            "sensitivity": channel.sensitivity,
-            "sensitivity_unit": channel.sensitivity_unit,
-            "family": channel.family,
-            "physical_channel": channel.physical_channel,
-            "position_m": np.array(channel.position_m),
-            "axis": channel.axis,
-            "range_si": np.array(channel.range_si),
-            "certificate": channel.certificate.number,
-            "certificate_due": channel.certificate.due.isoformat(),
-        }
-        if channel.anchor_m is not None:
-            attributes["anchor_m"] = np.array(channel.anchor_m)
-        for group in (raw_group, si_group):
-            group[channel.id].attrs.update(attributes)
-    for channel_id in header.channel_ids:
-        raw_group[channel_id].attrs["time_offset_s"] = header.time_offset_s(channel_id)
-        if channel_id in si_group:
-            si_group[channel_id].attrs["time_offset_s"] = header.time_offset_s(channel_id)
-
-
-def _long_name(channel: Channel) -> str:
-    quantity = {
-        "lvdt": "opening of the base joint",
-        "wire": "shortening of the wire",
-        "accelerometer": "acceleration",
-        "tiltmeter": "rotation",
-    }[channel.family]
-    return f"{quantity} at {channel.id}"
-
-
-def _write_channels(file: h5py.File, source: RunSource, scaling: RunScaling) -> None:
-    """One row per channel: the sensor table with certificates."""
-    header = source.header
-    group = file.create_group(layout.CHANNELS)
-    ids = group.create_dataset("channel", data=list(header.channel_ids), dtype=_TEXT)
-    ids.make_scale("channel")
-    found = [scaling.channels.get(channel_id) for channel_id in header.channel_ids]
-    texts: dict[str, list[str]] = {
-        "family": [c.family if c else "" for c in found],
-        "physical_channel": [c.physical_channel if c else "" for c in found],
-        "reading_units": list(header.reading_units),
-        "si_units": [c.si_unit if c else "" for c in found],
-        "sensitivity_unit": [c.sensitivity_unit if c else "" for c in found],
-        "certificate": [c.certificate.number if c else "" for c in found],
-        "calibrated": [c.certificate.calibrated.isoformat() if c else "" for c in found],
-        "calibration_due": [c.certificate.due.isoformat() if c else "" for c in found],
-    }
-    numbers: dict[str, tuple[str, list[float]]] = {
-        "x": ("m", [c.position_m[0] if c else np.nan for c in found]),
-        "y": ("m", [c.position_m[1] if c else np.nan for c in found]),
-        "z": ("m", [c.position_m[2] if c else np.nan for c in found]),
-        "sensitivity": ("see sensitivity_unit", [c.sensitivity if c else np.nan for c in found]),
-        "offset": ("see reading_units", [c.offset if c else np.nan for c in found]),
-        "tare": ("see reading_units", [header.tare.get(i, 0.0) for i in header.channel_ids]),
-        "polarity": ("1", [float(c.polarity) if c else np.nan for c in found]),
-        "time_offset": ("s", [header.time_offset_s(i) for i in header.channel_ids]),
-    }
-    for name, values in texts.items():
-        dataset = group.create_dataset(name, data=values, dtype=_TEXT)
-        dataset.dims[0].attach_scale(ids)
-    for name, (unit, column) in numbers.items():
-        dataset = group.create_dataset(name, data=np.array(column, dtype=np.float64))
-        dataset.attrs["units"] = unit
-        dataset.dims[0].attach_scale(ids)
 
 
 def _write_events(file: h5py.File, events: Sequence[Event], rate_hz: float) -> None:
