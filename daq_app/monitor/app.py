@@ -82,7 +82,6 @@ def run_on_rig(rig: Path | None, out: Path | None, plan: Path | None, options: S
     chosen in the window they are shown there.
     """
     app, settings = application(), WindowSettings()
-    apply_theme(app, THEMES[settings.theme], settings.type_size)
     windows: list[MainWindow] = []
 
     def start(chosen: Path, folder: Path) -> None:
@@ -99,6 +98,7 @@ def run_on_rig(rig: Path | None, out: Path | None, plan: Path | None, options: S
         start(rig, out or settings.runs_folder)
     else:
         chooser = StartWindow(settings, out or settings.runs_folder, start)
+        apply_theme(app, chooser, THEMES[settings.theme], settings.type_size)
         chooser.show()
     return _execute(app)
 

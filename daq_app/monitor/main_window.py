@@ -209,7 +209,7 @@ class MainWindow(QMainWindow):
         app = QApplication.instance()
         assert isinstance(app, QApplication)
         self.colours = THEMES[self.settings.theme]
-        apply_theme(app, self.colours, self.settings.type_size)
+        apply_theme(app, self, self.colours, self.settings.type_size)
         for page in (self.prepare, self.live, self.campaign, self.result, self.replay):
             page.restyle(self.colours)
         self.notices.restyle(self.colours)

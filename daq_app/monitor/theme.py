@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from PySide6.QtGui import QColor, QFont, QPalette
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 ThemeName = Literal["dark", "light"]
 
@@ -112,10 +112,15 @@ def font(points: float, *, bold: bool = False, mono: bool = False) -> QFont:
     return result
 
 
-def apply_theme(app: QApplication, colours: Colours, base_points: float) -> None:
-    """Give the whole application `colours` and a base type size."""
-    app.setStyle("Fusion")
-    app.setFont(font(base_points))
+def apply_theme(app: QApplication, window: QWidget, colours: Colours, base_points: float) -> None:
+    """Give a window `colours` and a base type size, and the application the palette for what Qt draws itself.
+
+    The style sheet belongs to the window: on the application it would be worked out anew for every
+    widget of every window.
+    """
+    if app.style().name() != "fusion":
+        app.setStyle("Fusion")
+    window.setFont(font(base_points))
     palette = QPalette()
     roles = QPalette.ColorRole
     for role, colour in {
@@ -137,7 +142,7 @@ def apply_theme(app: QApplication, colours: Colours, base_points: float) -> None
     for role in (roles.Text, roles.ButtonText, roles.WindowText):
         palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(colours.muted))
     app.setPalette(palette)
-    app.setStyleSheet(_stylesheet(colours, base_points))
+    window.setStyleSheet(_stylesheet(colours, base_points))
 
 
 def _stylesheet(c: Colours, base: float) -> str:

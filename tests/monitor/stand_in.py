@@ -69,6 +69,10 @@ class StandIn:
             release_s=self.release_s,
             smallest_peak_rad=0.006 * specimen.alpha0_rad,
         )
+        rng = np.random.default_rng(seed)
+        levels = np.array([channel.noise_si for channel in rig.channels])[:, None]
+        self._noise = levels * rng.normal(size=(levels.size, 20_011))
+        """Noise of all channels; each block takes a piece of it."""
         self.end_s = float(self.motion.impacts_s[-1]) + self.rest_s
 
     def rotation(self, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -133,19 +137,15 @@ class StandIn:
 
     def block_readings(self, first: int) -> np.ndarray:
         time = (first + np.arange(self.block)) / self.rate_hz
-        rng = np.random.default_rng([self.seed, first])
         theta, _ = self.rotation(time)
         hits = np.zeros(self.block)
         for impact, speed in zip(self.motion.impacts_s, self.motion.speeds_before_rad_s, strict=True):
             since = time - impact
             ring = (since >= 0) & (since < 0.2)
             hits[ring] += 60 * speed * np.exp(-since[ring] / 0.015) * np.cos(2 * np.pi * 90 * since[ring])
-        rows = [
-            channel_signal(channel, self.rig, theta, theta, hits)
-            + channel.noise_si * rng.normal(size=self.block)
-            for channel in self.rig.channels
-        ]
-        return np.array(rows, dtype=np.float32)
+        rows = [channel_signal(channel, self.rig, theta, theta, hits) for channel in self.rig.channels]
+        start = (first * 7919) % (self._noise.shape[1] - self.block)
+        return (np.array(rows) + self._noise[:, start : start + self.block]).astype(np.float32)
 
     def instants(self, until_s: float | None = None) -> Iterator[Instant]:
         """All that is published, block by block."""

@@ -1,0 +1,361 @@
+"""The parts of the window, each driven by hand: what is enabled, shown, remembered and asked for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from daq_app.acquisition.messages import EstimatePoint, EventMessage, HealthMessage, State, StateMessage
+
+# qtbot: this module needs Qt; tests/monitor/conftest.py skips it where Qt cannot start.
+from daq_app.monitor.actions import ActionBar
+from daq_app.monitor.background import Background
+from daq_app.monitor.estimate_plots import running_mean
+from daq_app.monitor.main_window import MainWindow
+from daq_app.monitor.notices import NoticeLine
+from daq_app.monitor.plot_base import envelope
+from daq_app.monitor.pull_gauge import pull_advice
+from daq_app.monitor.session import Published
+from daq_app.monitor.settings import WindowSettings
+from daq_app.monitor.state_look import LOOKS, look_of
+from daq_app.monitor.strip_panel import arrange
+from daq_app.monitor.test_card import TestCard
+
+
+class Clock:
+    now = 50.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def window(qtbot, settings, rig):
+    """A window without a link, whose session a test feeds by hand."""
+    window = MainWindow(None, settings)
+    qtbot.addWidget(window)
+    window._frame_timer.stop()
+    window._slow_timer.stop()
+    clock = Clock()
+    window.session.clock = clock
+    window.clock = clock
+    window.session.set_rig(rig, 4000.0)
+    window.prepare.set_rig(rig)
+    window.header.show()
+    return window
+
+
+def play(window, stand_in, until_s):
+    start = window.clock.now
+    for instant in stand_in.instants(until_s):
+        window.clock.now = start + instant.time_s
+        for message, readings in instant.messages:
+            window.session.feed(Published(message, window.clock.now, readings))
+
+
+# -- states and orders ---------------------------------------------------------------------------
+
+
+def test_every_state_has_its_own_word_and_shape_so_that_colour_is_not_needed():
+    words = [look.word for look in LOOKS.values()]
+    assert set(LOOKS) == set(State)
+    assert len(set(words)) == len(words)
+    assert len({(look.shape, look.tone) for look in LOOKS.values()}) == len(LOOKS)
+    assert look_of(None).word == "No link"
+
+
+@pytest.mark.parametrize(
+    ("state", "sampling", "enabled"),
+    [
+        (State.IDLE, False, {"preview", "next"}),
+        (State.PREVIEWING, True, {"arm", "next", "marker"}),
+        (State.PREVIEWING, False, {"next"}),
+        (State.ARMED, True, {"stop", "abort", "marker"}),
+        (State.HOLDING, True, {"stop", "abort", "marker"}),
+        (State.ROCKING, True, {"stop", "marker"}),
+        (State.AT_REST, True, {"stop", "marker"}),
+        (State.SAVING, True, set()),
+        (State.SAVED, True, {"arm", "next"}),
+        (State.FAILED, False, {"preview", "next"}),
+        (None, False, set()),
+    ],
+)
+def test_only_orders_that_make_sense_can_be_given(qtbot, state, sampling, enabled):
+    bar = ActionBar()
+    qtbot.addWidget(bar)
+    bar.refresh(state, sampling=sampling, may_command=True)
+    assert {name for name, button in bar.buttons.items() if button.isEnabled()} == enabled
+    bar.refresh(state, sampling=sampling, may_command=False)
+    assert not any(button.isEnabled() for button in bar.buttons.values())
+
+
+def test_an_abort_must_be_ordered_twice_within_seconds(qtbot):
+    clock = Clock()
+    bar = ActionBar(clock)
+    qtbot.addWidget(bar)
+    bar.refresh(State.ARMED, sampling=True, may_command=True)
+    orders = []
+    bar.ordered.connect(orders.append)
+    button = bar.buttons["abort"]
+    button.click()
+    assert orders == [] and button.text() == "F8 again: abort"
+    clock.now += 3.0
+    bar.refresh(State.ARMED, sampling=True, may_command=True)
+    assert button.text() == "Abort  F8"
+    button.click()
+    button.click()
+    assert orders == ["abort"]
+
+
+def test_orders_have_keys(qtbot):
+    from PySide6.QtCore import Qt
+
+    bar = ActionBar()
+    qtbot.addWidget(bar)
+    with qtbot.waitActive(bar):
+        bar.show()
+        bar.activateWindow()
+    bar.refresh(State.PREVIEWING, sampling=True, may_command=True)
+    with qtbot.waitSignal(bar.ordered) as ordered:
+        qtbot.keyClick(bar, Qt.Key.Key_F5)
+    assert ordered.args == ["arm"]
+
+
+# -- notices -------------------------------------------------------------------------------------
+
+
+def test_errors_stay_in_front_until_they_are_read(qtbot):
+    line = NoticeLine()
+    qtbot.addWidget(line)
+    line.tell("info", "zero taken")
+    line.tell("error", "the disk is full")
+    line.tell("error", "the disk is full")
+    line.tell("info", "marker written")
+    assert line.current == ("error", "the disk is full")
+    line.dismiss()
+    assert line.current == ("info", "marker written")
+    line.dismiss()
+    assert line.current is None
+    assert line.isHidden()
+
+
+def test_a_background_failure_is_handed_back_not_swallowed(qtbot):
+    background = Background()
+    failures = []
+
+    def fail():
+        raise ValueError("no")
+
+    background.run(fail, lambda _: None, failures.append)
+    qtbot.waitUntil(lambda: bool(failures))
+    assert isinstance(failures[0], ValueError)
+    assert not background.busy
+
+
+# -- the live page -------------------------------------------------------------------------------
+
+
+def test_the_live_page_draws_what_the_session_knows(window, stand_in):
+    play(window, stand_in, stand_in.release_s + 3.0)
+    live = window.live
+    live.motion.set_target(0.35 * window.session.alpha_rad)
+    live.theory_button.setChecked(True)
+    live.draw_frame()
+    live.draw_slow()
+    estimate = window.session.estimate
+    assert live.restitution.shown == {"eav": len(estimate.eav), "crt": len(estimate.crt)}
+    assert len(live.motion._impacts.data) == len(estimate.impact_samples)
+    x, y = live.motion._curves[0].getData()
+    expected, _ = stand_in.rotation(np.asarray(x) + stand_in.release_s)
+    np.testing.assert_allclose(y, 1e3 * expected, atol=1.0)
+    assert live.motion.theory_caption() == f"Housner with r = {estimate.crt_mean:.3f} (CRT)"
+    assert live.counters.tiles["impacts"].value == str(len(estimate.impact_samples))
+
+
+def test_theory_with_the_right_r_lies_on_the_measured_motion(window, stand_in):
+    play(window, stand_in, stand_in.release_s + 4.0)
+    live = window.live
+    live.theory_button.setChecked(True)
+    live.draw_frame()
+    x, y = live.motion._theory[0].getData()
+    measured, _ = stand_in.rotation(np.asarray(x) + stand_in.release_s)
+    until = np.asarray(x) < 3.0
+    assert (
+        np.max(np.abs(np.asarray(y) - 1e3 * measured)[until]) < 6.0
+    )  # mrad, of 75: r is found to half a percent
+
+
+def test_a_silent_acquisition_is_shown_as_not_live(window, stand_in):
+    play(window, stand_in, 6.0)
+    window.header.refresh(window.colours)
+    assert "Armed" in window.header.words["state"]
+    window.clock.now += 0.8
+    window.live.draw_frame()
+    window._on_slow()
+    assert window.live.motion._notice.toPlainText().startswith("Not live")
+    assert "not live" in window.header.words["sentence"]
+    assert window.header.words["recording"] == "Not confirmed"
+    assert all(text == "–" for text in window.health.texts)
+    window.clock.now += 3.0
+    window.header.refresh(window.colours)
+    assert window.header.words["state"] == "No link"
+
+
+def test_the_strips_keep_an_impact_that_lasts_one_sample(window, stand_in, rig):
+    play(window, stand_in, 3.0)
+    row = rig.channel_ids.index("AC-1")
+    assert np.nanmax(window.session.strips.columns()[1][row]) < 1.0
+    from daq_app.acquisition.messages import BlockMessage
+
+    block = np.zeros((41, 400), dtype=np.float32)
+    block[row, 177] = 40.0
+    heading = BlockMessage(first_sample=12000, n_samples=400, n_channels=41, rate_hz=4000.0)
+    window.session.feed(Published(heading, window.clock.now, block))
+    assert np.nanmax(window.session.strips.columns()[1][row]) == 40.0
+    window.show_page(window.live)
+    window.live.strips.resize(1240, 180)
+    image = window.live.strips.grab().toImage()
+    assert image.width() > 0 and window.live.strips.paints > 0
+
+
+@pytest.mark.parametrize("size", [(1240, 160), (1800, 260), (1240, 620), (700, 300)])
+def test_all_41_strips_have_their_own_place_inside_the_panel(rig, size):
+    cells, titles = arrange(rig, *size)
+    assert sorted(cell.index for cell in cells) == list(range(41))
+    assert [family for family, _ in titles] == ["lvdt", "wire", "accelerometer", "tiltmeter"]
+    for place, cell in enumerate(cells):
+        assert cell.box.right() <= size[0] + 0.5 and cell.box.bottom() <= size[1] + 0.5
+        assert cell.box.height() > 15
+        assert not any(cell.box.intersects(other.box) for other in cells[place + 1 :])
+
+
+def test_drawing_decimation_keeps_every_extreme():
+    rng = np.random.default_rng(2)
+    y = rng.normal(size=20_000)
+    y[777], y[13_131] = 50.0, -60.0
+    y[5000:5100] = np.nan
+    x = np.arange(y.size) / 4000
+    dx, dy = envelope(x, y, 600)
+    assert dx.size < 2500 and (np.diff(dx) >= 0).all()
+    assert np.nanmax(dy) == 50.0 and np.nanmin(dy) == -60.0
+    short = envelope(x[:100], y[:100], 600)
+    np.testing.assert_array_equal(short[1], y[:100])
+
+
+def test_running_mean_and_its_standard_error():
+    points = [EstimatePoint(impact=k + 1, r=r) for k, r in enumerate((0.9, 0.92, 0.88))]
+    impacts, mean, error = running_mean(points)
+    assert impacts.tolist() == [1, 2, 3]
+    np.testing.assert_allclose(mean, [0.9, 0.91, 0.9])
+    assert error[0] == 0
+    assert error[2] == pytest.approx(np.std([0.9, 0.92, 0.88], ddof=1) / math.sqrt(3))
+
+
+# -- preparing -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("tilt", "words", "role"),
+    [
+        (math.nan, "not live", "muted"),
+        (0.03003, "Pull 45.2 mrad more", "text"),
+        (-0.0745, "On target", "good"),
+        (0.090, "ease back", "warning"),
+        (0.180, "STOP", "bad"),
+    ],
+)
+def test_the_gauge_tells_what_to_do_on_either_side(tilt, words, role):
+    advice = pull_advice(tilt, 0.35 * 0.215, 0.215)
+    assert words in advice.words
+    assert advice.role == role
+
+
+def test_the_level_follows_from_the_name_and_notes_do_not_linger(qtbot):
+    card = TestCard()
+    qtbot.addWidget(card)
+    card.propose("FR1-L3-2")
+    assert card.choice.target_ratio == 0.35
+    card._notes.setPlainText("rain")
+    card.propose("FR2-L4-R")
+    assert card.choice.name == "FR2-L4-R"
+    assert (card.choice.target_ratio, card.choice.notes) == (0.40, "")
+
+
+def test_the_check_ends_in_a_verdict_with_the_worst_channel_on_top(qtbot, window, stand_in, rig):
+    play(window, stand_in, 3.5)
+    window.prepare.run_check()
+    qtbot.waitUntil(lambda: window.prepare.check is not None)
+    assert window.prepare.verdict_text == "Go"
+    row = rig.channel_ids.index("WP-3")
+    for _, readings in window.session._recent:
+        readings[row] = 0.0
+    window.prepare.check = None
+    window.prepare.run_check()
+    qtbot.waitUntil(lambda: window.prepare.check is not None)
+    assert window.prepare.verdict_text == "No-go"
+    model = window.prepare.table.check_model
+    assert [model.data(model.index(0, c)) for c in (0, 1)] == ["No-go", "WP-3"]
+    assert "Stuck" in window.prepare._detail.text()
+
+
+def test_a_check_without_data_says_so_in_the_window_not_in_a_box(window):
+    window.prepare.run_check()
+    severity, text = window.notices.current
+    assert severity == "warning"
+    assert "3 s of data" in text
+
+
+# -- habits --------------------------------------------------------------------------------------
+
+
+def test_theme_type_size_and_layout_are_remembered(qtbot, settings, tmp_path):
+    window = MainWindow(None, settings)
+    qtbot.addWidget(window)
+    window.resize(780, 740)  # within the screen that Qt has without a display
+    window.toggle_theme()
+    window.change_type_size(2)
+    window.close()
+    again = WindowSettings(tmp_path / "window.ini")
+    assert (again.theme, again.type_size) == ("light", 13.0)
+    second = MainWindow(None, again)
+    qtbot.addWidget(second)
+    assert (second.width(), second.height()) == (780, 740)
+
+
+def test_nonsense_in_the_settings_file_falls_back(tmp_path):
+    path = tmp_path / "window.ini"
+    path.write_text("[General]\ntheme=pink\ntype_size=huge\n[overturning]\nalarm_ratio=7\n", encoding="utf-8")
+    settings = WindowSettings(path)
+    assert (settings.theme, settings.type_size) == ("dark", 10.0)
+    assert settings.alarm_levels.alarm == 0.65
+
+
+def test_events_that_matter_are_told_and_routine_ones_are_not(window):
+    window._after(EventMessage(kind="impact", sample=1, text="impact 3"))
+    assert window.notices.current is None
+    window._after(EventMessage(kind="gap", sample=1, text="400 samples lost", severity="error"))
+    assert window.notices.current == ("error", "400 samples lost")
+
+
+def test_arming_without_a_name_is_refused_with_what_to_do(window):
+    window._arm()
+    assert window.notices.current == ("warning", "Give the test a name before arming.")
+
+
+def test_recording_light_says_when_the_disk_is_behind(window):
+    window.session.feed(Published(StateMessage(state=State.ARMED), window.clock.now))
+    health = HealthMessage(
+        sample=20_000,
+        acknowledged_sample=8_000,
+        recording=True,
+        backlog_samples=0,
+        buffer_samples=80_000,
+        gaps=0,
+        lost_samples=0,
+    )
+    window.session.feed(Published(health, window.clock.now))
+    window.header.refresh(window.colours)
+    assert window.header.words["recording"] == "Disk is slow"
+    assert window.header.words["recording_detail"] == "3.0 s wait for the disk"
