@@ -6,10 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from daq_app.config.rig import Channel, Family, Specimen
+from daq_app.config.rig import Channel, Family, Rig, Specimen
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.runfile import open_run
@@ -98,7 +99,7 @@ class GapRun:
 
     def aligned(self, index: int) -> FloatArray:
         """A channel at the instants of the sample clock, shape (n,)."""
-        values = self.channels[index]
+        values: FloatArray = self.channels[index]
         offset = self.time_offset_s[index] if self.time_offset_s.size else 0.0
         if offset == 0.0:
             return values
@@ -107,13 +108,26 @@ class GapRun:
         return shifted
 
 
-def load_run(path: Path) -> GapRun:
-    """A run file of this product. Raises `CannotDiagnose` where its rig lacks what is needed."""
+def load_run(path: Path, rig: Rig | None = None) -> GapRun:
+    """A run file of this product; `rig` replaces the rig file that the run carries.
+
+    Raises `CannotDiagnose` where there is no rig or a channel is not in it, and the run file's own
+    errors for a file that cannot be read.
+    """
     with open_run(path) as run:
-        rig = run.rig
+        rig = rig or run.rig
+        if rig is None:
+            raise CannotDiagnose(f"Run {path.name} carries no rig file.", "Name one with --rig.")
         ids = list(run.channel_ids)
+        missing = [name for name in ids if name not in rig.channel_ids]
+        if missing:
+            raise CannotDiagnose(
+                f"Run {path.name} has channels that the rig file does not: {', '.join(missing[:5])}.",
+                "Give the rig file with which it was recorded.",
+            )
         channels = [rig.channel(name) for name in ids]
-        offsets = np.array([_offset(run.header.plan, name) for name in ids])
+        known = _offsets(run.header.plan)
+        offsets = np.array([known.get(name, 0.0) for name in ids])
         name = run.header.test or path.stem
         return GapRun(
             name=name,
@@ -132,14 +146,13 @@ def level_of(test: str) -> str:
     return parts[0] if parts else test
 
 
-def _offset(plan: dict[str, object], channel: str) -> float:
-    """Time offset of a channel in a run's task plan; 0 where the plan does not say."""
-    entries = plan.get("channels", [])
-    if isinstance(entries, Sequence):
-        for entry in entries:
-            if isinstance(entry, dict) and entry.get("id", entry.get("channel_id")) == channel:
-                return float(entry.get("time_offset_s", 0.0))
-    return 0.0
+def _offsets(plan: dict[str, Any]) -> dict[str, float]:
+    """Time offset of each channel from a run's task plan: multiplexer skew less converter delay."""
+    found = {}
+    for task in plan.get("tasks", []):
+        for entry in task.get("channels", []):
+            found[str(entry["id"])] = float(entry.get("skew_s", 0.0)) - float(entry.get("input_delay_s", 0.0))
+    return found
 
 
 def check_consistent(runs: Sequence[GapRun]) -> None:

@@ -116,7 +116,7 @@ def _impact_samples(theta: FloatArray, smooth: FloatArray, release: int) -> list
     """Samples at which the rotation passes zero, until half-cycles become too short to see."""
     found: list[int] = []
     signs = np.sign(smooth)
-    for k in np.flatnonzero(np.diff(signs) != 0):
+    for k in np.flatnonzero(np.diff(signs) != 0).tolist():
         if k <= release:
             continue
         if found and (k - found[-1] < 100 or np.abs(smooth[found[-1] : k]).max() < SMALLEST_GRID_RAD):

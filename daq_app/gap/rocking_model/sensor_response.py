@@ -306,12 +306,14 @@ def _joint(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatA
 
 def _base(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     found = values["base_follow"] * _unit(run, block, "theta", lambda: run.grid.theta)
-    return found + values.get("sliding.c", 0.0) * _unit(run, block, "slip", partial(_slip, run))
+    total: FloatArray = found + values.get("sliding.c", 0.0) * _unit(run, block, "slip", partial(_slip, run))
+    return total
 
 
 def _twist(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     follow = values["twist_follow"] + values.get("twist.follow", 0.0)
-    return follow * _unit(run, block, "theta", lambda: run.grid.theta)
+    found: FloatArray = follow * _unit(run, block, "theta", lambda: run.grid.theta)
+    return found
 
 
 _PREDICT = {

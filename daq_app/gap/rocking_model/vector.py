@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.run_features import RockingRun
@@ -47,12 +48,16 @@ def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> tuple[bytes, 
     measured = [v for k, v in values.items() if k in ("zero", "face_a", "face_b") or "@" in k]
     dynamic = vector.copy()
     dynamic[[par.RESTITUTION, par.R_SLOPE, par.R_ASYMMETRY, par.CRUSH_R]] = 0.0
-    key = dynamic.tobytes() + np.asarray(measured, dtype=float).tobytes()
-    return key, vector, 1.0 + values.get("clock.error", 0.0)
+    identity = dynamic.tobytes() + np.asarray(measured, dtype=float).tobytes()
+    return identity, vector, 1.0 + values.get("clock.error", 0.0)
 
 
 def restitution_of(
-    run: RockingRun, values: Mapping[str, float], speeds: FloatArray, sides: FloatArray, impacts: FloatArray
+    run: RockingRun,
+    values: Mapping[str, float],
+    speeds: FloatArray,
+    sides: FloatArray,
+    impacts: NDArray[np.intp],
 ) -> FloatArray:
     """r of each impact, as the simulator's impact rule has it, plus the free form of the probe."""
     r = values["r"] + values.get("restitution_slope.k", 0.0) * (speeds - 0.2)

@@ -1,0 +1,211 @@
+"""`daq-app gap diagnose`, `gap effects` and `gap apply`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+from rich.table import Table
+
+from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED, print_paragraph, reported
+from daq_app.config import load_rig
+
+if TYPE_CHECKING:
+    from daq_app.gap.core import Diagnosis
+
+
+def register(app: typer.Typer) -> None:
+    """Add the group ``gap``."""
+    group = typer.Typer(
+        no_args_is_help=True,
+        help="Where simulator and recordings differ, which effect explains it, how far it shrinks.",
+    )
+    group.command(
+        "diagnose",
+        epilog="Example: daq-app gap diagnose FR1-*.h5 --rig fr1.toml --report gap.html --json gap.json",
+    )(diagnose)
+    group.command("effects", epilog="Example: daq-app gap effects --family dissipation")(effects)
+    group.command(
+        "apply",
+        epilog="Example: daq-app gap apply gap.json --rig configs/fr1.toml --out fr1-with-effect.toml",
+    )(apply)
+    app.add_typer(group, name="gap")
+
+
+@contextmanager
+def _refusals() -> Iterator[None]:
+    """A refusal to diagnose is bad input, said in one paragraph."""
+    from daq_app.gap.core import CannotDiagnose
+
+    with reported():
+        try:
+            yield
+        except CannotDiagnose as refusal:
+            print_paragraph("Cannot diagnose", str(refusal))
+            raise typer.Exit(EXIT_BAD_INPUT) from None
+
+
+def diagnose(
+    runs: Annotated[list[Path], typer.Argument(help="Run files (HDF5) of one specimen.", metavar="RUN…")],
+    rig: Annotated[
+        Path | None, typer.Option(help="Rig file to compare with; the one kept in each run if left out.")
+    ] = None,
+    report: Annotated[Path | None, typer.Option(help="Write a one-page report (HTML).")] = None,
+    json_out: Annotated[Path | None, typer.Option("--json", help="Write the whole result as JSON.")] = None,
+    pairs: Annotated[
+        bool, typer.Option("--pairs", help="Always fit pairs of effects, not only when needed.")
+    ] = False,
+    hold_out: Annotated[
+        str, typer.Option(help="What is held out to measure the gap: level or repetition.")
+    ] = "level",
+    cores: Annotated[int, typer.Option(min=0, help="Processes; 0 takes all cores.")] = 0,
+) -> None:
+    """Say where simulator and runs differ, which missing effect explains it, and how far the gap shrinks.
+
+    Exit code 0 when an effect, a pair, parameters or nothing missing was found; 1 when the answer is
+    that it cannot be told, none of these, or below detection; 2 for input that cannot be diagnosed.
+    """
+    from daq_app.gap.core import Options
+    from daq_app.gap.core.parallel import Interrupted
+    from daq_app.gap.report import write_report
+    from daq_app.gap.rocking_model.records import load_run
+    from daq_app.gap.rocking_model.study import diagnose_runs
+
+    if hold_out not in ("level", "repetition"):
+        print_paragraph("Error", f"--hold-out is level or repetition, not {hold_out}.")
+        raise typer.Exit(EXIT_BAD_INPUT)
+    with _refusals():
+        replacement = load_rig(rig) if rig is not None else None
+        loaded = [load_run(path, replacement) for path in runs]
+        console = Console(stderr=True)
+        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"))
+        with Progress(*columns, console=console, transient=True) as progress:
+            bar = progress.add_task("reading features", total=1)
+
+            def show(done: int, total: int, text: str) -> None:
+                progress.update(bar, description=text, completed=done, total=total)
+
+            options = Options(
+                always_pairs=pairs, hold_out=hold_out, workers=cores or os.cpu_count() or 1, progress=show
+            )
+            try:
+                result = diagnose_runs(loaded, options)
+            except (KeyboardInterrupt, Interrupted):
+                print_paragraph("Interrupted", "the diagnosis was stopped; nothing was written")
+                raise typer.Exit(EXIT_INTERRUPTED) from None
+        if json_out is not None:
+            result.save(json_out)
+        if report is not None:
+            write_report(result, report)
+    _print(result)
+    good = result.decision.verdict in ("effect", "pair", "parameters", "nothing_missing")
+    raise typer.Exit(0 if good else EXIT_FAILED)
+
+
+def _print(result: Diagnosis) -> None:
+    console = Console()
+    console.print(f"{result.decision.verdict}: {result.decision.sentence}", markup=False)
+    console.print(f"Where: {result.where.sentence}", markup=False)
+    table = Table("hypothesis", "family", "probability", "log evidence")
+    for entry in result.which[:6]:
+        table.add_row(
+            " + ".join(entry.effects) or "nothing missing",
+            entry.family,
+            f"{entry.probability:.3f}",
+            f"{entry.log_evidence:.1f}",
+        )
+    console.print(table)
+    estimates = Table("parameter", "value", "95 % interval", "unit")
+    for estimate in (*result.effect_parameters, *result.parameters[:4]):
+        interval = f"{estimate.low:.4g} … {estimate.high:.4g}"
+        estimates.add_row(estimate.name, f"{estimate.value:.4g}", interval, estimate.unit)
+    console.print(estimates)
+    if result.gap is not None:
+        console.print(
+            f"Gap on held-out runs, in units of noise and scatter: {result.gap.before:.2f} → "
+            f"{result.gap.after:.2f} (floor {result.gap.floor:.1f}); closure {result.gap.closure:.2f}."
+        )
+    console.print(f"Next: {result.next_measurement}", markup=False)
+    for limit in result.limits:
+        console.print(f"Limit: {limit}", markup=False)
+
+
+def effects(
+    family: Annotated[str | None, typer.Option(help="Only effects of this family.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the library as JSON.")] = False,
+) -> None:
+    """List the effects that a diagnosis knows: equation, parameters, reference, what it is confusable with.
+
+    Exit code 0; 2 for a family that does not exist.
+    """
+    import json
+
+    from daq_app.gap.rocking_model.library import rocking_library
+
+    library = rocking_library()
+    chosen = [e for e in library.values() if family in (None, e.family)]
+    if not chosen:
+        print_paragraph("Error", f"there is no family {family}; there are {', '.join(library.families)}")
+        raise typer.Exit(EXIT_BAD_INPUT)
+    if as_json:
+        listed = [
+            {
+                "name": e.name,
+                "family": e.family,
+                "kind": e.kind,
+                "equation": e.equation,
+                "reference": e.reference,
+                "signature": e.signature,
+                "parameters": [
+                    {
+                        "name": p.name,
+                        "unit": p.unit,
+                        "meaning": p.meaning,
+                        "prior_sd": p.sd,
+                        "per_run": p.per_run,
+                    }
+                    for p in e.parameters
+                ],
+                "confusable_with": [{"effect": c.effect, "measure": c.measure} for c in e.confusable_with],
+            }
+            for e in chosen
+        ]
+        typer.echo(json.dumps(listed, ensure_ascii=False, indent=1))
+        return
+    table = Table("effect", "family", "adds", "parameters", "confusable with", "source")
+    for e in chosen:
+        table.add_row(
+            e.name if e.kind == "effect" else f"{e.name} (probe)",
+            e.family,
+            e.equation,
+            ", ".join(f"{p.name} ({p.unit})" if p.unit else p.name for p in e.parameters),
+            ", ".join(dict.fromkeys(c.effect for c in e.confusable_with)),
+            e.reference,
+        )
+    Console().print(table)
+
+
+def apply(
+    result: Annotated[Path, typer.Argument(help="Result of `gap diagnose --json`.", metavar="RESULT")],
+    rig: Annotated[Path, typer.Option(help="Rig file to start from.")],
+    out: Annotated[Path, typer.Option(help="Rig file to write.")],
+) -> None:
+    """Write a rig file whose simulated wall has the parameters and the effect that a diagnosis found.
+
+    Exit code 0; 2 where the result names no effect or a file cannot be used.
+    """
+    from daq_app.gap.apply import apply_result, read_result
+
+    with _refusals():
+        found = apply_result(read_result(result), rig, out)
+    console = Console()
+    for name, values in found.items():
+        written = ", ".join(f"{key} = {value:.5g}" for key, value in values.items())
+        console.print(f"{name}: {written}", markup=False)
+    console.print(f"Written to {out}.", markup=False, soft_wrap=True)

@@ -1,0 +1,72 @@
+"""Closing the loop: the rig file with what a diagnosis found switched on in its simulated wall."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from daq_app.config import ConfigError, load_rig
+from daq_app.gap.core import CannotDiagnose
+from daq_app.gap.core.result import FORMAT_VERSION
+
+
+def read_result(path: Path) -> dict[str, Any]:
+    """The JSON of a diagnosis. Raises `CannotDiagnose` if the file is none."""
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as problem:
+        raise CannotDiagnose(f"{path} is no result of a diagnosis ({problem}).") from None
+    if not isinstance(data, dict) or data.get("format") != FORMAT_VERSION or "effect_parameters" not in data:
+        raise CannotDiagnose(f"{path} is no result of a diagnosis in format {FORMAT_VERSION}.")
+    return data
+
+
+def effects_found(result: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """Effects with their parameters as the simulator takes them."""
+    effects: dict[str, dict[str, float]] = {}
+    for estimate in result["effect_parameters"]:
+        name, _, parameter = str(estimate["name"]).rpartition(".")
+        effects.setdefault(name, {})[parameter] = float(estimate["value"])
+    return effects
+
+
+def apply_result(result: dict[str, Any], rig: Path, out: Path) -> dict[str, dict[str, float]]:
+    """Write `out`: `rig` with fitted α, p, r, b, scatter of r, and the effects found. Returns the effects.
+
+    Comments of the rig file are not kept. Raises `ConfigError` where a file is no rig, and
+    `CannotDiagnose` where the result names nothing that can be switched on.
+    """
+    load_rig(rig)
+    effects = effects_found(result)
+    if not effects and result["decision"] not in ("parameters", "nothing_missing"):
+        raise CannotDiagnose(
+            f"The diagnosis ended with {result['decision']}: there is no effect to switch on.",
+            "Read its report.",
+        )
+    data = tomllib.loads(rig.read_text(encoding="utf-8-sig"))
+    values = {p["name"]: float(p["value"]) for p in result["parameters"]}
+    specimen = data["specimen"]
+    r0 = values["half_base"] / math.sin(values["alpha"])
+    specimen["alpha0_rad"], specimen["r0_m"], specimen["p_rad_s"] = values["alpha"], r0, values["p"]
+    specimen["rotational_inertia_kg_m2"] = specimen["weight_n"] * r0 / values["p"] ** 2
+    simulation = data.setdefault("simulation", {})
+    simulation["restitution"] = min(values["r"], 1.0)
+    scatter = [s["value"] for s in result["scatter"] if s["name"] == "scatter of r"]
+    if scatter:
+        simulation["restitution_scatter"] = float(scatter[0])
+    simulation["effects"] = {**simulation.get("effects", {}), **effects}
+    if "assumed" in simulation:
+        simulation["assumed"] = [k for k in simulation["assumed"] if k != "restitution_scatter"]
+    text = tomli_w.dumps(data)
+    out.write_text(text, encoding="utf-8")
+    try:
+        load_rig(out)
+    except ConfigError:
+        out.unlink()
+        raise
+    return effects

@@ -1,0 +1,92 @@
+"""A diagnosis of recorded tests from beginning to end, with its refusals and stated limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from daq_app.gap.core import CannotDiagnose, Diagnosis, Options, diagnose
+from daq_app.gap.core.result import Decision
+from daq_app.gap.rocking_model.library import rocking_library
+from daq_app.gap.rocking_model.model import RockingModel
+from daq_app.gap.rocking_model.records import GapRun, check_consistent
+from daq_app.gap.rocking_model.run_features import RockingRun, extract
+
+FAR_FROM_SURVEY = 4.0
+"""Prior sd by which α, p or the base may differ from the survey before the rig file is doubted."""
+
+
+def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
+    """Features of all runs in the order of the campaign, and the limits that come from what was left out.
+
+    Raises `CannotDiagnose` where no run can be used, or where runs do not belong together.
+    """
+    check_consistent(runs)
+    found: list[RockingRun] = []
+    limits: list[str] = []
+    impacts = 0.0
+    for run in runs:
+        try:
+            whole = run if run.impacts_before else replace(run, impacts_before=impacts)
+            features = extract(_without_gaps(whole))
+        except CannotDiagnose as problem:
+            if len(runs) == 1:
+                raise
+            limits.append(f"Left out. {problem}")
+            continue
+        found.append(features)
+        limits += features.notes
+        impacts = features.impacts_before + features.swings.peak_s.size
+    if not found:
+        raise CannotDiagnose("None of the runs can be used.", " ".join(limits))
+    return found, limits
+
+
+def _without_gaps(run: GapRun) -> GapRun:
+    """The run, or a refusal if samples of all channels are missing in it."""
+    missing = np.flatnonzero(np.isnan(run.channels).all(axis=0))
+    if missing.size:
+        raise CannotDiagnose(
+            f"Run {run.name} has a gap of {missing.size} samples from {missing[0] / run.rate_hz:.2f} s on.",
+            "Leave it out, or diagnose it with the part before the gap.",
+        )
+    return run
+
+
+def diagnose_runs(runs: Sequence[GapRun], options: Options | None = None) -> Diagnosis:
+    """Where, which and how far, for tests of one specimen on one rig.
+
+    Raises `CannotDiagnose` with the reason in words, and `parallel.Interrupted` when stopped.
+    """
+    prepared, limits = prepare(runs)
+    sides = {np.sign(run.swings.peak_rad[0]) for run in prepared}
+    if len({run.level for run in prepared}) < 2:
+        limits.append(
+            "One level only: effects that differ in how they grow with amplitude cannot be told apart."
+        )
+    if len(sides) < 2:
+        limits.append(
+            "All releases are to one side: release effects cannot be told from a difference of sides."
+        )
+    model = RockingModel(prepared[0].survey)
+    result = diagnose(model, prepared, rocking_library(), options, limits)
+    return _doubt_the_survey(result)
+
+
+def _doubt_the_survey(result: Diagnosis) -> Diagnosis:
+    """With α, p or b far from the survey the rig file is more likely wrong than physics missing."""
+    far = [
+        p
+        for p in result.parameters
+        if p.name in ("alpha", "p", "half_base")
+        and abs(p.value - p.prior_mean) > FAR_FROM_SURVEY * p.prior_sd
+    ]
+    if not far:
+        return result
+    words = ", ".join(f"{p.name} = {p.value:.4g} {p.unit} (rig file {p.prior_mean:.4g})" for p in far)
+    sentence = f"The runs do not fit the specimen of the rig file: {words}. {result.decision.sentence}"
+    decision = Decision("cannot_tell", result.decision.effects, result.decision.family, sentence, 0.0)
+    advice = "Check that the rig file is that of this specimen, and survey its weight, height and base again."
+    return replace(result, decision=decision, next_measurement=advice)
