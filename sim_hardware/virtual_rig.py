@@ -103,7 +103,7 @@ class VirtualRig:
             self._now_s = max(self._now_s, time_s)
 
     def command(self, name: str, arguments: dict[str, float | str]) -> dict[str, object]:
-        """pull, release, hammer, upright (settle), reset or status; answers with the state after it.
+        """pull, release, hammer, upright (settle), reset or status; answers with the state it takes effect in.
 
         `ValueError` in words for a command that is not known or not possible now.
         """
@@ -125,23 +125,26 @@ class VirtualRig:
             raise ValueError(f"{name} has no argument {', '.join(unknown)}; it has {allowed}")
         with self._lock:
             action(arguments)
-            return self.status()
+            return self._status_at(self._instant())
 
     # what is so
 
     def status(self) -> dict[str, object]:
         """State now, in plain numbers."""
         with self._lock:
-            theta, omega, _ = self._state(self._now_s)
-            return {
-                "time_s": self._now_s,
-                "state": self._phase(self._now_s),
-                "rotation_rad": theta,
-                "velocity_rad_s": omega,
-                "rotation_over_alpha": theta / self._wall.body.alpha_rad,
-                "tests": sum(test.release_s <= self._now_s for test in self._tests),
-                "truth": self._tests[-1].truth() if self._tests else None,
-            }
+            return self._status_at(self._now_s)
+
+    def _status_at(self, time_s: float) -> dict[str, object]:
+        theta, omega, _ = self._state(time_s)
+        return {
+            "time_s": time_s,
+            "state": self._phase(time_s),
+            "rotation_rad": theta,
+            "velocity_rad_s": omega,
+            "rotation_over_alpha": theta / self._wall.body.alpha_rad,
+            "tests": sum(test.release_s <= time_s for test in self._tests),
+            "truth": self._tests[-1].truth() if self._tests else None,
+        }
 
     def truth(self, test: int = -1) -> dict[str, object]:
         """The true values of a test (the last by default): θ₀, r, impacts …; see `SimulatedTest.truth`.
