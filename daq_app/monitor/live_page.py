@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import time
+
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QVBoxLayout, QWidget
 
@@ -27,6 +30,8 @@ class LivePage(QWidget):
         self.phase = PhasePlane(session)
         self.periods = PeriodPlot(session)
         self.strips = StripPanel(session)
+        self.estimate_drawn_s = -math.inf
+        """When r was last handed to its plot (`time.monotonic`); the benchmark reads it."""
         self.frames = 0
         """Frames of the large plots drawn so far."""
         self._seen: tuple[int, int] = (-1, -1)
@@ -104,6 +109,7 @@ class LivePage(QWidget):
             return
         self._seen = seen
         self.restitution.draw()
+        self.estimate_drawn_s = time.monotonic()
         self.periods.draw()
         self.counters.refresh()
 

@@ -26,6 +26,7 @@ from PySide6.QtWidgets import (
 )
 
 from daq_app.acquisition.messages import EventMessage, Reply, State, StateMessage
+from daq_app.campaign.check_model import Verdict
 from daq_app.campaign.plan import Campaign
 from daq_app.campaign.verdicts import give_verdict
 from daq_app.config import ConfigError, parse_rig
@@ -47,6 +48,7 @@ from daq_app.runfile import RunFileError, open_run
 
 FRAME_MS: Final = 22
 SLOW_MS: Final = 160
+ARM_AGAIN_WITHIN_S: Final = 10.0
 _QUIET_EVENTS: Final = frozenset({"impact", "marker", "armed", "tare"})
 """Events that the pages show anyway."""
 
@@ -72,6 +74,7 @@ class MainWindow(QMainWindow):
         self._rig_text = ""
         self._state_before: State | None = None
         self._runs_folder: Path | None = None
+        self._arm_asked_s = -math.inf
         self._released = False
         """Whether the wall was let go since the last arming: an aborted arming has no result."""
 
@@ -346,12 +349,21 @@ class MainWindow(QMainWindow):
             self.show_page(self.prepare)
             self.notices.tell("warning", "Give the test a name before arming.")
             return
-        notes = choice.notes
         check = self.prepare.check
+        if check is not None and check.verdict is Verdict.NO_GO and not self._arm_insisted():
+            self.notices.tell(
+                "warning", f"The sensor check says no-go. {check.summary} Press F5 again to arm all the same."
+            )
+            return
         looked = (
             f"Sensor check: {check.verdict.value}. {check.summary}" if check else "Sensor check: not done."
         )
-        self._request("arm", {"test": choice.name, "notes": f"{notes}\n{looked}".strip()})
+        self._request("arm", {"test": choice.name, "notes": f"{choice.notes}\n{looked}".strip()})
+
+    def _arm_insisted(self) -> bool:
+        """Whether arming was asked for a second time within some seconds."""
+        before, self._arm_asked_s = self._arm_asked_s, time.monotonic()
+        return self._arm_asked_s - before <= ARM_AGAIN_WITHIN_S
 
     def next_test(self) -> None:
         """Take the next test of the campaign."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import time
 from typing import Any, Final
 
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QPaintEvent
 
 from daq_app.monitor.theme import Colours, font
 
@@ -52,6 +54,9 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]
         self.plot_item.showGrid(x=True, y=True, alpha=0.18)
         self.plot_item.layout.setContentsMargins(2, 2, 10, 2)
         self.setMinimumSize(120, 90)
+        self.painted_s = -math.inf
+        """When the plot was last painted (`time.monotonic`); the benchmark reads it."""
+        self.paints = 0
         self._swallow_wheel = not mouse
         self.viewport().installEventFilter(self)
 
@@ -60,6 +65,12 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]
         if self._swallow_wheel and event.type() == QEvent.Type.Wheel:
             return True
         return bool(super().eventFilter(watched, event))
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Paint, and remember when."""
+        super().paintEvent(event)
+        self.paints += 1
+        self.painted_s = time.monotonic()
 
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""

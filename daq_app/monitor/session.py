@@ -217,6 +217,11 @@ class Session:
         return self.current_state in RUNNING and not self.fresh(BlockMessage)
 
     @property
+    def newest_sample(self) -> int:
+        """First sample after the newest block."""
+        return self._newest_sample
+
+    @property
     def sampling(self) -> bool:
         """Samples are coming in now."""
         return self.fresh(BlockMessage)

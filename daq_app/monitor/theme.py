@@ -120,7 +120,7 @@ def apply_theme(app: QApplication, window: QWidget, colours: Colours, base_point
     """
     if app.style().name() != "fusion":
         app.setStyle("Fusion")
-    window.setFont(font(base_points))
+    app.setFont(font(base_points))
     palette = QPalette()
     roles = QPalette.ColorRole
     for role, colour in {

@@ -359,3 +359,19 @@ def test_recording_light_says_when_the_disk_is_behind(window):
     window.header.refresh(window.colours)
     assert window.header.words["recording"] == "Disk is slow"
     assert window.header.words["recording_detail"] == "3.0 s wait for the disk"
+
+
+def test_a_no_go_must_be_overruled_on_purpose(window, monkeypatch):
+    from daq_app.campaign.check_model import ChannelCheck, Finding, SensorCheck, Verdict
+
+    bad = Finding("stuck", Verdict.NO_GO, "Stuck.")
+    window.prepare.check = SensorCheck((ChannelCheck("WP-3", "wire", (bad,), 0.0, 0.0, 1.0, 0.0),))
+    window.prepare.card.propose("FR1-L3-1")
+    asked = []
+    monkeypatch.setattr(window, "_request", lambda name, arguments=None: asked.append((name, arguments)))
+    window._arm()
+    assert asked == []
+    assert "no-go" in window.notices.current[1]
+    window._arm()
+    assert asked[0][1]["test"] == "FR1-L3-1"
+    assert "Sensor check: no-go" in asked[0][1]["notes"]
