@@ -49,7 +49,7 @@ def control_handler(bench: Bench) -> grpc.GenericRpcHandler:
         try:
             message = json.loads(request)
             answer = run_command(bench, str(message["name"]), dict(message.get("arguments", {})))
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
             context.abort(grpc.StatusCode.INVALID_ARGUMENT, f"{type(error).__name__}: {error}")
         return json.dumps(answer).encode()
 

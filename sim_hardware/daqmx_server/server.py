@@ -66,6 +66,8 @@ def _task_of(request: Any) -> str:
 def _unary(bench: Bench, gate: Gate, handler: Handler) -> Callable[[Any, Any], Any]:
     def call(request: Any, context: Any) -> Any:
         gate.pass_through()
+        if not context.is_active():  # the client gave up while the server was frozen
+            context.abort(grpc.StatusCode.CANCELLED, "the call was cancelled")
         try:
             with bench.changed:
                 reply = handler(bench, request)

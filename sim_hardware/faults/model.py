@@ -113,7 +113,7 @@ def _parameters(name: str, kind: Kind, table: Mapping[str, Any]) -> dict[str, fl
         if value is None:
             raise ValueError(f"{name}: {key} is missing")
         if isinstance(default, float) or (default is None and key != "product"):
-            value = float(value) if isinstance(value, float) else _number(name, key, value)
+            value = _number(name, key, value)
         out[key] = value
     if out.get("side", "high") not in ("high", "low"):
         raise ValueError(f"{name}: side is high or low, not {out['side']!r}")
@@ -122,7 +122,14 @@ def _parameters(name: str, kind: Kind, table: Mapping[str, Any]) -> dict[str, fl
     return out
 
 
+_SIGNED: Final = ("ppm", "value_v", "amplitude_v", "hum_v")
+
+
 def _number(name: str, key: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or (value < 0 and key != "ppm"):
-        raise ValueError(f"{name}: {key} is a number of 0 or more, not {value!r}")
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{name}: {key} is a number, not {value!r}")
+    if value < 0 and key not in _SIGNED:
+        raise ValueError(f"{name}: {key} is 0 or more, not {value!r}")
+    if not math.isfinite(value) and key not in ("value_v", "for_s"):
+        raise ValueError(f"{name}: {key} is a finite number, not {value!r}")
     return float(value)
