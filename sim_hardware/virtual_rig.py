@@ -103,7 +103,7 @@ class VirtualRig:
             self._now_s = max(self._now_s, time_s)
 
     def command(self, name: str, arguments: dict[str, float | str]) -> dict[str, object]:
-        """pull, release, hammer, upright (settle), reset or status; answers with the state it takes effect in.
+        """pull, release, hammer, upright (settle), reset or status; answers with the state it leads to.
 
         `ValueError` in words for a command that is not known or not possible now.
         """

@@ -104,7 +104,7 @@ def test_a_test_by_commands_and_another_in_the_same_power_on(rig: Rig) -> None:
         assert wall.command("status", {})["state"] == "held"
         assert wall.command("release", {})["state"] == "rocking"
         truth = wall.truth()
-        assert truth["release_s"] == pytest.approx(now + 9.0)
+        assert now + 9.0 <= truth["release_s"] < now + 9.0101  # on the grid of commands
         assert np.sign(truth["theta0_rad"]) == side
         theta0.append(truth["theta0_over_alpha"])
         now = truth["rest_s"] + 3.0
