@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _METHODS = {
     "eav": "EAV (4.4), one-sided fits",
     "crt": "CRT (4.5)",
-    "fit": "fit of the whole motion (nonlinear)",
+    "fit": "fit of the whole motion",
     "crt_exact": "CRT, exact potential",
     "eav_filtered": "EAV, filtered peaks (as the paper)",
     "eav_filtered_corrected": "EAV, filtered peaks, loss corrected",
@@ -69,7 +69,7 @@ def _pm(value: ValueWithSigma | None, digits: int, scale: float) -> str:
 def _table(title: str, *columns: str) -> Table:
     table = Table(title=title, title_justify="left", header_style="bold", pad_edge=False)
     for index, name in enumerate(columns):
-        table.add_column(name, justify="left" if index == 0 else "right")
+        table.add_column(name, justify="left" if index == 0 else "right", no_wrap=index == 0)
     return table
 
 

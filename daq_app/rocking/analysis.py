@@ -36,8 +36,8 @@ class AnalysisOptions:
 
     velocity_cutoff_hz: float | None = None
     """Cut-off of the stated filter; the rig's if None."""
-    zero_at_rest: bool = False
-    """Take the zero of every sensor from the rest after the test (records without a tare)."""
+    zero_at_rest: bool | None = None
+    """Take the zero of every sensor from the rest after the test. None: where the record has no tare."""
     fit: bool = True
     """Fit the whole motion."""
     bias_runs: int = 6
@@ -56,7 +56,8 @@ def analyse_record(record: TestRecord, options: AnalysisOptions | None = None) -
     velocity_filter = VelocityFilter(record.rate_hz, cutoff)
     signals = read_signals(record)
     times = find_phases(signals)
-    if options.zero_at_rest and times.rest is not None:
+    from_rest = not record.tared if options.zero_at_rest is None else options.zero_at_rest
+    if from_rest and times.rest is not None:
         signals = signals.zeroed(times.rest)
         times = find_phases(signals)
     velocity = velocity_filter.velocity(signals.bridged_rad)
@@ -191,8 +192,8 @@ def _fit(
 
 
 def _theta0(signals: Signals, track: MotionTrack) -> dict[str, ValueWithSigma]:
-    """θ0 by family over the last second of the hold, and the best of all."""
-    start, stop = np.searchsorted(signals.time_s, [track.release.time_s - 1.0, track.release.time_s - 0.05])
+    """θ0 by family over the last half second of the hold (slow tiltmeters have settled), and the best."""
+    start, stop = np.searchsorted(signals.time_s, [track.release.time_s - 0.5, track.release.time_s - 0.02])
     scale = abs(track.theta0_rad)
     found: dict[str, ValueWithSigma] = {}
     if signals.tilts_rad.shape[0]:

@@ -3,11 +3,12 @@
 θ̇ jumps at each impact, so no symmetric filter can show the speeds just before and after it. Each
 half-cycle ("arc") is therefore fitted by itself, strictly between its two impacts, with
 
-    θ(t) = a + b cosh p(t−t_c) + c sinh p(t−t_c)  [+ powers 3…6 of (t−t_c) where the data ask for them]
+    θ(t) = a + b cosh q(t−t_c) + c sinh q(t−t_c)  [+ powers 3…6 of (t−t_c) where the data ask for them]
 
-The first three terms are the general linearised motion with the nominal p but free constants; the
-powers take up the nonlinearity, another p, a yielding joint. Which powers are used is decided by
-the Bayesian information criterion. Nothing is assumed about α, energy or the neighbouring arcs.
+with q² = p² cos(mean of α − |θ|). The first three terms are the general motion, linearised about the
+middle of the half-cycle, with free constants; the powers take up another p, a yielding joint, what
+else the wall does. They are used only where the data ask for them clearly (Bayesian information
+criterion with a margin). Nothing is assumed about energy or the neighbouring half-cycles.
 """
 
 from __future__ import annotations
@@ -30,6 +31,10 @@ _POINTS = 160
 _MIN_POINTS = 12
 _POWERS: tuple[tuple[int, ...], ...] = ((), (4,), (3,), (3, 4), (3, 4, 5, 6))
 """Candidate additions to the basis, from stiff to free."""
+_CLEARLY = 10.0
+"""How much better in BIC a freer basis must be: noise alone must not choose it."""
+_MODEL_SHARE = 1e-4
+"""Standard uncertainty of speeds and peaks that the basis itself leaves, as a share of the value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +115,7 @@ def fit_arc(
     *,
     index: int,
     p_rad_s: float,
+    alpha_rad: float,
     zero_sigma_rad: float = 2e-5,
 ) -> Arc | None:
     """Fit the half-cycle between two zero crossings (for `index` 0 between release and crossing).
@@ -127,7 +133,8 @@ def fit_arc(
     left = first if index == 0 else start_s
     centre, half = (left + end_s) / 2.0, (end_s - left) / 2.0
     x, y = (points[0] - centre) / half, points[1]
-    fit = _best_fit(x, y, p_rad_s * half)
+    middle = max(alpha_rad - float(np.mean(np.abs(y))), 0.0)
+    fit = _best_fit(x, y, p_rad_s * math.sqrt(math.cos(middle)) * half)
     end = _crossing(fit, 1.0, half, zero_sigma_rad)
     start = None if index == 0 else _crossing(fit, -1.0, half, zero_sigma_rad)
     if end is None or (index > 0 and start is None):
@@ -183,7 +190,8 @@ def _best_fit(x: Floats, y: Floats, kappa: float) -> _Fit:
         if x.size >= 3 * (len(powers) + 3):
             columns = [0, 1, 2, *(3 + _POWERS[-1].index(n) for n in powers)]
             fits.append(_fit(full[:, columns], y, _Basis(kappa, powers)))
-    return min(fits, key=lambda fit: fit.score)
+    best = min(fits, key=lambda fit: fit.score)
+    return best if best.score < fits[0].score - _CLEARLY else fits[0]
 
 
 def _fit(design: Floats, y: Floats, basis: _Basis) -> _Fit:
@@ -219,7 +227,7 @@ def _crossing(
     gradient = slope - curvature / speed * value
     shift = math.hypot(math.sqrt(float(value @ fit.covariance @ value)), zero_sigma) / abs(speed)
     own = float(gradient @ fit.covariance @ gradient)
-    sigma = math.hypot(math.sqrt(max(own, 0.0)), curvature / speed * zero_sigma)
+    sigma = math.hypot(math.sqrt(max(own, 0.0)), curvature / speed * zero_sigma, _MODEL_SHARE * speed)
     return x, shift, speed / half_s, sigma / half_s
 
 
@@ -240,5 +248,5 @@ def _peak(fit: _Fit) -> tuple[float, float, float] | None:
     if not abs(x) < 1.0:
         return None
     row = fit.basis.rows(x)[0]
-    sigma = math.sqrt(float(row @ fit.covariance @ row))
-    return x, float(row @ fit.coefficients), sigma
+    value = float(row @ fit.coefficients)
+    return x, value, math.hypot(math.sqrt(float(row @ fit.covariance @ row)), _MODEL_SHARE * value)

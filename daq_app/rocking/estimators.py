@@ -156,11 +156,24 @@ def _combine(
         points=points,
         r=r,
         standard_error=r * math.sqrt(variance),
-        degrees_of_freedom=max(values.size - 1, 1),
+        degrees_of_freedom=_degrees(rows, variances / walk_factor**2, scatter),
         scatter=scatter,
         plain_mean=float(spread.mean()),
         plain_standard_error=float(spread.std(ddof=1) / math.sqrt(values.size)) if values.size > 1 else None,
     )
+
+
+def _degrees(rows: Floats, variances: Floats, scatter: float) -> int:
+    """Degrees of freedom of the standard error: how many impacts tell something of the scatter.
+
+    Steps between neighbouring values whose own error exceeds the scatter tell little of it.
+    """
+    if scatter == 0.0:
+        return max(len(rows) - 1, 1)
+    used = variances[np.any(rows != 0.0, axis=0)]
+    step = used[1:] + used[:-1]
+    informative = float(np.sum(scatter**2 / (scatter**2 + step)))
+    return max(round(informative) - 1, 1)
 
 
 def _weighted_mean(values: Floats, measured: Floats, walk: Floats) -> tuple[float, float, float]:

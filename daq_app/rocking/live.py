@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 _MEMORY_S = 15.0
 """How far back rotation and tilt are kept: hold, fall and the longest half-cycle need less."""
 _PIECE_FRAMES = 100
-_TILT_WINDOW_S = (1.0, 0.05)
+_TILT_WINDOW_S = (0.5, 0.02)
 """θ0 is read from the tiltmeters over this span before the release."""
 
 

@@ -77,6 +77,7 @@ class MotionTrack:
             crossing_s,
             index=index,
             p_rad_s=self.settings.p_rad_s,
+            alpha_rad=self.settings.alpha_rad,
             zero_sigma_rad=self.settings.zero_sigma_rad,
         )
         self.crossings_s.append(crossing_s)

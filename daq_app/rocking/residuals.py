@@ -8,21 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.rocking.results import Residuals, ValueWithSigma
-from daq_app.rocking.signals import Signals
+from daq_app.rocking.signals import TILT_SETTLING_S, Signals
 
 Floats = NDArray[np.float64]
 
-_TILT_SETTLING_S = 1.0
-
 
 def residuals_after(signals: Signals, rest: slice | None) -> Residuals | None:
-    """Means over the rest (up to 2 s), against the zero before the test; None without a rest."""
-    if rest is None:
+    """Means over the rest (up to 2 s), against the zero before the test.
+
+    None without a rest, or where the rest is what the zero was taken from.
+    """
+    if rest is None or signals.zeroed_at_rest:
         return None
     joint = signals.joint
     rate = signals.record.rate_hz
-    # Tiltmeters are slow: their first second still shows the rocking.
-    settled = slice(min(rest.start + round(_TILT_SETTLING_S * rate), rest.stop - 1), rest.stop)
+    settled = slice(min(rest.start + round(TILT_SETTLING_S * rate), rest.stop - 1), rest.stop)
     tilts = signals.tilts_rad[:, settled]
     return Residuals(
         rotation_wires_rad=_mean(signals.rotation_rad[rest]),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,11 @@ from daq_app.rocking.phases import PhaseDetector, PhaseEvent, PhaseSettings
 from daq_app.rocking.record import TestRecord
 
 Floats = NDArray[np.float64]
+
+TILT_SETTLING_S = 1.0
+"""Tiltmeters are slow: their first second at rest still shows the rocking."""
+_SHORTEST_REST_S = 0.3
+"""A quiet end of the record of this length counts as rest after the fact."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +47,9 @@ class Signals:
     lvdt_noise_rad: float
     fused: Fused | None
     acceleration: Floats
-    acceleration_offsets_s: tuple[float, ...] = field(default=())
+    acceleration_offsets_s: tuple[float, ...] = ()
+    zeroed_at_rest: bool = False
+    """Whether the zeros were taken from the rest after the test."""
 
     @property
     def first_s(self) -> float:
@@ -51,15 +58,19 @@ class Signals:
 
     def zeroed(self, rest: slice) -> Signals:
         """The same with every sensor's zero taken from the samples of a rest."""
-        return _combine(
+        settled = slice(
+            min(rest.start + round(TILT_SETTLING_S * self.record.rate_hz), rest.stop - 1), rest.stop
+        )
+        zeroed = _combine(
             self.record,
             self.geometry,
             _zero(self.wires_m, rest),
-            _zero(self.tilts_rad, rest),
+            _zero(self.tilts_rad, settled),
             _zero(self.openings_m, rest),
             self.acceleration,
             self.acceleration_offsets_s,
         )
+        return replace(zeroed, zeroed_at_rest=True)
 
 
 @dataclass(frozen=True)
@@ -166,27 +177,40 @@ def find_phases(signals: Signals) -> TestTimes:
     events = tuple(detector.process(signals.bridged_rad, signals.tilts_rad))
     offset = float(signals.time_s[0]) - signals.first_s if signals.time_s.size else 0.0
 
-    def seconds(event: PhaseEvent) -> float:
-        return event.sample / record.rate_hz + offset
+    def seconds(sample: float) -> float:
+        return sample / record.rate_hz + offset
 
     releases = [k for k, event in enumerate(events) if event.kind == "release"]
     followed = [k for k in releases if any(e.kind == "impact" for e in events[k:])]
     start = followed[-1] if followed else (releases[-1] if releases else len(events))
-    impacts = tuple(seconds(event) for event in events[start:] if event.kind == "impact")
-    rests = [event for event in events[start:] if event.kind == "rest"]
+    impacts = tuple(seconds(event.sample) for event in events[start:] if event.kind == "impact")
+    rests = [event.sample for event in events[start:] if event.kind == "rest"]
+    first = math.ceil(rests[0]) - record.first_sample if rests else _quiet_end(signals)
     rest = None
-    if rests:
-        first = max(math.ceil(rests[0].sample) - record.first_sample, 0)
+    if first is not None and impacts:
         stop = min(first + round(2.0 * record.rate_hz), record.n_samples)
-        rest = slice(first, stop) if stop - first >= 0.2 * record.rate_hz else None
+        rest = slice(max(first, 0), stop) if stop - first >= _SHORTEST_REST_S * record.rate_hz else None
     return TestTimes(
         events=events,
-        release_s=seconds(events[start]) if start < len(events) else None,
+        release_s=seconds(events[start].sample) if start < len(events) else None,
         hold_rad=detector.theta0_rad,
         impacts_s=impacts,
-        rest_s=seconds(rests[0]) if rests else None,
+        rest_s=None if first is None or not impacts else seconds(first + record.first_sample),
         rest=rest,
     )
+
+
+def _quiet_end(signals: Signals) -> int | None:
+    """First sample of a quiet end of the record, shorter than the detector asks for; None without one."""
+    size = signals.phase_settings.frame_samples
+    frames = signals.bridged_rad[: signals.bridged_rad.size // size * size].reshape(-1, size).mean(axis=1)
+    need = round(_SHORTEST_REST_S / signals.phase_settings.frame_s)
+    if frames.size < need:
+        return None
+    level = float(frames[-need:].mean())
+    loud = np.flatnonzero(np.abs(frames - level) > signals.phase_settings.quiet_rad / 2.0)
+    first = int(loud[-1]) + 1 if loud.size else 0
+    return first * size if frames.size - first >= need else None
 
 
 def _zero(values: Floats, rest: slice) -> Floats:

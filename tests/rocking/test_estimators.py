@@ -1,0 +1,176 @@
+"""Half-cycle fits and the estimators built on them, with their claimed errors."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from daq_app.rocking.arcs import fit_arc
+from daq_app.rocking.estimators import crt, eav
+from daq_app.rocking.housner import free_rocking
+from daq_app.rocking.motion import MotionSettings, MotionTrack
+from daq_app.rocking.motion_fit import fit_motion
+
+P, ALPHA, RATE = 2.2, 0.215, 4000.0
+SETTINGS = MotionSettings(RATE, P, ALPHA)
+
+
+def rock(phi, r, noise=0.0, seed=0, p=P, side=1, smallest=3e-4):
+    motion = free_rocking(side * phi * ALPHA, r, p, ALPHA, release_s=0.6, smallest_peak_rad=smallest)
+    time = np.arange(round((motion.impacts_s[-1] + 0.1) * RATE)) / RATE
+    rotation = motion.at(time)[0] + np.random.default_rng(seed).normal(0, noise, time.size)
+    return motion, time, rotation
+
+
+def follow(motion, time, rotation):
+    first = np.searchsorted(time, motion.impacts_s[0] + 1e-3)
+    track = MotionTrack.begin(
+        SETTINGS, time[:first], rotation[:first], 0.6, motion.side * motion.peaks_rad[0]
+    )
+    for crossing in motion.impacts_s:
+        track.add_impact(float(crossing), time, rotation)
+    return track
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0.05, 0.6), st.floats(0.7, 0.98), st.floats(0.95, 1.05), st.sampled_from([1, -1]))
+def test_arcs_of_clean_motion_are_exact_for_any_p(phi, r, factor, side):
+    """Without noise the fits give peaks and one-sided speeds, though their own p is wrong."""
+    motion, time, rotation = rock(phi, r, p=P * factor, side=side, smallest=3e-3)
+    track = follow(motion, time, rotation)
+    before, after = np.abs(track.speeds_before_rad_s), np.abs(track.speeds_after_rad_s[:-1])
+    np.testing.assert_allclose(before, motion.speeds_before_rad_s, rtol=5e-4)
+    np.testing.assert_allclose(after, motion.speeds_after_rad_s[:-1], rtol=5e-4)
+    np.testing.assert_allclose(np.abs(track.peaks_rad[1:]), motion.peaks_rad[1:-1], rtol=3e-4)
+    np.testing.assert_allclose(track.impacts_s, motion.impacts_s, atol=1e-4)
+    signs = np.sign(track.peaks_rad)
+    assert (signs[1:] == -signs[:-1]).all() and signs[0] == side
+
+
+def test_errors_of_arcs_are_as_claimed():
+    """Over repeated noise the errors of speeds and peaks are normal with the claimed sigma."""
+    motion = rock(0.35, 0.9)[0]
+    normalised = []
+    for seed in range(30):
+        _, time, rotation = rock(0.35, 0.9, noise=6e-5, seed=seed)
+        for n in (4, 9, 14):
+            start, stop = motion.impacts_s[n - 1 : n + 1]
+            arc = fit_arc(
+                time, rotation, start, stop, index=n, p_rad_s=P, alpha_rad=ALPHA, zero_sigma_rad=0.0
+            )
+            normalised += [
+                (abs(arc.speed_end_rad_s) - motion.speeds_before_rad_s[n]) / arc.sigma_speed_end_rad_s,
+                (abs(arc.speed_start_rad_s) - motion.speeds_after_rad_s[n - 1]) / arc.sigma_speed_start_rad_s,
+                (abs(arc.peak_rad) - motion.peaks_rad[n]) / arc.sigma_peak_rad,
+            ]
+    assert 0.7 < np.std(normalised) < 1.25
+    assert abs(np.mean(normalised)) < 0.3
+
+
+def test_too_little_to_fit_is_none_not_nonsense():
+    time = np.arange(100) / RATE
+    assert fit_arc(time, np.full(100, np.nan), 0.0, 0.02, index=1, p_rad_s=P, alpha_rad=ALPHA) is None
+    assert fit_arc(time, np.ones(100), 0.0, 0.02, index=1, p_rad_s=P, alpha_rad=ALPHA) is None
+    assert fit_arc(time, np.ones(100), 0.0, 0.005, index=1, p_rad_s=P, alpha_rad=ALPHA) is None
+
+
+@pytest.mark.parametrize("r", [0.82, 0.9, 0.95])
+@pytest.mark.parametrize(("phi", "tolerance"), [(0.15, 0.01), (0.25, 0.003), (0.4, 0.003)])
+def test_both_estimators_meet_the_requirement_with_worse_sensors(r, phi, tolerance):
+    """Rotation noise of 0.1 mrad is what five wires of 0.5 mm rms would give."""
+    for seed in range(4):
+        track = follow(*rock(phi, r, noise=1e-4, seed=seed))
+        assert track.eav().r == pytest.approx(r, abs=tolerance)
+        assert track.crt().r == pytest.approx(r, abs=tolerance)
+
+
+def test_linear_and_exact_crt_differ_as_the_theory_says():
+    track = follow(*rock(0.35, 0.9))
+    assert track.crt_exact().r == pytest.approx(0.9, abs=1e-5)
+    # E_nl / E_lin ≈ 1 − (1−φ)² α²/12: (4.5) comes out high by about a ten-thousandth here.
+    assert 2e-5 < track.crt().r - 0.9 < 3e-4
+    assert "exact" in track.crt_exact().method
+
+
+def test_points_are_named_by_the_impact_that_completed_them():
+    track = follow(*rock(0.35, 0.9))
+    first = track.eav().points[0]
+    assert (first.first, first.last, first.impact) == (1, 3, 3)
+    first = track.crt().points[0]
+    assert (first.first, first.last, first.impact) == (0, 1, 1)
+    v = np.abs(track.speeds_before_rad_s)
+    assert track.eav().points[2].r == pytest.approx(math.sqrt(v[4] / v[2]))
+
+
+def test_a_lost_half_cycle_costs_its_pairs_only():
+    speeds = 0.3 * 0.9 ** np.arange(10.0)
+    speeds[4] = math.nan
+    estimate = eav(speeds.tolist(), (1e-4 * np.ones(10)).tolist())
+    assert {(p.first, p.last) for p in estimate.points} == {(1, 3), (2, 4), (4, 6), (6, 8), (7, 9), (8, 10)}
+    assert estimate.r == pytest.approx(0.9)
+
+
+def test_late_noisy_points_do_not_spoil_the_weighted_mean():
+    speeds = 0.3 * 0.9 ** np.arange(12.0)
+    sigmas = np.full(12, 2e-4)
+    speeds[-1] *= 1.3
+    sigmas[-1] = 0.3 * speeds[-1] * 0.4
+    estimate = eav(speeds.tolist(), sigmas.tolist())
+    assert abs(estimate.r - 0.9) < 1e-3
+    assert abs(estimate.plain_mean - 0.9) > abs(estimate.r - 0.9)
+
+
+def test_scatter_of_r_is_found_and_in_the_standard_error():
+    rng = np.random.default_rng(2)
+    covered, scatters = 0, []
+    for _ in range(60):
+        rs = 0.9 * (1 + rng.normal(0, 0.01, 18))
+        speeds = 0.35 * np.cumprod(np.concatenate(([1.0], rs)))
+        estimate = eav(speeds.tolist(), (1e-4 + 0 * speeds).tolist())
+        low, high = estimate.interval95()
+        covered += low <= 0.9 <= high
+        scatters.append(estimate.scatter)
+    assert covered >= 51  # 95 % of 60 is 57; three standard deviations below
+    assert np.median(scatters) == pytest.approx(0.01, rel=0.3)
+
+
+def test_no_points_no_value():
+    for estimate in (
+        eav([0.3, 0.2], [1e-3, 1e-3]),
+        crt([0.05], [1e-4], ALPHA),
+        crt([math.nan, 0.1], [1, 1], ALPHA),
+    ):
+        assert estimate.r is None and estimate.points == () and estimate.interval95() is None
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.02])
+def test_fit_of_the_whole_motion_finds_the_body_too(scatter):
+    """True p 3 % off: the fit finds it, α and the mean r of the impacts it saw."""
+    rng = np.random.default_rng(4)
+    rs = np.minimum(0.88 * (1 + rng.normal(0, scatter, 40)), 0.99) if scatter else 0.88
+    motion, time, rotation = rock(0.35, rs, noise=5e-5, p=P * 1.03)
+    track = follow(motion, time, rotation)
+    fit = fit_motion(
+        time,
+        rotation,
+        release_s=track.release.time_s,
+        theta0_rad=track.theta0_rad,
+        impacts_s=track.impacts_s,
+        peaks_rad=track.peaks_rad,
+        speeds_rad_s=track.speeds_before_rad_s,
+        r=track.crt().r,
+        scatter=max(track.crt().scatter, track.eav().scatter),
+        noise_rad=5e-5,
+        p_rad_s=P,
+        alpha_rad=ALPHA,
+    )
+    truth = float(np.mean(motion.restitution[: fit.impacts]))
+    assert fit.explains_the_motion
+    assert fit.p_rad_s == pytest.approx(P * 1.03, rel=2e-3)
+    assert fit.alpha_rad == pytest.approx(ALPHA, rel=3e-3)
+    assert fit.r == pytest.approx(truth, abs=max(1e-3, 0.15 * scatter))
+    assert abs(fit.r - 0.88) < 4 * fit.standard_error + 1e-4
