@@ -83,7 +83,15 @@ class RockingModel:
         )
 
     def local_nuisance(self, run: Run) -> tuple[Parameter, ...]:
-        return (Parameter("zero", 0.0, 5e-5, "rad", meaning="rotation at which the wall stands upright"),)
+        assert isinstance(run, RockingRun)
+        swings = run.swings
+        return (
+            Parameter("zero", 0.0, 5e-5, "rad", meaning="rotation at which the wall stands upright"),
+            Parameter("theta0", 0.0, swings.hold_sd + 2e-6, "rad", meaning="sway of the held rotation"),
+            Parameter(
+                "omega0", 0.0, swings.hold_rate_sd + 2e-5, "rad/s", meaning="speed of the sway at release"
+            ),
+        )
 
     def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
         assert isinstance(run, RockingRun)

@@ -71,6 +71,7 @@ def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
     acceleration = -(values["p"] ** 2) * np.sin(values["alpha"] - np.abs(peaks)) * side
     lost = np.where(np.arange(peaks.size) > 0, slow * acceleration, 0.0)
     true = (peaks - offset - bend * peaks**2 - lost) / gain
+    true[0] += side[0] * values["theta0"]
     levels = side[:, None] * run.swings.levels
     behind = (levels - offset[:, None] - bend * levels**2) / gain[:, None]
     return true, np.abs(behind)

@@ -43,6 +43,10 @@ class Swings:
     rise_s: FloatArray
     rise_sd: FloatArray
     rest_s: float
+    hold_sd: float
+    """How far the held rotation sways, rad: nobody holds five tonnes still."""
+    hold_rate_sd: float
+    """Speed of that sway, rad/s."""
 
 
 def find_swings(theta: FloatArray, noise_rad: float, rate_hz: float, name: str) -> Swings:
@@ -63,6 +67,7 @@ def find_swings(theta: FloatArray, noise_rad: float, rate_hz: float, name: str) 
             f"Run {name}: the wall never rocks.", "Check that it was released in this record."
         )
     release = _release(smooth, held, noise_rad, int(crossings[0]))
+    held, held_sd, sway, sway_rate = _hold(theta, release, noise_rad, rate_hz)
     peaks = _peaks(theta, smooth, crossings, noise_rad, rate_hz)
     if len(peaks) < 3:
         raise CannotDiagnose(
@@ -72,7 +77,7 @@ def find_swings(theta: FloatArray, noise_rad: float, rate_hz: float, name: str) 
     rest = float(np.flatnonzero(np.abs(smooth) > max(5 * noise_rad, 2e-4))[-1]) / rate_hz
     times = np.array([release / rate_hz, *(p[0] for p in peaks)]) - release / rate_hz
     values = np.array([held, *(p[1] for p in peaks)])
-    sds = np.array([noise_rad / np.sqrt(HOLD_S * rate_hz), *(p[2] for p in peaks)])
+    sds = np.array([held_sd, *(p[2] for p in peaks)])
     count = len(RELEASE_FRACTIONS)
     levels = np.abs(values)[:, None] * np.array([*FRACTIONS, *[FRACTIONS[-1]] * (count - len(FRACTIONS))])
     levels[0] = abs(held) * np.array(RELEASE_FRACTIONS)
@@ -83,6 +88,8 @@ def find_swings(theta: FloatArray, noise_rad: float, rate_hz: float, name: str) 
         begin = int(release) if k == 0 else int(peaks[k - 1][3])
         end = int(peaks[k][3]) if k < len(peaks) else min(begin + int(1.0 * rate_hz), theta.size - 1)
         for j in range(count if k == 0 else len(FRACTIONS)):
+            if k == 0 and RELEASE_FRACTIONS[j] > 1.0 - 6.0 * sway / abs(held):
+                continue  # the sway alone may keep the wall below this level
             fall[k, j], fall_sd[k, j] = _crossing(
                 side * theta, side * smooth, levels[k, j], begin, end, noise_rad, rate_hz
             )
@@ -92,7 +99,39 @@ def find_swings(theta: FloatArray, noise_rad: float, rate_hz: float, name: str) 
                     side * theta, side * smooth, levels[k, j], begin, before, noise_rad, rate_hz
                 )
     offset = release / rate_hz
-    return Swings(offset, times, values, sds, levels, fall - offset, fall_sd, rise - offset, rise_sd, rest)
+    return Swings(
+        offset,
+        times,
+        values,
+        sds,
+        levels,
+        fall - offset,
+        fall_sd,
+        rise - offset,
+        rise_sd,
+        rest,
+        sway,
+        sway_rate,
+    )
+
+
+def _hold(
+    theta: FloatArray, release: float, noise: float, rate_hz: float
+) -> tuple[float, float, float, float]:
+    """(rotation just before the release, its noise, sway, speed of the sway) while the wall is held."""
+    end = max(int(release - 0.02 * rate_hz), int(0.3 * rate_hz))
+    start = max(int(end - HOLD_S * rate_hz), 0)
+    step = int(0.02 * rate_hz)
+    count = (end - start) // step
+    means = theta[end - count * step : end].reshape(count, step).mean(axis=1)
+    own = noise / np.sqrt(step)
+    sway = float(np.sqrt(max(np.var(means) - own**2, 0.0)))
+    rates = np.diff(means) * rate_hz / step
+    speed = float(np.sqrt(max(np.var(rates) - 2 * (own * rate_hz / step) ** 2, 0.0)))
+    if sway < 0.5 * own:
+        return float(means.mean()), float(noise / np.sqrt(count * step)), 0.0, 0.0
+    last = means[-4:]
+    return float(last.mean()), float(own / 2.0), sway, speed
 
 
 def _release(smooth: FloatArray, held: float, noise: float, first_crossing: int) -> float:

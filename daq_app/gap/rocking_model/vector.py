@@ -45,7 +45,10 @@ def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> tuple[bytes, 
                 if vector[other] == 0.0:
                     vector[other] = default
             vector[index] = value
-    measured = [v for k, v in values.items() if k in ("zero", "face_a", "face_b") or "@" in k]
+    vector[par.OMEGA0] += values["omega0"]
+    measured = [
+        v for k, v in values.items() if k in ("zero", "theta0", "cal_wire", "face_a", "face_b") or "@" in k
+    ]
     dynamic = vector.copy()
     dynamic[[par.RESTITUTION, par.R_SLOPE, par.R_ASYMMETRY, par.CRUSH_R]] = 0.0
     identity = dynamic.tobytes() + np.asarray(measured, dtype=float).tobytes()
