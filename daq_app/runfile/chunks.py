@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, Final
@@ -80,8 +80,9 @@ _Job = tuple[tuple[h5py.Dataset, ...], int, "Future[bytes]"]
 class ChunkWriter:
     """Writes chunks that worker threads compress. All calls from one thread."""
 
-    def __init__(self, pool: ThreadPoolExecutor) -> None:
+    def __init__(self, pool: ThreadPoolExecutor, check: Callable[[], None]) -> None:
         self._pool = pool
+        self._check = check
         self._waiting: list[_Job] = []
         self._previous: list[_Job] = []
 
@@ -99,6 +100,7 @@ class ChunkWriter:
             for dataset in datasets:
                 dataset.id.write_direct_chunk((start,), job.result())
         self._previous, self._waiting = self._waiting, []
+        self._check()
 
     def flush(self) -> None:
         """Wait for everything and write it."""
@@ -107,7 +109,7 @@ class ChunkWriter:
 
 
 @contextmanager
-def chunk_writer() -> Iterator[ChunkWriter]:
-    """A `ChunkWriter` with one thread per core (at most eight)."""
+def chunk_writer(check: Callable[[], None]) -> Iterator[ChunkWriter]:
+    """A `ChunkWriter` with one thread per core (at most eight); `check` is called after each window."""
     with ThreadPoolExecutor(min(8, os.cpu_count() or 1), thread_name_prefix="compress") as pool:
-        yield ChunkWriter(pool)
+        yield ChunkWriter(pool, check)

@@ -14,6 +14,7 @@ import numpy as np
 
 from daq_app.runfile import layout
 from daq_app.runfile.chunks import ChunkWriter, chunk_samples, chunk_writer, create_chunked
+from daq_app.runfile.guarded_file import guarded_hdf5
 from daq_app.runfile.hdf5_channels import describe_channels
 from daq_app.runfile.model import RUN_FORMAT, RUN_FORMAT_VERSION, DerivedData, Event, Gap, to_json
 from daq_app.runfile.source import Provenance, RunScaling, RunSource, rig_of
@@ -27,12 +28,17 @@ def write_run(
 ) -> None:
     """Write the whole run to `path`, replacing it. Memory stays within some tens of megabytes.
 
+    Raises `OSError` if the disk is full or fails.
+
     The caller gives a temporary name and checks the file (`compare_run`) before it gets its own.
     """
     header = source.header
     scaling = RunScaling.of(header, rig_of(header))
     # Version 1.8 of the file format: every HDF5 library since 2008 reads it.
-    with h5py.File(path, "w", libver=("v108", "v108")) as file, chunk_writer() as writer:
+    with (
+        guarded_hdf5(path, libver=("v108", "v108")) as (file, guarded),
+        chunk_writer(guarded.raise_failure) as writer,
+    ):
         _write_texts(file, source)
         digest = _write_samples(file, source, scaling, writer)
         describe_channels(file, header, scaling)

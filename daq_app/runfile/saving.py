@@ -72,7 +72,7 @@ def save_run(
     except OSError as error:
         raise RunFileError(
             f"{out} cannot be written ({error.strerror or error})",
-            advice="The journal is untouched; run `daq-app recover` when the disk is well.",
+            advice="What it is made from is untouched; a journal becomes a run with `daq-app recover`.",
         ) from error
     finally:
         temporary.unlink(missing_ok=True)

@@ -75,6 +75,16 @@ def import_file(
         )
     if not final.parent.is_dir():
         raise RunFileError(f"the folder {final.parent} does not exist", advice="Make it first.")
+    try:
+        return _convert(path, rig, rig_text, final, import_map)
+    except OSError as error:
+        raise RunFileError(
+            f"{path} cannot be brought to {final} ({error.strerror or error})",
+            advice="Check that the disk is well and has room for twice the run.",
+        ) from error
+
+
+def _convert(path: Path, rig: Rig, rig_text: str, final: Path, import_map: ImportMap) -> ImportReport:
     digest = _sha256(path)
     with closing(_opener(path.suffix.lower())(path, import_map.source)) as reader:
         mapped = map_channels(path, reader, rig, import_map)
