@@ -146,9 +146,13 @@ class Connection:
             self._raw.close()
             self._connect()
 
+    def full_name(self, name: str) -> str:
+        """What a task of the plan is called on the device server."""
+        return f"{self.prefix}_{name}"
+
     def new_task(self, name: str) -> nidaqmx.Task:
         """A new, empty task of that name (made unique)."""
-        unique = f"{self.prefix}_{name}"
+        unique = self.full_name(name)
         return nidaqmx.Task(
             unique,
             grpc_options=self._options(unique, SessionInitializationBehavior.INITIALIZE_SERVER_SESSION),
@@ -156,7 +160,10 @@ class Connection:
 
     def attach_task(self, name: str) -> nidaqmx.Task:
         """The task that `new_task` made, over a new socket. Only for a device server."""
-        unique = f"{self.prefix}_{name}"
+        return self.attach_by_full_name(self.full_name(name))
+
+    def attach_by_full_name(self, unique: str) -> nidaqmx.Task:
+        """Any task on the device server, by the name it has there."""
         return nidaqmx.Task(
             unique,
             grpc_options=self._options(unique, SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION),

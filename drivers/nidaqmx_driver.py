@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 import warnings
+from collections.abc import Callable
 from pathlib import PurePath
 
 import nidaqmx
@@ -14,6 +15,7 @@ from nidaqmx import errors as ni_errors
 from daq_app.config.plan import TaskPlan
 from drivers.connection import Connection
 from drivers.error_advice import translate
+from drivers.ledger import TaskLedger
 from drivers.protocol import Block, DeviceInfo, DriverError, Opened
 from drivers.stream import TaskStream
 from drivers.tasks import commit, create_task, log_to_tdms, read_ranges
@@ -28,6 +30,10 @@ _CATCH_UP_READS = 10
 _CLOSE_LIMIT_S = 2.0
 
 
+Inspection = Callable[[tuple[DeviceInfo, ...]], list[str]]
+"""Looks at the devices before any task is made; one sentence for each that is not as it should be."""
+
+
 class _OutOfStepError(DriverError):
     """What was just read may belong to other samples than we thought: it is read again, not handed out."""
 
@@ -35,12 +41,23 @@ class _OutOfStepError(DriverError):
 class NidaqmxDriver:
     """Keeps `drivers.protocol.Driver`. All calls from one thread.
 
-    `backup_folder` switches on the NI driver's own TDMS logging (`start_backup`).
+    `backup_folder` switches on the NI driver's own TDMS logging (`start_backup`); `ledger` lets the
+    next session clear the tasks that this one leaves on a device server if it is killed; `object_to`
+    may refuse devices before a wrong module gives a puzzling error.
     """
 
-    def __init__(self, connection: str, *, backup_folder: PurePath | None = None) -> None:
+    def __init__(
+        self,
+        connection: str,
+        *,
+        backup_folder: PurePath | None = None,
+        ledger: TaskLedger | None = None,
+        object_to: Inspection | None = None,
+    ) -> None:
         self._connection = Connection(connection)
+        self._ledger = ledger if self._connection.is_remote else None
         self._backup_folder = backup_folder
+        self._object_to = object_to
         self._plan: TaskPlan | None = None
         self._streams: list[TaskStream] = []
         self._next_sample = 0
@@ -55,6 +72,7 @@ class NidaqmxDriver:
         self._connection.limit_calls_to()
         try:
             devices = self._check_devices(plan)
+            self._clear_what_was_left(plan)
             for planned in plan.tasks:
                 self._streams.append(TaskStream(planned, create_task(self._connection, planned)))
             for stream in self._streams:
@@ -83,7 +101,7 @@ class NidaqmxDriver:
                 code=-200220,
                 device=missing[0],
             )
-        return tuple(
+        devices = tuple(
             DeviceInfo(
                 name=name,
                 product=str(present[name].product_type),
@@ -92,6 +110,23 @@ class NidaqmxDriver:
             )
             for name in wanted
         )
+        objections = self._object_to(devices) if self._object_to is not None else []
+        if objections:
+            raise DriverError(
+                "The hardware is not what the rig file says: " + "; ".join(objections),
+                advice="Nothing was started",
+            )
+        return devices
+
+    def _clear_what_was_left(self, plan: TaskPlan) -> None:
+        """Clear the tasks of a session of ours that was killed: they hold the hardware."""
+        if self._ledger is None:
+            return
+        target = str(self._connection.target)
+        for name in self._ledger.left_behind(target):
+            with contextlib.suppress(Exception):  # a server that was restarted has none of them
+                self._connection.attach_by_full_name(name).close()
+        self._ledger.opening(target, [self._connection.full_name(task.name) for task in plan.tasks])
 
     def _read_back(self, devices: tuple[DeviceInfo, ...]) -> Opened:
         rates = [float(stream.task.timing.samp_clk_rate) for stream in self._streams]
@@ -289,6 +324,8 @@ class NidaqmxDriver:
             warnings.simplefilter("ignore", ni_errors.DaqWarning)
             for stream in self._streams:
                 self._clear(stream)
+        if self._ledger is not None and self._streams:
+            self._ledger.closed()
         self._streams = []
 
     def _clear(self, stream: TaskStream) -> None:

@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from daq_app.acquisition.preflight import check_modules
 from daq_app.acquisition.simulated import SimulatedServer
 from daq_app.config.rig import Rig
 from daq_app.runfile import RunFileError, open_run
@@ -17,22 +18,30 @@ _REPLAY = "replay:"
 
 
 def driver_maker(
-    connection: str, options: argparse.Namespace, stack: ExitStack
+    connection: str, rig: Rig, options: argparse.Namespace, stack: ExitStack
 ) -> tuple[Callable[[], Driver], Callable[[], str]]:
     """How to make a driver for `connection`, and how to learn what the connection comes to.
 
     A simulated server is started here (both answers wait for it), a run that is replayed is opened;
     both end with `stack`. Raises `DriverError`.
     """
+
+    def open_it(to: str) -> Driver:
+        return open_driver(
+            to,
+            backup_folder=options.backup,
+            ledger=options.out / ".open-tasks.json",
+            object_to=lambda devices: check_modules(rig, devices),
+        )
+
     if connection == "simulated":
         server = stack.enter_context(SimulatedServer(options.rig, _server_options(options)))
-        return (lambda: open_driver(server.connection)), (lambda: server.connection)
+        return (lambda: open_it(server.connection)), (lambda: server.connection)
     if connection.startswith(_REPLAY):
         return _replay(Path(connection.removeprefix(_REPLAY)), options, stack), (lambda: connection)
-    backup: Path | None = options.backup
     # Checks the address now rather than in the reader's thread.
-    open_driver(connection).close()
-    return (lambda: open_driver(connection, backup_folder=backup)), (lambda: connection)
+    open_it(connection).close()
+    return (lambda: open_it(connection)), (lambda: connection)
 
 
 def planned_truth(connection: str, rig: Rig, options: argparse.Namespace) -> dict[str, Any] | None:

@@ -30,6 +30,13 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
     add("--test", help="take this one test without an operator, then end")
     add("--notes", default="", help="kept in the run of --test")
     add("--release-within", type=float, default=1800.0, metavar="S", help="longest wait for a release")
+    add(
+        "--reconnect-within",
+        type=float,
+        default=30.0,
+        metavar="S",
+        help="how long to look for a device that does not answer before the run is closed",
+    )
     add("--spare", type=Path, metavar="DIR", help="folder on another disk to go on in if the first fails")
     add("--backup", type=Path, metavar="DIR", help="let the NI driver write TDMS files there as well")
     add("--speed", default="1", help="time factor of a simulated device or a replay, or max")

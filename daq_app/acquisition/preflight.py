@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 from daq_app.acquisition.items import RequestRefused
 from daq_app.config import catalogue
 from daq_app.config.rig import Rig
-from drivers import Opened
+from drivers import DeviceInfo
 
 _BYTES_PER_READING: Final = 8
 _COPIES: Final = 3.0
@@ -52,9 +53,9 @@ def check_name(test: str) -> str:
     return test
 
 
-def check_modules(rig: Rig, opened: Opened) -> list[str]:
+def check_modules(rig: Rig, devices: Sequence[DeviceInfo]) -> list[str]:
     """One sentence for each module that is not what the rig file says; empty if all are."""
-    found = {device.name: device for device in opened.devices}
+    found = {device.name: device for device in devices}
     wrong = []
     for chassis in rig.hardware.chassis:
         bus = catalogue.chassis(chassis.product).bus

@@ -33,9 +33,10 @@ class Process:
 
     def __init__(self, options: argparse.Namespace, rig: Rig, plan: TaskPlan, stack: ExitStack) -> None:
         connection = options.connection or rig.hardware.connection
-        make_driver, self._connection = driver_maker(connection, options, stack)
+        make_driver, self._connection = driver_maker(connection, rig, options, stack)
         self._simulated = connection == "simulated"
         # Loaded while a simulated server starts: the analysis takes seconds to load, and so does it.
+        from daq_app.acquisition.reader import Patience
         from daq_app.acquisition.session import Session, SessionSettings
         from daq_app.acquisition.unattended import Unattended
 
@@ -57,6 +58,7 @@ class Process:
                 make_driver=make_driver,
                 release_within_s=options.release_within,
                 spare_folder=options.spare,
+                patience=Patience(reconnect_limit_s=options.reconnect_within),
                 truth=planned_truth(connection, rig, options),
             ),
             self._desk.publisher,
@@ -130,6 +132,7 @@ class Process:
             "tare_record": self.session.analyst.tare.record,
             "connection": self._connection() if opened else "",
             "simulated": self._simulated,
+            "events": [event.model_dump(mode="json") for event in self.session.recent_events],
             "folder": str(self._folder.resolve()),
             "pid": os.getpid(),
             "state": self.session.analyst.state_message().model_dump(mode="json"),
@@ -159,3 +162,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except DriverError as error:
         print(str(error), file=sys.stderr, flush=True)
         return 3
+
+
+def run_and_exit(argv: Sequence[str]) -> None:
+    """`main` for whoever starts us as a function in a new process: its code becomes the exit code."""
+    raise SystemExit(main(argv))

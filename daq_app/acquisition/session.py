@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -24,7 +25,7 @@ from daq_app.acquisition.items import (
     Started,
 )
 from daq_app.acquisition.messages import Command, EventMessage, Reply, State
-from daq_app.acquisition.preflight import check_modules, check_name, check_space
+from daq_app.acquisition.preflight import check_name, check_space
 from daq_app.acquisition.reader import Patience, Reader
 from daq_app.acquisition.recorder import Recorded, Recorder
 from daq_app.acquisition.watchdog import Watchdog
@@ -68,6 +69,8 @@ class Session:
         self.opened: Opened | None = None
         self.error: DriverError | None = None
         """Why sampling ended, if it ended by a fault."""
+        self.recent_events: deque[EventMessage] = deque(maxlen=50)
+        """For viewers that come later: what was recovered, which module is wrong, what was lost."""
         self._reader: Reader | None = None
 
     # -- life ------------------------------------------------------------------------------------
@@ -113,14 +116,13 @@ class Session:
         match item:
             case Started(opened=opened):
                 self.opened = opened
-                for sentence in check_modules(self._settings.rig, opened):
-                    self._say(EventMessage(kind="hardware", sample=0, text=sentence, severity="error"))
             case SourceEnded(error=error):
                 self.opened = None
                 self.error = error
         self.analyst.inbox.put(item)
 
     def _announce(self, event: EventMessage) -> None:
+        self.recent_events.append(event)
         self._publisher.send("event", event)
 
     def _say(self, event: EventMessage) -> None:
@@ -186,9 +188,6 @@ class Session:
             raise RequestRefused("Nothing is being sampled. Start the preview first")
         if self.recording:
             raise RequestRefused("A run is being recorded already. Stop or abort it before the next one")
-        wrong = check_modules(settings.rig, self.opened)
-        if wrong:
-            raise RequestRefused("; ".join(wrong))
         check_space(settings.folder, settings.rig, self.opened.rate_hz)
         header = make_header(
             settings.rig,

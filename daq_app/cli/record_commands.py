@@ -1,9 +1,11 @@
-"""`daq-app run` and `daq-app simulate`: take a test, or make one without real time."""
+"""`daq-app run`, `simulate` and `keys`: take a test, make one without real time, admit viewers."""
 
 from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -18,13 +20,17 @@ _LEVEL_IN_NAME: Final = re.compile(r"(?:^|-)(L[1-4])(?:-|$)")
 
 
 def register(app: typer.Typer) -> None:
-    """Add ``run`` and ``simulate``."""
+    """Add ``run``, ``simulate`` and ``keys``."""
     app.command("run", epilog="Example: daq-app run configs/fr1.toml --test FR1-L3-2 --headless --out runs")(
         run
     )
     app.command(
         "simulate", epilog="Example: daq-app simulate configs/fr1.toml --level L3 --r 0.9 --out run.h5"
     )(simulate)
+    keys = typer.Typer(no_args_is_help=True, help="Keys for viewers beyond this machine.")
+    keys.command("recorder", epilog="Example: daq-app keys recorder keys")(recorder_keys)
+    keys.command("viewer", epilog="Example: daq-app keys viewer my-keys bench-laptop")(viewer_keys)
+    app.add_typer(keys, name="keys")
 
 
 def level_of(test: str) -> str | None:
@@ -127,3 +133,44 @@ def simulate(
             typer.echo(json.dumps(as_document(out, "complete"), indent=1))
         else:
             Console().print(results_table(out))
+
+
+KeyFolder = Annotated[Path, typer.Argument(help="Folder of the keys.", metavar="DIR", show_default=False)]
+
+
+def recorder_keys(folder: KeyFolder) -> None:
+    """Make the recorder's keys; give the folder to the acquisition with --keys.
+
+    Put the public key (.key) of each viewer that may listen into the folder's `viewers`.
+    """
+    from daq_app.acquisition.curve import VIEWERS, create_recorder_keys
+
+    with _writing(folder):
+        public = create_recorder_keys(folder)
+    typer.echo(f"The recorder's public key, for viewers: {public}")
+    typer.echo(f"Viewers that may listen: put their .key files into {folder / VIEWERS}")
+
+
+def viewer_keys(
+    folder: KeyFolder,
+    name: Annotated[str, typer.Argument(help="Name of the viewer.", metavar="NAME", show_default=False)],
+) -> None:
+    """Make a viewer's keys; the public one goes to the recorder, the secret one stays here."""
+    from daq_app.acquisition.curve import create_viewer_keys
+
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,59}", name):
+        print_paragraph("Error", f"'{name}' is no name: letters, digits, '-' and '_'")
+        raise typer.Exit(EXIT_BAD_INPUT)
+    with _writing(folder):
+        public, secret = create_viewer_keys(folder, name)
+    typer.echo(f"For the recorder's folder of viewers: {public}")
+    typer.echo(f"Keep this one here (daq-app monitor --key): {secret}")
+
+
+@contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        print_paragraph("Error", f"{folder} cannot be written to ({error.strerror})")
+        raise typer.Exit(EXIT_BAD_INPUT) from None

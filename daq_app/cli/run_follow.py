@@ -105,7 +105,14 @@ def follow_run(options: RunOptions, console: Console) -> RunEnd:
 def _open_window(process: AcquisitionProcess) -> subprocess.Popen[bytes]:
     """The monitor, in a process of its own: whatever happens to it costs no sample."""
     return subprocess.Popen(
-        [sys.executable, "-m", "daq_app.monitor", "--connect", process.address],
+        [
+            sys.executable,
+            "-c",
+            "from daq_app.cli import main; main()",
+            "monitor",
+            "--connect",
+            process.address,
+        ],
         stdin=subprocess.DEVNULL,
         env={**os.environ, "DAQ_APP_TOKEN": process.token},
     )

@@ -271,6 +271,34 @@ def test_replies_above_four_megabytes_arrive(laboratory: Laboratories) -> None:
     driver.close()
 
 
+def test_tasks_that_a_killed_session_left_on_the_server_are_cleared_by_the_next(
+    laboratory: Laboratories, tmp_path: Path
+) -> None:
+    lab = laboratory()
+    ledger = tmp_path / "open-tasks.json"
+    killed = open_driver(lab.connection, ledger=ledger)
+    killed.open(lab.plan)
+    killed.start()
+    assert ledger.exists()
+    stranger = open_driver(lab.connection, ledger=tmp_path / "of somebody else.json")
+    with pytest.raises(DriverError, match="reserved"):
+        stranger.open(lab.plan)
+    following = started_with(lab, ledger)
+    assert following.read(1.0).first_sample == 0
+    following.close()
+    assert not ledger.exists()
+    for rubbish in ("", "{}", "[1]", '{"target": 1, "tasks": 2}'):
+        ledger.write_text(rubbish)
+        started_with(lab, ledger).close()
+
+
+def started_with(lab: Any, ledger: Path) -> Driver:
+    driver = open_driver(lab.connection, ledger=ledger)
+    driver.open(lab.plan)
+    driver.start()
+    return driver
+
+
 def test_a_channel_that_the_module_lacks_is_told_as_such(laboratory: Laboratories) -> None:
     lab = laboratory()
     first = lab.plan.tasks[0].channels[0]
