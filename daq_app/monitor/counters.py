@@ -83,7 +83,7 @@ def tile_texts(session: Session, levels: AlarmLevels) -> dict[str, TileText]:
         ("crt", estimate.crt_mean, estimate.crt_standard_error, estimate.crt),
     ):
         of_bound = f"{mean / estimate.r_max:.2f} r_max" if mean is not None else ""
-        detail = f"± {error:.3f} · {of_bound}" if error is not None else of_bound
+        detail = f"± {error:.4f} · {of_bound}" if error is not None else of_bound
         texts[name] = TileText(restitution_text(mean, None), detail if points else "needs three impacts")
     return texts
 

@@ -64,7 +64,8 @@ class Header(QFrame):
         self._test.setText(message.test if message is not None and message.test else "No test chosen")
         sentence = look.sentence
         if state is not None and message is not None and message.text:
-            sentence = f"{message.text.rstrip('.')}. {look.sentence}"
+            told = message.text.rstrip(".")
+            sentence = f"{told[:1].upper()}{told[1:]}. {look.sentence}"
         if session.data_missing:
             sentence = "No data for more than half a second: what is shown is not live."
         self._sentence.setText(sentence)

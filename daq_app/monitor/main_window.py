@@ -49,8 +49,8 @@ from daq_app.runfile import RunFileError, open_run
 FRAME_MS: Final = 22
 SLOW_MS: Final = 160
 ARM_AGAIN_WITHIN_S: Final = 10.0
-_QUIET_EVENTS: Final = frozenset({"impact", "marker", "armed", "tare"})
-"""Events that the pages show anyway."""
+_QUIET_EVENTS: Final = frozenset({"impact", "marker", "tare", "saved", *State})
+"""Events that the pages show anyway, unless they are more than information."""
 
 
 class MainWindow(QMainWindow):
@@ -187,6 +187,7 @@ class MainWindow(QMainWindow):
         self.prepare.card.changed.connect(self._on_choice)
         self.campaign.told.connect(self.notices.tell)
         self.campaign.take.connect(self._take)
+        self.campaign.scanned.connect(self._propose_after_scan)
         self.campaign.run_chosen.connect(lambda name: self.open_run(Path(name)))
         self.replay.told.connect(self.notices.tell)
         self.result.told.connect(self.notices.tell)
@@ -270,7 +271,7 @@ class MainWindow(QMainWindow):
             case EventMessage():
                 if message.kind == "tare" and self.link is not None:
                     self.link.request("hello")
-                if message.kind not in _QUIET_EVENTS:
+                if message.kind not in _QUIET_EVENTS or message.severity != "info":
                     self.notices.tell(message.severity, message.text)
 
     def _on_state(self, message: StateMessage) -> None:
@@ -372,6 +373,15 @@ class MainWindow(QMainWindow):
             self.notices.tell("info", "No campaign is open: type the name of the next test.")
             return
         self.campaign.take_next()
+
+    def _propose_after_scan(self) -> None:
+        """A name that has been used is replaced by the next one, so that no test is armed under it again."""
+        proposal, status = self.campaign.proposal, self.campaign.status
+        if proposal is None or status is None or self.session.current_state in RECORDING:
+            return
+        used = {str(test.name) for place in status.places for test in place.tests}
+        if self.prepare.card.choice.name in used | {""}:
+            self.prepare.card.propose(str(proposal.name), proposal.theta0_over_alpha)
 
     def _take(self, name: str, ratio: float) -> None:
         self.prepare.card.propose(name, ratio)

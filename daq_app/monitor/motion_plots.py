@@ -140,7 +140,7 @@ class MotionPlots(QWidget):
         if self._frame != (start, stop):
             self._frame = (start, stop)
             self.rotation.setXRange(start, stop, padding=0)
-            self.velocity.plot_item.getAxis("bottom").setLabel(label)
+            self.velocity.set_label("bottom", label)
             self._limits = (math.nan, math.nan)
 
     def _set_limits(self, rotation: Array, velocity: Array) -> None:

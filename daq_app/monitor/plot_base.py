@@ -50,6 +50,9 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]
         self.plot_item.hideButtons()
         self.setMouseEnabled(mouse, mouse)
         self.setFrameShape(self.Shape.NoFrame)
+        for name in ("left", "bottom", "right"):
+            # Only now, while no label shows: later, pyqtgraph computes a prefix in this very call.
+            self.plot_item.getAxis(name).enableAutoSIPrefix(False)
         self.setAntialiasing(False)
         self.plot_item.showGrid(x=True, y=True, alpha=0.18)
         self.plot_item.layout.setContentsMargins(2, 2, 10, 2)
@@ -82,7 +85,6 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]
             axis.setTextPen(pg.mkPen(colours.muted))
             axis.setTickFont(small)
             axis.setStyle(tickLength=-4, hideOverlappingLabels=True)
-            axis.enableAutoSIPrefix(False)
             # Axes and grid change rarely and cost most of a frame: keep them as a picture.
             axis.setCacheMode(pg.QtWidgets.QGraphicsItem.CacheMode.DeviceCoordinateCache)
         for name, text in self._labels.items():
@@ -92,6 +94,11 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]
             self.plot_item.setTitle(self._title, color=colours.muted, size="9.5pt")
             self.plot_item.titleLabel.setMaximumHeight(20)
             self.plot_item.layout.setRowFixedHeight(0, 20)
+
+    def set_label(self, axis: str, text: str) -> None:
+        """Change an axis label, which then outlives a change of theme."""
+        self._labels[axis] = text
+        self.plot_item.getAxis(axis).setLabel(text)
 
     def curve(self, *, dashed: bool = False) -> Any:
         """A new line in this plot; colour it in `restyle`."""

@@ -6,12 +6,12 @@ import math
 from pathlib import Path
 
 import pyqtgraph.exporters
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QBrush, QColor, QKeySequence, QShortcut
+from PySide6.QtCore import QPoint, QRect, QRectF, Qt, Signal
+from PySide6.QtGui import QBrush, QColor, QKeySequence, QPainter, QShortcut
+from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
-    QHeaderView,
     QLabel,
     QListWidget,
     QListWidgetItem,
@@ -53,7 +53,7 @@ class ReplayPage(QWidget):
         self.tree = QTreeWidget()
         self.tree.setHeaderLabels(["Signal", "At the cursor"])
         self.tree.header().setStretchLastSection(True)
-        self.tree.header().setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
+        self.tree.setColumnWidth(0, 165)
         self.tree.setIndentation(14)
         self.tree.itemChanged.connect(self._on_item)
         self.events = QListWidget()
@@ -336,14 +336,31 @@ class ReplayPage(QWidget):
                 rows = self.run.write_csv(path, self.chosen, *self.plots.view_s)
                 self.told.emit("info", f"{rows} rows of {len(self.chosen)} signals saved as {path.name}.")
                 return
-            makers = {"png": pyqtgraph.exporters.ImageExporter, "svg": pyqtgraph.exporters.SVGExporter}
-            exporter = makers[kind](self.plots.scene())
-            if kind == "png":
+            if kind == "svg":
+                self._write_svg(path)
+            else:
+                exporter = pyqtgraph.exporters.ImageExporter(self.plots.scene())
                 exporter.parameters()["width"] = 2 * self.plots.width()
-            exporter.export(str(path))
+                exporter.export(str(path))
             if not path.is_file() or path.stat().st_size == 0:
                 raise OSError("the file was not written")
         except (OSError, RunFileError) as error:
             self.told.emit("error", f"{path} could not be saved ({error}). Choose another folder.")
             return
         self.told.emit("info", f"The view was saved as {path.name}.")
+
+    def _write_svg(self, path: Path) -> None:
+        """Qt draws the scene itself: pyqtgraph's own exporter stumbles over curved paths."""
+        scene = self.plots.scene()
+        size = self.plots.size()
+        generator = QSvgGenerator()
+        generator.setFileName(str(path))
+        generator.setSize(size)
+        generator.setViewBox(QRect(QPoint(0, 0), size))
+        generator.setTitle(self.run.path.name if self.run is not None else "")
+        painter = QPainter(generator)
+        try:
+            painter.fillRect(QRect(QPoint(0, 0), size), QColor(self._colours.surface))
+            scene.render(painter, QRectF(QRect(QPoint(0, 0), size)), QRectF(self.plots.viewRect()))
+        finally:
+            painter.end()

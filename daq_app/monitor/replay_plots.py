@@ -174,9 +174,9 @@ class ReplayPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         line.setHoverPen(pg.mkPen(self._colours.accent, width=3))
         line.setVisible(True)
         line.setZValue(20)
-        line.sigPositionChanged.connect(lambda moved: self.set_cursor(float(moved.value())))
         assert self._run is not None
-        line.setValue(self._run.span_s[0])
+        line.setValue(self.cursor_s if math.isfinite(self.cursor_s) else self._run.span_s[0])
+        line.sigPositionChanged.connect(lambda moved: self.set_cursor(float(moved.value())))
         plot.addItem(line, ignoreBounds=True)
         self._cursors.append(line)
 

@@ -86,6 +86,9 @@ class ResultPage(QWidget):
         self.table.verticalHeader().hide()
         self.table.verticalHeader().setDefaultSectionSize(23)
         self.table.setShowGrid(False)
+        self.table.horizontalHeader().setDefaultAlignment(
+            Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+        )
         self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
         self.table.setMaximumHeight(150)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
@@ -172,7 +175,7 @@ class ResultPage(QWidget):
             if method is None:
                 self.tiles[name].show_value(DASH, "too few impacts")
                 continue
-            detail = f"± {method.standard_error:.3f} · {method.r / test.r_max:.2f} r_max"
+            detail = f"± {method.standard_error:.4f} · {method.r / test.r_max:.2f} r_max"
             self.tiles[name].show_value(f"{method.r:.3f}", detail)
         deviation = period_deviation(test)
         shown = DASH if deviation is None else f"{number(100 * deviation, 1)} %"

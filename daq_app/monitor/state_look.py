@@ -27,23 +27,17 @@ LOOKS: Final[dict[State, StateLook]] = {
     State.PREVIEWING: StateLook(
         "Live view", "Sensors are read; nothing is recorded. Check, zero, then arm.", "eye", "accent"
     ),
-    State.ARMED: StateLook(
-        "Armed", "Recording. Pull the wall to the target rotation.", "triangle", "warning"
-    ),
+    State.ARMED: StateLook("Armed", "Pull the wall to the target rotation.", "triangle", "warning"),
     State.HOLDING: StateLook(
         "Holding", "The wall is held still at its rotation. Release when ready.", "square", "warning"
     ),
     State.RELEASED: StateLook("Released", "The wall moves. Keep clear.", "diamond", "bad"),
-    State.ROCKING: StateLook(
-        "Rocking", "The wall rocks. Keep clear; recording stops by itself.", "disc", "bad"
-    ),
+    State.ROCKING: StateLook("Rocking", "Keep clear; recording stops by itself.", "disc", "bad"),
     State.AT_REST: StateLook("At rest", "Recording the wall at rest for the end zero.", "bar", "good"),
     State.SAVING: StateLook(
         "Saving", "The record is checked and written. Do not switch off.", "arrow", "accent"
     ),
-    State.SAVED: StateLook(
-        "Saved", "The run is on disk. Look at the result, then take the next test.", "tick", "good"
-    ),
+    State.SAVED: StateLook("Saved", "Look at the result, then take the next test.", "tick", "good"),
     State.FAILED: StateLook("Failed", "The test did not end as it should. Read the message.", "cross", "bad"),
 }
 

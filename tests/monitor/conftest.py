@@ -60,3 +60,12 @@ def settings(tmp_path: Path) -> Any:
     from daq_app.monitor.settings import WindowSettings
 
     return WindowSettings(tmp_path / "window.ini")
+
+
+@pytest.fixture(scope="session")
+def run_file(rig: Any, configs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of the stand-in's test as a finished file, in a folder of its own."""
+    module = _load("stand_in")
+    folder = tmp_path_factory.mktemp("runs")
+    path: Path = module.write_run(module.StandIn(rig), configs / "fr1.toml", folder, "FR1-L1-1", 1)
+    return path

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from pydantic import BaseModel
@@ -21,9 +22,11 @@ from daq_app.acquisition.messages import (
     State,
     StateMessage,
 )
+from daq_app.config import Scaling
 from daq_app.config.rig import Channel, Rig
 from daq_app.rocking import theory
 from daq_app.rocking.housner import FreeRocking, free_rocking
+from daq_app.runfile import JournalWriter, RunHeader, finalise
 
 
 @dataclass(frozen=True)
@@ -217,3 +220,37 @@ class StandIn:
             free_bytes=84_000_000_000,
             block_to_disk_ms_p99=7.0,
         )
+
+
+def write_run(stand_in: StandIn, rig_file: Path, folder: Path, test: str, when_s: int = 0) -> Path:
+    """A finished run file of the stand-in's test."""
+    rig = stand_in.rig
+    header = RunHeader(
+        run_id=f"{test}_{when_s}",
+        test=test,
+        specimen=rig.specimen.name,
+        rig_name=rig.name,
+        rig_text=rig_file.read_text(encoding="utf-8"),
+        channel_ids=rig.channel_ids,
+        reading_units=tuple(channel.reading_unit for channel in rig.channels),
+        rate_hz=stand_in.rate_hz,
+        start_utc_ns=(1_700_000_000 + when_s) * 10**9,
+    )
+    impacts = stand_in.motion.impacts_s
+    times = {
+        "armed": stand_in.upright_s,
+        "holding": stand_in.upright_s + stand_in.pull_s + 0.5,
+        "released": stand_in.release_s,
+        "rocking": float(impacts[0]),
+        "at_rest": float(impacts[-1]) + 0.5,
+    }
+    scaling = Scaling.of(rig.channels)
+    journal = folder / f"{test}_{when_s}.journal"
+    with JournalWriter(journal, header) as writer:
+        end = int(stand_in.end_s * stand_in.rate_hz) - stand_in.block
+        for first in range(0, end, stand_in.block):
+            writer.append_block(first, scaling.to_readings(stand_in.block_readings(first).astype(np.float64)))
+        for kind, time_s in times.items():
+            writer.append_event(kind, round(time_s * stand_in.rate_hz), kind, {})
+        writer.append_event("end", end, "at rest", {"outcome": "complete"})
+    return finalise(journal, journal.with_suffix(".h5"))

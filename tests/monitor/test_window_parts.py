@@ -334,6 +334,7 @@ def test_nonsense_in_the_settings_file_falls_back(tmp_path):
 
 def test_events_that_matter_are_told_and_routine_ones_are_not(window):
     window._after(EventMessage(kind="impact", sample=1, text="impact 3"))
+    window._after(EventMessage(kind="rocking", sample=1, text="rocking"))
     assert window.notices.current is None
     window._after(EventMessage(kind="gap", sample=1, text="400 samples lost", severity="error"))
     assert window.notices.current == ("error", "400 samples lost")
@@ -375,3 +376,19 @@ def test_a_no_go_must_be_overruled_on_purpose(window, monkeypatch):
     window._arm()
     assert asked[0][1]["test"] == "FR1-L3-1"
     assert "Sensor check: no-go" in asked[0][1]["notes"]
+
+
+def test_axes_say_what_they_show_also_after_a_change_of_theme(window, stand_in):
+    play(window, stand_in, stand_in.release_s + 2.0)
+    window.live.draw_frame()
+    for _ in range(2):
+        window.toggle_theme()
+    for plot in (
+        window.live.motion.velocity,
+        window.live.motion.rotation,
+        window.live.periods,
+        window.live.phase,
+    ):
+        for name in ("left", "bottom", "right"):
+            assert plot.plot_item.getAxis(name).autoSIPrefixScale == 1.0
+    assert window.live.motion.velocity.plot_item.getAxis("bottom").labelText == "time since release  (s)"
