@@ -1,4 +1,4 @@
-"""The blind check: cases from an independent simulator, sealed labels, a runner that cannot read them, a score.
+"""The blind check: cases of an independent simulator, sealed labels, a runner without them, a score.
 
 `daq_app.gap.blind.world` generates; it shares no code with the diagnosis nor with the simulated hardware.
 """

@@ -1,0 +1,159 @@
+"""How visible a hidden effect is, judged by the generator that knows the truth.
+
+An estimate in units of standard deviations, for sorting cases into weak and strong ones: it compares
+two quiet twins of a run, with and without the effect, first in what swings and impacts show locally
+(duration and loss of a swing, speed against peak, restitution of an impact, against impact scatter
+and with α, p and r refitted), then in what the channels show beyond the motion (against their noise,
+with gain and offset refitted). No diagnosis can see much more.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.blind.world.campaign import PlannedRun, World
+from daq_app.gap.blind.world.catalogue import Drawn
+from daq_app.gap.blind.world.chain import CALIBRATION_TOLERANCE, Place, quiet_signals
+from daq_app.gap.blind.world.faults import ELECTRONICS, Bench
+from daq_app.gap.blind.world.mechanics import build
+from daq_app.gap.blind.world.motion import Motion
+from daq_app.gap.blind.world.scene import stage
+from daq_app.gap.blind.world.wall import Wall
+
+FloatArray = NDArray[np.float64]
+
+_SMALLEST_PEAK_RAD: Final = 4e-3
+_TIME_SD_S: Final = 3e-4
+_SPEED_SD: Final = 2e-3
+_RATE_HZ: Final = 500.0
+_CORRELATED: Final = 10.0
+"""Samples at 500 Hz that count as one: what remains of motion and calibration is not white."""
+_MODEL_SHARE: Final = 1e-3
+"""Part of a channel's signal that nobody trusts."""
+_CLOCK_SD: Final = 1e-3
+
+
+def detectability(world: World, effect: Drawn) -> float:
+    """Strength of one effect of a case in standard deviations of what it could be known to."""
+    if effect.name == "clock":
+        return abs(effect.parameters["error"]) / _CLOCK_SD
+    alone = replace(
+        world, effects=(effect,), wall=replace(world.wall, restitution_scatter=0.0), runs=_extremes(world)
+    )
+    square = 0.0
+    for index in range(len(alone.runs)):
+        before = (0, 30 * (len(world.runs) - 1))[index]
+        square += _in_channels(alone, index, before)
+        if not effect.targets:
+            square += _in_swings(alone.motion(index, before)[0], world.wall)
+    return math.sqrt(square * len(world.runs) / len(alone.runs))
+
+
+def _extremes(world: World) -> tuple[PlannedRun, PlannedRun]:
+    runs = sorted(world.runs, key=lambda run: abs(run.theta0))
+    return (runs[0], runs[-1])
+
+
+def block_swing(theta: float, alpha: float, p: float) -> tuple[float, float]:
+    """(time from a peak to upright, speed there) of a rigid block: energy integral by Gauss–Legendre.
+
+    ω² = 2 p² [cos(α − θpeak) − cos(α − θ)], with θ = θpeak (1 − x²) to tame the root at the peak.
+    """
+    x, weights = np.polynomial.legendre.leggauss(32)
+    x, weights = (x + 1.0) / 2.0, weights / 2.0
+    angle = theta * (1.0 - x * x)
+    rate = np.sqrt(2.0 * (np.cos(alpha - theta) - np.cos(alpha - angle))) * p
+    time = float(np.sum(weights * 2.0 * theta * x / rate))
+    speed = p * math.sqrt(2.0 * abs(math.cos(alpha - theta) - math.cos(alpha)))
+    return time, speed
+
+
+def _in_swings(motion: Motion, wall: Wall) -> float:
+    """Squared distance of a motion from any rigid block's in local features: α, p and r are free."""
+    values, sds, columns = _features(motion, wall)
+    if values.size <= columns.shape[1]:
+        return 0.0
+    weighted, design = values / sds, columns / sds[:, None]
+    left = weighted - design @ np.linalg.lstsq(design, weighted, rcond=None)[0]
+    return float(left @ left)
+
+
+def _features(motion: Motion, wall: Wall) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Departures from the rigid block (n,), their standard deviations, and the (n, 3) slopes in α, p, r."""
+    crossings = [impact for impact in motion.impacts if impact.restitution > 0.0]
+    turning = list(motion.peaks)
+    if not turning or (crossings and turning[0][0] > crossings[0].time):
+        turning.insert(0, (0.0, motion.release.theta0))  # let go at rest: the release is the first peak
+    rows: list[tuple[float, float, float, float, float]] = []
+    scatter = math.hypot(wall.restitution_scatter, _SPEED_SD / 2.0)
+    for k, (at, peak) in enumerate(turning[: len(crossings)]):
+        if abs(peak) < _SMALLEST_PEAK_RAD:
+            break
+        time, speed, slopes = _block_with_slopes(abs(peak), wall)
+        impact = crossings[k]
+        rows.append(((impact.time - at) / time - 1.0, _TIME_SD_S / time, slopes[0], slopes[1], 0.0))
+        rows.append((abs(impact.before) / speed - 1.0, _SPEED_SD, slopes[2], slopes[3], 0.0))
+        rows.append((impact.restitution - wall.restitution, scatter, 0.0, 0.0, 1.0))
+        if k > 0:
+            start = crossings[k - 1]
+            rows.append(((at - start.time) / time - 1.0, _TIME_SD_S / time, slopes[0], slopes[1], 0.0))
+            rows.append((abs(start.after) / speed - 1.0, _SPEED_SD, slopes[2], slopes[3], 0.0))
+    table = np.array(rows).reshape(-1, 5)
+    return table[:, 0], table[:, 1], table[:, 2:]
+
+
+def _block_with_slopes(peak: float, wall: Wall) -> tuple[float, float, tuple[float, float, float, float]]:
+    """Time and speed of a block, and relative slopes (time by α, by p, speed by α, by p)."""
+    h = 1e-5
+    time, speed = block_swing(peak, wall.alpha, wall.p)
+    time_a, speed_a = block_swing(peak, wall.alpha + h, wall.p)
+    time_p, speed_p = block_swing(peak, wall.alpha, wall.p + h)
+    slopes = (
+        (time_a / time - 1.0) / h,
+        (time_p / time - 1.0) / h,
+        (speed_a / speed - 1.0) / h,
+        (speed_p / speed - 1.0) / h,
+    )
+    return time, speed, slopes
+
+
+def _in_channels(alone: World, index: int, before: int) -> float:
+    """Squared distance of the channels with and without the effect, for one and the same motion."""
+    run = alone.runs[index]
+    motion, mechanics = alone.motion(index, before)
+    plain = build(alone.wall, {}, motion.release)
+    time_s = np.arange(-0.5, motion.rest_s + 0.5, 1.0 / _RATE_HZ)
+    place = Place(run.campaign_s + 600.0, abs(run.theta0))
+    rng = np.random.default_rng(0)
+    scene = stage(mechanics, motion, alone.mechanical, time_s)
+    with_effect = quiet_signals(alone.rig, scene, alone.faults, rng, place)
+    without = quiet_signals(alone.rig, stage(plain, motion, {}, time_s), (), rng, place)
+    total = 0.0
+    for row, channel in enumerate(alone.rig.channels):
+        bench = Bench(channel, scene, _RATE_HZ, place.campaign_s, place.largest_rad, rng)
+        noise = channel.noise_si * rng.standard_normal(time_s.size)
+        signal = with_effect[row] + noise
+        for fault in alone.faults:
+            if fault.name in ELECTRONICS and channel.id in fault.targets:
+                signal = ELECTRONICS[fault.name](signal, fault.parameters, bench)
+        total += _distance(signal - noise, without[row], channel.noise_si)
+    return total
+
+
+def _distance(value: FloatArray, reference: FloatArray, noise: float) -> float:
+    difference = value - reference
+    if not np.any(difference):
+        return 0.0
+    sd = np.hypot(noise, _MODEL_SHARE * float(np.max(np.abs(reference))))
+    design = np.column_stack([np.ones_like(reference), reference])
+    # Gain is known to the calibration tolerance only: that much of it is no evidence.
+    slope = float(np.linalg.lstsq(design, difference, rcond=None)[0][1])
+    allowed = float(np.clip(slope, -CALIBRATION_TOLERANCE, CALIBRATION_TOLERANCE))
+    left = difference - allowed * reference
+    left -= np.median(left)
+    return float(left @ left / sd**2) / _CORRELATED

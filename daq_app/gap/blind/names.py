@@ -1,0 +1,59 @@
+"""Which answers count as right for which truth, and the families of the design page's table.
+
+Effects that share a row of the table because no sensor tells them apart accept each other. A name
+may carry a target (``gain@WP-1``): the part before the ``@`` is compared here.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+FAMILIES: Final = (
+    "interface",
+    "restitution",
+    "dissipation",
+    "geometry",
+    "contact",
+    "structure",
+    "release",
+    "ambient",
+    "sensor",
+)
+
+_SAME_TO_ALL_SENSORS: Final = (
+    # A base that leans, a mass off centre and unequal edges turn gravity against the wall alike.
+    ("alpha_asymmetry", "base_tilt", "eccentric_mass"),
+    ("dwell", "bounce"),
+    ("lag", "filter_delay"),
+    ("wire_cosine", "wire_sag"),
+)
+_OTHER_WORDS: Final[dict[str, tuple[str, ...]]] = {
+    "winkler": ("compliant_joint", "semi_rigid_winkler"),
+    "restitution_slope": ("restitution_velocity",),
+    "flexible_wall": ("flexible_mode",),
+    "compliance": ("base_compliance", "rig_compliance"),
+    "yaw": ("twist",),
+    "ambient": ("ambient_vibration",),
+    "drift": ("offset_drift",),
+    "clock": ("clock_rate",),
+    "swap": ("channel_swap",),
+}
+
+
+def base_name(name: str) -> str:
+    """Name without its target."""
+    return name.partition("@")[0]
+
+
+def accepted_names(truth: str) -> tuple[str, ...]:
+    """Answers that are right where `truth` was hidden, the truth first."""
+    group = next((g for g in _SAME_TO_ALL_SENSORS if truth in g), (truth,))
+    names = [truth, *group]
+    for name in tuple(names):
+        names += _OTHER_WORDS.get(name, ())
+    return tuple(dict.fromkeys(names))
+
+
+def families_of(text: str) -> tuple[str, ...]:
+    """Families of a hypothesis as a result writes them: ``interface`` or ``interface + sensor``."""
+    return tuple(part.strip() for part in text.split("+") if part.strip() not in ("", "none"))

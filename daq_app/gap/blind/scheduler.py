@@ -1,0 +1,37 @@
+"""Spread the cases over machines with dask.distributed (optional extra ``scale``)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from daq_app.gap.blind.runner import Outcome, diagnose_apart, pending, save_outcome
+
+
+class SchedulerMissing(Exception):
+    """dask.distributed is not installed, or its scheduler does not answer."""
+
+
+def run_on_scheduler(folder: Path, diagnoser: str, address: str, timeout_s: float) -> Iterator[Outcome]:
+    """As `runner.run_pending`, on the workers of the scheduler at `address` (``tcp://HOST:PORT``).
+
+    Every worker must see the folder under the same path and have this program installed. Outcomes
+    come back to this process, which alone writes them.
+    """
+    try:
+        from distributed import Client, as_completed
+    except ImportError:
+        raise SchedulerMissing("dask.distributed is not installed. Install the extra `scale`") from None
+    try:
+        client = Client(address, timeout=20)
+    except (OSError, ValueError) as error:
+        raise SchedulerMissing(f"no scheduler answers at {address} ({error})") from None
+    with client:
+        cases = [case.resolve() for case in pending(folder, diagnoser)]
+        jobs = client.map(
+            diagnose_apart, cases, diagnoser=diagnoser, timeout_s=timeout_s, pure=False, retries=2
+        )
+        for job in as_completed(jobs):
+            outcome: Outcome = job.result()
+            save_outcome(folder, outcome)
+            yield outcome

@@ -1,0 +1,131 @@
+"""The runs of one case: levels and repetitions of one wall, with the effects that it hides."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.config import Rig, plan_tasks
+from daq_app.gap.blind.world.catalogue import Drawn
+from daq_app.gap.blind.world.chain import Calibration, Place, draw_calibration, readings
+from daq_app.gap.blind.world.faults import Fault
+from daq_app.gap.blind.world.mechanics import Mechanics, Release, build
+from daq_app.gap.blind.world.motion import Motion, integrate
+from daq_app.gap.blind.world.scene import stage
+from daq_app.gap.blind.world.wall import Wall, draw_wall
+
+LEVELS: Final = {"L1": 0.15, "L2": 0.25, "L3": 0.35, "L4": 0.40}
+_AFTER_REST_S = 1.0
+_BETWEEN_RUNS_S = 420.0
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedRun:
+    """One run of a case before it happens."""
+
+    test: str
+    level: str
+    theta0: float
+    side: int
+    hold_s: float
+    omega0: float
+    seed: int
+    campaign_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class MadeRun:
+    """One run of a case: its readings and, for the label, how it went."""
+
+    plan: PlannedRun
+    readings: NDArray[np.float64]
+    """(channels, n), unit of each channel's reading."""
+    motion: Motion
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """All that is true in one case."""
+
+    rig: Rig
+    wall: Wall
+    calibration: Calibration
+    effects: tuple[Drawn, ...]
+    runs: tuple[PlannedRun, ...]
+
+    @property
+    def mechanical(self) -> dict[str, dict[str, float]]:
+        """Effects on the wall, the floor and the clock by name; those on channels are `faults`."""
+        return {e.name: e.parameters for e in self.effects if not e.targets}
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        return tuple(Fault(e.name, e.parameters, e.targets) for e in self.effects if e.targets)
+
+    def make(self) -> Iterator[MadeRun]:
+        """The runs in their order; the wall wears from one to the next."""
+        rate_hz = self.rig.acquisition.rate_hz
+        skew = {c.channel.id: c.time_offset_s for task in plan_tasks(self.rig).tasks for c in task.channels}
+        clock = 1.0 + self.mechanical.get("clock", {}).get("error", 0.0)
+        largest = max(abs(run.theta0) for run in self.runs)
+        impacts = 0
+        for index, run in enumerate(self.runs):
+            motion, mechanics = self.motion(index, impacts)
+            # A clock that runs wrong takes sample k at k/(rate·clock), and the file says k/rate.
+            n = round((run.hold_s + motion.rest_s + _AFTER_REST_S) * rate_hz)
+            time_s = np.arange(n) / (rate_hz * clock) - run.hold_s
+            scene = stage(mechanics, motion, self.mechanical, time_s)
+            rng = np.random.default_rng([run.seed, 2])
+            place = Place(run.campaign_s, largest)
+            values = readings(self.rig, scene, self.faults, self.calibration, skew, rng, place)
+            impacts += len(motion.impacts)
+            yield MadeRun(run, values, motion)
+
+    def motion(self, index: int, impacts_before: int = 0) -> tuple[Motion, Mechanics]:
+        """One run's motion, and the mechanics that made it."""
+        run = self.runs[index]
+        omega0 = run.omega0
+        if "initial_velocity" in self.mechanical:
+            # Each run its own push, of one sign.
+            push = np.random.default_rng([run.seed, 3]).uniform(0.6, 1.4)
+            omega0 += run.side * push * self.mechanical["initial_velocity"]["omega_rad_s"]
+        release = Release(run.theta0, omega0, run.hold_s, run.seed, index, impacts_before)
+        mechanics = build(self.wall, self.mechanical, release)
+        return integrate(mechanics, release), mechanics
+
+
+def draw_world(rig: Rig, effects: Sequence[Drawn], n_runs: int, rng: np.random.Generator) -> World:
+    """A wall, its sensors and its campaign around the given effects."""
+    wall = draw_wall(rig.specimen, rng)
+    calibration = draw_calibration(rig, rng)
+    order = list(LEVELS) + [list(LEVELS)[int(i)] for i in rng.integers(0, len(LEVELS), max(0, n_runs - 4))]
+    order = sorted(order[:n_runs])
+    if rng.uniform() < 0.3:
+        order = [order[int(i)] for i in rng.permutation(n_runs)]
+    both_sides = rng.uniform() < 0.3
+    first_side = int(rng.choice([-1, 1]))
+    runs: list[PlannedRun] = []
+    seen: dict[str, int] = {}
+    started = 0.0
+    for level in order:
+        seen[level] = seen.get(level, 0) + 1
+        side = int(rng.choice([-1, 1])) if both_sides else first_side
+        runs.append(
+            PlannedRun(
+                test=f"{rig.specimen.name}-{level}-{seen[level]}",
+                level=level,
+                theta0=side * LEVELS[level] * rig.specimen.alpha0_rad * (1.0 + 0.01 * rng.standard_normal()),
+                side=side,
+                hold_s=float(rng.uniform(2.0, 2.8)),
+                omega0=float(-side * abs(3e-4 * rng.standard_normal())),
+                seed=int(rng.integers(2**62)),
+                campaign_s=started,
+            )
+        )
+        started += _BETWEEN_RUNS_S * math.exp(0.3 * rng.standard_normal())
+    return World(rig, wall, calibration, tuple(effects), tuple(runs))

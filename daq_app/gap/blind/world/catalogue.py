@@ -1,0 +1,292 @@
+"""Every effect that a case can hide: name, family, how strong it may be, on which channels it acts.
+
+`library` effects are those of the table in the design page (the diagnosis may know them); `near` ones
+are another form of a family of that table; `far` ones belong to none of its forms.
+Strengths are drawn between `low` and `high` on a logarithmic scale; the first parameter carries them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from daq_app.config import Rig
+
+Kind = Literal["library", "near", "far"]
+Parameters = dict[str, float]
+Targets = Callable[[Rig, np.random.Generator], tuple[str, ...]]
+Others = Callable[[np.random.Generator], Parameters]
+
+
+def _no_targets(rig: Rig, rng: np.random.Generator) -> tuple[str, ...]:
+    return ()
+
+
+def _nothing_else(rng: np.random.Generator) -> Parameters:
+    return {}
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One effect that a case can hide."""
+
+    name: str
+    family: str
+    kind: Kind
+    parameter: str
+    """The parameter that carries the strength, with its unit as suffix."""
+    low: float
+    high: float
+    signed: bool = False
+    others: Others = _nothing_else
+    targets: Targets = _no_targets
+
+    @property
+    def on_sensors(self) -> bool:
+        return self.targets is not _no_targets
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """An effect with its values. `strength` is its place in the range, 0 weakest to 1 strongest."""
+
+    name: str
+    family: str
+    kind: Kind
+    parameters: Parameters
+    targets: tuple[str, ...]
+    strength: float
+
+
+def draw(entry: Entry, rig: Rig, rng: np.random.Generator, strength: float | None = None) -> Drawn:
+    """Values for an effect; `strength` in [0, 1] fixes the place in its range."""
+    place = float(rng.uniform()) if strength is None else strength
+    value = entry.low * (entry.high / entry.low) ** place
+    if entry.signed and rng.uniform() < 0.5:
+        value = -value
+    parameters = {entry.parameter: value, **entry.others(rng)}
+    return Drawn(entry.name, entry.family, entry.kind, parameters, entry.targets(rig, rng), place)
+
+
+def _of(*families: str) -> Targets:
+    """All channels of one of the families."""
+
+    def choose(rig: Rig, rng: np.random.Generator) -> tuple[str, ...]:
+        family = families[int(rng.integers(len(families)))]
+        return tuple(c.id for c in rig.channels if c.family == family and _moves(c.id, rig))
+
+    return choose
+
+
+def _one(*families: str) -> Targets:
+    """One channel of one of the families."""
+
+    def choose(rig: Rig, rng: np.random.Generator) -> tuple[str, ...]:
+        family = families[int(rng.integers(len(families)))]
+        ids = [c.id for c in rig.channels if c.family == family and _moves(c.id, rig)]
+        return (ids[int(rng.integers(len(ids)))],)
+
+    return choose
+
+
+def _one_or_all(*families: str) -> Targets:
+    one, every = _one(*families), _of(*families)
+    return lambda rig, rng: one(rig, rng) if rng.uniform() < 0.6 else every(rig, rng)
+
+
+def _moves(channel_id: str, rig: Rig) -> bool:
+    """Channels that see rocking at all: a tiltmeter across it shows no fault of scale or time."""
+    channel = rig.channel(channel_id)
+    return not (channel.family == "tiltmeter" and channel.axis != "x")
+
+
+def _pair(rig: Rig, rng: np.random.Generator) -> tuple[str, ...]:
+    """Two channels of one family that see different things."""
+    family = ("lvdt", "wire", "accelerometer")[int(rng.integers(3))]
+    channels = [c for c in rig.channels if c.family == family]
+    while True:
+        a, b = rng.choice(len(channels), 2, replace=False)
+        first, second = channels[int(a)], channels[int(b)]
+        differ = first.position_m[0] != second.position_m[0] or (
+            abs(first.position_m[2] - second.position_m[2]) > 0.3
+        )
+        if differ and first.axis == second.axis:
+            return (first.id, second.id)
+
+
+def _any(rig: Rig, rng: np.random.Generator) -> tuple[str, ...]:
+    ids = [c.id for c in rig.channels]
+    return tuple(ids[int(i)] for i in sorted(rng.choice(len(ids), 3, replace=False)))
+
+
+def _uniform(**ranges: tuple[float, float]) -> Others:
+    return lambda rng: {name: float(rng.uniform(*limits)) for name, limits in ranges.items()}
+
+
+_LIBRARY: Final = (
+    Entry("pivot_shift", "interface", "library", "a_m", 0.008, 0.05),
+    Entry("winkler", "interface", "library", "theta_c_rad", 1e-5, 9e-4),
+    Entry("rounded_edge", "interface", "library", "rho_m", 0.008, 0.06),
+    Entry("crushing", "interface", "library", "loss_per_100", 0.001, 0.03),
+    Entry("restitution_wear", "interface", "library", "loss_per_100", 0.002, 0.03),
+    Entry("restitution_slope", "restitution", "library", "k_s_rad", 0.005, 0.05, True),
+    Entry("restitution_asymmetry", "restitution", "library", "d", 0.002, 0.02, True),
+    Entry("viscous", "dissipation", "library", "zeta", 0.001, 0.02),
+    Entry("coulomb", "dissipation", "library", "mu", 0.001, 0.02),
+    Entry("alpha_asymmetry", "geometry", "library", "delta_rad", 2e-4, 5e-3, True),
+    Entry("base_tilt", "geometry", "library", "beta_rad", 2e-4, 5e-3, True),
+    Entry("eccentric_mass", "geometry", "library", "e_m", 3e-4, 7.5e-3, True),
+    Entry("sliding", "contact", "library", "c_m_s", 1e-3, 2e-2),
+    Entry("dwell", "contact", "library", "tau_s", 5e-4, 1e-2),
+    Entry("bounce", "contact", "library", "tau_s", 1e-3, 1e-2),
+    Entry(
+        "flexible_wall",
+        "structure",
+        "library",
+        "gain",
+        0.05,
+        0.6,
+        others=_uniform(frequency_hz=(9.0, 35.0), zeta=(0.01, 0.05)),
+    ),
+    Entry("compliance", "structure", "library", "phi_rad", 1e-4, 3e-3),
+    Entry(
+        "yaw",
+        "structure",
+        "library",
+        "gain",
+        0.03,
+        0.5,
+        True,
+        _uniform(frequency_hz=(2.0, 8.0), zeta=(0.01, 0.05)),
+    ),
+    Entry("residual_cable", "release", "library", "k", 0.005, 0.2, others=_uniform(slack=(0.2, 0.7))),
+    Entry("initial_velocity", "release", "library", "omega_rad_s", 3e-3, 3e-2, True),
+    Entry("slow_release", "release", "library", "tau_s", 0.02, 0.4),
+    Entry(
+        "ambient", "ambient", "library", "amplitude_m_s2", 5e-3, 0.1, others=_uniform(frequency_hz=(0.5, 4.0))
+    ),
+    Entry(
+        "gain",
+        "sensor",
+        "library",
+        "error",
+        0.01,
+        0.1,
+        True,
+        targets=_one_or_all("lvdt", "wire", "accelerometer"),
+    ),
+    Entry("drift", "sensor", "library", "rate_rad_s", 2e-5, 1e-3, True, targets=_one_or_all("lvdt", "wire")),
+    Entry("lag", "sensor", "library", "tau_s", 1e-3, 0.05, targets=_of("lvdt", "wire", "accelerometer")),
+    Entry("slow_response", "sensor", "library", "tau_s", 1e-3, 0.05, targets=_one_or_all("lvdt", "wire")),
+    Entry(
+        "filter_delay", "sensor", "library", "tau_s", 1e-3, 0.03, targets=_of("lvdt", "wire", "accelerometer")
+    ),
+    Entry("saturation", "sensor", "library", "cut", 0.05, 0.5, targets=_one_or_all("lvdt", "wire")),
+    Entry(
+        "dropout",
+        "sensor",
+        "library",
+        "share",
+        0.01,
+        0.2,
+        others=_uniform(duration_s=(0.02, 0.3)),
+        targets=_one("lvdt", "wire"),
+    ),
+    Entry("quantisation", "sensor", "library", "times_noise", 4.0, 40.0, targets=_one_or_all("lvdt", "wire")),
+    Entry("wire_cosine", "sensor", "library", "anchor_m", 0.03, 0.4, True, targets=_one_or_all("wire")),
+    Entry("wire_sag", "sensor", "library", "kappa_1_m", 0.03, 0.5, True, targets=_one_or_all("wire")),
+    Entry(
+        "wire_inertia",
+        "sensor",
+        "library",
+        "frequency_hz",
+        6.0,
+        30.0,
+        others=_uniform(zeta=(0.05, 0.4)),
+        targets=_of("wire"),
+    ),
+    Entry(
+        "hum",
+        "sensor",
+        "library",
+        "times_noise",
+        0.5,
+        10.0,
+        targets=_one_or_all("lvdt", "wire", "accelerometer"),
+    ),
+    Entry("clock", "sensor", "library", "error", 0.002, 0.07, True),
+    Entry("polarity", "sensor", "library", "on", 1.0, 1.0, targets=_one("lvdt", "wire", "accelerometer")),
+    Entry("swap", "sensor", "library", "on", 1.0, 1.0, targets=_pair),
+)
+
+_OUTSIDE: Final = (
+    Entry("quadratic_drag", "dissipation", "near", "c", 0.02, 0.4),
+    Entry("one_sided_drag", "dissipation", "near", "rate_1_s", 0.02, 0.2),
+    Entry(
+        "stepped_restitution",
+        "restitution",
+        "near",
+        "step",
+        0.01,
+        0.06,
+        True,
+        _uniform(speed_rad_s=(0.1, 0.3)),
+    ),
+    Entry("restitution_memory", "restitution", "near", "drop", 0.02, 0.15),
+    Entry("cubic_joint", "interface", "near", "theta_j_rad", 1e-3, 8e-3),
+    Entry(
+        "hysteretic_joint", "interface", "near", "share", 0.02, 0.2, others=_uniform(theta_h_rad=(1e-3, 8e-3))
+    ),
+    Entry("sudden_crack", "interface", "near", "loss", 0.01, 0.05),
+    Entry("cubic_gain", "sensor", "near", "share", 0.03, 0.3, True, targets=_of("lvdt", "wire")),
+    Entry("backlash", "sensor", "far", "play_m", 2e-3, 1e-2, targets=_one("wire")),
+    Entry(
+        "loose_bracket",
+        "sensor",
+        "far",
+        "size_si",
+        0.01,
+        0.1,
+        others=_uniform(frequency_hz=(8.0, 60.0)),
+        targets=_one("lvdt", "wire"),
+    ),
+    Entry(
+        "amplifier_temperature",
+        "sensor",
+        "far",
+        "share",
+        0.01,
+        0.06,
+        True,
+        _uniform(warm_up_s=(300.0, 1500.0)),
+        _of("lvdt", "wire"),
+    ),
+    Entry("crosstalk", "sensor", "far", "share", 0.02, 0.15, targets=_any),
+    Entry(
+        "spikes",
+        "sensor",
+        "far",
+        "times_noise",
+        15.0,
+        80.0,
+        others=_uniform(per_second=(0.5, 5.0)),
+        targets=_any,
+    ),
+    Entry(
+        "passing_lorry",
+        "ambient",
+        "far",
+        "amplitude_m_s2",
+        0.1,
+        0.8,
+        others=_uniform(frequency_hz=(6.0, 15.0)),
+    ),
+    Entry("rope_snag", "release", "far", "strength", 0.05, 0.5, others=_uniform(at_s=(0.6, 2.0))),
+)
+
+ENTRIES: Final[dict[str, Entry]] = {entry.name: entry for entry in _LIBRARY + _OUTSIDE}
+LIBRARY: Final = tuple(entry.name for entry in _LIBRARY)
+OUTSIDE: Final = tuple(entry.name for entry in _OUTSIDE)

@@ -1,0 +1,130 @@
+"""From a scene to the readings of one run: calibration, noise, faults, wiring, ADC."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.config import Rig, Scaling
+from daq_app.gap.blind.world.faults import ELECTRONICS, RESPONSES, Bench, Fault
+from daq_app.gap.blind.world.instruments import ideal
+from daq_app.gap.blind.world.scene import Scene
+
+FloatArray = NDArray[np.float64]
+
+CALIBRATION_TOLERANCE = 0.003
+ADC_STEP_V = 20.5 / 65536
+"""16 bits over ±10.25 V; a binary fraction, so that files of readings pack well."""
+_TARE_SAMPLES = 2000
+_ZERO_WALK = 0.2
+"""Zero of a channel from run to run, in units of its noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A run's place in its campaign."""
+
+    campaign_s: float
+    """Time since the first run."""
+    largest_rad: float
+    """Largest planned release rotation."""
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """What every sensor of a case has of its own, the same in all runs."""
+
+    gain: FloatArray
+    """(n,) relative gain error."""
+    zero_si: FloatArray
+    """(n,) true zero, SI: the tare removes it but for its own noise."""
+    tare_reading: Mapping[str, float]
+    """What the operator found upright before the first run."""
+
+
+def draw_calibration(rig: Rig, rng: np.random.Generator) -> Calibration:
+    """Gain errors of 0.3 % and zeros of half a per cent of the range, with the tare that was taken."""
+    n = len(rig.channels)
+    gain = CALIBRATION_TOLERANCE * rng.standard_normal(n)
+    span = np.array([c.range_si[1] - c.range_si[0] for c in rig.channels])
+    noise = np.array([c.noise_si for c in rig.channels])
+    zero = 0.005 * span * rng.uniform(-1.0, 1.0, n)
+    found = zero + noise / np.sqrt(_TARE_SAMPLES) * rng.standard_normal(n)
+    factor = Scaling.of(rig.channels).gain[:, 0]
+    tare = {c.id: float(v) for c, v in zip(rig.channels, found / factor, strict=True)}
+    return Calibration(gain, zero, tare)
+
+
+def quiet_signals(
+    rig: Rig, scene: Scene, faults: Sequence[Fault], rng: np.random.Generator, place: Place
+) -> FloatArray:
+    """(channels, n) signals in SI without noise and calibration, with the faults of the first kind."""
+    rate_hz = 1.0 / float(scene.time_s[1] - scene.time_s[0])
+    rows = np.empty((len(rig.channels), scene.time_s.size))
+    for row, channel in enumerate(rig.channels):
+        mine = [fault for fault in faults if channel.id in fault.targets]
+        shift = sum(fault.parameters["anchor_m"] for fault in mine if fault.name == "wire_cosine")
+        signal = ideal(channel, scene, shift)
+        bench = Bench(channel, scene, rate_hz, place.campaign_s, place.largest_rad, rng)
+        for fault in mine:
+            if fault.name in RESPONSES:
+                signal = RESPONSES[fault.name](signal, fault.parameters, bench)
+        rows[row] = signal
+    return _wired(rig, rows, faults)
+
+
+def readings(
+    rig: Rig,
+    scene: Scene,
+    faults: Sequence[Fault],
+    calibration: Calibration,
+    skew_s: Mapping[str, float],
+    rng: np.random.Generator,
+    place: Place,
+) -> FloatArray:
+    """(channels, n) what the NI channels return for one run, quantised."""
+    rows = quiet_signals(rig, scene, faults, rng, place)
+    rate_hz = 1.0 / float(scene.time_s[1] - scene.time_s[0])
+    scaling = Scaling.of(rig.channels)
+    for row, channel in enumerate(rig.channels):
+        signal = rows[row]
+        part = min(max(skew_s.get(channel.id, 0.0) * rate_hz, 0.0), 1.0)
+        signal[:-1] += part * np.diff(signal)
+        signal *= 1.0 + calibration.gain[row]
+        noise = rng.standard_normal(signal.size, dtype=np.float32)
+        walk = _ZERO_WALK * rng.standard_normal()
+        signal += channel.noise_si * (noise + walk)
+        bench = Bench(channel, scene, rate_hz, place.campaign_s, place.largest_rad, rng)
+        for fault in faults:
+            if fault.name in ELECTRONICS and channel.id in fault.targets:
+                signal = ELECTRONICS[fault.name](signal, fault.parameters, bench)
+        rows[row] = np.clip(signal, *channel.range_si) + calibration.zero_si[row]
+    volts = scaling.to_readings(rows)
+    limits = np.array([_limits(c.input_range_v, c.measurement) for c in rig.channels])
+    steps = np.array([ADC_STEP_V if c.measurement == "voltage" else 1e-7 for c in rig.channels])[:, None]
+    clipped = np.clip(volts, limits[:, :1], limits[:, 1:])
+    return np.asarray(np.round(clipped / steps) * steps)
+
+
+def _limits(range_v: tuple[float, float], measurement: str) -> tuple[float, float]:
+    return (1.025 * range_v[0], 1.025 * range_v[1]) if measurement == "voltage" else (-np.inf, np.inf)
+
+
+def _wired(rig: Rig, rows: FloatArray, faults: Sequence[Fault]) -> FloatArray:
+    """Polarity, exchanged plugs, crosstalk."""
+    index = {channel.id: row for row, channel in enumerate(rig.channels)}
+    for fault in faults:
+        at = [index[name] for name in fault.targets]
+        if fault.name == "polarity":
+            rows[at] = -rows[at]
+        elif fault.name == "swap":
+            rows[at] = rows[at[::-1]]
+        elif fault.name == "crosstalk":
+            # As the multiplexer does it: a share of the channel scanned before, in volts.
+            scaling = Scaling.of(rig.channels).gain[:, 0]
+            before = [max(row - 1, 0) for row in at]
+            rows[at] += fault.parameters["share"] * rows[before] * (scaling[at] / scaling[before])[:, None]
+    return rows

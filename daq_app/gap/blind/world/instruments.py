@@ -1,0 +1,104 @@
+"""Ideal signals of the 41 sensors, in SI, from the geometry of the rig file and a scene.
+
+Own derivation: world x, z of a wall point at rotation q about the base point c are
+x' = c + (x − c) cos q + z sin q and z' = −(x − c) sin q + z cos q.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from daq_app.config.rig import G_M_S2, Channel
+from daq_app.gap.blind.world.scene import Scene
+
+FloatArray = NDArray[np.float64]
+
+_BEND_EXPONENT = 1.5
+_PULSE_S = 0.002
+_RING_DECAY_S = 0.006
+
+
+def ideal(channel: Channel, scene: Scene, anchor_shift_m: float = 0.0) -> FloatArray:
+    """Signal of one channel (n,), upright value removed. `anchor_shift_m` raises a wire's anchor."""
+    match channel.family:
+        case "lvdt":
+            return opening(channel, scene)
+        case "wire":
+            return shortening(channel, scene, anchor_shift_m)
+        case "accelerometer":
+            return specific_force(channel, scene)
+        case "tiltmeter":
+            return tilt(channel, scene)
+
+
+def opening(channel: Channel, scene: Scene) -> FloatArray:
+    """Vertical opening of the base joint below the sensor, + = open."""
+    return (scene.pivot_x - channel.position_m[0]) * np.sin(scene.theta) + scene.lift
+
+
+def shortening(channel: Channel, scene: Scene, anchor_shift_m: float = 0.0) -> FloatArray:
+    """|A − P0| − |A − P|: + when the point nears its anchor."""
+    assert channel.anchor_m is not None
+    x, y, z = channel.position_m
+    ax, ay, az = channel.anchor_m
+    az += anchor_shift_m
+    turn, cosine = np.sin(scene.lean), np.cos(scene.lean)
+    shape = (max(z, 0.0) / scene.height) ** _BEND_EXPONENT
+    px = scene.pivot_x + (x - scene.pivot_x) * cosine + z * turn
+    px = px + scene.slip - y * scene.yaw + shape * scene.bend
+    pz = -(x - scene.pivot_x) * turn + z * cosine + scene.lift
+    py = y + x * scene.yaw
+    rest = math.sqrt((ax - x) ** 2 + (ay - y) ** 2 + (az - z) ** 2)
+    now = np.sqrt((ax - px) ** 2 + (ay - py) ** 2 + (az - pz) ** 2)
+    return np.asarray(rest - now)
+
+
+def specific_force(channel: Channel, scene: Scene) -> FloatArray:
+    """Acceleration minus gravity along the wall-fixed axis, DC coupled, plus the shock of impacts."""
+    x, y, z = channel.position_m
+    arm = x - scene.pivot_x
+    square = scene.omega**2
+    if channel.axis == "z":
+        value = -scene.theta_dd * arm - square * z + G_M_S2 * (np.cos(scene.lean) - 1.0)
+        value = value + scene.ground * np.sin(scene.lean)
+        lever = abs(x)
+    else:
+        value = scene.theta_dd * z - square * arm - G_M_S2 * np.sin(scene.lean)
+        value = value + scene.ground * np.cos(scene.lean) - y * scene.yaw_dd
+        value = value + (max(z, 0.0) / scene.height) ** _BEND_EXPONENT * scene.bend_dd
+        lever = z
+    return value + _shocks(channel, scene, lever)
+
+
+def tilt(channel: Channel, scene: Scene) -> FloatArray:
+    """Rotation towards the channel's axis through the sensor's first-order response."""
+    if channel.axis != "x":
+        return np.zeros_like(scene.lean)
+    return first_order(scene.lean, channel.time_constant_s, scene.time_s[1] - scene.time_s[0])
+
+
+def first_order(signal: FloatArray, constant_s: float, step_s: float) -> FloatArray:
+    """Exact first-order lag of a signal held between samples; starts settled."""
+    if constant_s <= 0.0:
+        return signal
+    keep = math.exp(-step_s / constant_s)
+    filtered: FloatArray = lfilter([1.0 - keep], [1.0, -keep], signal, zi=[keep * signal[0]])[0]
+    return filtered
+
+
+def _shocks(channel: Channel, scene: Scene, lever: float) -> FloatArray:
+    """At an impact: the velocity jump as a half-sine of 2 ms, and local ringing of the masonry."""
+    value = np.zeros_like(scene.time_s)
+    frequency = 140.0 + 37.0 * (sum(map(ord, channel.id)) % 7)
+    for start, jump in zip(scene.impact_times, scene.impact_jumps, strict=True):
+        low, high = np.searchsorted(scene.time_s, [start, start + 8.0 * _RING_DECAY_S])
+        t = scene.time_s[low:high] - start
+        step = lever * jump
+        pulse = np.where(t < _PULSE_S, np.sin(math.pi * t / _PULSE_S), 0.0)
+        ring = np.exp(-t / _RING_DECAY_S) * np.sin(2.0 * math.pi * frequency * t)
+        value[low:high] += step * math.pi / (2.0 * _PULSE_S) * pulse + 300.0 * step * ring
+    return value
