@@ -110,4 +110,4 @@ def make_rig(speed: float = float("inf"), finite: str = "real", source: object =
 
 
 def continuous(task: nidaqmx.Task, rate_hz: float = 4000.0) -> None:
-    task.timing.cfg_samp_clk_timing(rate_hz, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=20_000)
+    task.timing.cfg_samp_clk_timing(rate_hz, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=200_000)

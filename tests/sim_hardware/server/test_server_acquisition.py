@@ -9,6 +9,7 @@ import pytest
 from nidaqmx.constants import (
     READ_ALL_AVAILABLE,
     AcquisitionType,
+    FillMode,
     OverwriteMode,
     ReadRelativeTo,
     TaskMode,
@@ -244,6 +245,17 @@ def test_read_variants_agree(rig: Rig) -> None:
             assert np.array_equal(words, codes.astype(np.int64).astype(dtype))
 
 
+def test_samples_can_be_grouped_by_scan(rig: Rig) -> None:
+    with rig.task() as task:
+        task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0:2")
+        continuous(task, 1000.0)
+        task.in_stream.relative_to = ReadRelativeTo.FIRST_SAMPLE
+        by_channel = np.array(task.read(50))
+        by_scan = np.zeros((50, 3))
+        task._interpreter.read_analog_f64(task._handle, 50, 5.0, FillMode.GROUP_BY_SCAN_NUMBER.value, by_scan)
+    assert np.array_equal(by_scan, by_channel.T)
+
+
 def test_waveform_names_its_channel_and_time(rig: Rig) -> None:
     with rig.task() as task:
         task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0:1", name_to_assign_to_channel="left, right")
@@ -331,7 +343,7 @@ def test_real_time_clock_runs_at_its_speed(start_rig: Callable[..., Rig]) -> Non
         task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
         continuous(task, 1000.0)
         task.start()
-        got = np.array(task.read(1000, timeout=5.0))
+        got = np.array(task.read(1000, timeout=30.0))
         before = task.in_stream.total_samp_per_chan_acquired
         assert before >= 1000
         while task.in_stream.total_samp_per_chan_acquired < before + 100:
