@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from daq_app.acquisition.client import AcquisitionClient
 from daq_app.acquisition.options import READY
 
-_START_LIMIT_S = 120.0
+_START_LIMIT_S = 240.0
 """Loading everything and starting the simulated server, on a machine that is busy."""
 
 

@@ -1,0 +1,42 @@
+"""A simulated test straight into a run file: same wall, sensors, modules and analysis, no waiting."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from daq_app.acquisition.offline import Readings, record_offline
+from daq_app.acquisition.tare import NotSteady
+from daq_app.config import ConfigError, Problem, load_rig, plan_tasks
+from daq_app.runfile import RunFileError
+from sim_hardware.direct import synthesise_test
+
+
+def simulate_run(
+    rig_file: Path,
+    out: Path,
+    *,
+    level: str,
+    theta0_over_alpha: float,
+    r: float | None,
+    seed: int | None,
+    test: str | None,
+) -> Path:
+    """Simulate one test and write its run to `out`. Raises `ConfigError` and `RunFileError` in words."""
+    rig = load_rig(rig_file)
+    plan = plan_tasks(rig, str(rig_file))
+    try:
+        simulated = synthesise_test(
+            rig, plan, theta0_over_alpha, seed, restitution=r, post_rest_s=rig.acquisition.post_rest_s + 2.0
+        )
+    except (ValueError, LookupError) as error:
+        raise ConfigError(
+            [Problem(str(rig_file), "simulation", str(error), "Correct the rig file or the option")]
+        ) from error
+    readings = Readings(simulated.readings, "simulated without real time", dict(simulated.truth))
+    name = test or f"{rig.specimen.name}-{level}-1"
+    try:
+        return record_offline(rig, rig_file.read_text(encoding="utf-8"), plan, readings, out, name)
+    except NotSteady as error:
+        raise RunFileError(
+            str(error), advice="Give the simulated wall a longer simulation.upright_s in the rig file."
+        ) from error
