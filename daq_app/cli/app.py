@@ -16,6 +16,7 @@ _GROUPS: Final = (
     "daq_app.cli.theory_commands",
     "daq_app.cli.run_file_commands",
     "daq_app.cli.gap_commands",
+    "daq_app.cli.gap_blind_commands",
 )
 """Modules with a ``register(app)`` function, in the order of the help page."""
 

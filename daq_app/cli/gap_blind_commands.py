@@ -1,0 +1,204 @@
+"""`daq-app gap blind`: make sealed cases, diagnose them without their labels, score."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, reported
+from daq_app.config import load_rig
+
+if TYPE_CHECKING:
+    from daq_app.gap.blind.score import Score
+
+_RIGS = (Path("configs/fr1.toml"), Path("configs/fr2.toml"))
+_PRODUCT = "daq_app.gap.blind.diagnosers:product"
+_LabelsOption = Annotated[
+    Path | None, typer.Option(help="Folder of the labels; beside the cases, as DIR-labels, if left out.")
+]
+_WorkersOption = Annotated[int, typer.Option(min=0, help="Processes; 0 takes one for each core.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the group ``blind`` to the group ``gap``, which is made if nobody made it."""
+    blind = typer.Typer(no_args_is_help=True, help="Check the diagnosis on cases whose cause it is not told.")
+    blind.command(
+        "make", epilog="Example: daq-app gap blind make --cases 200 --seed 1 --out check --labels kept/check"
+    )(make)
+    blind.command("run", epilog="Example: daq-app gap blind run check")(run)
+    blind.command(
+        "score", epilog="Example: daq-app gap blind score check --labels kept/check --html check.html"
+    )(score)
+    group = next((g.typer_instance for g in app.registered_groups if g.name == "gap"), None)
+    if group is None:
+        group = typer.Typer(no_args_is_help=True, help="The gap between simulator and recordings.")
+        app.add_typer(group, name="gap")
+    group.add_typer(blind, name="blind")
+
+
+@contextmanager
+def _refusals() -> Iterator[None]:
+    """Broken seals, missing diagnosers and schedulers are told in one paragraph."""
+    from daq_app.gap.blind.diagnosers import DiagnoserError
+    from daq_app.gap.blind.scheduler import SchedulerMissing
+    from daq_app.gap.blind.seal import SealBroken
+
+    with reported():
+        try:
+            yield
+        except (DiagnoserError, SchedulerMissing, ValueError) as error:
+            print_paragraph("Error", str(error))
+            raise typer.Exit(EXIT_BAD_INPUT) from None
+        except SealBroken as error:
+            print_paragraph("Seal broken", str(error))
+            raise typer.Exit(EXIT_FAILED) from None
+
+
+def make(
+    out: Annotated[Path, typer.Option(help="Folder of the cases.")],
+    cases: Annotated[int, typer.Option(min=1, max=100_000, help="How many cases.")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="Keep it from whoever diagnoses.")] = 1,
+    labels: _LabelsOption = None,
+    rig: Annotated[list[Path] | None, typer.Option(help="Rig files; the cases take turns.")] = None,
+    runs: Annotated[int, typer.Option(min=1, max=36, help="Runs in each case.")] = 6,
+    workers: _WorkersOption = 0,
+) -> None:
+    """Simulate release tests with hidden effects, and seal their labels. An interrupted making goes on."""
+    from daq_app.gap.blind.make import Order, check_apart, make_cases
+
+    with _refusals():
+        kept = labels or _beside(out)
+        check_apart(out, kept)
+        files = rig or list(_RIGS)
+        for file in files:
+            load_rig(file)
+        texts = tuple(file.read_text(encoding="utf-8") for file in files)
+        order = Order(seed, out, kept, texts, runs)
+        with _progress("making", cases) as advance:
+            before = sum((out / f"case_{k + 1:04d}" / "seal.json").exists() for k in range(cases))
+            advance(before)
+            for _ in make_cases(order, range(cases), _workers(workers)):
+                advance(1)
+        typer.echo(f"{cases} sealed cases in {out}; labels in {kept}: keep them away from the diagnosis")
+
+
+def run(
+    folder: Annotated[Path, typer.Argument(help="Folder of the cases.", metavar="DIR")],
+    diagnoser: Annotated[str, typer.Option(help="module:function that diagnoses a case.")] = _PRODUCT,
+    scheduler: Annotated[str, typer.Option(help="Address of a dask scheduler, tcp://HOST:PORT.")] = "",
+    workers: _WorkersOption = 0,
+    timeout: Annotated[float, typer.Option(min=1, help="Longest time for one case, seconds.")] = 1800.0,
+) -> None:
+    """Diagnose every case in a process that has nothing but its files. Goes on where it was interrupted."""
+    from daq_app.gap.blind.diagnosers import load_diagnoser
+    from daq_app.gap.blind.runner import case_folders, pending, run_pending
+    from daq_app.gap.blind.scheduler import run_on_scheduler
+
+    with _refusals():
+        load_diagnoser(diagnoser)
+        total, todo = len(case_folders(folder)), len(pending(folder, diagnoser))
+        if total == 0:
+            raise ValueError(f"{folder} holds no sealed cases. Make some: daq-app gap blind make --out DIR")
+        outcomes = (
+            run_on_scheduler(folder, diagnoser, scheduler, timeout)
+            if scheduler
+            else run_pending(folder, diagnoser, _workers(workers), timeout)
+        )
+        failed = 0
+        with _progress("diagnosing", total) as advance:
+            advance(total - todo)
+            for outcome in outcomes:
+                advance(1)
+                if outcome.failure:
+                    failed += 1
+                    print_paragraph(outcome.case, outcome.failure, style="bold yellow")
+        typer.echo(f"{total} cases, {todo} diagnosed now, {failed} of them without a result")
+        if failed:
+            raise typer.Exit(EXIT_FAILED)
+
+
+def score(
+    folder: Annotated[Path, typer.Argument(help="Folder of the cases.", metavar="DIR")],
+    labels: _LabelsOption = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page with pictures.")] = None,
+    json_out: Annotated[Path | None, typer.Option("--json", help="Write all numbers as JSON.")] = None,
+) -> None:
+    """Open the labels, check the seals, say how good the diagnosis is. Exit code 1: a target is missed."""
+    from daq_app.gap.blind.score import score_folder
+
+    with _refusals():
+        found = score_folder(folder, labels or _beside(folder))
+        _print_score(found)
+        if json_out:
+            json_out.write_text(json.dumps(found.to_dict(), ensure_ascii=False, indent=1), encoding="utf-8")
+        if html:
+            from daq_app.gap.blind.report import write_report
+
+            write_report(found, html)
+        if not found.passed:
+            raise typer.Exit(EXIT_FAILED)
+
+
+def _print_score(found: Score) -> None:
+    from daq_app.gap.blind.report import interval, number
+
+    console = Console()
+    table = Table(title=f"Blind check: {len(found.judged)} cases", title_justify="left")
+    for column in ("score", "found", "95 % interval", "cases", "target", ""):
+        table.add_column(column, overflow="fold")
+    for row in found.rows:
+        verdict = {True: "met", False: "missed", None: ""}[row.met]
+        table.add_row(
+            row.name, number(row.found.value), interval(row.found), str(row.found.n), row.target, verdict
+        )
+    console.print(table)
+    _print_confusion(found, console)
+    if found.waiting:
+        console.print(f"{len(found.waiting)} cases have no result yet: daq-app gap blind run goes on")
+
+
+def _print_confusion(found: Score, console: Console) -> None:
+    """What was hidden → what was answered, most frequent first; the matrix is in the HTML page."""
+    from daq_app.gap.blind.confusion import confusion
+
+    counts = confusion(found.judged)
+    table = Table(title="Hidden and answered", title_justify="left")
+    for column in ("hidden", "answers (cases)"):
+        table.add_column(column, overflow="fold")
+    for truth in counts.rows:
+        answers = sorted(
+            ((n, answer) for (hidden, answer), n in counts.counts.items() if hidden == truth),
+            key=lambda pair: (-pair[0], pair[1]),
+        )
+        table.add_row(truth, ", ".join(f"{answer} {n}" for n, answer in answers))
+    console.print(table)
+
+
+@contextmanager
+def _progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        task = progress.add_task(what, total=total)
+        yield lambda n: progress.advance(task, n)
+
+
+def _beside(folder: Path) -> Path:
+    return folder.with_name(f"{folder.name}-labels")
+
+
+def _workers(asked: int) -> int:
+    return asked or os.cpu_count() or 1

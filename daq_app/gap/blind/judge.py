@@ -1,0 +1,221 @@
+"""One diagnosis against its label: what was claimed, and what of it is right."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from daq_app.gap.blind.names import base_name, families_of
+from daq_app.gap.blind.runner import Outcome
+
+DECISIONS: Final = (
+    "effect",
+    "pair",
+    "parameters",
+    "nothing_missing",
+    "cannot_tell",
+    "none_of_these",
+    "below_detection",
+)
+_BLAMING: Final = ("effect", "pair")
+_CLEARLY_VISIBLE: Final = 4.0
+"""Standard deviations from which an effect must be found."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """One line of `which` or `set95`."""
+
+    effects: tuple[str, ...]
+    family: str
+    probability: float
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A diagnosis and what of it was right; None where the question does not arise."""
+
+    case: str
+    category: str
+    truth: tuple[str, ...]
+    families: tuple[str, ...]
+    strength: float
+    """Of the weakest effect, in standard deviations (detectability); infinite for null cases."""
+    decision: str
+    named: tuple[str, ...]
+    """Effects of the answer; empty for answers that name none."""
+    named_family: str
+    claimed: float
+    """Probability that the diagnosis gives its first hypothesis."""
+    first_right: bool
+    family_right: bool
+    in_set: bool
+    set_size: int
+    outside_score: float
+    """How much it says "none of these", for ranking."""
+    closure: float
+    after_to_floor: float
+    parameter_error: float
+    """Relative error of the strength parameter; NaN where the names or units do not meet."""
+    parameter_covered: bool | None
+    next_measurement: str
+    seconds: float
+    known: bool
+    """Whether the truth was among the hypotheses (an effect of the library)."""
+    failure: str = ""
+
+    @property
+    def visible(self) -> bool:
+        return self.strength >= _CLEARLY_VISIBLE
+
+    @property
+    def blames(self) -> bool:
+        return self.decision in _BLAMING
+
+    @property
+    def answered_rightly(self) -> bool:
+        """Whether the decision as a whole was right, for the confusion matrix of decisions."""
+        match self.category:
+            case "null":
+                return self.decision in ("nothing_missing", "parameters", "below_detection")
+            case "outside" if not self.known:
+                return self.decision == "none_of_these"
+            case _:
+                if self.decision == "cannot_tell":
+                    return self.in_set and bool(self.next_measurement)
+                return self.blames and self.first_right
+
+
+def judge(label: dict[str, Any], outcome: Outcome) -> Judged:
+    """Compare. A diagnosis that failed counts as one that said nothing."""
+    result = outcome.result or {}
+    which = _hypotheses(result.get("which"))
+    set95 = _hypotheses(result.get("set95"))
+    decision = str(result.get("decision", "")) if result else "failed"
+    effects = label["effects"]
+    accept = [tuple(effect["accept"]) for effect in effects]
+    named, family, claimed = _answer(decision, result, which)
+    gap = result.get("gap") or {}
+    error, covered = _parameter(label, result, decision)
+    return Judged(
+        case=outcome.case,
+        category=label["category"],
+        truth=tuple(effect["name"] for effect in effects),
+        families=tuple(effect["family"] for effect in effects),
+        strength=min(label["detectability"], default=math.inf),
+        decision=decision if decision in DECISIONS else "failed",
+        named=named,
+        named_family=family,
+        claimed=claimed,
+        first_right=bool(which) and _matches(which[0].effects, accept),
+        family_right=set(families_of(family)) == {effect["family"] for effect in effects},
+        in_set=any(_matches(hypothesis.effects, accept) for hypothesis in set95),
+        set_size=len(set95),
+        outside_score=_outside_score(decision, result, which),
+        closure=_number(gap, "closure"),
+        after_to_floor=_ratio(_number(gap, "after"), _number(gap, "floor")),
+        parameter_error=error,
+        parameter_covered=covered,
+        next_measurement=str(result.get("next_measurement") or ""),
+        seconds=outcome.seconds,
+        known=any(_matches(hypothesis.effects, accept) for hypothesis in which),
+        failure=outcome.failure,
+    )
+
+
+def _hypotheses(entries: Any) -> list[Hypothesis]:
+    found = []
+    for entry in entries or []:
+        names = tuple(str(name) for name in entry.get("effects", ()))
+        found.append(Hypothesis(names, str(entry.get("family", "")), float(entry.get("probability") or 0.0)))
+    return sorted(found, key=lambda hypothesis: -hypothesis.probability)
+
+
+def _answer(
+    decision: str, result: dict[str, Any], which: Sequence[Hypothesis]
+) -> tuple[tuple[str, ...], str, float]:
+    """(effects named, family named, claimed probability of the first hypothesis)."""
+    first = which[0] if which else Hypothesis((), "", 0.0)
+    if decision in _BLAMING:
+        return first.effects, first.family, first.probability
+    detail = result.get("decision_detail") or {}
+    return (), str(detail.get("family") or ""), first.probability
+
+
+def _matches(claimed: Sequence[str], accept: Sequence[tuple[str, ...]]) -> bool:
+    """Whether each hidden effect is claimed under an accepted name, and nothing else is."""
+    if len(claimed) != len(accept):
+        return False
+    names = [base_name(name) for name in claimed]
+    if len(names) < 2:
+        return all(name in accepted for name, accepted in zip(names, accept, strict=True))
+    straight = names[0] in accept[0] and names[1] in accept[1]
+    return straight or (names[0] in accept[1] and names[1] in accept[0])
+
+
+def _outside_score(decision: str, result: dict[str, Any], which: Sequence[Hypothesis]) -> float:
+    """How strongly a result speaks for "none of these", in [0, 2]; 1 and more where it decides so.
+
+    Within a decision the p-value of its goodness of fit ranks, and without one the probability that
+    the first hypothesis leaves over. A result may give ``notes.outside_score`` in [0, 1] instead.
+    """
+    given = (result.get("notes") or {}).get("outside_score")
+    p_value = (result.get("goodness") or {}).get("p_value")
+    if isinstance(given, int | float):
+        inner = min(1.0, max(0.0, float(given)))
+    elif isinstance(p_value, int | float):
+        size = -math.log10(max(float(p_value), 1e-300))
+        inner = max(0.0, size) / (1.0 + max(0.0, size))
+    else:
+        inner = 1.0 - (which[0].probability if which else 0.0)
+    return inner + (1.0 if decision == "none_of_these" else 0.0)
+
+
+def _parameter(label: dict[str, Any], result: dict[str, Any], decision: str) -> tuple[float, bool | None]:
+    """Relative error and coverage of the strength of a single effect that was named rightly.
+
+    Only where the result carries the parameter under the generator's name or its stem
+    (``zeta``, ``theta_c``), on the same scale.
+    """
+    if label["category"] != "single" or decision != "effect":
+        return math.nan, None
+    effect = label["effects"][0]
+    key, truth = next(iter(effect["parameters"].items()))
+    estimates = [*(result.get("effect_parameters") or []), *(result.get("parameters") or [])]
+    for estimate in estimates:
+        name = base_name(str(estimate.get("name", "")))
+        if not _same_parameter(name, key, effect["accept"]):
+            continue
+        try:
+            value, low, high = (float(estimate[k]) for k in ("value", "low", "high"))
+        except (KeyError, TypeError, ValueError):
+            continue
+        if truth == 0:
+            continue
+        return abs(value - truth) / abs(truth), low <= truth <= high
+    return math.nan, None
+
+
+def _same_parameter(name: str, key: str, accept: Sequence[str]) -> bool:
+    stem = key
+    for unit in ("_rad_s", "_s_rad", "_1_s", "_1_m", "_m_s2", "_m_s", "_rad", "_hz", "_si", "_m", "_s"):
+        if stem.endswith(unit):
+            stem = stem.removesuffix(unit)
+            break
+    effect, dot, parameter = name.rpartition(".")
+    if dot and base_name(effect) not in accept:
+        return False
+    return parameter in (key, stem)
+
+
+def _number(values: dict[str, Any], key: str) -> float:
+    value = values.get(key)
+    if isinstance(value, dict):
+        value = value.get("value")
+    return float(value) if isinstance(value, int | float) else math.nan
+
+
+def _ratio(above: float, below: float) -> float:
+    return above / below if below and math.isfinite(below) else math.nan

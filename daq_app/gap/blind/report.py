@@ -1,0 +1,143 @@
+"""The score of a blind check as one HTML page with its pictures inside."""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from jinja2 import Environment
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from daq_app.gap.blind.confusion import confusion
+from daq_app.gap.blind.judge import Judged
+from daq_app.gap.blind.score import Score, claims
+from daq_app.gap.blind.statistics import Value, reliability
+
+_PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>Blind check</title>
+<style>body{font-family:sans-serif;max-width:70rem;margin:2rem auto;color:#222}
+table{border-collapse:collapse;margin:1rem 0}
+td,th{padding:.25rem .7rem;border-bottom:1px solid #ddd;text-align:left}
+.no{color:#b00020;font-weight:bold}.yes{color:#1b6e2c}img{max-width:100%}small{color:#666}</style></head><body>
+<h1>Blind check of the diagnosis</h1>
+<p>{{ n }} cases with a result{% if waiting %}, {{ waiting|length }} still without{% endif %}.
+Every label was opened after the diagnosis and agreed with its seal. Intervals are 95 % (Wilson for shares,
+bootstrap otherwise).</p>
+<table><tr><th>score</th><th>found</th><th>95 % interval</th><th>cases</th><th>target</th><th></th></tr>
+{% for row in rows %}<tr><td>{{ row.name }}</td><td>{{ number(row.found.value) }}</td>
+<td>{{ interval(row.found) }}</td><td>{{ row.found.n }}</td><td>{{ row.target }}</td>
+<td>{% if row.met is true %}<span class="yes">met</span>{% elif row.met is false %}
+<span class="no">missed</span>{% endif %}</td></tr>{% endfor %}</table>
+{% for title, note, data in pictures %}<h2>{{ title }}</h2><p><small>{{ note }}</small></p>
+<img alt="{{ title }}" src="data:image/png;base64,{{ data }}">{% endfor %}
+<h2>Cases that were answered wrongly</h2>
+<table><tr><th>case</th><th>hidden</th><th>strength, sd</th><th>decision</th><th>named</th><th>p</th></tr>
+{% for j in wrong %}<tr><td>{{ j.case }}</td><td>{{ j.truth|join(" + ") or "nothing" }}</td>
+<td>{{ number(j.strength) }}</td><td>{{ j.decision }}{% if j.failure %}: {{ j.failure[:200] }}{% endif %}</td>
+<td>{{ j.named|join(" + ") }}</td><td>{{ number(j.claimed) }}</td></tr>{% endfor %}</table>
+</body></html>
+"""
+
+
+def write_report(score: Score, path: Path) -> None:
+    """Write the page."""
+    pictures = [
+        (
+            "Confusion matrix",
+            "Rows: what was hidden. Columns: what was answered; decisions that name nothing in brackets.",
+            _picture(lambda axes: _draw_confusion(axes, score), (13.0, 12.0)),
+        ),
+        (
+            "Reliability",
+            "Claimed probability of the first answer against how often it was right.",
+            _picture(lambda axes: _draw_reliability(axes, score), (6.0, 6.0)),
+        ),
+        (
+            "Closure by effect",
+            "Share of the reachable held-out score that was gained, each case a dot.",
+            _picture(lambda axes: _draw_closure(axes, score), (9.0, 9.0)),
+        ),
+    ]
+    template = Environment(autoescape=True).from_string(_PAGE)
+    text = template.render(
+        n=len(score.judged),
+        waiting=score.waiting,
+        rows=score.rows,
+        pictures=pictures,
+        wrong=[j for j in score.judged if not j.answered_rightly],
+        number=number,
+        interval=interval,
+    )
+    path.write_text(text, encoding="utf-8")
+
+
+def number(value: float) -> str:
+    """Three significant digits; a dash where there is none."""
+    return "–" if not math.isfinite(value) else f"{value:.3g}"
+
+
+def interval(value: Value) -> str:
+    return "–" if math.isnan(value.value) else f"{value.low:.3g} to {value.high:.3g}"
+
+
+def _picture(draw: Callable[[Axes], None], size: tuple[float, float]) -> str:
+    figure = Figure(figsize=size, layout="constrained")
+    draw(figure.add_subplot())
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=80)
+    return base64.b64encode(buffer.getvalue()).decode()
+
+
+def _draw_confusion(axes: Axes, score: Score) -> None:
+    found = confusion(score.judged)
+    grid = np.zeros((max(1, len(found.rows)), max(1, len(found.columns))))
+    for (truth, answer), count in found.counts.items():
+        grid[found.rows.index(truth), found.columns.index(answer)] = count
+    axes.imshow(grid, cmap="Blues", aspect="auto")
+    for (truth, answer), count in found.counts.items():
+        column, row = found.columns.index(answer), found.rows.index(truth)
+        axes.text(column, row, str(count), ha="center", va="center", fontsize=7)
+    axes.set_xticks(range(len(found.columns)), found.columns, rotation=90, fontsize=7)
+    axes.set_yticks(range(len(found.rows)), found.rows, fontsize=7)
+    axes.set_xlabel("answer")
+    axes.set_ylabel("hidden")
+
+
+def _draw_reliability(axes: Axes, score: Score) -> None:
+    claimed, right = claims(score.judged)
+    axes.plot([0, 1], [0, 1], color="grey", linewidth=1)
+    for bar in reliability(claimed, right):
+        below, above = bar.found.value - bar.found.low, bar.found.high - bar.found.value
+        axes.errorbar(
+            bar.claimed,
+            bar.found.value,
+            yerr=[[max(0.0, below)], [max(0.0, above)]],
+            fmt="o",
+            color="C0",
+            capsize=3,
+        )
+        axes.annotate(
+            str(bar.found.n), (bar.claimed, bar.found.value), xytext=(6, -10), textcoords="offset points"
+        )
+    axes.set(xlim=(0, 1.02), ylim=(0, 1.02), xlabel="claimed probability", ylabel="share that was right")
+
+
+def _draw_closure(axes: Axes, score: Score) -> None:
+    groups: dict[str, list[Judged]] = {}
+    for j in score.judged:
+        if j.category == "single" and math.isfinite(j.closure):
+            groups.setdefault(j.truth[0], []).append(j)
+    names = sorted(groups, reverse=True)
+    for row, name in enumerate(names):
+        for j in groups[name]:
+            axes.plot(j.closure, row, "o" if j.first_right else "x", color="C0" if j.first_right else "C3")
+    axes.set_yticks(range(len(names)), names, fontsize=8)
+    axes.axvline(1.0, color="grey", linewidth=1)
+    axes.axvline(0.9, color="grey", linewidth=1, linestyle=":")
+    axes.set_xlim(-0.1, 1.15)
+    axes.set_xlabel("closure (cross: named wrongly)")

@@ -1,0 +1,242 @@
+"""The score table of the design page, with intervals, from all cases of a check."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from daq_app.gap.blind.judge import Judged, judge
+from daq_app.gap.blind.runner import case_folders, read_outcome
+from daq_app.gap.blind.seal import SEAL_FILE, SealBroken, file_sha256, open_label
+from daq_app.gap.blind.statistics import (
+    NOTHING,
+    Value,
+    at_false_alarms,
+    auroc_interval,
+    bootstrap,
+    calibration_error,
+    share,
+)
+
+_SURE = 0.95
+_FALSE_ALARMS = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of the table. `low` and `high` bound the target; None on a side without a bound."""
+
+    name: str
+    found: Value
+    low: float | None = None
+    high: float | None = None
+
+    @property
+    def target(self) -> str:
+        match (self.low, self.high):
+            case (None, None):
+                return ""
+            case (low, None):
+                return f"≥ {low:g}"
+            case (None, high):
+                return f"≤ {high:g}"
+            case (low, high):
+                return f"{low:g} to {high:g}"
+        return ""
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the value meets the target; None without a target or without cases."""
+        if (self.low is None and self.high is None) or math.isnan(self.found.value):
+            return None
+        above = self.low is None or self.found.value >= self.low
+        return above and (self.high is None or self.found.value <= self.high)
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """All that the report shows."""
+
+    rows: tuple[Row, ...]
+    judged: tuple[Judged, ...]
+    waiting: tuple[str, ...]
+    """Sealed cases without a result."""
+
+    @property
+    def passed(self) -> bool:
+        """Every target that could be measured is met, and every case has a result."""
+        return not self.waiting and all(row.met is not False for row in self.rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-able: rows and judged cases; NaN and infinity as null."""
+        rows = [{**asdict(row), "target": row.target, "met": row.met} for row in self.rows]
+        data = {"rows": rows, "cases": [asdict(j) for j in self.judged], "waiting": list(self.waiting)}
+        cleaned: dict[str, Any] = _finite(data)
+        return cleaned
+
+
+def score_folder(folder: Path, labels: Path) -> Score:
+    """Open the labels and score every case that has a result.
+
+    Raises `SealBroken` at the first label or file that is not what was sealed, and for a result that
+    was given for other data.
+    """
+    judged: list[Judged] = []
+    waiting: list[str] = []
+    cases = case_folders(folder)
+    if not cases:
+        raise SealBroken(f"{folder}: there are no sealed cases")
+    for case in cases:
+        label = open_label(case, labels / f"{case.name}.json")
+        outcome = read_outcome(folder, case.name)
+        if outcome is None:
+            waiting.append(case.name)
+        elif outcome.seal_sha256 != file_sha256(case / SEAL_FILE):
+            raise SealBroken(f"{case.name}: the result belongs to other data. Run the diagnosis again")
+        else:
+            judged.append(judge(label, outcome))
+    return Score(tuple(table(judged)), tuple(judged), tuple(waiting))
+
+
+def table(judged: Sequence[Judged]) -> list[Row]:
+    """The rows in the order of the design page."""
+    singles = [j for j in judged if j.category == "single"]
+    visible = [j for j in singles if j.visible]
+    weak = [j for j in singles if not j.visible]
+    known = [j for j in judged if j.category in ("single", "pair", "null") or j.known]
+    nulls = [j for j in judged if j.category == "null"]
+    pairs = [j for j in judged if j.category == "pair"]
+    unsure = [j for j in judged if j.decision == "cannot_tell"]
+    speaking = [j for j in judged if j.decision != "failed"]
+    return [
+        Row("first answer right, effect ≥ 4 sd", share([j.first_right for j in visible]), low=0.95),
+        Row("family right, effect ≥ 4 sd", share([j.family_right for j in visible]), low=0.98),
+        Row("first answer right, effect < 4 sd", share([j.first_right for j in weak])),
+        Row("95 % set holds the truth", share([j.in_set for j in known]), 0.93, 0.98),
+        Row("95 % set: mean size", _mean([float(j.set_size) for j in known if j.set_size]), high=1.5),
+        Row("wrong at p > 0.95", share([_wrong_and_sure(j) for j in speaking]), high=0.01),
+        Row("expected calibration error", _calibration(judged), high=0.05),
+        *_outside_rows(judged),
+        Row("nothing hidden, yet blamed on an effect", share([j.blames for j in nulls]), high=0.05),
+        *_closure_rows(judged),
+        *_parameter_rows(singles),
+        Row("pairs exact", share([j.first_right and j.decision == "pair" for j in pairs]), low=0.80),
+        Row(
+            "cannot tell: truth in the set, measurement named",
+            share([j.in_set and bool(j.next_measurement) for j in unsure]),
+        ),
+        Row("decision right, all cases", share([j.answered_rightly for j in judged])),
+        Row("no result", share([j.decision == "failed" for j in judged]), high=0.0),
+        Row("seconds per diagnosis, median", bootstrap([j.seconds for j in speaking])),
+    ]
+
+
+def _outside_rows(judged: Sequence[Judged]) -> list[Row]:
+    """Outside the library: how well it ranks, and what is still put on an effect of the library.
+
+    The threshold is the one at which at most 5 % of the cases that the library does explain are
+    called "none of these".
+    """
+    outside = [j for j in judged if j.category == "outside" and not j.known]
+    inside = [j for j in judged if j.category != "outside" and j.decision != "failed"]
+    said_outside = [j for j in inside if j.decision == "none_of_these"]
+    threshold = at_false_alarms(
+        [j.outside_score for j in outside], [j.outside_score for j in inside], _FALSE_ALARMS
+    )
+    attributed = [j.blames and not j.outside_score > threshold for j in outside]
+    other_family = [
+        a and not set(j.families) & set(j.named_family.split(" + "))
+        for a, j in zip(attributed, outside, strict=True)
+    ]
+    return [
+        Row(
+            "outside the library: AUROC",
+            auroc_interval([j.outside_score for j in outside], [j.outside_score for j in inside]),
+            low=0.97,
+        ),
+        Row("outside, attributed to an effect (at 5 % false alarms)", share(attributed), high=0.05),
+        Row("outside, attributed to a wrong family (at 5 % false alarms)", share(other_family), high=0.02),
+        Row(
+            'known, yet decided "none of these"',
+            share([j in said_outside for j in inside]),
+            high=_FALSE_ALARMS,
+        ),
+        Row("outside, blamed on an effect as decided", share([j.blames for j in outside])),
+    ]
+
+
+def _closure_rows(judged: Sequence[Judged]) -> list[Row]:
+    found = [j for j in judged if j.category in ("single", "pair") and j.visible and j.blames]
+    closures = [j.closure for j in found if math.isfinite(j.closure)]
+    return [
+        Row("closure, median", bootstrap(closures), low=0.97),
+        Row("closure ≥ 0.9", share([c >= 0.9 for c in closures]), low=0.9),
+        Row(
+            "held-out gap after, against the floor, median",
+            _median([j.after_to_floor for j in found]),
+            high=1.1,
+        ),
+    ]
+
+
+def _parameter_rows(singles: Sequence[Judged]) -> list[Row]:
+    met = [j for j in singles if j.parameter_covered is not None and j.first_right]
+    return [
+        Row("parameter error, median", _median([j.parameter_error for j in met]), high=0.02),
+        Row(
+            "95 % interval holds the parameter",
+            share([bool(j.parameter_covered) for j in met]),
+            0.92,
+            0.98,
+        ),
+    ]
+
+
+def _wrong_and_sure(j: Judged) -> bool:
+    return j.decision != "none_of_these" and j.claimed > _SURE and not j.first_right
+
+
+def claims(judged: Sequence[Judged]) -> tuple[list[float], list[bool]]:
+    """(claimed probability, right) of the first hypothesis wherever the answer stands by it.
+
+    Where it says "none of these" its probabilities are conditional on the library and no claim.
+    """
+    kept = [j for j in judged if j.decision not in ("failed", "none_of_these")]
+    return [j.claimed for j in kept], [j.first_right for j in kept]
+
+
+def _calibration(judged: Sequence[Judged]) -> Value:
+    claimed, right = claims(judged)
+    if not claimed:
+        return NOTHING
+    rng = np.random.default_rng(0)
+    p, hit = np.array(claimed), np.array(right)
+    draws = []
+    for _ in range(500):
+        pick = rng.integers(0, p.size, p.size)
+        draws.append(calibration_error(p[pick].tolist(), hit[pick].tolist()))
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return Value(calibration_error(claimed, right), float(low), float(high), p.size)
+
+
+def _mean(values: Sequence[float]) -> Value:
+    return bootstrap(values, np.mean)
+
+
+def _median(values: Sequence[float]) -> Value:
+    return bootstrap(values)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: _finite(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

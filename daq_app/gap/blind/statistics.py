@@ -1,0 +1,116 @@
+"""The few statistics of a score: intervals of shares and medians, calibration, separation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Z95: Final = 1.959963984540054
+_RESAMPLES: Final = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A number with its 95 % interval and how many cases it stands on; NaN where there are none."""
+
+    value: float
+    low: float
+    high: float
+    n: int
+
+
+NOTHING: Final = Value(math.nan, math.nan, math.nan, 0)
+
+
+def share(flags: Sequence[bool]) -> Value:
+    """Share of true flags with Wilson's interval."""
+    n = len(flags)
+    if n == 0:
+        return NOTHING
+    p = sum(flags) / n
+    z2 = _Z95**2
+    centre = (p + z2 / (2 * n)) / (1 + z2 / n)
+    half = _Z95 * math.sqrt(p * (1 - p) / n + z2 / (4 * n * n)) / (1 + z2 / n)
+    return Value(p, max(0.0, centre - half), min(1.0, centre + half), n)
+
+
+def bootstrap(
+    values: Sequence[float], statistic: Callable[[NDArray[np.float64]], float] = np.median
+) -> Value:
+    """A statistic of numbers with its percentile bootstrap interval (2000 resamples, fixed seed)."""
+    data = np.array([v for v in values if math.isfinite(v)], dtype=np.float64)
+    if data.size == 0:
+        return NOTHING
+    rng = np.random.default_rng(0)
+    draws = [float(statistic(data[rng.integers(0, data.size, data.size)])) for _ in range(_RESAMPLES)]
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return Value(float(statistic(data)), float(low), float(high), data.size)
+
+
+@dataclass(frozen=True, slots=True)
+class Bin:
+    """One bar of a reliability diagram."""
+
+    low: float
+    high: float
+    claimed: float
+    """Mean claimed probability."""
+    found: Value
+    """Share that was right."""
+
+
+def reliability(claimed: Sequence[float], right: Sequence[bool], bins: int = 10) -> list[Bin]:
+    """Claimed probability against the share that was right, in equal bins; empty bins left out."""
+    p, hit = np.asarray(claimed, dtype=np.float64), np.asarray(right, dtype=bool)
+    index = np.minimum((p * bins).astype(int), bins - 1)
+    return [
+        Bin(k / bins, (k + 1) / bins, float(p[index == k].mean()), share(hit[index == k].tolist()))
+        for k in range(bins)
+        if np.any(index == k)
+    ]
+
+
+def calibration_error(claimed: Sequence[float], right: Sequence[bool], bins: int = 10) -> float:
+    """Expected calibration error: Σ n_bin/n · |claimed − found|; NaN without cases."""
+    found = reliability(claimed, right, bins)
+    n = sum(b.found.n for b in found)
+    return sum(b.found.n * abs(b.claimed - b.found.value) for b in found) / n if n else math.nan
+
+
+def auroc(positive: Sequence[float], negative: Sequence[float]) -> float:
+    """Probability that a positive scores above a negative, ties half; NaN if one side is empty."""
+    a, b = np.asarray(positive, dtype=np.float64), np.asarray(negative, dtype=np.float64)
+    if not a.size or not b.size:
+        return math.nan
+    above = (a[:, None] > b[None, :]).mean()
+    equal = (a[:, None] == b[None, :]).mean()
+    return float(above + 0.5 * equal)
+
+
+def auroc_interval(positive: Sequence[float], negative: Sequence[float]) -> Value:
+    """AUROC with its bootstrap interval over both groups."""
+    centre = auroc(positive, negative)
+    if math.isnan(centre):
+        return NOTHING
+    rng = np.random.default_rng(0)
+    a, b = np.asarray(positive), np.asarray(negative)
+    draws = [
+        auroc(a[rng.integers(0, a.size, a.size)].tolist(), b[rng.integers(0, b.size, b.size)].tolist())
+        for _ in range(500)
+    ]
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return Value(centre, float(low), float(high), a.size + b.size)
+
+
+def at_false_alarms(positive: Sequence[float], negative: Sequence[float], share_of_false: float) -> float:
+    """Lowest threshold (flag if score > threshold) that flags at most this share of the negatives."""
+    ranked = np.sort(np.asarray(negative, dtype=np.float64))[::-1]
+    if not ranked.size:
+        return math.nan
+    allowed = int(share_of_false * ranked.size)
+    return float(ranked[min(allowed, ranked.size - 1)])
