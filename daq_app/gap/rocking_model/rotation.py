@@ -14,6 +14,7 @@ from daq_app.gap.rocking_model.records import GapRun
 TAIL_S = 0.3
 """The wall stands at rest at the end of a record; this much of it is the zero of every channel."""
 HOLD_S = 0.5
+NOISE_S = 0.45
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +48,19 @@ def zeroed(run: GapRun, index: int) -> FloatArray:
 
 
 def sample_noise(values: FloatArray, rate_hz: float) -> float:
-    """Rms noise of one sample from second differences while the wall is held."""
-    held = values[: int(HOLD_S * rate_hz)]
-    second = held[2:] - 2 * held[1:-1] + held[:-2]
-    return float(np.sqrt(np.mean(second**2) / 6.0)) + 1e-12
+    """Rms noise of one sample, as averages over the timing windows see it, from the rest at the end.
+
+    Coloured noise averages down less than white noise of the same rms; the larger of the two counts.
+    """
+    rest = values[-int(NOISE_S * rate_hz) :]
+    second = rest[2:] - 2 * rest[1:-1] + rest[:-2]
+    white = float(np.sqrt(np.mean(second**2) / 6.0))
+    block = max(int(0.015 * rate_hz), 1)
+    means = rest[: rest.size // block * block].reshape(-1, block).mean(axis=1)
+    trend = np.polyfit(np.arange(means.size), means, 1)
+    left = means - np.polyval(trend, np.arange(means.size))
+    coloured = float(np.sqrt(np.sum(left**2) / max(means.size - 2, 1) * block))
+    return max(white, coloured) + 1e-12
 
 
 def joint_rotation(run: GapRun) -> Rotation:

@@ -90,7 +90,6 @@ def make_grid(theta: FloatArray, valid: NDArray[np.bool_], swings: Swings, rate_
     release = round(swings.release_s * rate_hz)
     crossings = _impact_samples(theta, smooth, release)
     ends = [release, *crossings]
-    smooth[:release] = swings.peak_rad[0]
     guard = int(0.004 * rate_hz)
     for start, stop in itertools.pairwise(ends):
         inside = np.arange(start + (0 if start == release else guard), stop - guard)
@@ -153,8 +152,12 @@ def regress(
     difference: FloatArray,
     columns: dict[str, tuple[FloatArray, str]],
     pick: NDArray[np.bool_],
+    absorbed: tuple[str, ...] = (),
 ) -> Block | None:
-    """Least squares of a difference on named shapes; None with too few samples."""
+    """Least squares of a difference on named shapes; None with too few samples.
+
+    The shapes `absorbed` are fitted but say nothing about the wall or the sensor, and are dropped.
+    """
     if pick.sum() < 20 * len(columns):
         return None
     design = np.column_stack([column[pick] for column, _ in columns.values()])
@@ -166,8 +169,10 @@ def regress(
     fraction = max(independent_fraction(residual), 0.01)
     variance = float(residual @ residual) / max(residual.size - len(columns), 1) / fraction
     covariance = variance * projection @ projection.T
-    names = tuple(columns)
-    return Block(family, names, tuple(u for _, u in columns.values()), values, covariance, projection, pick)
+    kept = [k for k, name in enumerate(columns) if name not in absorbed]
+    names = tuple(name for name in columns if name not in absorbed)
+    units = tuple(unit for name, (_, unit) in columns.items() if name not in absorbed)
+    return Block(family, names, units, values[kept], covariance[np.ix_(kept, kept)], projection[kept], pick)
 
 
 def blocks_of(run: GapRun, joint: Rotation, grid: Grid, swings: Swings, reference: str) -> dict[str, Block]:
@@ -228,9 +233,10 @@ def _tilt_block(run: GapRun, grid: Grid, pick: NDArray[np.bool_]) -> Block | Non
         "gain": (expected, "1"),
         "lag": (-np.gradient(expected, 1 / GRID_HZ), "s"),
         "drift": (grid.time_s, "rad/s"),
+        "start": (np.exp(-(grid.time_s - grid.time_s[0]) / max(slow, 0.05)), "rad"),
     }
     wide = pick | (grid.time_s <= 0)
-    return regress("tiltmeter", measured - expected, columns, wide)
+    return regress("tiltmeter", measured - expected, columns, wide, absorbed=("start",))
 
 
 def _acceleration_block(run: GapRun, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:
