@@ -31,6 +31,8 @@ REPOSITORY = Path(__file__).parents[2]
 RIG = REPOSITORY / "configs" / "fr1.toml"
 LEGACY = REPOSITORY.parent / "shared" / "data" / "legacy"
 MAX_SECONDS, MAX_BYTES = 20.0, 2**30
+START_SECONDS = 300.0
+"""For a worker to load the program, on a busy machine."""
 KINDS = ("run", "journal", "tdms", "mat", "npz", "csv", "lvm")
 LVM = (
     "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t,\nMulti_Headings\tYes\nX_Columns\tOne\n"
@@ -158,7 +160,8 @@ def watch(kind: str, seed: int, minutes: float) -> tuple[int, list[str]]:
                 now = log.read_text(errors="replace")
                 if now != seen:
                     seen, since = now, time.monotonic()
-                if time.monotonic() - since > MAX_SECONDS:
+                allowed = MAX_SECONDS if seen else START_SECONDS
+                if time.monotonic() - since > allowed:
                     why = "hangs"
                 elif process.is_running() and process.memory_info().rss > MAX_BYTES:
                     why = "memory"

@@ -38,29 +38,29 @@ def limited(name, size, action):
     left = sorted(set(p.name for p in folder.iterdir()) - set(before))
     answers[name] = [answer, left]
 
-units = tuple(channel.reading_unit for channel in rig.channels)
-ids = rig.channel_ids
+ids = rig.channel_ids[::7]
+units = tuple(rig.channel(channel_id).reading_unit for channel_id in ids)
 header = RunHeader(run_id="r", rig_text=text, channel_ids=ids, reading_units=units, rate_hz=4000.0)
-block = np.random.default_rng(1).normal(size=(41, 400))
+block = np.random.default_rng(1).normal(size=(len(ids), 2000))
 
 writer = JournalWriter(folder / "a.journal", header)
 resource.setrlimit(resource.RLIMIT_FSIZE, (writer.size_bytes + 300_000, resource.RLIM_INFINITY))
 for number in range(5):
     try:
-        writer.append_block(400 * number, block)
+        writer.append_block(2000 * number, block)
         writer.sync()
     except JournalDiskFull as error:
         answers["journal"] = [error.safe_sample, number, str(error)]
         break
 resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-for again in range(number, 20):
-    writer.append_block(400 * again, block)
+for again in range(number, 10):
+    writer.append_block(2000 * again, block)
 writer.close()
 answers["journal after"] = list(verify(folder / "a.journal").problems)
 
 run = finalise(folder / "a.journal", folder / "a.h5")
 size = run.stat().st_size
-for part in (0.001, 0.01, 0.1, 0.5, 0.9, 0.999):
+for part in (0.001, 0.01, 0.3, 0.9, 0.999):
     limited(f"finalise {part}", int(size * part), lambda: finalise(folder / "a.journal", folder / "b.h5"))
 for format_ in FORMATS:
     limited(f"export {format_}", 50_000, lambda: export_run(run, folder, format_))
@@ -79,10 +79,10 @@ def test_a_disk_that_fills_up_at_any_moment(tmp_path: Path, configs: Path) -> No
     assert process.returncode == 0, process.stderr[-2000:]
     answers = json.loads(process.stdout)
     safe, failed_block, sentence = answers.pop("journal")
-    assert safe == 400 * failed_block and "the disk is full; safe on disk up to sample" in sentence
+    assert safe == 2000 * failed_block and "the disk is full; safe on disk up to sample" in sentence
     assert answers.pop("journal after") == []
     assert answers.pop("sound") is True
-    assert len(answers) == 14
+    assert len(answers) == 13
     for name, (answer, left) in answers.items():
         assert answer.startswith("told: ") and "File too large" in answer, (name, answer)
         assert left == [], (name, left)

@@ -21,6 +21,7 @@ from daq_app.runfile import (
     finalise,
     open_run,
     recover,
+    saving,
     verify,
 )
 
@@ -189,3 +190,20 @@ def test_no_room_for_the_run_leaves_the_journal(
     with pytest.raises(RunFileError, match="the journal is safe"):
         finalise(tmp_path / "a.journal", tmp_path / "a.h5")
     assert [p.name for p in tmp_path.iterdir()] == ["a.journal"]
+
+
+@pytest.mark.parametrize("dataset", ["raw/WP-1", "si/AC-1"])
+def test_a_disk_that_changes_what_was_written_is_caught_before_the_run_has_its_name(
+    tmp_path: Path, make_journal, monkeypatch: pytest.MonkeyPatch, dataset: str
+) -> None:
+    make_journal(tmp_path / "a.journal")
+    real = saving.fsync_file
+
+    def faulty(path: Path) -> None:
+        _change(path, dataset, 700, 1.25)
+        real(path)
+
+    monkeypatch.setattr(saving, "fsync_file", faulty)
+    with pytest.raises(RunFileError, match="differs from its source near sample"):
+        finalise(tmp_path / "a.journal", tmp_path / "a.h5")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.journal"]
