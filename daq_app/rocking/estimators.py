@@ -1,9 +1,10 @@
 """r from impact speeds (EAV, 4.4) and from peaks (CRT, 4.5): points, plain mean, weighted mean.
 
-The plain mean is the paper's. The weighted mean is generalised least squares on ln r with two
-sources of error: what each speed or peak is known to (large for the last, small cycles) and the
-scatter of r itself from impact to impact, which every later speed and peak inherits. The scatter is
-found from the points by maximum likelihood; its standard error is part of the answer.
+The plain mean is the paper's. The weighted mean is the generalised least-squares slope of ln |θ̇_n|
+(EAV: each side with a level of its own, so that only pairs of the same side count) or ½ ln E_n (CRT)
+against n, with two sources of error: what each speed or peak is known to (large for the last, small
+cycles), and the scatter of r from impact to impact, which all later values inherit (a random walk).
+The scatter is found by restricted maximum likelihood.
 """
 
 from __future__ import annotations
@@ -77,17 +78,14 @@ def eav(
     if not pairs:
         return RestitutionEstimate(method, ())
     log, relative = np.log(np.where(usable, speeds, 1.0)), np.where(usable, sigmas / speeds, 0.0)
-    rows = np.zeros((len(pairs), speeds.size))
-    for row, (first, last) in zip(rows, pairs, strict=True):
-        row[first], row[last] = -0.5, 0.5
-    values = rows @ log
-    own = np.sqrt((rows**2) @ relative**2)
-    points = tuple(
-        RestitutionPoint(last + 1, first + 1, last + 1, math.exp(value), math.exp(value) * sigma)
-        for (first, last), value, sigma in zip(pairs, values, own, strict=True)
-    )
-    # Impact k inherits the scatter of the impacts before it: ln v_k = ln v_1 + Σ ln r.
-    return _combine(method, points, values, rows, relative**2, np.arange(speeds.size))
+    points = []
+    for first, last in pairs:
+        r = math.exp(0.5 * (log[last] - log[first]))
+        sigma = 0.5 * r * math.hypot(relative[first], relative[last])
+        points.append(RestitutionPoint(last + 1, first + 1, last + 1, r, sigma))
+    side = np.arange(speeds.size) % 2
+    levels = np.stack([side == 0, side == 1], axis=1).astype(np.float64)
+    return _combine(method, points, log, relative**2, usable, levels)
 
 
 def crt(
@@ -115,17 +113,12 @@ def crt(
     if not counts:
         return RestitutionEstimate(method, ())
     relative = np.where(usable, slope * sigmas / energies, 0.0)
-    rows = np.zeros((len(counts), peaks.size))
-    for row, n in zip(rows, counts, strict=True):
-        row[0], row[n] = -0.5 / n, 0.5 / n
-    values = rows @ np.log(energies)
-    own = np.sqrt((rows**2) @ relative**2)
-    points = tuple(
-        RestitutionPoint(n, 0, n, math.exp(value), math.exp(value) * sigma)
-        for n, value, sigma in zip(counts, values, own, strict=True)
-    )
-    # ln E_n = ln E_0 + 2 Σ ln r: in units of ln r the walk counts twice.
-    return _combine(method, points, values, rows, relative**2, np.arange(peaks.size), walk_factor=2.0)
+    log = np.log(energies)
+    points = []
+    for n in counts:
+        r = math.exp((log[n] - log[0]) / (2 * n))
+        points.append(RestitutionPoint(n, 0, n, r, r * math.hypot(relative[0], relative[n]) / (2 * n)))
+    return _combine(method, points, log / 2.0, (relative / 2.0) ** 2, usable, np.ones((peaks.size, 1)))
 
 
 def _usable(values: Floats, sigmas: Floats) -> NDArray[np.bool_]:
@@ -137,60 +130,71 @@ def _usable(values: Floats, sigmas: Floats) -> NDArray[np.bool_]:
 
 def _combine(
     method: str,
-    points: tuple[RestitutionPoint, ...],
+    points: list[RestitutionPoint],
     values: Floats,
-    rows: Floats,
     variances: Floats,
-    steps: NDArray[np.int_],
-    walk_factor: float = 1.0,
+    usable: NDArray[np.bool_],
+    levels: Floats,
 ) -> RestitutionEstimate:
-    """Weighted mean of the points, with the scatter of r as a random walk over the impacts."""
-    # Rounding and model error of a perfect recording: keeps the matrix well conditioned.
-    measured = (rows * variances) @ rows.T + 1e-12 * np.eye(values.size)
-    walk = walk_factor**2 * rows @ np.minimum.outer(steps, steps) @ rows.T
-    mean, variance, scatter = _weighted_mean(values, measured, walk)
-    spread = np.exp(values)
-    r = math.exp(mean)
+    """Weighted mean from values that fall by ln r per impact, and the plain mean of the points."""
+    slope, variance, scatter = _slope(values, variances, usable, levels, len(points) >= 4)
+    single = np.array([point.r for point in points])
+    r = math.exp(slope)
     return RestitutionEstimate(
         method=method,
-        points=points,
+        points=tuple(points),
         r=r,
         standard_error=r * math.sqrt(variance),
-        degrees_of_freedom=_degrees(rows, variances / walk_factor**2, scatter),
+        degrees_of_freedom=_degrees(variances[usable], len(points), scatter),
         scatter=scatter,
-        plain_mean=float(spread.mean()),
-        plain_standard_error=float(spread.std(ddof=1) / math.sqrt(values.size)) if values.size > 1 else None,
+        plain_mean=float(single.mean()),
+        plain_standard_error=float(single.std(ddof=1) / math.sqrt(single.size)) if single.size > 1 else None,
     )
 
 
-def _degrees(rows: Floats, variances: Floats, scatter: float) -> int:
+def _degrees(variances: Floats, points: int, scatter: float) -> int:
     """Degrees of freedom of the standard error: how many impacts tell something of the scatter.
 
     Steps between neighbouring values whose own error exceeds the scatter tell little of it.
     """
     if scatter == 0.0:
-        return max(len(rows) - 1, 1)
-    used = variances[np.any(rows != 0.0, axis=0)]
-    step = used[1:] + used[:-1]
+        return max(points - 1, 1)
+    step = variances[1:] + variances[:-1]
     informative = float(np.sum(scatter**2 / (scatter**2 + step)))
     return max(round(informative) - 1, 1)
 
 
-def _weighted_mean(values: Floats, measured: Floats, walk: Floats) -> tuple[float, float, float]:
-    """Generalised least-squares mean, its variance, and the scatter s of covariance C + s² W.
+def _slope(
+    values: Floats, variances: Floats, usable: NDArray[np.bool_], levels: Floats, find_scatter: bool
+) -> tuple[float, float, float]:
+    """Generalised least-squares slope of `values` against their index, its variance, and the scatter.
 
-    In the basis that makes C the identity and W diagonal, every s is tried at once; the one with the
-    largest restricted likelihood counts. Fewer than four points cannot tell: s = 0.
+    Errors are independent (`variances`) plus a random walk of step s. Every s of a grid is tried at
+    once by a Kalman filter that whitens values and regressors (Harvey's GLS by prediction errors);
+    the s of the largest restricted likelihood counts.
     """
-    lower = np.linalg.cholesky(measured)
-    half = np.linalg.solve(lower, walk)
-    eigenvalues, vectors = np.linalg.eigh(np.linalg.solve(lower, half.T))
-    ones, y = (vectors.T @ np.linalg.solve(lower, column) for column in (np.ones(values.size), values))
-    scatters = _SCATTERS if values.size >= 4 else _SCATTERS[:1]
-    spread = 1.0 + scatters[:, None] ** 2 * np.maximum(eigenvalues, 0.0)
-    information = (ones**2 / spread).sum(axis=1)
-    means = (ones * y / spread).sum(axis=1) / information
-    misfit = ((y - means[:, None] * ones) ** 2 / spread).sum(axis=1)
-    likelihood = -0.5 * (np.log(spread).sum(axis=1) + np.log(information) + misfit)
+    walk = (_SCATTERS if find_scatter else _SCATTERS[:1]) ** 2
+    used = levels[:, levels[usable].any(axis=0)]
+    rows = np.column_stack([values, used, np.arange(values.size)])
+    state, spread = np.zeros((walk.size, rows.shape[1])), np.zeros(walk.size)
+    whitened, log_spread = [], np.zeros(walk.size)
+    for k in range(values.size):
+        spread = spread + walk if k else spread
+        if usable[k]:
+            # Rounding and model error of a perfect recording keep the filter well conditioned.
+            total = spread + variances[k] + 1e-12
+            error = rows[k] - state
+            gain = spread / total
+            state = state + gain[:, None] * error
+            spread = spread * (1.0 - gain)
+            whitened.append(error / np.sqrt(total)[:, None])
+            log_spread += np.log(total)
+    table = np.stack(whitened, axis=1)
+    target, design = table[:, :, :1], table[:, :, 1:]
+    normal = np.swapaxes(design, 1, 2) @ design
+    inverse = np.linalg.inv(normal)
+    solution = inverse @ (np.swapaxes(design, 1, 2) @ target)
+    misfit = ((target - design @ solution) ** 2).sum(axis=(1, 2))
+    likelihood = -0.5 * (log_spread + np.linalg.slogdet(normal)[1] + misfit)
     best = int(np.argmax(likelihood))
-    return float(means[best]), float(1.0 / information[best]), float(scatters[best])
+    return float(solution[best, -1, 0]), float(inverse[best, -1, -1]), float(_SCATTERS[best])

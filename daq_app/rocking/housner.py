@@ -99,18 +99,25 @@ class FreeRocking:
         """|θ̇⁺| at each impact."""
         return self.restitution * self.speeds_before_rad_s
 
-    def at(self, time_s: ArrayLike) -> tuple[Floats, Floats]:
-        """θ and θ̇ at any times, rad and rad/s, signed."""
+    def locate(self, time_s: ArrayLike) -> tuple[NDArray[np.int_], Floats, Floats]:
+        """Of each time: the half-cycle it lies in, the time from that one's peak, the sign of θ.
+
+        Before the release the time from the peak is 0; beyond the last half-cycle the sign is 0.
+        """
         time = np.asarray(time_s, dtype=np.float64)
         index = np.searchsorted(self.impacts_s, time, side="right")
         quarter = exact_quarter_period(self.peaks_rad, self.p_rad_s, self.alpha_rad)
         peak_time = np.concatenate(([self.release_s], self.impacts_s + quarter[1:]))
         local = time - peak_time[index]
         local = np.where((index == 0) & (local < 0.0), 0.0, local)
-        rotation, speed = half_cycle_rotation(local, self.peaks_rad[index], self.p_rad_s, self.alpha_rad)
         sign = self.side * np.where(index % 2 == 0, 1.0, -1.0)
-        over = local > quarter[index]
-        return np.where(over, 0.0, sign * rotation), np.where(over, 0.0, sign * speed)
+        return index, local, np.where(local > quarter[index], 0.0, sign)
+
+    def at(self, time_s: ArrayLike) -> tuple[Floats, Floats]:
+        """θ and θ̇ at any times, rad and rad/s, signed."""
+        index, local, sign = self.locate(time_s)
+        rotation, speed = half_cycle_rotation(local, self.peaks_rad[index], self.p_rad_s, self.alpha_rad)
+        return sign * rotation, sign * speed
 
 
 def free_rocking(

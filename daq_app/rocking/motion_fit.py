@@ -14,16 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from daq_app.rocking.housner import FreeRocking, free_rocking
+from daq_app.rocking.motion_model import ALPHA_PRIOR, FIXED, P_PRIOR, POINT_S, ZERO_PRIOR_RAD, MotionModel
 
 Floats = NDArray[np.float64]
 
-_P_PRIOR, _ALPHA_PRIOR, _ZERO_PRIOR_RAD = 0.05, 0.10, 5e-4
-_POINT_S = 0.008
 _SMALLEST_SHARE = 0.02
 """The motion is fitted until its peaks fall below this share of the first."""
-_FIXED = 6
-_SOFT = 100.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,20 +78,30 @@ def fit_motion(
         impacts_s[count] - impacts_s[count - 1] if count < len(impacts_s) else 0.0
     )
     t, y, sigma = _points(time_s, rotation_rad, release_s - 0.1, stop, noise_rad)
-    if t.size < 4 * _FIXED:
+    if t.size < 4 * FIXED:
         return None
     spread = None if scatter is None else max(scatter, 3e-4)
     side = 1.0 if theta0_rad > 0 else -1.0
-    problem = _Problem(t, y, sigma, release_s, abs(theta0_rad), side, p_rad_s, alpha_rad, math.log(r), spread)
+    problem = MotionModel(
+        t, y, sigma, release_s, abs(theta0_rad), side, p_rad_s, alpha_rad, math.log(r), spread
+    )
     start = np.zeros(0) if spread is None else _deviations(speeds_rad_s, count, math.log(r)) / spread
-    x = np.zeros(_FIXED)
+    x = np.zeros(FIXED)
     # Where r is one number, later half-cycles join once the earlier ones are in phase; where every
     # impact has its own, the speeds put all of them in phase from the start.
     for span in sorted({min(4, count), count}) if spread is None else [count]:
-        x = np.concatenate((x, start[x.size - _FIXED : span]))
+        x = np.concatenate((x, start[x.size - FIXED : span]))
         end = impacts_s[span] if span < len(impacts_s) else stop
         arguments = (span, min(end, stop))
-        result = least_squares(problem.residual, x, args=arguments, x_scale="jac", method="trf", max_nfev=60)
+        result = least_squares(
+            problem.residual,
+            x,
+            args=arguments,
+            jac=problem.jacobian,
+            x_scale="jac",
+            method="trf",
+            max_nfev=60,
+        )
         x = result.x
     return _result(problem, result.x, result.jac, result.fun, count, sigma)
 
@@ -103,7 +109,7 @@ def fit_motion(
 def _span(peaks_rad: list[float], impacts: int) -> int:
     floor = _SMALLEST_SHARE * abs(peaks_rad[0])
     large = [n for n in range(1, min(len(peaks_rad), impacts)) if abs(peaks_rad[n]) >= floor]
-    return max(large, default=0) if large else 0
+    return max(large, default=0)
 
 
 def _deviations(speeds_rad_s: list[float], count: int, log_r: float) -> Floats:
@@ -120,7 +126,7 @@ def _points(
 ) -> tuple[Floats, Floats, float]:
     """Averages over 8 ms and their noise."""
     low, high = np.searchsorted(time_s, [start_s, stop_s])
-    size = max(1, round(_POINT_S * (time_s.size - 1) / (time_s[-1] - time_s[0])))
+    size = max(1, round(POINT_S * (time_s.size - 1) / (time_s[-1] - time_s[0])))
     groups = int(high - low) // size
     t = time_s[low : low + groups * size].reshape(groups, size).mean(axis=1)
     y = rotation_rad[low : low + groups * size].reshape(groups, size).mean(axis=1)
@@ -128,56 +134,11 @@ def _points(
     return t[good], y[good], noise_rad / math.sqrt(size)
 
 
-@dataclass(frozen=True)
-class _Problem:
-    """Residuals in units of their sigma; parameters are scaled deviations from the start."""
-
-    time_s: Floats
-    rotation_rad: Floats
-    sigma: float
-    release_s: float
-    theta0: float
-    side: float
-    p: float
-    alpha: float
-    log_r: float
-    spread: float | None
-    """None: r is the same at every impact."""
-
-    def motion(self, x: Floats, impacts: int) -> FreeRocking:
-        alpha = self.alpha * math.exp(min(max(_ALPHA_PRIOR * x[3], -0.5), 0.5))
-        theta0 = min(max(self.theta0 + 1e-3 * x[0], 1e-3), 0.97 * alpha)
-        mean = self.log_r + 0.01 * x[5]
-        deviations = np.zeros(1) if self.spread is None else self.spread * x[_FIXED:]
-        # r stays below 1 without a corner at which the fit could get stuck: −ln(1 + e^(−100 ln r))/100.
-        rs = np.exp(-np.logaddexp(0.0, -_SOFT * (mean + deviations)) / _SOFT)
-        return free_rocking(
-            self.side * theta0,
-            rs,
-            self.p * math.exp(_P_PRIOR * x[2]),
-            alpha,
-            release_s=self.release_s + 0.01 * x[1],
-            smallest_peak_rad=0.0,
-            max_impacts=impacts + 1,
-        )
-
-    def residual(self, x: Floats, span: int, stop_s: float) -> Floats:
-        inside = self.time_s <= stop_s
-        motion = self.motion(x, span)
-        model = motion.at(self.time_s[inside])[0]
-        # A point is a mean over `_POINT_S`: of a parabola that is its middle plus θ̈ h²/24.
-        free = self.time_s[inside] > motion.release_s
-        bend = -(motion.p_rad_s**2) * np.sin(motion.alpha_rad * np.sign(model) - model) * free
-        model = model + bend * _POINT_S**2 / 24.0 + _ZERO_PRIOR_RAD * x[4]
-        priors = np.concatenate((x[2:5], x[_FIXED:]))
-        return np.concatenate(((model - self.rotation_rad[inside]) / self.sigma, priors))
-
-
 def _result(
-    problem: _Problem, x: Floats, jacobian: Floats, residual: Floats, count: int, sigma: float
+    problem: MotionModel, x: Floats, jacobian: Floats, residual: Floats, count: int, sigma: float
 ) -> MotionFit | None:
-    data = residual[: residual.size - 3 - (x.size - _FIXED)]
-    excess = max(1.0, float(data @ data) / max(data.size - _FIXED, 1))
+    data = residual[: residual.size - 3 - (x.size - FIXED)]
+    excess = max(1.0, float(data @ data) / max(data.size - FIXED, 1))
     # Data rows are weakened by what the model leaves; priors keep their weight.
     scaled = jacobian.copy()
     scaled[: data.size] /= math.sqrt(excess)
@@ -192,12 +153,12 @@ def _result(
         r=r,
         standard_error=r * 0.01 * float(deviations[5]),
         p_rad_s=motion.p_rad_s,
-        sigma_p_rad_s=motion.p_rad_s * _P_PRIOR * float(deviations[2]),
+        sigma_p_rad_s=motion.p_rad_s * P_PRIOR * float(deviations[2]),
         alpha_rad=motion.alpha_rad,
-        sigma_alpha_rad=motion.alpha_rad * _ALPHA_PRIOR * float(deviations[3]),
+        sigma_alpha_rad=motion.alpha_rad * ALPHA_PRIOR * float(deviations[3]),
         theta0_rad=motion.side * float(motion.peaks_rad[0]),
         release_s=motion.release_s,
-        zero_rad=_ZERO_PRIOR_RAD * float(x[4]),
+        zero_rad=ZERO_PRIOR_RAD * float(x[4]),
         restitutions=tuple(float(value) for value in motion.restitution[:count]),
         impacts=count,
         residual_rad=float(np.sqrt(np.mean(data**2))) * sigma,

@@ -14,6 +14,7 @@ from daq_app.rocking.estimators import crt, eav
 from daq_app.rocking.housner import free_rocking
 from daq_app.rocking.motion import MotionSettings, MotionTrack
 from daq_app.rocking.motion_fit import fit_motion
+from daq_app.rocking.motion_model import FIXED, MotionModel
 
 P, ALPHA, RATE = 2.2, 0.215, 4000.0
 SETTINGS = MotionSettings(RATE, P, ALPHA)
@@ -174,3 +175,17 @@ def test_fit_of_the_whole_motion_finds_the_body_too(scatter):
     assert fit.alpha_rad == pytest.approx(ALPHA, rel=3e-3)
     assert fit.r == pytest.approx(truth, abs=max(1e-3, 0.15 * scatter))
     assert abs(fit.r - 0.88) < 4 * fit.standard_error + 1e-4
+
+
+@pytest.mark.parametrize("spread", [None, 0.02])
+def test_jacobian_of_the_fit_is_that_of_its_residual(spread):
+    time = np.arange(0.5, 6.0, 0.008)
+    model = MotionModel(time, np.zeros(time.size), 1e-5, 0.6, 0.075, -1.0, P, ALPHA, math.log(0.9), spread)
+    size = FIXED + (0 if spread is None else 8)
+    x = np.random.default_rng(0).normal(0, 0.3, size)
+    analytic = model.jacobian(x, 9, 5.5)
+    for column in range(size):
+        step = np.zeros(size)
+        step[column] = 1e-5
+        numeric = (model.residual(x + step, 9, 5.5) - model.residual(x - step, 9, 5.5)) / 2e-5
+        np.testing.assert_allclose(analytic[:, column], numeric, atol=1e-4 * np.abs(numeric).max())
