@@ -54,7 +54,7 @@ class Studio:
         end = time.monotonic() + limit_s
         while not condition():
             if time.monotonic() > end:
-                raise TimeoutError("the window did not get there in time")
+                raise TimeoutError(f"not there in time; the window says {self.window.header.words}")
             self.app.processEvents()
             time.sleep(0.002)
 

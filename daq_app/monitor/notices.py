@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Literal
+from typing import Final, Literal
 
+from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
 
 from daq_app.monitor.labels import role_label
 from daq_app.monitor.shapes import Sign
 from daq_app.monitor.theme import Colours
 
+INFO_MS: Final = 8000
 Severity = Literal["info", "warning", "error"]
 _SHAPES: dict[str, str] = {"info": "disc", "warning": "triangle", "error": "cross"}
 _TONES: dict[str, str] = {"info": "accent", "warning": "warning", "error": "bad"}
@@ -40,6 +42,10 @@ class NoticeLine(QFrame):
         layout.addWidget(self._text, 1)
         layout.addWidget(self._more)
         layout.addWidget(button)
+        self._fade = QTimer(self)
+        self._fade.setSingleShot(True)
+        self._fade.setInterval(INFO_MS)
+        self._fade.timeout.connect(self._let_info_go)
         self.hide()
 
     def restyle(self, colours: Colours) -> None:
@@ -56,8 +62,15 @@ class NoticeLine(QFrame):
             for old in [notice for notice in self._queue if notice[0] == "info"]:
                 self._queue.remove(old)
             self._queue.append((severity, text))
+            self._fade.start()
         else:
             self._queue.appendleft((severity, text))
+        self._show()
+
+    def _let_info_go(self) -> None:
+        """What was only good to know leaves by itself; warnings and errors wait to be read."""
+        for old in [notice for notice in self._queue if notice[0] == "info"]:
+            self._queue.remove(old)
         self._show()
 
     def dismiss(self) -> None:

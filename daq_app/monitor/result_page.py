@@ -29,6 +29,7 @@ from daq_app.monitor.shapes import Sign
 from daq_app.monitor.theme import DARK, Colours, font
 
 _LIMIT_S = 300.0
+_HEADER_PX, _ROW_PX, _VISIBLE_ROWS = 38, 23, 5
 
 
 def analyse(run: Path) -> Result:
@@ -84,13 +85,13 @@ class ResultPage(QWidget):
         self.table = QTableWidget(0, 6)
         self.table.setHorizontalHeaderLabels(["Test", "θ0/α", "Impacts", "r EAV", "r CRT", "Verdict"])
         self.table.verticalHeader().hide()
-        self.table.verticalHeader().setDefaultSectionSize(23)
+        self.table.verticalHeader().setDefaultSectionSize(_ROW_PX)
         self.table.setShowGrid(False)
         self.table.horizontalHeader().setDefaultAlignment(
             Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
         )
         self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
-        self.table.setMaximumHeight(150)
+        self.table.setFixedHeight(_HEADER_PX)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         self.buttons = {
             "page": QPushButton("Open the page"),
@@ -189,6 +190,7 @@ class ResultPage(QWidget):
     def _fill_table(self, result: Result) -> None:
         rows = repetition_rows(result.test, result.earlier)
         self.table.setRowCount(len(rows))
+        self.table.setFixedHeight(_HEADER_PX + _ROW_PX * min(len(rows), _VISIBLE_ROWS))
         for place, row in enumerate(rows):
             values = [DASH if row.r[name] is None else f"{row.r[name]:.4f}" for name in METHODS]
             name = f"{row.test}   (this test)" if row.this else row.test

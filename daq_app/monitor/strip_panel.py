@@ -23,10 +23,10 @@ from daq_app.monitor.session import Session
 from daq_app.monitor.theme import DARK, Colours, font
 
 FAMILY_TITLES: dict[Family, str] = {
-    "lvdt": "LVDT · opening of the base joint",
-    "wire": "Wire potentiometers",
-    "accelerometer": "Accelerometers",
-    "tiltmeter": "Tiltmeters",
+    "lvdt": "LVDTs · opening of the base joint (mm)",
+    "wire": "Wires (mm)",
+    "accelerometer": "Accelerometers (m/s²)",
+    "tiltmeter": "Tiltmeters (mrad)",
 }
 _SMALLEST_SPAN_SI = {"lvdt": 1e-3, "wire": 4e-3, "accelerometer": 1.0, "tiltmeter": 4e-3}
 """A quiet strip is not blown up beyond this, or noise would look like motion."""
@@ -163,7 +163,7 @@ class StripPanel(QWidget):
             painter.setPen(QPen(QColor(colours.bad), 2))
             painter.drawRect(box)
         label_px = 13.0
-        unit, factor = shown_unit(cell.channel.si_unit)
+        _, factor = shown_unit(cell.channel.si_unit)
         trace_box = box.adjusted(2, label_px, -2, -2)
         colour = QColor(colours.family(cell.channel.family) if live else colours.muted)
         if trace_box.height() > 4:
@@ -177,9 +177,8 @@ class StripPanel(QWidget):
         painter.drawText(head, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, name)
         mean = session.block_mean
         value = number(float(mean[cell.index]) * factor, 2) if live and mean is not None else DASH
-        text = f"{value} {unit}" if box.width() > 105 else value
         painter.setPen(QColor(colours.muted))
-        painter.drawText(head, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text)
+        painter.drawText(head, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, value)
 
     def _span(self, cell: Cell, low: NDArray[np.float32], high: NDArray[np.float32]) -> tuple[float, float]:
         """Vertical range of a strip: grows at once, shrinks only when far too large."""
