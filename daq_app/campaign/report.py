@@ -189,11 +189,12 @@ def _test_rows(tests: Sequence[TestSummary]) -> tuple[list[str], list[list[str]]
 
 
 def _table_page(title: str, heading: str, header: list[str], rows: list[list[str]]) -> Figure:
-    figure = Figure(figsize=(11.0, 0.9 + 0.27 * (len(rows) + 2)))
-    figure.suptitle(title, x=0.05, ha="left", fontsize=14, fontweight="bold")
-    axis = figure.add_axes((0.05, 0.03, 0.9, 0.85))
+    height = max(4.0, 1.2 + 0.27 * (len(rows) + 2))
+    figure = Figure(figsize=(11.0, height))
+    figure.text(0.05, 1.0 - 0.35 / height, title, fontsize=14, fontweight="bold", va="center")
+    figure.text(0.05, 1.0 - 0.70 / height, heading, fontsize=11, va="center")
+    axis = figure.add_axes((0.05, 0.02, 0.9, 1.0 - 1.0 / height))
     axis.axis("off")
-    axis.set_title(heading, loc="left", fontsize=11)
     table = axis.table(
         cellText=rows, colLabels=header, loc="upper left", cellLoc="center", edges="horizontal"
     )

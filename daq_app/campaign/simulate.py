@@ -17,13 +17,17 @@ from typing import Final
 
 import numpy as np
 
-from daq_app.acquisition.simulated_run import simulate_run
+from daq_app.acquisition.offline import Readings, record_offline
 from daq_app.campaign.plan import Campaign
-from daq_app.config import ConfigError, Problem, load_rig
+from daq_app.config import ConfigError, Problem, load_rig, plan_tasks
+from sim_hardware.direct import synthesise_test
 
 TRUTH_FILE: Final = "truth.json"
 IMPACTS_A_TEST: Final = 25
 """Impacts that a test adds to what the wall has had, for effects that wear (Table of physics.md)."""
+
+_AFTER_REST_S: Final = 2.0
+"""Readings beyond the recording's own end, so that the detector of rest has something to see."""
 
 Progress = Callable[[int, int, str], None]
 """Called with (done, total, name of the test just written)."""
@@ -141,15 +145,17 @@ def _document(truth: CampaignTruth, jobs: list[_Job]) -> dict[str, object]:
 def _run_job(job: _Job) -> None:
     rig = load_rig(Path(job.rig))
     simulation = rig.simulation.model_copy(update={"restitution_scatter": job.impact_scatter})
-    simulate_run(
-        rig.model_copy(update={"simulation": simulation}),
-        Path(job.rig).read_text(encoding="utf-8"),
-        Path(job.out),
-        test=job.test,
-        theta0_over_alpha=job.theta0_over_alpha,
-        r=job.r,
-        seed=job.seed,
+    rig = rig.model_copy(update={"simulation": simulation})
+    plan = plan_tasks(rig, job.rig)
+    made = synthesise_test(
+        rig,
+        plan,
+        job.theta0_over_alpha,
+        job.seed,
+        restitution=job.r,
         effects=job.effects,
         impacts_before=job.impacts_before,
-        keep_truth=False,
+        post_rest_s=rig.acquisition.post_rest_s + _AFTER_REST_S,
     )
+    text = Path(job.rig).read_text(encoding="utf-8")
+    record_offline(rig, text, plan, Readings(made.readings, "simulated"), Path(job.out), job.test)

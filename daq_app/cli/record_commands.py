@@ -118,6 +118,14 @@ def simulate(
     test: Annotated[
         str | None, typer.Option(help="Name of the test.", show_default="SPECIMEN-LEVEL-1")
     ] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME:PARAMETER=VALUE",
+            help="Effect beyond the rig file's, for instance viscous:zeta=0.006; may be repeated. "
+            "`daq-app gap effects` lists them.",
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the results as JSON on stdout.")] = False,
 ) -> None:
     """Write the run of a simulated test without real time, through the same sensors and modules."""
@@ -128,7 +136,16 @@ def simulate(
         print_paragraph("Error", f"{level} is no level. There are {', '.join(LEVELS)}")
         raise typer.Exit(EXIT_BAD_INPUT)
     with reported():
-        simulate_run(rig, out, level=level, theta0_over_alpha=LEVELS[level], r=r, seed=seed, test=test)
+        simulate_run(
+            rig,
+            out,
+            level=level,
+            theta0_over_alpha=LEVELS[level],
+            r=r,
+            seed=seed,
+            test=test,
+            effects=effect or (),
+        )
         if as_json:
             typer.echo(json.dumps(as_document(out, "complete"), indent=1))
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from daq_app.acquisition.offline import Readings, record_offline
@@ -9,6 +10,7 @@ from daq_app.acquisition.tare import NotSteady
 from daq_app.config import ConfigError, Problem, load_rig, plan_tasks
 from daq_app.runfile import RunFileError
 from sim_hardware.direct import synthesise_test
+from sim_hardware.dynamics.spec import parse_effect
 
 
 def simulate_run(
@@ -20,13 +22,23 @@ def simulate_run(
     r: float | None,
     seed: int | None,
     test: str | None,
+    effects: Sequence[str] = (),
 ) -> Path:
-    """Simulate one test and write its run to `out`. Raises `ConfigError` and `RunFileError` in words."""
+    """Simulate one test and write its run to `out`; `effects` such as ``viscous:zeta=0.006``.
+
+    Raises `ConfigError` and `RunFileError` in words.
+    """
     rig = load_rig(rig_file)
     plan = plan_tasks(rig, str(rig_file))
     try:
         simulated = synthesise_test(
-            rig, plan, theta0_over_alpha, seed, restitution=r, post_rest_s=rig.acquisition.post_rest_s + 2.0
+            rig,
+            plan,
+            theta0_over_alpha,
+            seed,
+            restitution=r,
+            effects=dict(parse_effect(effect) for effect in effects),
+            post_rest_s=rig.acquisition.post_rest_s + 2.0,
         )
     except (ValueError, LookupError) as error:
         raise ConfigError(
