@@ -8,7 +8,7 @@ Nothing above this module knows which driver it talks to.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,6 +88,19 @@ class DriverError(Exception):
         where = f"{device}: " if device else ""
         number = f" (NI-DAQmx {code})" if code is not None else ""
         super().__init__(f"{where}{message}{number}. {advice}")
+
+
+@runtime_checkable
+class BackupRecorder(Protocol):
+    """A driver that can let the hardware's own driver software record as well: the second recorder."""
+
+    def start_backup(self, stem: str) -> tuple[str, ...]:
+        """Begin files for the run called `stem`; answers their paths, none where it is switched off."""
+        ...
+
+    def stop_backup(self) -> None:
+        """Pause until the next run."""
+        ...
 
 
 class Driver(Protocol):

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+import platformdirs
+
 READY: Final = "Acquisition listening on "
 """First words of the line on the process's standard output that says where; then the address."""
 
@@ -37,7 +39,13 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
         metavar="S",
         help="how long to look for a device that does not answer before the run is closed",
     )
-    add("--spare", type=Path, metavar="DIR", help="folder on another disk to go on in if the first fails")
+    add(
+        "--spare",
+        type=Path,
+        metavar="DIR",
+        default=platformdirs.user_data_path("rocking-test-recorder") / "spare",
+        help="where to go on if the disk of OUT fails (best on another disk; default: %(default)s)",
+    )
     add("--backup", type=Path, metavar="DIR", help="let the NI driver write TDMS files there as well")
     add("--speed", default="1", help="time factor of a simulated device or a replay, or max")
     add("--seed", type=int, help="seed of the simulated wall's noise and scatter")

@@ -31,6 +31,7 @@ _GROUP_S: Final = 0.05
 """Longest wait of a written block for its flush while more blocks keep coming."""
 _SLOW_FLUSH_S: Final = 0.5
 _RETRY_S: Final = 0.2
+_LOOK_S: Final = 1.0
 _MEMORY_LIMIT_BYTES: Final = 512 * 2**20
 """Blocks held in memory while the disk takes none: six minutes of 41 channels at 4000 Hz."""
 
@@ -82,6 +83,7 @@ class Recorder(threading.Thread):
         self._unsafe: deque[Arrived | Lost | Noted] = deque()
         """In the journal but not known to be on the device."""
         self._last_flush_s = 0.0
+        self._last_look_s = 0.0
         self._last_read_ns = 0
         self._alarm = ""
 
@@ -168,7 +170,7 @@ class Recorder(threading.Thread):
                 self._raise_alarm("disk", str(error))
                 return
             except JournalDeviceError as error:
-                self._move_to_spare(error)
+                self._move_to_spare(str(error))
                 return
             self._waiting.popleft()
             self._unsafe.append(item)
@@ -203,9 +205,11 @@ class Recorder(threading.Thread):
             self._raise_alarm("disk", str(error))
             return
         except JournalDeviceError as error:
-            self._move_to_spare(error)
+            self._move_to_spare(str(error))
             return
         self._last_flush_s = time.monotonic()
+        if not self._still_there(journal):
+            return
         self.status.acknowledged_sample = acknowledged
         now = time.perf_counter()
         while self._unsafe:
@@ -218,6 +222,17 @@ class Recorder(threading.Thread):
         if self._alarm and not self._waiting:
             self._alarm = ""
             self._say("disk", "The disk takes data again; nothing was lost", "info")
+
+    def _still_there(self, journal: JournalWriter) -> bool:
+        """Whether the journal still has its name; looked at once a second. If not, its content is rescued."""
+        now = time.monotonic()
+        if now - self._last_look_s < _LOOK_S:
+            return True
+        self._last_look_s = now
+        if journal.is_in_place():
+            return True
+        self._move_to_spare(f"{journal.path} was deleted or moved while it was recorded", rescue=True)
+        return False
 
     def _close(self, end: End) -> None:
         journal = self._journal
@@ -235,36 +250,40 @@ class Recorder(threading.Thread):
         if recorded is not None:
             self._hand_over(recorded)
 
-    def _move_to_spare(self, error: JournalDeviceError) -> None:
-        """Go on in another folder from the first sample that is not known to be safe."""
-        journal = self._journal
+    def _move_to_spare(self, why: str, *, rescue: bool = False) -> None:
+        """Go on in another folder from the first sample that is not known to be safe.
+
+        `rescue` copies what the old file holds first: its name is gone, its content is not.
+        """
+        journal, spare = self._journal, self._spare_folder
         assert journal is not None
-        journal.abandon()
-        if self._spare_folder is None or self._spare_folder == journal.path.parent:
-            self._give_up(str(error))
+        if spare is None or (spare == journal.path.parent and not rescue):
+            self._give_up(why)
             return
-        name = f"{journal.path.stem}-continued{journal.path.suffix}"
         old = journal.header
         header = old.model_copy(
             update={
                 "run_id": f"{old.run_id}-continued",
-                "notes": f"{old.notes}\nContinues run {old.run_id} after: {error.message}",
+                "notes": f"{old.notes}\nContinues run {old.run_id} after: {why}",
                 "start_utc_ns": time.time_ns(),
             }
         )
         try:
-            self._spare_folder.mkdir(parents=True, exist_ok=True)
-            self._journal = JournalWriter(self._spare_folder / name, header)
+            spare.mkdir(parents=True, exist_ok=True)
+            if rescue:
+                journal.copy_to(spare / journal.path.name)
+            self._journal = JournalWriter(spare / f"{header.run_id}{journal.path.suffix}", header)
         except (OSError, RunFileError) as second:
-            self._give_up(f"{error}; and the spare folder: {second}")
+            self._give_up(f"{why}; and the spare folder: {second}")
             return
+        journal.abandon()
         self._waiting.extendleft(reversed(self._unsafe))
         self.status.waiting_bytes += sum(
             item.block.readings.nbytes for item in self._unsafe if isinstance(item, Arrived)
         )
         self._unsafe.clear()
         self.status.journal = self._journal.path
-        self._raise_alarm("disk", f"{error} Recording goes on in {self._journal.path}")
+        self._raise_alarm("disk", f"{why} Recording goes on in {self._journal.path}")
         self._write()
 
     def _give_up(self, why: str) -> None:

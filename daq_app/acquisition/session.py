@@ -32,7 +32,7 @@ from daq_app.acquisition.watchdog import Watchdog
 from daq_app.config.plan import TaskPlan
 from daq_app.config.rig import Rig
 from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX, find_journals
-from drivers import Driver, DriverError, Opened
+from drivers import BackupRecorder, Driver, DriverError, Opened
 
 _T = TypeVar("_T")
 
@@ -80,7 +80,9 @@ class Session:
         self.recorder.start()
         self.analyst.start()
         # Listed now: what this session will record is none of them.
-        for journal in find_journals(self._settings.folder):
+        folders = [self._settings.folder, self._settings.spare_folder]
+        left = [path for folder in folders if folder and folder.is_dir() for path in find_journals(folder)]
+        for journal in left:
             job = {"job": "recover", "journal": str(journal)}
             self._jobs.append(self._finaliser.submit(job, self._tell_recovery))
         self.preview()
@@ -131,6 +133,7 @@ class Session:
     def _hand_over(self, recorded: Recorded) -> None:
         """On the recorder's thread, when a journal is closed."""
         self.analyst.inbox.put(Closed(recorded.journal, recorded.end))
+        self._stop_backup()
         out = recorded.journal.with_suffix(RUN_SUFFIX)
         job = {"job": "finalise", "journal": str(recorded.journal), "out": str(out)}
         self._jobs.append(self._finaliser.submit(job, lambda done: self._tell_saved(recorded, done)))
@@ -201,7 +204,30 @@ class Session:
         )
         begin = Begin(settings.folder / f"{header.run_id}{JOURNAL_SUFFIX}", header)
         self.recorder.inbox.put(begin)
+        if self._reader is not None:
+            self._reader.ask(lambda driver: self._start_backup(driver, header.run_id))
         return begin.done
+
+    def _start_backup(self, driver: Driver, stem: str) -> None:
+        """On the reader's thread: the second recorder, where it is on. It must never cost the first."""
+        if not isinstance(driver, BackupRecorder):
+            return
+        try:
+            paths = driver.start_backup(stem)
+        except DriverError as error:
+            self._say(EventMessage(kind="backup", sample=0, text=str(error), severity="error"))
+            return
+        if paths:
+            text = f"The NI driver records as well: {', '.join(paths)}"
+            self._say(EventMessage(kind="backup", sample=self.recorder.status.sample, text=text))
+
+    def _stop_backup(self) -> None:
+        def stop(driver: Driver) -> None:
+            if isinstance(driver, BackupRecorder):
+                driver.stop_backup()
+
+        if self._reader is not None:
+            self._reader.ask(stop)
 
     def ask(self, name: str, arguments: dict[str, Any]) -> Future[tuple[str, dict[str, Any]]]:
         """Hand a request to the analyst, in step with the samples."""

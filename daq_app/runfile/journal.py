@@ -181,6 +181,31 @@ class JournalWriter:
         self._pending_sync = None
         return acknowledged
 
+    def is_in_place(self) -> bool:
+        """Whether the file is still there under its name: a folder can be deleted under a recording."""
+        try:
+            return os.path.samestat(os.fstat(self._fd), self.path.stat())
+        except OSError:
+            return False
+
+    def copy_to(self, path: Path) -> None:
+        """Copy what has been written to a new file and flush it; the way out for a file that was deleted.
+
+        Raises `OSError`.
+        """
+        with path.open("xb") as out:
+            position = os.lseek(self._fd, 0, os.SEEK_CUR)
+            try:
+                os.lseek(self._fd, 0, os.SEEK_SET)
+                left = self._bytes
+                while left > 0 and (piece := os.read(self._fd, min(left, 2**20))):
+                    out.write(piece)
+                    left -= len(piece)
+            finally:
+                os.lseek(self._fd, position, os.SEEK_SET)
+            out.flush()
+            fsync_data(out.fileno())
+
     def close(self) -> None:
         """Write the end frame and a last copy of the header, flush, unlock. Safe twice."""
         if self._closed:

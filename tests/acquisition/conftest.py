@@ -99,6 +99,8 @@ class StageDriver:
         self.opened = 0
         self.closed = 0
         self.refuse_to_open: DriverError | None = None
+        self.refuse_backup: DriverError | None = None
+        self.backups: list[str] = []
 
     def let(self, until: int) -> None:
         """Allow reading up to that sample."""
@@ -140,6 +142,15 @@ class StageDriver:
         if block.n_samples == 0:
             raise DriverError("The stage is empty", advice="End the test")
         return block
+
+    def start_backup(self, stem: str) -> tuple[str, ...]:
+        self.backups.append(stem)
+        if self.refuse_backup is not None:
+            raise self.refuse_backup
+        return (f"{stem}.tdms",)
+
+    def stop_backup(self) -> None:
+        self.backups.append("stop")
 
     def recover(self) -> None:
         if self._recovering:

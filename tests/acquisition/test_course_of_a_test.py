@@ -11,6 +11,7 @@ import pytest
 
 from daq_app.acquisition.messages import EstimateMessage, EventMessage, HealthMessage, State, StateMessage
 from daq_app.runfile import open_run, verify
+from drivers import DriverError
 
 Lives = Callable[..., Any]
 
@@ -222,3 +223,24 @@ def test_events_reach_the_viewer_with_their_severity(live: Lives) -> None:
     message = lab.wait_for_event("armed")
     assert isinstance(message, EventMessage)
     assert message.severity == "info"
+
+
+def test_the_second_recorder_runs_from_arming_to_the_end(live: Lives) -> None:
+    lab = live()
+    journal = lab.zero_and_arm()
+    lab.driver.let(lab.driver._allowed + 800)
+    assert f"{journal.stem}.tdms" in lab.wait_for_event("backup").text
+    lab.ask("abort")
+    lab.wait_for_state(State.SAVED)
+    lab.driver.let(lab.driver._allowed + 800)
+    lab.wait_for(lambda m: lab.driver.backups == [journal.stem, "stop"])
+
+
+def test_a_second_recorder_that_fails_is_told_and_costs_the_first_nothing(live: Lives) -> None:
+    lab = live()
+    lab.driver.refuse_backup = DriverError("No such folder on the server", advice="Choose another")
+    lab.zero_and_arm()
+    lab.driver.let(16_000)
+    told = lab.wait_for_event("backup")
+    assert told.severity == "error" and "No such folder" in told.text
+    lab.wait_for(lambda m: isinstance(m, HealthMessage) and m.acknowledged_sample == 16_000)

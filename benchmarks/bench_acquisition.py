@@ -1,0 +1,186 @@
+"""Acquisition through the real nidaqmx client: how much faster than needed, at what cost, how soon on disk.
+
+Three measurements on one simulated device server in a process of its own:
+sustained throughput with the journal on (the server's clock moves with the reads), processor time of
+client and recorder at the real rate, and the time from the return of a read to the flushed disk.
+"""
+
+from __future__ import annotations
+
+import statistics
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+from benchmarks.figure import Figure
+from daq_app.acquisition import AcquisitionProcess
+from daq_app.acquisition.items import Begin, End, Item, Lost, SourceEnded, Started
+from daq_app.acquisition.messages import HealthMessage, State, StateMessage
+from daq_app.acquisition.reader import Reader
+from daq_app.acquisition.recorder import Recorder
+from daq_app.acquisition.simulated import SimulatedServer
+from daq_app.config import load_rig, plan_tasks
+from daq_app.runfile import RunHeader
+from drivers import open_driver
+
+RIG = Path(__file__).parents[1] / "configs" / "fr1.toml"
+_RUNS = 3
+_THROUGHPUT_S = 6.0
+_REAL_RATE_S = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Throughput:
+    """One sustained recording."""
+
+    times_real: float
+    """Recorded seconds per second, journal on, against 41 channels at 4000 Hz."""
+    lost_samples: int
+    to_disk_p99_ms: float
+
+
+def sustained(connection: str, folder: Path, seconds: float = _THROUGHPUT_S) -> Throughput:
+    """Reader and recorder (no analysis, no viewer) as fast as the server can deliver."""
+    rig = load_rig(RIG)
+    plan = plan_tasks(rig)
+    begun, ended = threading.Event(), threading.Event()
+    lost: list[int] = []
+
+    def forward(item: Item) -> None:
+        match item:
+            case Started():
+                begun.set()
+            case Lost(n_samples=count):
+                lost.append(count)
+            case SourceEnded():
+                ended.set()
+
+    closed = threading.Event()
+    recorder = Recorder(forward, lambda event: None, lambda recorded: closed.set())
+    recorder.start()
+    reader = Reader(lambda: open_driver(connection), plan, recorder.inbox.put)
+    reader.start()
+    if not begun.wait(60.0):
+        raise RuntimeError("the simulated server gave no samples")
+    header = RunHeader(
+        run_id="bench",
+        channel_ids=rig.channel_ids,
+        reading_units=tuple(channel.reading_unit for channel in rig.channels),
+        rate_hz=plan.rate_hz,
+    )
+    done: Future[Path] = Future()
+    recorder.inbox.put(Begin(folder / f"bench-{time.monotonic_ns()}.journal", header, done))
+    journal = done.result(30.0)
+    started_s, started = time.perf_counter(), reader.next_sample
+    time.sleep(seconds)
+    elapsed_s = time.perf_counter() - started_s
+    recorded = recorder.status.acknowledged_sample - started
+    reader.request_stop()
+    ended.wait(30.0)
+    recorder.inbox.put(End("stopped", 0, "end of the benchmark"))
+    closed.wait(30.0)
+    recorder.inbox.put(None)
+    recorder.join()
+    journal.unlink()
+    return Throughput(recorded / plan.rate_hz / elapsed_s, sum(lost), recorder.latency.percentile_ms(99))
+
+
+@dataclass(frozen=True, slots=True)
+class RealRate:
+    """The whole acquisition process while it records at 4000 Hz with a viewer attached."""
+
+    processor_percent: float
+    """Of one core: client, recorder, analysis and publisher."""
+    to_disk_p99_ms: float
+    lost_samples: int
+    memory_mb: float
+
+
+def real_rate(connection: str, folder: Path, seconds: float = _REAL_RATE_S) -> RealRate:
+    """Arm, record for `seconds`, and look at the processor time of the acquisition process alone."""
+    process = AcquisitionProcess(["--rig", str(RIG), "--out", str(folder), "--connection", connection])
+    with process.client() as client:
+        _wait_for(client.receive, lambda m: isinstance(m, StateMessage) and m.state is State.PREVIEWING)
+        reply = client.request("arm", test="BENCH-L3-1")
+        if not reply.ok:
+            raise RuntimeError(reply.text)
+        watched = psutil.Process(process.process.pid)
+        begin, before = time.perf_counter(), watched.cpu_times()
+        health: HealthMessage | None = None
+        while time.perf_counter() - begin < seconds:
+            received = client.receive(0.2)
+            if received is not None and isinstance(received.message, HealthMessage):
+                health = received.message
+        after, elapsed_s = watched.cpu_times(), time.perf_counter() - begin
+        memory_mb = watched.memory_info().rss / 2**20
+        client.request("shutdown", force=1.0)
+    process.wait(60.0)
+    if health is None:
+        raise RuntimeError("no health was published")
+    used_s = (after.user - before.user) + (after.system - before.system)
+    return RealRate(100.0 * used_s / elapsed_s, health.block_to_disk_ms_p99, health.lost_samples, memory_mb)
+
+
+def client_and_recorder_percent(connection: str, folder: Path, seconds: float = _REAL_RATE_S) -> float:
+    """Processor time of reader and recorder alone at the real rate, per cent of a core."""
+    me = psutil.Process()
+    before = me.cpu_times()
+    sustained(connection, folder, seconds)
+    after = me.cpu_times()
+    # Opening the tasks is not part of sampling: measured once without recording time.
+    opening = me.cpu_times()
+    sustained(connection, folder, 0.0)
+    opened = me.cpu_times()
+    used = (after.user - before.user) + (after.system - before.system)
+    used -= (opened.user - opening.user) + (opened.system - opening.system)
+    return 100.0 * used / seconds
+
+
+def _wait_for(receive: Callable[[float], object], right: Callable[[object], bool]) -> None:
+    deadline = time.monotonic() + 120.0
+    while time.monotonic() < deadline:
+        received = receive(0.5)
+        if received is not None and right(getattr(received, "message", None)):
+            return
+    raise RuntimeError("the acquisition process did not start to sample")
+
+
+def figures() -> list[Figure]:
+    """All figures of the acquisition."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        with SimulatedServer(RIG, ["--speed", "max", "--wall", "commanded"]) as fast:
+            runs = [sustained(fast.connection, folder) for _ in range(_RUNS)]
+        with SimulatedServer(RIG, ["--speed", "1", "--wall", "commanded"]) as real:
+            lean = client_and_recorder_percent(real.connection, folder)
+            whole = real_rate(real.connection, folder / "runs")
+    machine = f"server in its own process on the same {psutil.cpu_count()} cores"
+    return [
+        Figure(
+            "sustained, journal on",
+            statistics.median(run.times_real for run in runs),
+            "× 41 × 4000 Hz",
+            runs=_RUNS,
+            aim=40.0,
+            better="high",
+            note=f"{machine}; lost {sum(run.lost_samples for run in runs)}",
+        ),
+        Figure("client and recorder at the real rate", lean, "% of a core", aim=10.0, note="journal on"),
+        Figure(
+            "whole process at the real rate",
+            whole.processor_percent,
+            "% of a core",
+            note="with live analysis and a viewer",
+        ),
+        Figure(
+            "block to disk, p99", whole.to_disk_p99_ms, "ms", aim=30.0, note="from the read's return to fsync"
+        ),
+        Figure("lost at the real rate", float(whole.lost_samples), "samples", aim=0.0),
+        Figure("memory of the process", whole.memory_mb, "MB"),
+    ]
