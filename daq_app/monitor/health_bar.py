@@ -14,6 +14,7 @@ BUFFER_WARNING = 0.25
 BUFFER_BAD = 0.7
 FREE_WARNING_BYTES = 5e9
 FREE_BAD_BYTES = 1e9
+_USUAL = ("00 %", "0", "none", "00.0 MB", "00.0 GB", "00 ms")
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +75,9 @@ class HealthBar(QWidget):
     def refresh(self) -> None:
         """Bring the figures up to date."""
         figures = health_texts(self._session.health, self._session.fresh(HealthMessage))
-        for label, figure in zip(self._values, figures, strict=True):
+        for label, figure, usual in zip(self._values, figures, _USUAL, strict=True):
+            # Room for the usual value: figures that come and go must not push each other about.
+            label.setMinimumWidth(label.fontMetrics().horizontalAdvance(usual))
             text = f"⚠ {figure.value}" if figure.role else figure.value
             if label.text() != text:
                 label.setText(text)

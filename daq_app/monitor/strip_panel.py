@@ -26,7 +26,7 @@ FAMILY_TITLES: dict[Family, str] = {
     "lvdt": "LVDTs · opening of the base joint (mm)",
     "wire": "Wires (mm)",
     "accelerometer": "Accelerometers (m/s²)",
-    "tiltmeter": "Tiltmeters (mrad)",
+    "tiltmeter": "Tilt (mrad)",
 }
 _SMALLEST_SPAN_SI = {"lvdt": 1e-3, "wire": 4e-3, "accelerometer": 1.0, "tiltmeter": 4e-3}
 """A quiet strip is not blown up beyond this, or noise would look like motion."""
