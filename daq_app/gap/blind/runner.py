@@ -7,6 +7,7 @@ that a finished case is not done twice and a result never speaks of other data.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -19,6 +20,8 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
+
+import psutil
 
 from daq_app.gap.blind.make import CASE_PREFIX
 from daq_app.gap.blind.seal import SEAL_FILE, check_files, file_sha256, read_seal
@@ -113,20 +116,32 @@ def diagnose_apart(case: Path, diagnoser: str, timeout_s: float) -> Outcome:
 
 
 def _run(command: list[str], place: str, timeout_s: float) -> str:
-    """Run to the end; empty, or why it failed."""
-    try:
-        done = subprocess.run(
-            command,
-            cwd=place,
-            env=_environment(),
-            capture_output=True,
-            text=True,
-            timeout=timeout_s,
-            check=False,
+    """Run to the end; empty, or why it failed. What the process started itself ends with it."""
+    words = Path(place) / "words.txt"
+    with words.open("w", encoding="utf-8") as stderr:
+        process = psutil.Popen(
+            command, cwd=place, env=_environment(), stdout=subprocess.DEVNULL, stderr=stderr
         )
-    except subprocess.TimeoutExpired:
-        return f"stopped after {timeout_s:g} s"
-    return "" if done.returncode == 0 else f"ended with {done.returncode}: {done.stderr[-_WORDS_KEPT:]}"
+        try:
+            code = process.wait(timeout_s)
+        except psutil.TimeoutExpired:
+            return f"stopped after {timeout_s:g} s"
+        finally:
+            _end_tree(process)
+    told = words.read_text(encoding="utf-8", errors="replace")[-_WORDS_KEPT:].strip()
+    return "" if code == 0 else f"ended with {code}: {told}"
+
+
+def _end_tree(process: psutil.Popen) -> None:
+    """End a process and all that it started."""
+    try:
+        family = [*process.children(recursive=True), process]
+    except psutil.NoSuchProcess:
+        return
+    for member in family:
+        with contextlib.suppress(psutil.NoSuchProcess):
+            member.kill()
+    psutil.wait_procs(family, timeout=10)
 
 
 def _read_result(out: Path) -> tuple[dict[str, Any] | None, str]:

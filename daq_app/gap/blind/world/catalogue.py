@@ -184,7 +184,7 @@ _LIBRARY: Final = (
     Entry(
         "filter_delay", "sensor", "library", "tau_s", 1e-3, 0.03, targets=_of("lvdt", "wire", "accelerometer")
     ),
-    Entry("saturation", "sensor", "library", "cut", 0.05, 0.5, targets=_one_or_all("lvdt", "wire")),
+    Entry("saturation", "sensor", "library", "cut", 0.05, 0.5, targets=_of("lvdt", "wire")),
     Entry(
         "dropout",
         "sensor",

@@ -70,7 +70,7 @@ def _slow(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
 
 def _filter_delay(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
     """Linear-phase filter of length 2 τ: delay τ and a moving average (Hann)."""
-    length = max(3, round(2.0 * q["tau_s"] * bench.rate_hz) | 1)
+    length = round(2.0 * q["tau_s"] * bench.rate_hz) | 1
     taps = np.hanning(length + 2)[1:-1]
     taps /= taps.sum()
     start = np.full(length - 1, signal[0])

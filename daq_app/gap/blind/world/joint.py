@@ -96,7 +96,7 @@ def cubic_joint(wall: Wall, parameters: Parameters) -> Joint:
     half, limit = wall.half_width, parameters["theta_j_rad"]
 
     def arm(q: float, s: int) -> float:
-        x = min(q / limit, 1.0)
+        x = max(-1.0, min(q / limit, 1.0))
         return half * x * (3.0 - x * x) / 2.0
 
     def contact(q: Any, s: Any) -> tuple[Any, Any]:

@@ -1,0 +1,253 @@
+"""The score itself: planted lies, and an honest diagnosis, each score as they deserve."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from daq_app.gap.blind.confusion import confusion
+from daq_app.gap.blind.judge import Judged, judge
+from daq_app.gap.blind.mix import category_of
+from daq_app.gap.blind.names import accepted_names, base_name
+from daq_app.gap.blind.report import write_report
+from daq_app.gap.blind.runner import Outcome, save_outcome
+from daq_app.gap.blind.score import Row, Score, score_folder, table
+from daq_app.gap.blind.seal import SEAL_FILE, SealBroken, file_sha256, read_seal, seal_case
+from daq_app.gap.blind.statistics import auroc, calibration_error, reliability, share
+from daq_app.gap.blind.world.catalogue import ENTRIES, LIBRARY, OUTSIDE
+
+Answer = Callable[[dict[str, Any], np.random.Generator], dict[str, Any]]
+N = 200
+
+
+def labels() -> list[dict[str, Any]]:
+    rng = np.random.default_rng(0)
+    return [_label(k, rng) for k in range(N)]
+
+
+def _label(index: int, rng: np.random.Generator) -> dict[str, Any]:
+    category = category_of(1, index)
+    names = {
+        "single": lambda: [LIBRARY[index % len(LIBRARY)]],
+        "pair": lambda: ["viscous", "gain"] if index % 2 else ["winkler", "hum"],
+        "outside": lambda: [OUTSIDE[index % len(OUTSIDE)]],
+        "null": list,
+    }[category]()
+    effects = [
+        {
+            "name": name,
+            "family": ENTRIES[name].family,
+            "accept": list(accepted_names(name)),
+            "parameters": {ENTRIES[name].parameter: ENTRIES[name].low},
+        }
+        for name in names
+    ]
+    seen = [float(rng.uniform(5, 100)) for _ in names]
+    return {"case": f"case_{index + 1:04d}", "category": category, "effects": effects, "detectability": seen}
+
+
+def claim(names: list[str], probability: float, decision: str = "", **more: Any) -> dict[str, Any]:
+    family = " + ".join(dict.fromkeys(ENTRIES[base_name(name)].family for name in names)) or "none"
+    first = {"effects": names, "family": family, "probability": probability}
+    by_number = {0: "nothing_missing", 1: "effect", 2: "pair"}
+    return {
+        "which": [first],
+        "set95": [first],
+        "decision": decision or by_number[len(names)],
+        "gap": {"before": 9.0, "after": 1.02, "floor": 1.0, "closure": 0.99},
+        **more,
+    }
+
+
+def perfect(label: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    if label["category"] == "outside":
+        return claim(["viscous"], 0.5, "none_of_these")
+    names = [effect["name"] for effect in label["effects"]]
+    if rng.uniform() < 0.04:  # a 95 % set that always held the truth would be too wide
+        return claim(["polarity"] if names != ["polarity"] else ["swap"], 0.3, "cannot_tell")
+    width = 0.005 if rng.uniform() < 0.05 else 0.1  # and so would be an interval that always held it
+    parameters = [
+        {
+            "name": f"{e['name']}.{key}",
+            "value": 1.01 * value,
+            "low": (1.01 - width) * value,
+            "high": (1.01 + width) * value,
+        }
+        for e in label["effects"]
+        for key, value in e["parameters"].items()
+    ]
+    return claim(names, 0.97, effect_parameters=parameters)
+
+
+def always_viscous(label: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    return claim(["viscous"], 0.9)
+
+
+def overconfident(label: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    """Right two times in three, and sure of it each time."""
+    names = [effect["name"] for effect in label["effects"]]
+    if label["category"] != "outside" and rng.uniform() < 0.67:
+        return claim(names, 0.99)
+    return claim(["swap" if names != ["swap"] else "hum"], 0.99)
+
+
+def scored(answer: Answer) -> tuple[dict[str, Row], list[Judged]]:
+    rng = np.random.default_rng(1)
+    judged = [
+        judge(label, Outcome(label["case"], "test", "", 1.0, json.loads(json.dumps(answer(label, rng)))))
+        for label in labels()
+    ]
+    return {row.name: row for row in table(judged)}, judged
+
+
+def missed(rows: dict[str, Row]) -> set[str]:
+    return {name for name, row in rows.items() if row.met is False}
+
+
+def test_a_perfect_diagnosis_meets_every_target() -> None:
+    rows, judged = scored(perfect)
+    assert missed(rows) == set()
+    assert rows["outside the library: AUROC"].found.value == 1.0
+    assert rows["parameter error, median"].found.value == pytest.approx(0.01, abs=1e-6)
+    assert rows["95 % set holds the truth"].found.n == 160
+    assert Score(tuple(rows.values()), tuple(judged), ()).passed is True
+
+
+def test_always_viscous_scores_what_guessing_deserves() -> None:
+    rows, judged = scored(always_viscous)
+    assert rows["first answer right, effect ≥ 4 sd"].found.value < 0.06
+    assert rows["pairs exact"].found.value == 0.0
+    assert rows["nothing hidden, yet blamed on an effect"].found.value == 1.0
+    assert rows["outside, blamed on an effect as decided"].found.value == 1.0
+    assert rows["expected calibration error"].found.value > 0.8
+    assert rows["outside the library: AUROC"].found.value == pytest.approx(0.5)
+    assert {"first answer right, effect ≥ 4 sd", "pairs exact"} <= missed(rows)
+    assert set(confusion(judged).columns) == {"viscous"}
+
+
+def test_overconfidence_shows_in_calibration_and_not_in_the_right_answers_alone() -> None:
+    rows, _ = scored(overconfident)
+    assert 0.5 < rows["first answer right, effect ≥ 4 sd"].found.value < 0.8
+    assert rows["expected calibration error"].found.value > 0.3
+    assert rows["wrong at p > 0.95"].found.value > 0.3
+    assert {"expected calibration error", "wrong at p > 0.95"} <= missed(rows)
+
+
+def test_peeking_at_the_hashes_gains_nothing(tmp_path: Path) -> None:
+    """A diagnosis that tries every label it can think of against the published hash only guesses."""
+
+    def peek(folder: Path) -> str:
+        seal = read_seal(folder)
+        for name in LIBRARY:
+            guess = json.dumps({"effects": [{"name": name}]}, sort_keys=True, ensure_ascii=False)
+            for salt in (b"", folder.name.encode()):
+                if hashlib.sha256(salt + guess.encode()).hexdigest() == seal["label_sha256"]:
+                    return name
+        digits = int(seal["label_sha256"], 16)  # what is left: to make something of the digits
+        return LIBRARY[digits % len(LIBRARY)]
+
+    right = 0
+    for index, name in enumerate(LIBRARY * 3):
+        folder = tmp_path / f"case_{index:04d}"
+        folder.mkdir()
+        seal_case(folder, {"effects": [{"name": name}]}, tmp_path / "labels" / f"{index}.json")
+        right += peek(folder) == name
+    assert right <= 0.12 * 3 * len(LIBRARY)  # chance is 1 in 37
+
+
+def test_a_pair_half_found_is_not_exact_and_a_synonym_is() -> None:
+    pair = next(label for label in labels() if [e["name"] for e in label["effects"]] == ["viscous", "gain"])
+    half = judge(pair, Outcome("c", "t", "", 1.0, claim(["viscous"], 0.9)))
+    whole = judge(pair, Outcome("c", "t", "", 1.0, claim(["gain@WP-1", "viscous"], 0.9)))
+    assert (half.first_right, whole.first_right, whole.family_right) == (False, True, True)
+    tilt = next(label for label in labels() if label["category"] == "single")
+    tilt = {
+        **tilt,
+        "effects": [{**tilt["effects"][0], "name": "base_tilt", "accept": accepted_names("base_tilt")}],
+    }
+    assert judge(tilt, Outcome("c", "t", "", 1.0, claim(["eccentric_mass"], 0.9))).first_right
+
+
+def test_cannot_tell_is_right_only_with_the_truth_in_the_set_and_a_measurement() -> None:
+    label = next(label for label in labels() if label["category"] == "single")
+    name = label["effects"][0]["name"]
+    unsure = claim([name], 0.5, "cannot_tell")
+    assert not judge(label, Outcome("c", "t", "", 1.0, unsure)).answered_rightly
+    unsure["next_measurement"] = "a tiltmeter on the base"
+    assert judge(label, Outcome("c", "t", "", 1.0, unsure)).answered_rightly
+    unsure["set95"] = []
+    assert not judge(label, Outcome("c", "t", "", 1.0, unsure)).answered_rightly
+
+
+def test_an_effect_that_the_diagnosis_does_know_is_not_outside() -> None:
+    label = next(label for label in labels() if label["category"] == "outside")
+    name = label["effects"][0]["name"]
+    known = judge(label, Outcome("c", "t", "", 1.0, claim([name], 0.99)))
+    assert known.known and known.answered_rightly
+
+
+def test_a_failed_diagnosis_counts_against_it() -> None:
+    judged = [judge(label, Outcome(label["case"], "t", "", 1.0, None, "broke")) for label in labels()]
+    rows = {row.name: row for row in table(judged)}
+    assert rows["no result"].met is False
+    assert rows["first answer right, effect ≥ 4 sd"].found.value == 0.0
+
+
+def test_wilson_and_calibration_against_known_numbers() -> None:
+    nine_of_ten = share([True] * 9 + [False])
+    assert (nine_of_ten.low, nine_of_ten.high) == pytest.approx((0.5958, 0.9821), abs=1e-4)
+    assert calibration_error([0.95] * 100, [True] * 95 + [False] * 5) == pytest.approx(0.0, abs=1e-12)
+    assert calibration_error([0.95] * 100, [True] * 60 + [False] * 40) == pytest.approx(0.35)
+    assert [bar.found.n for bar in reliability([0.1, 0.9, 1.0], [True, True, False])] == [1, 2]
+    assert auroc([2.0, 3.0], [1.0, 2.0]) == pytest.approx(0.875)
+    assert math.isnan(auroc([], [1.0]))
+
+
+@pytest.fixture
+def check(tmp_path: Path) -> Path:
+    """A folder of twenty sealed cases with perfect results."""
+    folder, rng = tmp_path / "check", np.random.default_rng(1)
+    for label in labels()[:20]:
+        case = folder / label["case"]
+        case.mkdir(parents=True)
+        (case / "rig.toml").write_text(label["case"], encoding="utf-8")
+        seal_case(case, label, tmp_path / "labels" / f"{case.name}.json")
+        sealed = file_sha256(case / SEAL_FILE)
+        save_outcome(folder, Outcome(case.name, "test", sealed, 1.0, perfect(label, rng)))
+    return folder
+
+
+def test_a_folder_is_scored_and_shown(check: Path, tmp_path: Path) -> None:
+    found = score_folder(check, tmp_path / "labels")
+    assert len(found.judged) == 20 and not found.waiting
+    json.dumps(found.to_dict(), allow_nan=False)
+    write_report(found, tmp_path / "score.html")
+    page = (tmp_path / "score.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 3
+    assert "Confusion matrix" in page and "20 cases" in page
+
+
+def test_a_result_for_other_data_and_a_changed_label_are_refused(check: Path, tmp_path: Path) -> None:
+    kept = tmp_path / "labels" / "case_0003.json"
+    text = kept.read_text(encoding="utf-8")
+    kept.write_text(text.replace("single", "null").replace("pair", "null"), encoding="utf-8")
+    if kept.read_text(encoding="utf-8") != text:
+        with pytest.raises(SealBroken, match="case_0003"):
+            score_folder(check, tmp_path / "labels")
+    kept.write_text(text, encoding="utf-8")
+    seal_case(check / "case_0003", json.loads(json.loads(text)["label"]), kept)
+    with pytest.raises(SealBroken, match="belongs to other data"):
+        score_folder(check, tmp_path / "labels")
+
+
+def test_cases_without_a_result_are_named(check: Path, tmp_path: Path) -> None:
+    (check / "results" / "case_0007.json").unlink()
+    found = score_folder(check, tmp_path / "labels")
+    assert found.waiting == ("case_0007",) and not found.passed
