@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from daq_app.cli.analyse_bias import with_whole_chain_bias
 from daq_app.cli.analyse_files import write_outputs
 from daq_app.cli.analyse_tables import analysis_tables
 from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, reported
@@ -39,6 +40,12 @@ def analyse(
     bias_runs: Annotated[
         int, typer.Option(min=0, max=1000, help="Simulated tests behind each method's bias; 0: none.")
     ] = 6,
+    chain_runs: Annotated[
+        int,
+        typer.Option(
+            min=0, max=1000, help="As well, whole simulated tests with all sensors (about 1 s each)."
+        ),
+    ] = 0,
 ) -> None:
     """Analyse a recorded test: θ0, impacts, peaks, speeds, periods, r by each method, base joint.
 
@@ -70,6 +77,8 @@ def analyse(
             except (ValueError, KeyError) as error:
                 print_paragraph("Error", f"{run}: {error}")
                 raise typer.Exit(EXIT_BAD_INPUT) from None
+        if chain_runs and analysis.found:
+            analysis = with_whole_chain_bias(analysis, used, chain_runs)
         if as_json:
             typer.echo(json.dumps(analysis.as_dict(), ensure_ascii=False, allow_nan=False))
         else:

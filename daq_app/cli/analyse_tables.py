@@ -111,7 +111,7 @@ def _restitution_table(analysis: TestAnalysis) -> Table:
     table = _table(
         f"Coefficient of restitution; r_max = {analysis.theory.r_max:.4f} (1.2), "
         f"{analysis.theory.r_max_block:.4f} for this block",
-        "method", "r", "std error", "95 % interval", "r/r_max", "plain mean", "bias (simulated)", "points",
+        "method", "r", "std error", "95 % interval", "r/r_max", "plain mean", "bias, simulated", "points",
     )  # fmt: skip
     for key, name in _METHODS.items():
         bias = _bias(analysis.bias.get(key))
@@ -147,7 +147,7 @@ def _estimate_cells(estimate: RestitutionEstimate, r_max: float) -> tuple[str, .
 
 
 def _bias(bias: Bias | None) -> str:
-    return "" if bias is None else f"{bias.mean:+.5f} ± {bias.standard_error:.5f}"
+    return "" if bias is None else f"{bias.mean:+.5f}"
 
 
 def _base_table(analysis: TestAnalysis) -> Table:

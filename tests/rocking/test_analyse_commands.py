@@ -68,6 +68,14 @@ def test_analyse_prints_the_table_of_results(run):
         assert words in result.output
 
 
+def test_bias_over_the_whole_chain_is_told_when_asked_for(run):
+    result = call("analyse", run, "--json", "--bias-runs", 0, "--chain-runs", 2)
+    bias = json.loads(result.stdout)["bias"]
+    assert bias["eav"]["runs"] == 2 and abs(bias["eav"]["mean"]) < 5e-4
+    assert abs(bias["crt_lvdts"]["mean"]) < 5e-4
+    assert bias["eav_filtered"]["mean"] < -0.003
+
+
 def test_analyse_json_is_one_document(run):
     result = call("analyse", run, "--json", "--bias-runs", 0)
     found = json.loads(result.stdout)
