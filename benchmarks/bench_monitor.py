@@ -98,8 +98,13 @@ def frames(bench: Bench, size: tuple[int, int]) -> list[Figure]:
             better="high",
         ),
         Figure(f"longest stall of the window, {place}", 1e3 * window.longest_stall_s, "ms", aim=200.0),
-        Figure(f"CPU of the window, {place}", 100.0 * used / elapsed, "% of a core"),
+        Figure(f"CPU of the window, {place}", 100.0 * used / elapsed, "% of a core", note=_load()),
     ]
+
+
+def _load() -> str:
+    """How busy the machine was beside: other work takes frames away."""
+    return f"load {psutil.getloadavg()[0]:.1f} on {psutil.cpu_count()} cores"
 
 
 def latency(bench: Bench) -> list[Figure]:

@@ -59,7 +59,7 @@ class Header(QFrame):
         colour = str(getattr(colours, look.tone))
         self._sign.show_shape(look.shape, colour)
         self._word.setText(look.word)
-        self._word.setStyleSheet(f"color: {colour};")
+        _colour(self._word, colour)
         message = session.state
         self._test.setText(message.test if message is not None and message.test else "No test chosen")
         sentence = look.sentence
@@ -90,7 +90,7 @@ class Header(QFrame):
     def _show_light(self, shape: str, colour: str, word: str, detail: str) -> None:
         self._light.show_shape(shape, colour)
         self._light_word.setText(word)
-        self._light_word.setStyleSheet(f"color: {colour};")
+        _colour(self._light_word, colour)
         self._light_detail.setText(detail)
         self._light_detail.setVisible(bool(detail))
 
@@ -104,3 +104,10 @@ class Header(QFrame):
             "recording": self._light_word.text(),
             "recording_detail": self._light_detail.text(),
         }
+
+
+def _colour(label: QLabel, colour: str) -> None:
+    """Colour a label's text; a style sheet that is set anew is worked out anew, so only on a change."""
+    sheet = f"color: {colour};"
+    if label.styleSheet() != sheet:
+        label.setStyleSheet(sheet)
