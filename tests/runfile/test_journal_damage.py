@@ -197,6 +197,25 @@ def test_contradicting_frames_are_both_left_out(tmp_path: Path, sound: bytes) ->
     assert check(path) == (BLOCKS - 1) * BLOCK
 
 
+@pytest.mark.parametrize("first", [FIRST, LAST - 1, GAP.start + 1])
+def test_a_block_that_repeats_samples_is_left_out(tmp_path: Path, sound: bytes, first: int) -> None:
+    """Whichever program wrote it: what was recorded first stands."""
+    path = tmp_path / "repeats.journal"
+    late = pack_frame(
+        FrameType.DATA,
+        sound[16:24],
+        1000,
+        np.full(10, 9.0).tobytes(),
+        first_sample=first,
+        n_samples=BLOCK,
+        n_channels=CHANNELS,
+    )
+    path.write_bytes(sound + late)
+    assert check(path) == BLOCKS * BLOCK
+    with read_journal(path) as contents:
+        assert f"a block that repeats sample {first} was left out" in contents.damage
+
+
 @pytest.mark.parametrize(
     ("frame", "why"),
     [
