@@ -135,7 +135,7 @@ def _probes() -> Iterable[Effect]:
         "non-parametric",
         kind="probe",
     )
-    for family, count in (("wire", 6), ("accelerometer", 3), ("joint", 6), ("base", 4), ("tiltmeter", 4)):
+    for family, count in (("wire", 5), ("accelerometer", 2), ("joint", 5), ("base", 2), ("tiltmeter", 3)):
         kind = {"joint": "interface", "base": "contact"}.get(family, "sensor")
         yield Effect(
             f"free_{family}",

@@ -33,7 +33,7 @@ class RockingModel:
         Scatter(SCATTER_R, 0.004, 0.7, 0.02, "1", "relative scatter of r from impact to impact"),
         Scatter(SCATTER_TIME, 3e-5, 1.0, 1e-3, "s", "what half-cycle times scatter by beyond sensor noise"),
         Scatter(
-            SCATTER_SENSOR, 0.5, 1.0, 4.0, "1", "repeatability of sensor coefficients, in their own units"
+            SCATTER_SENSOR, 0.5, 0.35, 2.5, "1", "repeatability of sensor coefficients, in their own units"
         ),
     )
 

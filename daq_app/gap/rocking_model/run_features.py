@@ -54,7 +54,7 @@ def extract(run: GapRun) -> RockingRun:
     swings = sw.find_swings(theta, noise, run.rate_hz, run.name)
     grid = make_grid(theta, joint.valid, swings, run.rate_hz)
     blocks = tuple(blocks_of(run, joint, grid, swings, reference).values())
-    values, sds, labels, places = _times(swings, reference)
+    values, sds, labels, places = _times(swings, reference, run.survey)
     peaks = np.arange(1, swings.peak_s.size)
     amplitude, order = swings.peak_rad, swings.peak_s / max(swings.peak_s[-1], 1e-9)
     for k in peaks:
@@ -128,7 +128,7 @@ def _reference(run: GapRun, joint: Rotation) -> tuple[str, FloatArray, float, tu
 
 
 def _times(
-    swings: sw.Swings, reference: str
+    swings: sw.Swings, reference: str, survey: Survey
 ) -> tuple[list[float], list[float], list[Label], NDArray[np.intp]]:
     """Time features of all half-cycles: parts of the fall and rise, over the top, across the impact."""
     values: list[float] = []
@@ -148,7 +148,7 @@ def _times(
         if not np.isfinite(ta + tb + sa + sb):
             return
         values.append(tb - ta)
-        sds.append(float(np.hypot(sa, sb)))
+        sds.append(float(np.sqrt(sa**2 + sb**2 + _from_peak_error(swings, survey, ka, a, kb, b) ** 2)))
         labels.append(
             Label(
                 reference, phase, observable, "s", float(swings.peak_rad[ka]), float(swings.peak_s[ka] / last)
@@ -173,6 +173,21 @@ def _times(
 def _wire_height(run: GapRun) -> float:
     heights = np.array([run.sensors[i].position_m[2] for i in run.indices("wire")])
     return float(np.sum(heights**2) / np.sum(heights)) if heights.size else 1.0
+
+
+def _from_peak_error(swings: sw.Swings, survey: Survey, ka: int, a: int, kb: int, b: int) -> float:
+    """What the error of a measured peak does to the time over the top of it, s.
+
+    Near the top |θ| = φ − ½ c t², so the time between two crossings of a level h below the peak,
+    2 √(2h/c), changes by 2/√(2 h c) per rad of the peak.
+    """
+    count = swings.levels.shape[1]
+    if ka != kb or not a >= count > b:
+        return 0.0
+    peak = abs(float(swings.peak_rad[ka]))
+    curvature = survey.p_rad_s**2 * max(np.sin(survey.alpha_rad - peak), 0.01)
+    below = max(peak - float(swings.levels[ka, b]), 1e-6)
+    return float(2.0 * swings.peak_sd[ka] / np.sqrt(2.0 * below * curvature))
 
 
 def _block_loadings(blocks: tuple[Block, ...], first: int, n: int) -> FloatArray:

@@ -205,7 +205,7 @@ def _wire_block(
     compared = coarse(theta, run.rate_hz) - (
         coarse(joint.theta, run.rate_hz) if reference == "wire" else grid.theta
     )
-    return regress("wire", compared, rotation_columns(grid, run.survey.alpha_rad), pick)
+    return regress("wire", compared, rotation_columns(grid, run.survey.alpha_rad), pick, ("zero",))
 
 
 def rotation_columns(grid: Grid, alpha: float) -> dict[str, tuple[FloatArray, str]]:
@@ -236,7 +236,7 @@ def _tilt_block(run: GapRun, grid: Grid, pick: NDArray[np.bool_]) -> Block | Non
         "start": (np.exp(-(grid.time_s - grid.time_s[0]) / max(slow, 0.05)), "rad"),
     }
     wide = pick | (grid.time_s <= 0)
-    return regress("tiltmeter", measured - expected, columns, wide, absorbed=("start",))
+    return regress("tiltmeter", measured - expected, columns, wide, absorbed=("zero", "start"))
 
 
 def _acceleration_block(run: GapRun, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:
@@ -260,7 +260,7 @@ def _acceleration_block(run: GapRun, grid: Grid, pick: NDArray[np.bool_]) -> Blo
         "gain of inertia": (inertia, "1"),
     }
     # No lag here: between impacts the specific force hardly changes. The impacts themselves tell it.
-    return regress("accelerometer", measured - expected, columns, pick)
+    return regress("accelerometer", measured - expected, columns, pick, ("zero",))
 
 
 def _impact_block(run: GapRun, grid: Grid, swings: Swings) -> Block | None:
@@ -304,7 +304,9 @@ def _lift_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_
         "contact length": (np.sqrt(size), "m"),
         "drift": (grid.time_s, "m/s"),
     }
-    return regress("joint", coarse(joint.lift, run.rate_hz) - expected, columns, pick & ~grid.near_impact)
+    return regress(
+        "joint", coarse(joint.lift, run.rate_hz) - expected, columns, pick & ~grid.near_impact, ("zero",)
+    )
 
 
 def _twist_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:
@@ -313,7 +315,7 @@ def _twist_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool
         "follows rotation": (grid.theta, "1/m"),
         "drift": (grid.time_s, "rad/m/s"),
     }
-    return regress("twist", coarse(joint.twist, run.rate_hz), columns, pick)
+    return regress("twist", coarse(joint.twist, run.rate_hz), columns, pick, ("zero", "drift"))
 
 
 def slip_shape(time_s: FloatArray, impact_s: FloatArray, speeds: FloatArray) -> FloatArray:
@@ -344,7 +346,7 @@ def _translation_block(run: GapRun, grid: Grid, swings: Swings, pick: NDArray[np
         "follows rotation": (grid.theta, "m/rad"),
         "drift": (grid.time_s, "m/s"),
     }
-    return regress("base", moved, columns, pick)
+    return regress("base", moved, columns, pick, ("zero", "drift"))
 
 
 def impacts_of(grid: Grid) -> tuple[FloatArray, FloatArray]:
