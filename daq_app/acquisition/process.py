@@ -11,7 +11,6 @@ import secrets
 import signal
 import sys
 from collections.abc import Sequence
-from concurrent.futures import Future
 from contextlib import ExitStack
 
 from daq_app.acquisition.desk import Answer, Desk, DeskError
@@ -26,6 +25,7 @@ from daq_app.runfile import FolderLock, RunFileError
 from drivers import DriverError
 
 _TICK_S = 0.2
+_LAST_TICKS = 2
 
 
 class Process:
@@ -66,7 +66,8 @@ class Process:
         )
         self._unattended = Unattended(self.session, options.test, options.notes) if options.test else None
         self._interrupted = False
-        self._leaving: Future[Reply] | None = None
+        self._leaving = False
+        self._quiet_ticks = 0
         self._folder = options.out
 
     def run(self) -> int:
@@ -97,10 +98,12 @@ class Process:
         self.session.tick()
         if self._unattended is not None and not self._interrupted:
             self._unattended.advance()
-            if self._unattended.exit_code is not None:
+            self._leaving = self._leaving or self._unattended.exit_code is not None
+        if self._interrupted or self._leaving:
+            # One tick more than needed, so that viewers still hear how it ended.
+            self._quiet_ticks = 0 if self.session.busy else self._quiet_ticks + 1
+            if self._quiet_ticks > _LAST_TICKS:
                 self._desk.stop()
-        if (self._interrupted or self._leaving is not None) and not self.session.recording:
-            self._desk.stop()
 
     def _on_signal(self, number: int, frame: object) -> None:
         """Ctrl-C and the like: stop the test, keep what was recorded, end."""
@@ -143,7 +146,7 @@ class Process:
             raise RequestRefused("A run is being recorded. Stop or abort it first")
         if self.session.recording:
             self.session.ask("stop", {})
-        self._leaving = Future()
+        self._leaving = True
         return Reply(ok=True, text="The acquisition process ends once everything is saved")
 
 

@@ -28,6 +28,7 @@ from daq_app.acquisition.messages import Command, EventMessage, Reply, State
 from daq_app.acquisition.preflight import check_name, check_space
 from daq_app.acquisition.reader import Patience, Reader
 from daq_app.acquisition.recorder import Recorded, Recorder
+from daq_app.acquisition.wakefulness import Wakefulness
 from daq_app.acquisition.watchdog import Watchdog
 from daq_app.config.plan import TaskPlan
 from daq_app.config.rig import Rig
@@ -66,6 +67,7 @@ class Session:
             settings.rig, publisher, self.recorder.inbox.put, release_within_s=settings.release_within_s
         )
         self.watchdog = Watchdog(self.recorder, settings.folder, self._say)
+        self._wakefulness = Wakefulness()
         self.opened: Opened | None = None
         self.error: DriverError | None = None
         """Why sampling ended, if it ended by a fault."""
@@ -98,9 +100,14 @@ class Session:
             job.result()
         self.analyst.inbox.put(None)
         self.analyst.join()
+        self._wakefulness.close()
 
     def tick(self) -> None:
         """Five times a second, on the main thread."""
+        if self.recording:
+            self._wakefulness.hold()
+        else:
+            self._wakefulness.let_go()
         self._publisher.send("health", self.watchdog.look(self._reader, self.analyst.overloaded))
 
     @property
@@ -110,6 +117,11 @@ class Session:
     @property
     def recording(self) -> bool:
         return self.recorder.status.recording
+
+    @property
+    def busy(self) -> bool:
+        """Whether a run is being recorded or made into its file."""
+        return self.recording or self.state is State.SAVING or not all(job.done() for job in self._jobs)
 
     # -- between the threads ---------------------------------------------------------------------
 
