@@ -43,7 +43,8 @@ def verify_command(
     Every sample is read and its checksums proven. Exit code 0 if all is well, 1 if not.
     """
     with reported():
-        reports = [verify(path) for path in paths]
+        with Console(stderr=True).status("reading every sample …"):
+            reports = [verify(path) for path in paths]
         if as_json:
             typer.echo(json.dumps([_report_dict(report) for report in reports], ensure_ascii=False))
         else:
@@ -105,7 +106,8 @@ def recover_command(
     being recorded is left alone. Exit code 1 if a journal could not be used.
     """
     with reported():
-        results = recover(folder, thorough=not quick)
+        with Console(stderr=True).status("recovering …"):
+            results = recover(folder, thorough=not quick)
         if as_json:
             typer.echo(json.dumps([_recovery_dict(result) for result in results], ensure_ascii=False))
         elif not results:
@@ -180,7 +182,8 @@ def import_command(
     with reported():
         rig_text = read_text(rig)
         import_map = load_import_map(map_) if map_ else None
-        report = import_file(file, parse_rig(rig_text, str(rig)), rig_text, out, import_map)
+        with Console(stderr=True).status(f"importing {file.name} …"):
+            report = import_file(file, parse_rig(rig_text, str(rig)), rig_text, out, import_map)
     if as_json:
         document = {
             "run": str(report.run),

@@ -7,6 +7,7 @@ Source: The MathWorks, "MAT-File Format", level 5.
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 from collections.abc import Iterator
@@ -179,33 +180,28 @@ class Mat5File:
         """Stream standing at the variable's numbers; their type and bytes."""
         stream, _ = self._open_element(variable.offset)
         self._read_head(stream, variable.offset)
-        return stream, *self._tag(stream)
+        kind, n_bytes, inline = self._tag(stream)
+        return (stream if inline is None else io.BytesIO(inline)), kind, n_bytes
 
-    def _tag(self, stream: _Stream) -> tuple[int, int]:
+    def _tag(self, stream: _Stream) -> tuple[int, int, bytes | None]:
         """Type and length of the element that follows; short ones keep their data in the tag."""
         raw = self._exactly(stream, 8)
         (first,) = self._unpack("I", raw[:4])
-        if first >> 16:  # small element: length and type share a word, the data is the other
-            self._pending = raw[4 : 4 + min(first >> 16, 4)]
-            return first & 0xFFFF, len(self._pending)
-        self._pending = b""
-        return first, int(self._unpack("I", raw[4:])[0])
+        if first >> 16:  # small element: length and type share a word, the other word is the data
+            inline = raw[4 : 4 + min(first >> 16, 4)]
+            return first & 0xFFFF, len(inline), inline
+        return first, self._unpack("I", raw[4:])[0], None
 
     def _small(self, stream: _Stream, limit: int) -> bytes:
         """A whole short element with its padding."""
-        _, n_bytes = self._tag(stream)
+        _, n_bytes, inline = self._tag(stream)
+        if inline is not None:
+            return inline
         if n_bytes > limit:
             raise self._damaged("the head of a variable is absurdly long")
-        if self._pending:
-            data, self._pending = self._pending, b""
-            return data
         return self._exactly(stream, n_bytes + -n_bytes % 8)[:n_bytes]
 
     def _exactly(self, stream: _Stream, n_bytes: int) -> bytes:
-        pending = getattr(self, "_pending", b"")
-        if pending:
-            self._pending = b""
-            return pending
         parts = []
         try:
             while n_bytes:
