@@ -100,8 +100,10 @@ class Analyst(threading.Thread):
                 self._sequence = None
                 self._go(State.SAVING, f"{item.end.text}. The run file is being made")
             case Saved():
-                self.run_path = item.path
-                self._go(State.SAVED if item.ok else State.FAILED, item.text)
+                # The next test may be armed already: then its state is the one that matters.
+                if self._sequence is None:
+                    self.run_path = item.path
+                    self._go(State.SAVED if item.ok else State.FAILED, item.text)
             case Noted() | End():
                 return
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import secrets
 import signal
@@ -90,7 +91,8 @@ class Process:
         if self._interrupted:
             return 130
         if self._unattended is not None and self._unattended.exit_code:
-            print(self._unattended.text, file=sys.stderr, flush=True)
+            with contextlib.suppress(OSError):  # whoever started us may be gone
+                print(self._unattended.text, file=sys.stderr, flush=True)
             return self._unattended.exit_code
         return 0
 

@@ -111,6 +111,20 @@ def test_an_arming_without_a_sample_leaves_no_run_and_no_trouble(live: Lives) ->
     assert not list(lab.folder.glob("*.journal"))
 
 
+def test_the_next_test_can_be_armed_while_the_last_is_still_being_saved(live: Lives) -> None:
+    lab = live()
+    lab.zero_and_arm("FR1-L1-1")
+    lab.driver.let(12_000)
+    lab.wait_for(lambda m: isinstance(m, HealthMessage) and m.acknowledged_sample == 12_000)
+    assert lab.ask("stop").ok
+    lab.wait_for_state(State.SAVING)
+    reply = lab.ask("arm", test="FR1-L1-2")
+    assert reply.ok, reply.text
+    lab.wait_for_event("saved", test="FR1-L1-1")
+    state = lab.wait_for(lambda m: isinstance(m, StateMessage))
+    assert (state.state, state.test) == (State.ARMED, "FR1-L1-2")
+
+
 def test_after_the_release_a_test_is_stopped_not_aborted(live: Lives, wall_test: Any) -> None:
     lab = live()
     lab.zero_and_arm()
