@@ -87,7 +87,7 @@ def _picture(analysis: TestAnalysis, path: Path) -> Path:
     rotation.plot(time, series.rotation_rad[::step] / alpha, lw=0.8, color="tab:blue")
     rotation.set_ylabel("θ/α")
     velocity.plot(time, series.velocity_rad_s[::step], lw=0.8, color="tab:red")
-    velocity.set_ylabel("θ̇, rad/s")
+    velocity.set_ylabel(r"$\dot{\theta}$, rad/s")
     velocity.set_xlabel("time from the release, s")
     cycles = [c for c in analysis.half_cycles if math.isfinite(c.peak_rad)]
     peak_times = [c.start_s - start + (0.0 if c.n == 0 else 0.5 * c.duration_s) for c in cycles]

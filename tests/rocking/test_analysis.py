@@ -253,3 +253,26 @@ def test_a_record_without_wires_is_refused_in_words(made):
         analyse_record(record)
     with pytest.raises(ValueError, match="as many rows"):
         TestRecord.from_array(test.rig, test.rate_hz, test.si[:3])
+
+
+def test_known_delays_of_a_family_are_taken_out(made):
+    """LVDTs sampled 3 ms late and accelerometers 5 ms early, both declared: nothing moves."""
+    test = made(phi=0.35, r=0.895, side=-1, seed=8, full=True)
+    si, offsets = test.si.copy(), dict(test.offsets_s)
+    for row, channel in enumerate(test.rig.channels):
+        shift = {"lvdt": 12, "accelerometer": -20}.get(channel.family, 0)
+        si[row] = np.roll(si[row], -shift)
+        offsets[channel.id] += shift / test.rate_hz
+    analysis = analyse_record(record_of(test, si, time_offsets_s=offsets), QUICK)
+    inner = slice(100, -100)
+    truth = test.motion.at(analysis.series.time_s)[0]
+    moving = (analysis.series.time_s > test.motion.release_s)[inner]
+    assert np.abs(analysis.series.best_rotation_rad - truth)[inner][moving].max() < 4e-4
+    shocks = np.array([cycle.accelerometer_s for cycle in analysis.half_cycles[1:13]])
+    np.testing.assert_allclose(shocks, test.motion.impacts_s[:12], atol=5e-4)
+
+
+def test_the_simulated_bias_has_this_tests_noise(whole):
+    _, analysis = whole
+    assert 1e-5 < analysis.bias["eav_filtered"].scatter < 5e-3
+    assert analysis.bias["eav"].runs == 6 and analysis.bias["fit"].runs == 2

@@ -189,3 +189,12 @@ def test_jacobian_of_the_fit_is_that_of_its_residual(spread):
         step[column] = 1e-5
         numeric = (model.residual(x + step, 9, 5.5) - model.residual(x - step, 9, 5.5)) / 2e-5
         np.testing.assert_allclose(analytic[:, column], numeric, atol=1e-4 * np.abs(numeric).max())
+
+
+def test_a_gain_that_differs_by_side_does_not_reach_eav():
+    """Pairs are of the same side: speeds that read 5 % high on one side change nothing."""
+    speeds = 0.3 * 0.9 ** np.arange(12.0)
+    speeds[::2] *= 1.05
+    estimate = eav(speeds.tolist(), (1e-4 * speeds).tolist())
+    assert estimate.r == pytest.approx(0.9, abs=1e-6)
+    assert estimate.scatter == 0.0 and estimate.standard_error < 1e-4
