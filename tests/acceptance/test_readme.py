@@ -22,7 +22,7 @@ def readme_command(repository: Path, marker: str) -> list[str]:
     return shlex.split(match["line"].split("uv run ")[1])
 
 
-def daq_app(*arguments: str, cwd: Path, timeout_s: float = 150.0) -> subprocess.CompletedProcess[str]:
+def daq_app(*arguments: str, cwd: Path, timeout_s: float = 500.0) -> subprocess.CompletedProcess[str]:
     """Run the installed console script as a user does."""
     script = Path(sys.executable).with_name("daq-app")
     return subprocess.run(

@@ -174,9 +174,9 @@ class Live:
     heard: list[Message] = field(default_factory=list)
 
     def ask(self, name: str, **arguments: float | str) -> Reply:
-        return self.client.request(name, timeout_s=20.0, **arguments)
+        return self.client.request(name, timeout_s=60.0, **arguments)
 
-    def wait_for(self, right: Callable[[Message], bool], timeout_s: float = 30.0) -> Message:
+    def wait_for(self, right: Callable[[Message], bool], timeout_s: float = 150.0) -> Message:
         """Listen until a message is the right one; all are kept in `heard`."""
         deadline = time.monotonic() + timeout_s
         while time.monotonic() < deadline:
@@ -220,7 +220,7 @@ class Live:
 
     def _ask_apart(self, name: str) -> Reply:
         with AcquisitionClient(self.client._address, TOKEN, topics=()) as client:
-            return client.request(name, timeout_s=20.0)
+            return client.request(name, timeout_s=60.0)
 
 
 @pytest.fixture(scope="session")

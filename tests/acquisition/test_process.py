@@ -87,11 +87,11 @@ class Running:
             assert time.monotonic() < deadline
             self.process.join(0.02)
             session = read_session_file(out)
-        self.client = AcquisitionClient(session.address, session.token, timeout_s=30.0)
+        self.client = AcquisitionClient(session.address, session.token, timeout_s=60.0)
         self.acknowledged = 0
         self.test_journal = ""
 
-    def wait_for(self, right: Callable[[Message], bool], timeout_s: float = 60.0) -> Message:
+    def wait_for(self, right: Callable[[Message], bool], timeout_s: float = 200.0) -> Message:
         deadline = time.monotonic() + timeout_s
         while time.monotonic() < deadline:
             received = self.client.receive(0.2)

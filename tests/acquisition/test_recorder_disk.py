@@ -79,7 +79,7 @@ class Bench:
 
         return note
 
-    def until(self, right: Callable[[], bool], timeout_s: float = 10.0) -> None:
+    def until(self, right: Callable[[], bool], timeout_s: float = 60.0) -> None:
         deadline = time.monotonic() + timeout_s
         with self.changed:
             while not right():
