@@ -67,7 +67,7 @@ def page(qtbot, settings, run_file):
     qtbot.addWidget(window)
     window.show()
     window.open_run(run_file)
-    qtbot.waitUntil(lambda: window.replay.run is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: window.replay.run is not None, timeout=120_000)
     yield window.replay
     window.replay.run.close()
 
@@ -115,7 +115,7 @@ def test_a_rejected_test_is_offered_again_at_once(qtbot, configs, run_file):
 
     page = CampaignPage(Background())
     qtbot.addWidget(page)
-    with qtbot.waitSignal(page.scanned, timeout=20_000):
+    with qtbot.waitSignal(page.scanned, timeout=120_000):
         page.set_campaign(load_campaign(configs / "campaigns" / "costa.toml"), run_file.parent, "FR1")
     assert str(page.proposal.name) == "FR1-L1-2"
     page.table.selectRow(0)
@@ -124,7 +124,7 @@ def test_a_rejected_test_is_offered_again_at_once(qtbot, configs, run_file):
     page.reject_button.click()
     assert "Say why" in told[0]
     page._reason.setText("a rope touched the wall")
-    with qtbot.waitSignal(page.scanned, timeout=20_000):
+    with qtbot.waitSignal(page.scanned, timeout=120_000):
         page.reject_button.click()
     assert page.proposal.planned.name.number == 1
     assert "rope" in page.proposal.reason

@@ -58,7 +58,7 @@ def test_the_chooser_shows_why_a_rig_cannot_be_opened_and_stays(qtbot, settings,
     window._add(bad)
     window.rigs.setCurrentRow(0)
     window.go.click()
-    qtbot.waitUntil(lambda: "bad.toml" in window.message.text())
+    qtbot.waitUntil(lambda: "bad.toml" in window.message.text(), timeout=60_000)
     assert window.go.isEnabled()
 
 
@@ -71,7 +71,7 @@ def test_the_chooser_closes_once_the_window_is_open(qtbot, settings, tmp_path, c
     window._add(configs / "fr1.toml")
     window.rigs.setCurrentRow(0)
     window.go.click()
-    qtbot.waitUntil(lambda: window.isHidden())
+    qtbot.waitUntil(lambda: window.isHidden(), timeout=60_000)
     assert opened == [(configs / "fr1.toml", tmp_path)]
 
 

@@ -67,7 +67,7 @@ def test_from_the_check_to_the_next_test(qtbot, acquisition, configs, settings):
         qtbot.waitUntil(lambda: session.current_state is state, timeout=timeout_ms)
 
     # The campaign proposes the first test, and its target.
-    qtbot.waitUntil(lambda: window.campaign.status is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: window.campaign.status is not None, timeout=120_000)
     reach(State.PREVIEWING)
     window.actions_bar.buttons["next"].setEnabled(True)
     window.actions_bar.buttons["next"].click()
@@ -75,13 +75,13 @@ def test_from_the_check_to_the_next_test(qtbot, acquisition, configs, settings):
     assert prepare.card.choice.target_ratio == 0.15
 
     # Check the sensors, then zero.
-    qtbot.waitUntil(lambda: session.recent(3.0) is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: session.recent(3.0) is not None, timeout=120_000)
     window._on_slow()
     prepare.check_button.click()
-    qtbot.waitUntil(lambda: prepare.check is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: prepare.check is not None, timeout=120_000)
     assert prepare.check.verdict is Verdict.GO, prepare.check.summary
     prepare.tare_button.click()
-    qtbot.waitUntil(lambda: bool(prepare.zero.record), timeout=20_000)
+    qtbot.waitUntil(lambda: bool(prepare.zero.record), timeout=120_000)
     assert set(prepare.zero.readings) == set(session.rig.channel_ids)
 
     # Arm, pull, take the pull test while the wall is held, release.
@@ -89,7 +89,7 @@ def test_from_the_check_to_the_next_test(qtbot, acquisition, configs, settings):
     window.actions_bar.buttons["arm"].click()
     reach(State.ARMED)
     assert window.stack.currentWidget() is window.live
-    qtbot.waitUntil(lambda: session.recording_on_disk, timeout=20_000)
+    qtbot.waitUntil(lambda: session.recording_on_disk, timeout=120_000)
     window._on_slow()
     assert window.header.words["recording"] == "Recording"
     prepare.wall.order("pull")
@@ -101,11 +101,11 @@ def test_from_the_check_to_the_next_test(qtbot, acquisition, configs, settings):
     assert abs(prepare.check.pull_rotation_rad) == pytest.approx(0.15 * session.alpha_rad, rel=0.1)
     prepare.wall.order("release")
     qtbot.waitUntil(lambda: session.estimate is not None and len(session.estimate.eav) >= 2, timeout=60_000)
-    qtbot.waitUntil(lambda: window.live.restitution.shown["eav"] >= 2, timeout=5_000)
+    qtbot.waitUntil(lambda: window.live.restitution.shown["eav"] >= 2, timeout=60_000)
 
     # It ends by itself, the result appears, and the next test is offered.
     reach(State.SAVED, 90_000)
-    qtbot.waitUntil(lambda: window.result.result is not None, timeout=90_000)
+    qtbot.waitUntil(lambda: window.result.result is not None, timeout=200_000)
     assert window.stack.currentWidget() is window.result
     test = window.result.result.test
     assert test.test == "FR1-L1-1"
@@ -115,7 +115,7 @@ def test_from_the_check_to_the_next_test(qtbot, acquisition, configs, settings):
     assert run.with_suffix(".result.pdf").read_bytes().startswith(b"%PDF")
     qtbot.waitUntil(
         lambda: window.campaign.proposal is not None and str(window.campaign.proposal.name) == "FR1-L1-2",
-        timeout=20_000,
+        timeout=120_000,
     )
     window.result.buttons["next"].click()
     assert prepare.card.choice.name == "FR1-L1-2"
@@ -179,7 +179,7 @@ def test_a_window_without_the_token_watches_and_cannot_command(qtbot, acquisitio
     qtbot.waitUntil(lambda: window.session.fresh(BlockMessage), timeout=60_000)
     window._on_slow()
     assert not any(button.isEnabled() for button in window.actions_bar.buttons.values())
-    with qtbot.waitSignal(window.link.replied, timeout=10_000) as replied:
+    with qtbot.waitSignal(window.link.replied, timeout=60_000) as replied:
         window.link.request("arm", {"test": "FR1-L1-1"})
     assert not replied.args[1].ok
     assert "may watch, not command" in replied.args[1].text

@@ -149,7 +149,7 @@ def test_a_background_failure_is_handed_back_not_swallowed(qtbot):
         raise ValueError("no")
 
     background.run(fail, lambda _: None, failures.append)
-    qtbot.waitUntil(lambda: bool(failures))
+    qtbot.waitUntil(lambda: bool(failures), timeout=60_000)
     assert isinstance(failures[0], ValueError)
     assert not background.busy
 
@@ -286,14 +286,14 @@ def test_the_level_follows_from_the_name_and_notes_do_not_linger(qtbot):
 def test_the_check_ends_in_a_verdict_with_the_worst_channel_on_top(qtbot, window, stand_in, rig):
     play(window, stand_in, 3.5)
     window.prepare.run_check()
-    qtbot.waitUntil(lambda: window.prepare.check is not None)
+    qtbot.waitUntil(lambda: window.prepare.check is not None, timeout=60_000)
     assert window.prepare.verdict_text == "Go"
     row = rig.channel_ids.index("WP-3")
     for _, readings in window.session._recent:
         readings[row] = 0.0
     window.prepare.check = None
     window.prepare.run_check()
-    qtbot.waitUntil(lambda: window.prepare.check is not None)
+    qtbot.waitUntil(lambda: window.prepare.check is not None, timeout=60_000)
     assert window.prepare.verdict_text == "No-go"
     model = window.prepare.table.check_model
     assert [model.data(model.index(0, c)) for c in (0, 1)] == ["No-go", "WP-3"]
