@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from daq_app.cli.app import build_app
-from daq_app.gap.blind.case_files import run_files
+from daq_app.gap.blind.layout import run_files
 from daq_app.gap.blind.runner import case_folders, pending, read_outcome, run_pending
 from daq_app.gap.blind.seal import SealBroken, open_label, seal_case
 from daq_app.runfile import open_run
@@ -20,7 +20,8 @@ import os, sys, time
 from pathlib import Path
 
 def guess(case):
-    return {"decision": "effect", "which": [{"effects": ["viscous"], "family": "dissipation", "probability": 0.9}]}
+    first = {"effects": ["viscous"], "family": "dissipation", "probability": 0.9}
+    return {"decision": "effect", "which": [first]}
 
 def look_around(case):
     """Everything within reach that could tell: files of the case, above it, arguments, environment."""

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from daq_app.gap.blind.seal import SEAL_FILE, SealBroken, open_label, seal_case
+from daq_app.gap.blind.layout import SEAL_FILE
+from daq_app.gap.blind.seal import SealBroken, open_label, seal_case
 
 LABEL = {"case": "case_0001", "category": "single", "effects": [{"name": "viscous"}]}
 

@@ -8,18 +8,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.config import Rig, plan_tasks
+from daq_app.gap.blind.layout import RIG_FILE
 from daq_app.gap.blind.world.campaign import MadeRun, World
 from daq_app.runfile import Event, Gap, RunHeader, plan_to_dict
 from daq_app.runfile.saving import save_run
 from daq_app.runfile.source import Provenance
-
-RIG_FILE: Final = "rig.toml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +71,3 @@ def _header(case: str, run: MadeRun, world: World, rig_text: str, start_utc_ns: 
         tare=dict(world.calibration.tare_reading),
         start_utc_ns=start_utc_ns + round(run.plan.campaign_s * 1e9),
     )
-
-
-def run_files(folder: Path) -> list[Path]:
-    """Run files of a case in the order of their names."""
-    return sorted(folder.glob("*.h5"))

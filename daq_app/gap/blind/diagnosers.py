@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from daq_app.gap.blind.case_files import RIG_FILE, run_files
+from daq_app.gap.blind.layout import RIG_FILE, run_files
 
 Result = dict[str, Any]
 Diagnoser = Callable[[Path], Result]

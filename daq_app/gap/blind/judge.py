@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from daq_app.gap.blind.names import base_name, families_of
+from daq_app.gap.blind.names import COMPARABLE, base_name, families_of
 from daq_app.gap.blind.runner import Outcome
 
 DECISIONS: Final = (
@@ -174,40 +174,28 @@ def _outside_score(decision: str, result: dict[str, Any], which: Sequence[Hypoth
 
 
 def _parameter(label: dict[str, Any], result: dict[str, Any], decision: str) -> tuple[float, bool | None]:
-    """Relative error and coverage of the strength of a single effect that was named rightly.
+    """Relative error and coverage of the strength of a single effect, where the two numbers compare.
 
-    Only where the result carries the parameter under the generator's name or its stem
-    (``zeta``, ``theta_c``), on the same scale.
+    Names are ``zeta`` or ``viscous.zeta``. Which side is + is a matter of convention: a result with
+    the other sign is turned round before it is compared.
     """
-    if label["category"] != "single" or decision != "effect":
+    effects = label["effects"]
+    if label["category"] != "single" or decision != "effect" or effects[0]["name"] not in COMPARABLE:
         return math.nan, None
-    effect = label["effects"][0]
-    key, truth = next(iter(effect["parameters"].items()))
-    estimates = [*(result.get("effect_parameters") or []), *(result.get("parameters") or [])]
-    for estimate in estimates:
-        name = base_name(str(estimate.get("name", "")))
-        if not _same_parameter(name, key, effect["accept"]):
+    wanted = COMPARABLE[effects[0]["name"]]
+    truth = float(next(iter(effects[0]["parameters"].values())))
+    for estimate in [*(result.get("effect_parameters") or []), *(result.get("parameters") or [])]:
+        effect, dot, parameter = str(estimate.get("name", "")).rpartition(".")
+        if parameter != wanted or (dot and base_name(effect) != effects[0]["name"]):
             continue
         try:
-            value, low, high = (float(estimate[k]) for k in ("value", "low", "high"))
+            value, low, high = (float(estimate[key]) for key in ("value", "low", "high"))
         except (KeyError, TypeError, ValueError):
             continue
-        if truth == 0:
-            continue
+        if value * truth < 0:
+            value, low, high = -value, -high, -low
         return abs(value - truth) / abs(truth), low <= truth <= high
     return math.nan, None
-
-
-def _same_parameter(name: str, key: str, accept: Sequence[str]) -> bool:
-    stem = key
-    for unit in ("_rad_s", "_s_rad", "_1_s", "_1_m", "_m_s2", "_m_s", "_rad", "_hz", "_si", "_m", "_s"):
-        if stem.endswith(unit):
-            stem = stem.removesuffix(unit)
-            break
-    effect, dot, parameter = name.rpartition(".")
-    if dot and base_name(effect) not in accept:
-        return False
-    return parameter in (key, stem)
 
 
 def _number(values: dict[str, Any], key: str) -> float:

@@ -14,12 +14,12 @@ import numpy as np
 from daq_app.config import Rig, parse_rig
 from daq_app.gap.blind.case_files import write_case
 from daq_app.gap.blind.detectability import detectability
+from daq_app.gap.blind.layout import CASE_PREFIX, SEAL_FILE
 from daq_app.gap.blind.mix import case_generator, category_of, draw_effects
 from daq_app.gap.blind.names import accepted_names
-from daq_app.gap.blind.seal import SEAL_FILE, seal_case
+from daq_app.gap.blind.seal import seal_case
 from daq_app.gap.blind.world.campaign import MadeRun, World, draw_world
 
-CASE_PREFIX: Final = "case_"
 _EPOCH_UTC_NS: Final = 1_767_225_600 * 10**9
 """2026-01-01: campaigns start within the hundred days after it."""
 

@@ -39,6 +39,32 @@ _OTHER_WORDS: Final[dict[str, tuple[str, ...]]] = {
     "swap": ("channel_swap",),
 }
 
+COMPARABLE: Final[dict[str, str]] = {
+    "pivot_shift": "a",
+    "winkler": "theta_c",
+    "rounded_edge": "rho",
+    "restitution_slope": "k",
+    "restitution_asymmetry": "d",
+    "viscous": "zeta",
+    "coulomb": "mu",
+    "alpha_asymmetry": "delta",
+    "base_tilt": "beta",
+    "eccentric_mass": "e",
+    "sliding": "c",
+    "dwell": "tau",
+    "bounce": "tau",
+    "residual_cable": "k",
+    "slow_release": "tau",
+    "ambient": "amplitude",
+    "gain": "error",
+    "lag": "tau",
+    "slow_response": "tau",
+    "filter_delay": "tau",
+    "wire_inertia": "frequency",
+    "clock": "error",
+}
+"""Effects whose strength means the same number in the generator and in a result, and its name there."""
+
 
 def base_name(name: str) -> str:
     """Name without its target."""

@@ -23,10 +23,9 @@ from typing import Any, Final
 
 import psutil
 
-from daq_app.gap.blind.make import CASE_PREFIX
-from daq_app.gap.blind.seal import SEAL_FILE, check_files, file_sha256, read_seal
+from daq_app.gap.blind.layout import CASE_PREFIX, RESULTS, SEAL_FILE
+from daq_app.gap.blind.seal import check_files, file_sha256, read_seal
 
-RESULTS: Final = "results"
 _WORDS_KEPT: Final = 4000
 
 

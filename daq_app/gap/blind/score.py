@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from daq_app.gap.blind.judge import Judged, judge
+from daq_app.gap.blind.layout import SEAL_FILE
 from daq_app.gap.blind.runner import case_folders, read_outcome
-from daq_app.gap.blind.seal import SEAL_FILE, SealBroken, file_sha256, open_label
+from daq_app.gap.blind.seal import SealBroken, file_sha256, open_label
 from daq_app.gap.blind.statistics import (
     NOTHING,
     Value,

@@ -14,7 +14,8 @@ import secrets
 from pathlib import Path
 from typing import Any, Final
 
-SEAL_FILE: Final = "seal.json"
+from daq_app.gap.blind.layout import SEAL_FILE
+
 _FORMAT: Final = 1
 _HASH_CHUNK: Final = 2**20
 
