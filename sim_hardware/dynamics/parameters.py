@@ -74,7 +74,7 @@ BOUNCE_SPEED: Final = 0.2
 """Approach speed (rad/s) at which a bounce takes `BOUNCE` seconds; the flight grows with the speed."""
 REST_AMPLITUDE_RAD: Final = 2e-5
 """Default rest criterion: 0.02 mrad is 0.06 mm at the top of a 3 m wall, far below any sensor's noise."""
-STEP_TOLERANCE: Final = 1e-11
+STEP_TOLERANCE: Final = 1e-10
 
 
 def base_vector(body: Body) -> NDArray[np.float64]:
