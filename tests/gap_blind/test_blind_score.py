@@ -75,7 +75,7 @@ def perfect(label: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
     # A 95 % set that always held the truth would be too wide, and so would such an interval.
     if label["category"] in ("pair", "null") and number % 8 == 0:
         return claim(["polarity"] if names != ["polarity"] else ["swap"], 0.3, "cannot_tell")
-    width = 0.005 if number % 19 == 0 else 0.1
+    width = 0.005 if number % 15 == 1 else 0.1
     parameters = [
         {
             "name": f"{e['name']}.{COMPARABLE.get(e['name'], key)}",
