@@ -176,6 +176,12 @@ def _swing(
 
 
 @part
+def _too_tired(q: float, v: float, rest_energy: float, rest_amplitude: float) -> bool:
+    """Whether the energy at (q, v) would not lift the wall to the amplitude that counts as rest."""
+    return q < rest_amplitude and 0.5 * v * v + rest_energy * q / rest_amplitude <= rest_energy
+
+
+@part
 def _fill_flat(pieces: NDArray[np.float64], n: int, t: float, q: float, v: float, side: float) -> int:
     """A row of constant velocity; returns the rows used."""
     row = pieces[n]
@@ -214,7 +220,7 @@ def integrate(
     limit = min(impacts.shape[0] - 2, peaks.shape[0] - 1)
     while True:
         c = both[1 if side > 0.0 else 0]
-        if q <= 0.0 and 0.5 * v * v <= rest_energy[1 if side > 0.0 else 0]:
+        if n_peaks > 0 and _too_tired(q, v, rest_energy[1 if side > 0.0 else 0], vector[par.REST_AMPLITUDE]):
             return _fill_flat(pieces, n, t, 0.0, 0.0, 0.0), n_impacts, n_peaks, AT_REST, t
         ended, n = _swing(t, q, v, side, t_end, vector[par.TOLERANCE], c, pieces, n, out)
         t, q, v = out[0], out[1], out[2]
