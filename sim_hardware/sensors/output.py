@@ -62,7 +62,7 @@ def _seen_at(row: NDArray[np.float64], key: np.uint64, t: float) -> float:
     """Instant of the wall that a sample at `t` shows: clock error, stuck sensor, drop-outs."""
     t = min(t * row[la.RW_CLOCK], row[la.RW_STUCK])
     if row[la.RW_DROP_SHARE] > 0.0:
-        k = np.int64(math.floor(t / row[la.RW_DROP_S]))
+        k = np.int64(math.floor(t / row[la.RW_DROP_S] + 1e-9))
         if share(key ^ np.uint64(0x5851F42D4C957F2D), k) < row[la.RW_DROP_SHARE]:
             t = k * row[la.RW_DROP_S]
     return float(t)
