@@ -99,7 +99,7 @@ def figures() -> list[Figure]:
         Figure(
             "analysis of a 20 s run", statistics.median(whole), "s", _RUNS, 1.0, note=note + ", with bias"
         ),
-        Figure("processor time of it", processor, "s", note="does not grow with other load on the machine"),
+        Figure("processor time of it", processor, "s", note="one run; BLAS threads included"),
         Figure("the same without simulated bias", statistics.median(bare), "s", _RUNS, 1.0),
         *_accuracy(rig, plan),
     ]
