@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
+from nptdms.log import log_manager
 from scipy.io import savemat
 
 from daq_app.config import ConfigError, Rig
@@ -122,7 +123,11 @@ def test_unequal_channels_are_padded_with_nan_and_doubted(tmp_path: Path, bring)
         assert [event.kind for event in run.events] == ["short channel"]
 
 
-def test_tdms_cut_short_keeps_what_is_there_and_says_so(tmp_path: Path, bring) -> None:
+def test_tdms_cut_short_keeps_what_is_there_and_says_so(
+    tmp_path: Path, bring, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    printed = io.StringIO()
+    monkeypatch.setattr(log_manager.console_handler, "stream", printed)
     values = np.arange(9000.0) * 1e-4
     path = write_tdms(tmp_path / "t.tdms", {"WP-1": values})
     data = path.read_bytes()
@@ -132,6 +137,7 @@ def test_tdms_cut_short_keeps_what_is_there_and_says_so(tmp_path: Path, bring) -
     with open_run(report.run) as run:
         np.testing.assert_array_equal(run.readings()[0], values[: run.n_samples])
         assert run.n_samples > 6000
+    assert printed.getvalue() == ""
 
 
 def test_real_unscaled_daqmx_data(shared_data: Path, bring) -> None:

@@ -22,6 +22,7 @@ from daq_app.runfile.importers.recording import Findings, ForeignChannel, Spool
 _WHOLE_CHUNK_BYTES: Final = 2**26
 """Chunks of all channels up to this size are read at once; larger ones channel by channel."""
 _MAX_LISTED: Final = 20_000
+_MAX_MESSAGE: Final = 200
 
 
 class TdmsReader:
@@ -79,8 +80,11 @@ class TdmsReader:
     def _told(self, what: str) -> Iterator[None]:
         """npTDMS raises many kinds of errors and logs what it doubts: both reach the operator."""
         heard = _Listener(self.findings.doubts)
-        logger = logging.getLogger("nptdms")
-        logger.addHandler(heard)
+        loggers = [logging.getLogger(name) for name in logging.root.manager.loggerDict if "nptdms" in name]
+        # Its own handlers would write to the terminal, damaged bytes and all.
+        before = [(logger, logger.handlers, logger.propagate) for logger in loggers]
+        for logger in loggers:
+            logger.handlers, logger.propagate = [heard], False
         try:
             yield
         except RunFileError:
@@ -91,7 +95,8 @@ class TdmsReader:
                 f"{self._path} {what} ({reason})", advice="Is it a whole TDMS file?"
             ) from error
         finally:
-            logger.removeHandler(heard)
+            for logger, handlers, propagate in before:
+                logger.handlers, logger.propagate = handlers, propagate
 
 
 class _Listener(logging.Handler):
@@ -100,7 +105,7 @@ class _Listener(logging.Handler):
         self._doubts = doubts
 
     def emit(self, record: logging.LogRecord) -> None:
-        text = f"TDMS: {record.getMessage()}"
+        text = f"TDMS: {record.getMessage()[:_MAX_MESSAGE]}"
         if text not in self._doubts and len(self._doubts) < 100:
             self._doubts.append(text)
 
