@@ -13,7 +13,10 @@ from collections.abc import Callable, Iterator
 from multiprocessing.context import ForkServerContext, SpawnContext
 from pathlib import Path
 
+import grpc
 import pytest
+import session_pb2
+import session_pb2_grpc
 
 from daq_app.acquisition import AcquisitionClient, AcquisitionDied, AcquisitionProcess, read_session_file
 from daq_app.acquisition.messages import HealthMessage, Message, State, StateMessage
@@ -25,6 +28,7 @@ from sim_hardware.control import SimControl
 SPEED = 5
 """Slow enough that a busy machine keeps up: at this speed the buffer of 20 s lasts 4 s."""
 RESTITUTION = 0.75
+RATE_HZ = 4000
 
 
 @pytest.fixture(scope="module")
@@ -56,9 +60,16 @@ def wall(server: SimulatedServer) -> Iterator[SimControl]:
     """The simulated wall, upright and whole."""
     with SimControl(server.connection) as control:
         control.command("clear_faults")
+        free_the_hardware(server)
         control.command("reset")
         yield control
         control.command("clear_faults")
+
+
+def free_the_hardware(server: SimulatedServer) -> None:
+    """Forget what killed sessions left on the server, as its operator would with a reset."""
+    with grpc.insecure_channel(server.connection.removeprefix("grpc://")) as channel:
+        session_pb2_grpc.SessionUtilitiesStub(channel).ResetServer(session_pb2.ResetServerRequest())
 
 
 def _context() -> ForkServerContext | SpawnContext:
@@ -130,7 +141,7 @@ class Running:
         return self.wait()
 
     def wait(self) -> int:
-        self.process.join(60)
+        self.process.join(200)
         self.client.close()
         code = self.process.exitcode
         if code is None:
@@ -156,9 +167,17 @@ def start(
 
 
 def whole_test(running: Running, wall: SimControl, test: str) -> StateMessage:
+    running.wait_for_state(State.PREVIEWING)
+    zeroed = running.client.request("tare", timeout_s=60.0)
+    assert zeroed.ok, zeroed.text
+    running.wait_for_state(State.PREVIEWING)
+    zeroed = running.client.request("tare", timeout_s=60.0)
+    assert zeroed.ok, zeroed.text
     running.arm(test)
     wall.command("pull", duration_s=1.0)
-    running.wait_for_state(State.HOLDING)
+    held = running.wait_for_state(State.HOLDING)
+    # As in a lab: the wall hangs still for a while before it is let go.
+    running.wait_for(lambda m: isinstance(m, HealthMessage) and m.sample >= held.sample + 3 * RATE_HZ)
     wall.command("release")
     return running.wait_for_state(State.SAVED, State.FAILED)
 
@@ -190,7 +209,7 @@ def test_killed_at_twenty_random_moments_every_run_is_recovered_by_the_next_star
         safe[stem] = running.acknowledged
         running.kill()
     last = start()
-    last.wait_for_state(State.PREVIEWING)
+    last.wait_for(lambda m: not list((tmp_path / "runs").glob("*.journal")), timeout_s=300.0)
     assert last.end() == 0
     for stem, acknowledged in safe.items():
         path = tmp_path / "runs" / f"{stem}.h5"
@@ -357,8 +376,8 @@ def test_a_killed_viewer_costs_no_sample(start: Callable[..., Running], wall: Si
         results = run.derived.results
         assert results["quality"]["verdict"] == "good"
         for method in ("eav", "crt"):
-            assert results["analysis"]["estimates"][method]["r"] == pytest.approx(RESTITUTION, abs=0.005)
-            assert results["online"][f"{method}_mean"] == pytest.approx(RESTITUTION, abs=0.005)
+            assert results["analysis"]["estimates"][method]["r"] == pytest.approx(RESTITUTION, abs=0.003)
+            assert results["online"][f"{method}_mean"] == pytest.approx(RESTITUTION, abs=0.003)
     assert running.end() == 0
 
 
