@@ -36,6 +36,7 @@ class Finaliser(threading.Thread):
         super().__init__(name="finaliser", daemon=True)
         self._jobs: queue.SimpleQueue[tuple[dict[str, str], Future[Finished]] | None] = queue.SimpleQueue()
         self._worker: subprocess.Popen[str] | None = None
+        self._closing = False
 
     def submit(self, job: dict[str, str], then: Callable[[Finished], None] | None = None) -> Future[Finished]:
         """Do ``{"job": "finalise", "journal": …, "out": …}`` or ``{"job": "recover", "journal": …}``.
@@ -56,12 +57,16 @@ class Finaliser(threading.Thread):
             if entry is None:
                 break
             job, done = entry
-            done.set_result(self._do(job))
+            if self._closing and job["job"] == "recover":
+                done.set_result(Finished(True, ""))  # the next start does it
+            else:
+                done.set_result(self._do(job))
         if self._worker is not None:
             end_guarded(self._worker)
 
     def close(self) -> None:
-        """Finish what was submitted, then end the worker."""
+        """Finish what must be saved (recovery can wait for the next start), then end the worker."""
+        self._closing = True
         self._jobs.put(None)
         if self.is_alive():
             self.join()

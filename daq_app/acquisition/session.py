@@ -61,7 +61,7 @@ class Session:
         self._settings = settings
         self._publisher = publisher
         self._finaliser = finaliser
-        self._jobs: list[Future[Finished]] = []
+        self._saving: list[Future[Finished]] = []
         self.recorder = Recorder(self._forward, self._announce, self._hand_over, settings.spare_folder)
         self.analyst = Analyst(
             settings.rig, publisher, self.recorder.inbox.put, release_within_s=settings.release_within_s
@@ -86,17 +86,20 @@ class Session:
         left = [path for folder in folders if folder and folder.is_dir() for path in find_journals(folder)]
         for journal in left:
             job = {"job": "recover", "journal": str(journal)}
-            self._jobs.append(self._finaliser.submit(job, self._tell_recovery))
+            self._finaliser.submit(job, self._tell_recovery)
         self.preview()
 
     def close(self) -> None:
-        """Stop sampling, close what is open, wait until it is saved, end the threads."""
+        """Stop sampling, close what is open, wait until it is saved, end the threads.
+
+        Journals of earlier sessions that have not been recovered yet wait for the next start.
+        """
         if self._reader is not None:
             self._reader.request_stop()
             self._reader.join()
         self.recorder.inbox.put(None)
         self.recorder.join()
-        for job in self._jobs:
+        for job in self._saving:
             job.result()
         self.analyst.inbox.put(None)
         self.analyst.join()
@@ -121,7 +124,7 @@ class Session:
     @property
     def busy(self) -> bool:
         """Whether a run is being recorded or made into its file."""
-        return self.recording or self.state is State.SAVING or not all(job.done() for job in self._jobs)
+        return self.recording or self.state is State.SAVING or not all(job.done() for job in self._saving)
 
     # -- between the threads ---------------------------------------------------------------------
 
@@ -148,7 +151,7 @@ class Session:
         self._stop_backup()
         out = recorded.journal.with_suffix(RUN_SUFFIX)
         job = {"job": "finalise", "journal": str(recorded.journal), "out": str(out)}
-        self._jobs.append(self._finaliser.submit(job, lambda done: self._tell_saved(recorded, done)))
+        self._saving.append(self._finaliser.submit(job, lambda done: self._tell_saved(recorded, done)))
 
     def _tell_saved(self, recorded: Recorded, finished: Finished) -> None:
         """On the finaliser's thread."""

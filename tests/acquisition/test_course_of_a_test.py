@@ -89,7 +89,7 @@ def test_an_aborted_arming_is_kept_and_burns_no_test(live: Lives) -> None:
     with open_run(Path(saved.run_path)) as run:
         (ended,) = [event for event in run.events if event.kind == "end"]
         assert ended.data["outcome"] == "aborted"
-        assert run.n_samples > 8000
+        assert run.n_samples >= 4000
     # The same name can be armed again and gets a file of its own.
     again = lab.ask("arm", test="FR1-L1-1")
     assert again.ok, again.text
