@@ -54,7 +54,7 @@ def script(text: str, folder: Path, *more: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen([sys.executable, "-c", text, str(folder), *more], stdout=subprocess.PIPE)
 
 
-@pytest.mark.parametrize("lines", [1, 2, 37, 150, 1999])
+@pytest.mark.parametrize("lines", [1, 37, 1999])
 def test_killed_recorder_loses_nothing_it_had_written(tmp_path: Path, lines: int) -> None:
     process = script(_WRITER, tmp_path)
     assert process.stdout is not None
@@ -74,7 +74,6 @@ def test_killed_recorder_loses_nothing_it_had_written(tmp_path: Path, lines: int
 
 _STEPS = {
     "while writing": "f.write_run = lambda path, *rest: (path.write_bytes(b'half'), os._exit(9))",
-    "before the flush": "f.fsync_file = lambda path: os._exit(9)",
     "before the comparison": "f.compare_run = lambda *rest: os._exit(9)",
     "before the rename": "f.replace_durably = lambda *rest: os._exit(9)",
     "after the rename": """
@@ -107,7 +106,7 @@ def test_two_recoveries_at_once_make_one_sound_run(tmp_path: Path) -> None:
     for number in range(4):
         with JournalWriter(tmp_path / f"{number}.journal", header) as writer:
             writer.append_block(0, truth(np.arange(5000)))
-    processes = [script(_COMMON + "for r in recover(folder): print(r.outcome)", tmp_path) for _ in range(3)]
+    processes = [script(_COMMON + "for r in recover(folder): print(r.outcome)", tmp_path) for _ in range(2)]
     outcomes = [process.communicate()[0].decode().split("\n")[:-1] for process in processes]
     assert all(process.returncode == 0 for process in processes)
     for of_one_journal in zip(*outcomes, strict=True):

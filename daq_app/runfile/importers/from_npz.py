@@ -6,7 +6,6 @@ Pickled objects are refused; arrays are read in pieces and never trusted to be a
 from __future__ import annotations
 
 import zipfile
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any, Final
@@ -31,10 +30,8 @@ class NpzReader:
     def __init__(self, path: Path, source: SourceMap) -> None:
         self._path = path
         self.findings = Findings()
-        try:
+        with _Told(str(path)):
             self._archive = zipfile.ZipFile(path)
-        except (OSError, zipfile.BadZipFile) as error:
-            raise RunFileError(f"{path} is no NPZ file or is damaged ({error})") from error
         try:
             self._shapes = self._read_shapes()
             self._rectangle = "data" if len(self._shapes.get("data", ((),))[0]) == 2 else ""
@@ -161,7 +158,7 @@ class NpzReader:
 
 
 class _Told:
-    """Errors of zip and NumPy in plain words."""
+    """Errors of zip and NumPy in plain words; damaged archives raise nearly anything in them."""
 
     def __init__(self, what: str) -> None:
         self._what = what
@@ -170,9 +167,10 @@ class _Told:
         return None
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
-        known = (ValueError, OSError, EOFError, zlib.error, zipfile.BadZipFile, KeyError, RuntimeError)
-        if isinstance(error, (*known, NotImplementedError)) and not isinstance(error, RunFileError):
-            raise RunFileError(f"{self._what} cannot be read ({error})") from error
+        if isinstance(error, Exception) and not isinstance(error, RunFileError):
+            raise RunFileError(
+                f"{self._what} cannot be read ({error})", advice="Is it a whole NPZ file?"
+            ) from error
 
 
 def _exactly(member: IO[bytes], n_bytes: int) -> bytes:
