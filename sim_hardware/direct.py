@@ -18,7 +18,7 @@ from sim_hardware.daqmx_server.converter import Converter
 from sim_hardware.sensors.rows import excitation_v
 from sim_hardware.virtual_rig import DEFAULT_LEVEL, VirtualRig
 
-_BLOCK: Final = 16_000
+_BLOCK: Final = 8_000
 _NO_EFFECTS: Final[Mapping[str, Mapping[str, float]]] = {}
 
 
@@ -98,14 +98,23 @@ def _fill_group(
 ) -> None:
     terminals = tuple(planned.channel.physical_channel for planned in group)
     converters = [converter_of(rig, planned.channel) for planned in group]
+    middle = np.array([[converter.middle] for converter in converters])
+    step = np.array([[converter.step] for converter in converters])
+    low, high = np.array([converter.code_limits for converter in converters], dtype=np.float64).T[:, :, None]
+    per_reading = np.array([[electrical_per_reading(planned.channel)] for planned in group])
+    rows = [planned.rig_index for planned in group]
     n = readings.shape[1]
     for start in range(0, n, _BLOCK):
         stop = min(start + _BLOCK, n)
-        electrical = wall.volts(terminals, np.arange(start, stop) / rate_hz + offset_s)
-        for row, planned, converter in zip(electrical, group, converters, strict=True):
-            channel = planned.channel
-            seen = converter.electrical(converter.codes(row))
-            readings[planned.rig_index, start:stop] = seen / electrical_per_reading(channel)
+        values = wall.volts(terminals, np.arange(start, stop) / rate_hz + offset_s)
+        values -= middle
+        values *= 1.0 / step
+        np.rint(values, out=values)
+        np.clip(values, low, high, out=values)
+        values *= step
+        values += middle
+        values /= per_reading
+        readings[rows, start:stop] = values
 
 
 def electrical_per_reading(channel: Channel) -> float:

@@ -44,8 +44,11 @@ _NEVER: Final = 2.0
 @part
 def _root(row: NDArray[np.float64], first: int, target: float, low: float, high: float) -> float:
     """x in [low, high] where the polynomial equals `target`; the ends must bracket it."""
-    f_low = pc.horner(row, first, low) - target
-    x = high - (pc.horner(row, first, high) - target) / pc.horner_slope(row, first, high)
+    f_low, f_high = pc.horner(row, first, low) - target, pc.horner(row, first, high) - target
+    # speeds are nearly straight between the ends; a rotation is cut just beyond its root
+    x = low + (high - low) * f_low / (f_low - f_high)
+    if first == pc.ROTATION:
+        x = high - f_high / pc.horner_slope(row, first, high)
     for _ in range(60):
         if not low < x < high:
             x = 0.5 * (low + high)
@@ -57,7 +60,7 @@ def _root(row: NDArray[np.float64], first: int, target: float, low: float, high:
         else:
             high = x
         step = f / pc.horner_slope(row, first, x)
-        if abs(step) < 1e-15:
+        if abs(step) < 1e-9:  # the next error is its square
             return x - step
         x -= step
     return x
@@ -87,6 +90,8 @@ def _first_guess(q: float, v: float, c: NDArray[np.float64]) -> float:
     time = 0.0
     if v > 0.0:
         ratio = min(v / (rate * max(arm - q, 1e-6)), 0.999)
+        if q == 0.0:
+            return 1.02 * 2.0 * math.atanh(ratio) / rate + 1e-9
         time = math.atanh(ratio) / rate
         fall_from = arm - (arm - q) * math.sqrt(1.0 - ratio * ratio)
     fall = min(fall_from / arm, 0.999)

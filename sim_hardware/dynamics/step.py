@@ -74,32 +74,40 @@ def take_step(
 
 
 @part
+def _lift(out: NDArray[np.float64], first: int, add: float, complement: bool) -> None:
+    """Add a constant to the polynomial in ``out[first:first+8]`` and multiply it by x, or by 1 − x."""
+    out[first] += add
+    if complement:
+        for m in range(first + 7, first, -1):
+            out[m] -= out[m - 1]
+    else:
+        for m in range(first + 7, first, -1):
+            out[m] = out[m - 1]
+        out[first] = 0.0
+
+
+@part
 def _to_powers(
-    y0: float, y1: float, h: float, k: NDArray[np.float64], out: NDArray[np.float64], first: int, sign: float
+    y0: float, y1: float, h: float, k: NDArray[np.float64], out: NDArray[np.float64], first: int
 ) -> None:
-    """Write the interpolant of one component as powers of x = (t − t₀)/h into `out[first:first+8]`."""
-    f = np.empty(7)
-    f[0] = y1 - y0
-    f[1] = h * k[0] - f[0]
-    f[2] = 2.0 * f[0] - h * (k[N_STAGES] + k[0])
-    for i in range(4):
-        total = 0.0
-        for j in range(_N_ALL):
-            total += _D[i, j] * k[j]
-        f[3 + i] = h * total
-    power = np.zeros(9)
-    for i in range(7):
-        power[0] += f[6 - i]
-        if i % 2 == 0:  # times x
-            for m in range(8, 0, -1):
-                power[m] = power[m - 1]
-            power[0] = 0.0
-        else:  # times (1 − x)
-            for m in range(8, 0, -1):
-                power[m] -= power[m - 1]
-    power[0] += y0
-    for m in range(8):
-        out[first + m] = sign * power[m]
+    """Write the interpolant of one component as powers of x = (t − t₀)/h into ``out[first:first+8]``."""
+    d3 = d4 = d5 = d6 = 0.0
+    for j in range(_N_ALL):
+        d3 += _D[0, j] * k[j]
+        d4 += _D[1, j] * k[j]
+        d5 += _D[2, j] * k[j]
+        d6 += _D[3, j] * k[j]
+    rise = y1 - y0
+    bend = h * k[0] - rise
+    out[first : first + 8] = 0.0
+    _lift(out, first, h * d6, False)
+    _lift(out, first, h * d5, True)
+    _lift(out, first, h * d4, False)
+    _lift(out, first, h * d3, True)
+    _lift(out, first, 2.0 * rise - h * (k[N_STAGES] + k[0]), False)
+    _lift(out, first, bend, True)
+    _lift(out, first, rise, False)
+    out[first] += y0
 
 
 @part
@@ -126,5 +134,5 @@ def interpolant(
             dv += _A[i, j] * kv[j]
         kq[i] = v + h * dv
         kv[i] = acceleration(q + h * dq, kq[i], t + _C[i] * h, c)
-    _to_powers(q, q1, h, kq, row, first_q, 1.0)
-    _to_powers(v, v1, h, kv, row, first_v, 1.0)
+    _to_powers(q, q1, h, kq, row, first_q)
+    _to_powers(v, v1, h, kv, row, first_v)
