@@ -170,9 +170,6 @@ def whole_test(running: Running, wall: SimControl, test: str) -> StateMessage:
     running.wait_for_state(State.PREVIEWING)
     zeroed = running.client.request("tare", timeout_s=60.0)
     assert zeroed.ok, zeroed.text
-    running.wait_for_state(State.PREVIEWING)
-    zeroed = running.client.request("tare", timeout_s=60.0)
-    assert zeroed.ok, zeroed.text
     running.arm(test)
     wall.command("pull", duration_s=1.0)
     held = running.wait_for_state(State.HOLDING)
