@@ -63,6 +63,7 @@ class SimulatedTest:
             "impact_time_s": (motion.impact_time_s[happened] + self.release_s).tolist(),
             "velocity_before_rad_s": motion.velocity_before_rad_s[happened].tolist(),
             "velocity_after_rad_s": motion.velocity_after_rad_s[happened].tolist(),
+            "impact_kind": motion.impact_kind[happened].tolist(),
             "peak_time_s": (motion.peak_time_s + self.release_s).tolist(),
             "peak_rotation_rad": motion.peak_rotation_rad.tolist(),
             "ending": motion.ending,

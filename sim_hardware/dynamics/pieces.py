@@ -60,6 +60,33 @@ def find_piece(pieces: NDArray[np.float64], t: float, hint: int) -> int:
     return i
 
 
+@part
+def _rotation_only(
+    pieces: NDArray[np.float64], times: NDArray[np.float64], rotation: NDArray[np.float64]
+) -> None:
+    """θ alone, with the coefficients of the piece kept at hand from one time to the next."""
+    i, start, end, rate = -1, np.inf, -np.inf, 1.0
+    c0 = c1 = c2 = c3 = c4 = c5 = c6 = c7 = 0.0
+    for k in range(times.size):
+        t = times[k]
+        if not start <= t < end:
+            i = find_piece(pieces, t, i)
+            row = pieces[max(i, 0)]
+            start = row[START] if i >= 0 else -np.inf
+            end = pieces[i + 1, START] if i + 1 < pieces.shape[0] else np.inf
+            rate = 1.0 / row[SCALE] if i >= 0 else 0.0
+            c0, c1, c2, c3 = row[ROTATION], row[ROTATION + 1], row[ROTATION + 2], row[ROTATION + 3]
+            c4, c5, c6, c7 = row[ROTATION + 4], row[ROTATION + 5], row[ROTATION + 6], row[ROTATION + 7]
+        if rate == 0.0:
+            rotation[k] = c0
+            continue
+        x = (t - start) * rate
+        y = x * x
+        low = (c0 + c1 * x) + (c2 + c3 * x) * y
+        high = (c4 + c5 * x) + (c6 + c7 * x) * y
+        rotation[k] = low + high * (y * y)
+
+
 @kernel
 def evaluate(
     pieces: NDArray[np.float64],
@@ -70,6 +97,9 @@ def evaluate(
 ) -> None:
     """Fill the outputs that have the length of `times`; an output of length 0 is left out."""
     want_velocity, want_acceleration = velocity.size > 0, acceleration.size > 0
+    if not want_velocity and not want_acceleration:
+        _rotation_only(pieces, times, rotation)
+        return
     i = -1
     for k in range(times.size):
         t = times[k]
