@@ -14,6 +14,12 @@ from daq_app.config.scaling import Scaling
 
 Floats = NDArray[np.float64]
 
+UNZEROED: Final = (
+    "No zero has been taken: r on screen is off by about 3 %. The result after the test is not, it takes "
+    "its zero from the wall at rest."
+)
+"""What a viewer says beside a live r that rests on no tare."""
+
 _LARGEST_SHARE: Final = 0.25
 """A zero further off than this share of the sensor's range is a fault, not a zero."""
 _NOISE_FACTOR: Final = 6.0

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from daq_app.campaign.figures import METHOD_COLOURS, METHOD_MARKS
 from daq_app.campaign.summary import TestSummary
+from daq_app.config.wording import plus_minus
 from daq_app.rocking import free_rocking, period
 
 Floats = NDArray[np.float64]
@@ -99,7 +100,7 @@ def _draw_restitution(axis: Axes, test: TestSummary) -> None:
             METHOD_MARKS[name],
             ms=5,
             color=METHOD_COLOURS[name],
-            label=f"{name} {method.r:.3f} ± {method.standard_error:.3f}",
+            label=f"{name} {method.r:.4f} {plus_minus(method.standard_error)}",
         )
         low, high = method.r - method.standard_error, method.r + method.standard_error
         axis.axhspan(low, high, color=METHOD_COLOURS[name], alpha=0.18, lw=0)

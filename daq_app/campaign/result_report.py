@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from daq_app.campaign.report import CaptionedFigure
 from daq_app.campaign.result_figures import measured_periods, result_figure
 from daq_app.campaign.summary import TestSummary
+from daq_app.config.wording import plus_minus
 from daq_app.rocking import period
 
 METHODS: Final = ("EAV", "CRT")
@@ -86,6 +87,7 @@ def write_result(run: Path, test: TestSummary, earlier: Sequence[TestSummary] = 
             rows=rows,
             names=METHODS,
             deviation=period_deviation(test),
+            plus_minus=plus_minus,
         )
     )
     return [

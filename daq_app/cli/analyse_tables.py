@@ -10,6 +10,8 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from daq_app.config.wording import plus_minus
+
 if TYPE_CHECKING:
     from daq_app.rocking.estimators import RestitutionEstimate
     from daq_app.rocking.results import Bias, TestAnalysis, ValueWithSigma
@@ -142,7 +144,7 @@ def _estimate_cells(estimate: RestitutionEstimate, r_max: float) -> tuple[str, .
         f"{estimate.standard_error:.5f}",
         "–" if interval is None else f"{interval[0]:.4f} … {interval[1]:.4f}",
         _number(estimate.r / r_max, 3),
-        _number(plain, 4) + ("" if error is None else f" ± {error:.4f}"),
+        _number(plain, 4) + ("" if error is None else f" {plus_minus(error)}"),
     )
 
 
@@ -155,10 +157,12 @@ def _base_table(analysis: TestAnalysis) -> Table:
     theory, fit, joint, left = analysis.theory, analysis.fit, analysis.joint, analysis.residuals
     if fit is not None:
         table.add_row(
-            "p fitted, rad/s", f"{fit.p_rad_s:.4f} ± {fit.sigma_p_rad_s:.4f}", f"{theory.p_rad_s:.4f}"
+            "p fitted, rad/s", f"{fit.p_rad_s:.4f} {plus_minus(fit.sigma_p_rad_s)}", f"{theory.p_rad_s:.4f}"
         )
         table.add_row(
-            "α fitted, rad", f"{fit.alpha_rad:.4f} ± {fit.sigma_alpha_rad:.4f}", f"{theory.alpha_rad:.4f}"
+            "α fitted, rad",
+            f"{fit.alpha_rad:.4f} {plus_minus(fit.sigma_alpha_rad)}",
+            f"{theory.alpha_rad:.4f}",
         )
         table.add_row(
             "misfit of the fit, mrad rms", f"{fit.residual_rad * 1e3:.4f}", f"noise {fit.noise_rad * 1e3:.4f}"

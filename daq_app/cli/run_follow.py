@@ -6,9 +6,11 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 from rich.console import Console
 
@@ -125,6 +127,7 @@ def _follow(
     previous = signal.signal(signal.SIGINT, interrupts)
     outcome, run, stopping = "", "", False
     hand: SimulatedHand | None = None
+    armed: Mapping[str, Any] = {}
     rig = parse_rig(str(client.about["rig_text"]), str(options.rig))
     try:
         with RunView(console, options.test, client.about) as view:
@@ -137,8 +140,11 @@ def _follow(
                 if received is None:
                     continue
                 view.take(received.message)
+                if view.state is State.ARMED and not armed:
+                    armed = client.request("hello").data
+                    view.zeroed = bool(armed.get("tare"))
                 if hand is None and client.about.get("simulated") and view.state is State.ARMED:
-                    connection = str(client.request("hello").data["connection"])
+                    connection = str(armed["connection"])
                     hand = SimulatedHand(connection, rig, options.theta0_over_alpha)
                 if hand is not None:
                     hand.take(received.message)

@@ -8,6 +8,7 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
+from daq_app.config.wording import plus_minus
 from daq_app.runfile import Run, open_run
 
 
@@ -102,6 +103,6 @@ def _r_text(estimate: dict[str, Any], r_max: float, formula: str) -> str:
     mean, error, online = estimate["r"], estimate["standard_error"], estimate["online"]
     if mean is None:
         return f"–  ({estimate['values']} values: too few)"
-    spread = f" ± {error:.4f}" if error is not None else ""
+    spread = f" {plus_minus(error)}" if error is not None else ""
     live = f", online {online:.4f}" if online is not None else ""
     return f"{mean:.4f}{spread}  ({estimate['values']} values, r/r_max {mean / r_max:.3f}{live})  {formula}"

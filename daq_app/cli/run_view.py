@@ -21,6 +21,7 @@ from daq_app.acquisition.messages import (
     State,
     StateMessage,
 )
+from daq_app.acquisition.tare import UNZEROED
 
 _BAR_CELLS: Final = 61
 _SHOWN_IMPACTS: Final = 12
@@ -49,6 +50,8 @@ class RunView:
         self._estimate: EstimateMessage | None = None
         self._rotation_rad = math.nan
         self._tilt_rad = math.nan
+        self.zeroed = bool(about.get("tare"))
+        """Whether the live r rests on a zero."""
         self._told_impacts = 0
         self._live = Live(console=console, refresh_per_second=8) if console.is_terminal else None
 
@@ -82,6 +85,8 @@ class RunView:
                     self._rotation_rad = rotation[-1]
             case EstimateMessage():
                 self._on_estimate(message)
+            case EventMessage(kind="tare"):
+                self.zeroed = True
             case EventMessage(severity="warning" | "error" as severity, text=text):
                 self.say(text, "bold red" if severity == "error" else "yellow")
         if self._live is not None:
@@ -89,6 +94,8 @@ class RunView:
 
     def _on_state(self, message: StateMessage) -> None:
         if message.state is not self.state or message.text != self.last_text:
+            if message.state is State.RELEASED and self.state is not State.RELEASED:
+                self._warn_without_zero()
             self.state, self.last_text = message.state, message.text
             if self._live is None:
                 at = f"{message.since_sample / self._rate_hz:8.2f} s  " if self._rate_hz else ""
@@ -112,6 +119,8 @@ class RunView:
         parts: list[Text | Table] = [heading, self._bar(), self._figures()]
         if self._estimate is not None and self._estimate.impact_samples:
             parts.append(self._impacts(self._estimate))
+            if not self.zeroed:
+                parts.append(Text(UNZEROED, style="yellow"))
         return Panel(Group(*parts), title=self._test, title_align="left")
 
     def _bar(self) -> Text:
@@ -159,6 +168,10 @@ class RunView:
         table.add_section()
         table.add_row("", "", "", "mean", _r(estimate.eav_mean), _r(estimate.crt_mean))
         return table
+
+    def _warn_without_zero(self) -> None:
+        if not self.zeroed:
+            self.say(UNZEROED, "yellow")
 
 
 def _r(value: float | None) -> str:

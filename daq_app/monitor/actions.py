@@ -75,6 +75,7 @@ ACTIONS: Final = (
         confirm=True,
     ),
     Action("marker", "Marker", "F9", RUNNING, "Write a marker with this instant into the record"),
+    Action("note", "Note", "F10", RUNNING, "Type a note into the record"),
 )
 
 

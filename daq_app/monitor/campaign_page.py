@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
@@ -78,8 +79,8 @@ class CampaignPage(QWidget):
         self._chosen.setWordWrap(True)
         self._reason = QLineEdit()
         self._reason.setPlaceholderText("Why (needed to reject)")
-        self.accept_button = QPushButton("Good")
-        self.reject_button = QPushButton("Repeat it")
+        self.accept_button = QPushButton("Good  Ctrl+G")
+        self.reject_button = QPushButton("Repeat it  Ctrl+R")
         self.open_button = QPushButton("Open its run")
         self._build()
         self.take_button.clicked.connect(self.take_next)
@@ -87,7 +88,9 @@ class CampaignPage(QWidget):
         self.reject_button.clicked.connect(lambda: self._judge("bad"))
         self.open_button.clicked.connect(self._open_chosen)
         self.table.selectionModel().selectionChanged.connect(lambda *_: self._show_chosen())
-        self.table.doubleClicked.connect(lambda _index: self._open_chosen())
+        self.table.activated.connect(lambda _index: self._open_chosen())
+        QShortcut(QKeySequence("Ctrl+G"), self).activated.connect(self.accept_button.click)
+        QShortcut(QKeySequence("Ctrl+R"), self).activated.connect(self.reject_button.click)
 
     def _build(self) -> None:
         top = QHBoxLayout()

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from daq_app.acquisition.messages import MotionMessage
+from daq_app.acquisition.messages import MotionMessage, State
+from daq_app.config.wording import plus_minus
 from daq_app.monitor.labels import DASH, Tile, number, restitution_text
 from daq_app.monitor.session import RECORDING, Session
 
@@ -65,13 +66,14 @@ def tile_texts(session: Session, levels: AlarmLevels) -> dict[str, TileText]:
         texts["margin"] = TileText(f"{100 * margin:.0f} %", words[role], role)
     estimate = session.estimate
     peak = session.peak_rotation_rad
-    texts["peak"] = TileText(
-        number(peak / alpha, 3) if peak > 0 else DASH, "since arming" if peak > 0 else ""
-    )
+    since = "since arming" if session.saw_arming else "since this window opened"
+    texts["peak"] = TileText(number(peak / alpha, 3) if peak > 0 else DASH, since if peak > 0 else "")
     running = session.current_state in RECORDING
     which = "this test" if running else "last test"
     if estimate is None:
-        waiting = "waiting for the release" if running else ""
+        state = session.current_state
+        held = state in (State.ARMED, State.HOLDING)
+        waiting = "waiting for the release" if held else "no impact heard yet" if running else ""
         texts["elapsed"] = TileText(DASH, waiting)
         texts["impacts"] = TileText(DASH)
         texts["eav"] = texts["crt"] = TileText(DASH)
@@ -83,8 +85,11 @@ def tile_texts(session: Session, levels: AlarmLevels) -> dict[str, TileText]:
         ("crt", estimate.crt_mean, estimate.crt_standard_error, estimate.crt),
     ):
         of_bound = f"{mean / estimate.r_max:.2f} r_max" if mean is not None else ""
-        detail = f"± {error:.4f} · {of_bound}" if error is not None else of_bound
-        texts[name] = TileText(restitution_text(mean, None), detail if points else "needs three impacts")
+        detail = " · ".join(part for part in (plus_minus(error), of_bound) if part)
+        if session.run_zeroed is False and points:
+            texts[name] = TileText(restitution_text(mean), "⚠ no zero: ~3 % off", "warning")
+        else:
+            texts[name] = TileText(restitution_text(mean), detail if points else "needs three impacts")
     return texts
 
 

@@ -7,23 +7,11 @@ import pyqtgraph as pg
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from daq_app.acquisition.messages import EstimateMessage, EstimatePoint
-from daq_app.monitor.plot_base import Array, Plot, line_pen
+from daq_app.acquisition.messages import EstimateMessage
+from daq_app.monitor.plot_base import Plot, line_pen
 from daq_app.monitor.session import Session
 from daq_app.monitor.theme import Colours
 from daq_app.monitor.theory_overlay import measured_periods, period_curve
-
-
-def running_mean(points: list[EstimatePoint]) -> tuple[Array, Array, Array]:
-    """(impact, mean of r so far, its standard error) after each point; no error from one point."""
-    impacts = np.array([point.impact for point in points], dtype=np.float64)
-    values = np.array([point.r for point in points], dtype=np.float64)
-    count = np.arange(1, values.size + 1)
-    mean = np.cumsum(values) / count
-    squares = np.cumsum(values**2) - count * mean**2
-    with np.errstate(invalid="ignore", divide="ignore"):
-        error = np.sqrt(np.maximum(squares, 0.0) / (count - 1) / count)
-    return impacts, mean, np.where(count > 1, error, 0.0)
 
 
 class RestitutionPlot(QWidget):
@@ -87,9 +75,10 @@ class RestitutionPlot(QWidget):
         )
         values: list[float] = []
         last = 10
-        for name, points in series.items():
-            impacts, mean, error = running_mean(points)
-            self._points[name].setData(impacts, [point.r for point in points])
+        for name, every in series.items():
+            points = [point for point in every if np.isfinite(point.r)]
+            self._points[name].setData([point.impact for point in points], [point.r for point in points])
+            impacts, mean, error = self._session.running_mean(name)
             self._means[name].setData(impacts, mean)
             low, high, _ = self._bands[name]
             low.setData(impacts, mean - error)  # type: ignore[attr-defined]

@@ -53,11 +53,9 @@ def size_text(n_bytes: float) -> str:
     return f"{n_bytes:.0f} B"
 
 
-def restitution_text(mean: float | None, standard_error: float | None) -> str:
-    """Mean r with its standard error."""
-    if mean is None:
-        return DASH
-    return f"{mean:.3f}" if standard_error is None else f"{mean:.3f} ± {standard_error:.3f}"
+def restitution_text(mean: float | None) -> str:
+    """Mean r."""
+    return DASH if mean is None else f"{mean:.3f}"
 
 
 class Tile(QFrame):

@@ -9,9 +9,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QVBoxLayout, QWidget
 
 from daq_app.acquisition.messages import EstimateMessage, MotionMessage, StateMessage
+from daq_app.acquisition.tare import UNZEROED
 from daq_app.monitor.counters import AlarmLevels, Counters
 from daq_app.monitor.estimate_plots import PeriodPlot, PhasePlane, RestitutionPlot, side_by_side
-from daq_app.monitor.labels import role_label
+from daq_app.monitor.labels import role_label, set_role
 from daq_app.monitor.motion_plots import MotionPlots
 from daq_app.monitor.session import Session
 from daq_app.monitor.strip_panel import StripPanel
@@ -99,7 +100,16 @@ class LivePage(QWidget):
         self.counters.refresh()
         self.strips.refresh()
         self.phase.draw(self._session.fresh(MotionMessage))
-        self._caption.setText(self.motion.theory_caption())
+        self._show_caption()
+
+    def _show_caption(self) -> None:
+        """What must be known beside the plots: a missing zero first, then which theory is laid over."""
+        doubtful = self._session.run_zeroed is False and self._session.estimate is not None
+        parts = [UNZEROED if doubtful else "", self.motion.theory_caption()]
+        text = "  ".join(part for part in parts if part)
+        if self._caption.text() != text:
+            self._caption.setText(text)
+        set_role(self._caption, "warning" if doubtful else "muted")
 
     def _draw_estimate(self) -> None:
         """Draw r as soon as it comes, not with the slow parts: it is what the operator waits for."""
@@ -115,7 +125,7 @@ class LivePage(QWidget):
 
     def _on_theory(self, on: bool) -> None:
         self.motion.set_theory(on)
-        self._caption.setText(self.motion.theory_caption())
+        self._show_caption()
 
     def _on_strips(self, on: bool) -> None:
         self.upper.setVisible(not on)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,7 +15,6 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QApplication,
-    QButtonGroup,
     QFrame,
     QHBoxLayout,
     QMainWindow,
@@ -25,10 +24,16 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.acquisition.messages import EventMessage, Reply, State, StateMessage
-from daq_app.campaign.check_model import Verdict
+from daq_app.acquisition.messages import (
+    BlockMessage,
+    EventMessage,
+    HealthMessage,
+    MotionMessage,
+    Reply,
+    State,
+    StateMessage,
+)
 from daq_app.campaign.plan import Campaign
-from daq_app.campaign.verdicts import give_verdict
 from daq_app.config import ConfigError, parse_rig
 from daq_app.monitor.actions import ActionBar
 from daq_app.monitor.background import Background
@@ -37,18 +42,19 @@ from daq_app.monitor.header import Header
 from daq_app.monitor.health_bar import HealthBar
 from daq_app.monitor.link import Link
 from daq_app.monitor.live_page import LivePage
+from daq_app.monitor.navigation import NavigationRail
+from daq_app.monitor.note_entry import NoteEntry
 from daq_app.monitor.notices import NoticeLine
+from daq_app.monitor.orders import Orders
 from daq_app.monitor.prepare_page import PreparePage, Zero
 from daq_app.monitor.replay_page import ReplayPage
 from daq_app.monitor.result_page import ResultPage
 from daq_app.monitor.session import RECORDING, Session
 from daq_app.monitor.settings import TYPE_SIZES, WindowSettings
 from daq_app.monitor.theme import THEMES, Colours, apply_theme
-from daq_app.runfile import RunFileError, open_run
 
 FRAME_MS: Final = 22
 SLOW_MS: Final = 160
-ARM_AGAIN_WITHIN_S: Final = 10.0
 _QUIET_EVENTS: Final = frozenset({"impact", "marker", "tare", "saved", *State})
 """Events that the pages show anyway, unless they are more than information."""
 
@@ -73,13 +79,15 @@ class MainWindow(QMainWindow):
         self._last_frame_s = math.nan
         self._rig_text = ""
         self._state_before: State | None = None
+        self._was_live: tuple[bool, ...] = ()
+        self._told_past = False
         self._runs_folder: Path | None = None
-        self._arm_asked_s = -math.inf
         self._released = False
         """Whether the wall was let go since the last arming: an aborted arming has no result."""
 
         self.header = Header(self.session)
         self.notices = NoticeLine()
+        self.note_entry = NoteEntry()
         self.actions_bar = ActionBar()
         self.health = HealthBar(self.session)
         self.live = LivePage(self.session, settings.alarm_levels)
@@ -95,6 +103,14 @@ class MainWindow(QMainWindow):
             "Replay": self.replay,
         }
         self._build()
+        self.orders = Orders(
+            link,
+            self.session,
+            (self.prepare, self.campaign, self.result),
+            self.notices,
+            self.show_page,
+            self,
+        )
         self.restyle()
         self._connect()
         self.resize(1366, 768)
@@ -118,38 +134,9 @@ class MainWindow(QMainWindow):
 
     def _build(self) -> None:
         self.stack = QStackedWidget()
-        self._nav = QButtonGroup(self)
-        rail = QVBoxLayout()
-        rail.setContentsMargins(0, 10, 0, 10)
-        rail.setSpacing(2)
-        for number, (name, page) in enumerate(self.pages.items(), start=1):
+        for page in self.pages.values():
             self.stack.addWidget(page)
-            button = QPushButton(name)
-            button.setCheckable(True)
-            button.setProperty("role", "nav")
-            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # reached by its key
-            button.setToolTip(f"Ctrl+{number}")
-            button.setShortcut(f"Ctrl+{number}")
-            button.clicked.connect(lambda _checked=False, p=page: self.show_page(p))
-            self._nav.addButton(button, number - 1)
-            rail.addWidget(button)
-        rail.addStretch(1)
-        for text, tip, key, act in (
-            ("Theme", "Light or dark", "Ctrl+T", self.toggle_theme),
-            ("A+", "Larger type", "Ctrl++", lambda: self.change_type_size(1)),
-            ("A−", "Smaller type", "Ctrl+-", lambda: self.change_type_size(-1)),
-        ):
-            button = QPushButton(text)
-            button.setProperty("role", "nav")
-            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-            button.setToolTip(f"{tip}  ({key})")
-            button.setShortcut(key)
-            button.clicked.connect(act)
-            rail.addWidget(button)
-        rail_frame = QFrame()
-        rail_frame.setObjectName("bar")
-        rail_frame.setLayout(rail)
-        rail_frame.setFixedWidth(104)
+        self.rail = NavigationRail(list(self.pages))
         footer = QFrame()
         footer.setObjectName("bar")
         footer_layout = QHBoxLayout(footer)
@@ -159,7 +146,7 @@ class MainWindow(QMainWindow):
         footer_layout.addWidget(self.health)
         middle = QHBoxLayout()
         middle.setSpacing(0)
-        middle.addWidget(rail_frame)
+        middle.addWidget(self.rail)
         middle.addWidget(self.stack, 1)
         central = QWidget()
         layout = QVBoxLayout(central)
@@ -167,6 +154,7 @@ class MainWindow(QMainWindow):
         layout.setSpacing(0)
         layout.addWidget(self.header)
         layout.addWidget(self.notices)
+        layout.addWidget(self.note_entry)
         layout.addLayout(middle, 1)
         layout.addWidget(footer)
         self.setCentralWidget(central)
@@ -182,29 +170,35 @@ class MainWindow(QMainWindow):
 
     def _connect(self) -> None:
         self.actions_bar.ordered.connect(self._on_order)
-        self.prepare.tare_wanted.connect(lambda: self._request("tare"))
+        self.rail.page_wanted.connect(lambda place: self.show_page(list(self.pages.values())[place]))
+        self.rail.theme_wanted.connect(self.toggle_theme)
+        self.rail.size_wanted.connect(self.change_type_size)
+        self.note_entry.noted.connect(self.orders.note)
+        self.prepare.tare_wanted.connect(lambda: self.orders.request("tare"))
         self.prepare.told.connect(self.notices.tell)
         self.prepare.card.changed.connect(self._on_choice)
         self.campaign.told.connect(self.notices.tell)
-        self.campaign.take.connect(self._take)
-        self.campaign.scanned.connect(self._propose_after_scan)
         self.campaign.run_chosen.connect(lambda name: self.open_run(Path(name)))
         self.replay.told.connect(self.notices.tell)
         self.result.told.connect(self.notices.tell)
         self.result.replay.connect(lambda name: self.open_run(Path(name)))
-        self.result.judge.connect(self._judge)
-        self.result.next_wanted.connect(self.next_test)
+        for key, button in self.prepare.keys.items() if self.link is not None else ():
+            QShortcut(QKeySequence(key), self).activated.connect(lambda b=button: self._prepare_by_key(b))
         QShortcut(QKeySequence("T"), self.live).activated.connect(self.live.theory_button.toggle)
         QShortcut(QKeySequence("C"), self.live).activated.connect(self.live.strips_button.toggle)
+
+    def _prepare_by_key(self, button: QPushButton) -> None:
+        """Check, pull test and zero from any page; their answer is on the page that comes to the front."""
+        self.prepare.refresh()
+        self.show_page(self.prepare)
+        button.click()
 
     def show_page(self, page: QWidget) -> None:
         """Bring a page to the front; one that this window does not have stays away."""
         if page not in self.pages.values():
             return
         self.stack.setCurrentWidget(page)
-        button = self._nav.button(list(self.pages.values()).index(page))
-        if button is not None:
-            button.setChecked(True)
+        self.rail.mark(list(self.pages.values()).index(page))
 
     # -- look ------------------------------------------------------------------------------------
 
@@ -251,6 +245,19 @@ class MainWindow(QMainWindow):
         self.prepare.planned_rate_hz = float(about.get("planned_rate_hz", 0.0) or 0.0)
         if "tare" in about:
             self.prepare.set_zero(Zero(dict(about["tare"]), dict(about.get("tare_record", {}))))
+            self.session.set_zeroed(bool(about["tare"]))
+        self._adopt_past(about.get("events", []))
+
+    def _adopt_past(self, events: Sequence[Any]) -> None:
+        """What was said before this window came: warnings are told now, the arming dates the run."""
+        if self._told_past:
+            return
+        self._told_past = True
+        past = [EventMessage.model_validate(event) for event in events]
+        self.session.adopt_past(past)
+        for event in past:
+            if event.severity != "info":
+                self.notices.tell(event.severity, event.text)
 
     def _on_frame(self) -> None:
         now = time.monotonic()
@@ -261,6 +268,11 @@ class MainWindow(QMainWindow):
             for published in self.link.take():
                 self.session.feed(published)
                 self._after(published.message)
+        live = tuple(self.session.fresh(kind) for kind in (BlockMessage, MotionMessage, HealthMessage))
+        if live != self._was_live:
+            # What has just gone stale must not stand as live until the next slow tick.
+            self._was_live = live
+            self._on_slow()
         if self.stack.currentWidget() is self.live:
             self.live.draw_frame()
 
@@ -301,20 +313,6 @@ class MainWindow(QMainWindow):
             self.show_page(self.result)
             self.result.open(run)
 
-    def _judge(self, name: str, verdict: str) -> None:
-        """The operator's verdict on the result that is shown."""
-        run = Path(name)
-        reason = "rejected on the result page" if verdict == "bad" else ""
-        try:
-            with open_run(run) as opened:
-                run_id = opened.header.run_id
-            give_verdict(run.parent, run_id, "bad" if verdict == "bad" else "good", reason)
-        except (RunFileError, ConfigError, OSError) as error:
-            self.notices.tell("error", str(error))
-            return
-        self.result.open(run)
-        self.campaign.scan()
-
     def _on_slow(self) -> None:
         self.header.refresh(self.colours)
         self.health.refresh()
@@ -334,58 +332,14 @@ class MainWindow(QMainWindow):
     # -- orders ----------------------------------------------------------------------------------
 
     def _on_order(self, name: str) -> None:
-        match name:
-            case "arm":
-                self._arm()
-            case "next":
-                self.next_test()
-            case "marker":
-                self._request("marker", {"text": "marker"})
-            case _:
-                self._request(name)
-
-    def _arm(self) -> None:
-        choice = self.prepare.card.choice
-        if not choice.name:
-            self.show_page(self.prepare)
-            self.notices.tell("warning", "Give the test a name before arming.")
-            return
-        check = self.prepare.check
-        if check is not None and check.verdict is Verdict.NO_GO and not self._arm_insisted():
-            self.notices.tell(
-                "warning", f"The sensor check says no-go. {check.summary} Press F5 again to arm all the same."
-            )
-            return
-        looked = (
-            f"Sensor check: {check.verdict.value}. {check.summary}" if check else "Sensor check: not done."
-        )
-        self._request("arm", {"test": choice.name, "notes": f"{choice.notes}\n{looked}".strip()})
-
-    def _arm_insisted(self) -> bool:
-        """Whether arming was asked for a second time within some seconds."""
-        before, self._arm_asked_s = self._arm_asked_s, time.monotonic()
-        return self._arm_asked_s - before <= ARM_AGAIN_WITHIN_S
+        if name == "note":
+            self.note_entry.ask()
+        else:
+            self.orders.order(name)
 
     def next_test(self) -> None:
         """Take the next test of the campaign."""
-        if self.campaign.status is None:
-            self.show_page(self.prepare)
-            self.notices.tell("info", "No campaign is open: type the name of the next test.")
-            return
-        self.campaign.take_next()
-
-    def _propose_after_scan(self) -> None:
-        """A name that has been used is replaced by the next one, so that no test is armed under it again."""
-        proposal, status = self.campaign.proposal, self.campaign.status
-        if proposal is None or status is None or self.session.current_state in RECORDING:
-            return
-        used = {str(test.name) for place in status.places for test in place.tests}
-        if self.prepare.card.choice.name in used | {""}:
-            self.prepare.card.propose(str(proposal.name), proposal.theta0_over_alpha)
-
-    def _take(self, name: str, ratio: float) -> None:
-        self.prepare.card.propose(name, ratio)
-        self.show_page(self.prepare)
+        self.orders.next_test()
 
     def open_run(self, path: Path) -> None:
         """Show a run on the replay page."""
@@ -394,18 +348,7 @@ class MainWindow(QMainWindow):
 
     def set_campaign(self, campaign: Campaign, folder: Path | None = None) -> None:
         """Follow a campaign; the runs lie in `folder`, else where the acquisition puts them."""
-        where = folder or self._runs_folder
-        if where is None:
-            self.notices.tell(
-                "warning", "The folder of the runs is not known: the campaign cannot be followed."
-            )
-            return
-        rig = self.session.rig
-        self.campaign.set_campaign(campaign, where, rig.specimen.name if rig is not None else "")
-
-    def _request(self, name: str, arguments: Mapping[str, float | str] | None = None) -> None:
-        if self.link is not None:
-            self.link.request(name, arguments)
+        self.orders.set_campaign(campaign, folder or self._runs_folder)
 
     def _on_reply(self, name: str, reply: Reply) -> None:
         if not reply.ok:
@@ -416,9 +359,10 @@ class MainWindow(QMainWindow):
         elif name == "tare":
             self.notices.tell("info", reply.text)
             self.prepare.set_zero(Zero(_numbers(reply.data.get("tare")), {}))
-            self._request("hello")
-        elif name == "marker":
-            self.notices.tell("info", f"Marker written: {reply.text}.")
+            self.session.set_zeroed(True)
+            self.orders.request("hello")
+        elif name in ("marker", "note"):
+            self.notices.tell("info", f"Written: {reply.text}.")
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Remember the layout and hang up; a run under way goes on without the window."""

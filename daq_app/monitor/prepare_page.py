@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from daq_app.campaign.check_model import SensorCheck
@@ -80,13 +79,11 @@ class PreparePage(QWidget):
         self._detail.setMinimumHeight(36)
         self.table.selectionModel().selectionChanged.connect(lambda *_: self._show_detail())
         self._build()
-        for button, key, act in (
-            (self.check_button, "F2", self.run_check),
-            (self.pull_button, "F3", self.run_pull),
-            (self.tare_button, "Ctrl+0", self.tare_wanted.emit),
-        ):
-            button.clicked.connect(act)
-            QShortcut(QKeySequence(key), self).activated.connect(button.click)
+        self.keys = {"F2": self.check_button, "F3": self.pull_button, "Ctrl+0": self.tare_button}
+        """Keys of the whole window: a pull test is wanted while the live page is in front."""
+        self.check_button.clicked.connect(self.run_check)
+        self.pull_button.clicked.connect(self.run_pull)
+        self.tare_button.clicked.connect(self.tare_wanted.emit)
         self.card.changed.connect(self._on_choice)
 
     def _build(self) -> None:

@@ -64,9 +64,9 @@ class ReplayPage(QWidget):
             "open": QPushButton("Open …  Ctrl+O"),
             "whole": QPushButton("Whole run  Home"),
             "motion": QPushButton("Motion  End"),
-            "png": QPushButton("PNG"),
-            "svg": QPushButton("SVG"),
-            "csv": QPushButton("CSV of the view"),
+            "png": QPushButton("PNG  Ctrl+P"),
+            "svg": QPushButton("SVG  Ctrl+G"),
+            "csv": QPushButton("CSV of the view  Ctrl+E"),
         }
         self._build()
         self.plots.cursor_moved.connect(self._on_cursor)
@@ -83,6 +83,9 @@ class ReplayPage(QWidget):
             ("Right", lambda: self._step(1)),
             ("+", lambda: self._zoom(0.5)),
             ("-", lambda: self._zoom(2.0)),
+            ("Ctrl+P", lambda: self._choose_export("png")),
+            ("Ctrl+G", lambda: self._choose_export("svg")),
+            ("Ctrl+E", lambda: self._choose_export("csv")),
         ):
             shortcut = QShortcut(QKeySequence(key), self)
             shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)

@@ -6,7 +6,7 @@ import threading
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl, Signal
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtGui import QDesktopServices, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
 from daq_app.acquisition.guarded import end_guarded, start_guarded
 from daq_app.campaign.result import NoResult, Result, load_result
 from daq_app.campaign.result_report import METHODS, period_deviation, repetition_rows, verdict_sentence
+from daq_app.config.wording import plus_minus
 from daq_app.monitor.background import Background
 from daq_app.monitor.labels import DASH, Tile, number, role_label, set_role
 from daq_app.monitor.result_plots import ResultPlots
@@ -94,10 +95,10 @@ class ResultPage(QWidget):
         self.table.setFixedHeight(_HEADER_PX)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         self.buttons = {
-            "page": QPushButton("Open the page"),
-            "replay": QPushButton("Replay"),
-            "good": QPushButton("Good"),
-            "bad": QPushButton("Repeat it"),
+            "page": QPushButton("Open the page  Ctrl+O"),
+            "replay": QPushButton("Replay  Ctrl+P"),
+            "good": QPushButton("Good  Ctrl+G"),
+            "bad": QPushButton("Repeat it  Ctrl+R"),
             "next": QPushButton("Next test  F6"),
         }
         self.buttons["next"].setProperty("role", "primary")
@@ -107,6 +108,8 @@ class ResultPage(QWidget):
         self.buttons["good"].clicked.connect(lambda: self.run and self.judge.emit(str(self.run), "good"))
         self.buttons["bad"].clicked.connect(lambda: self.run and self.judge.emit(str(self.run), "bad"))
         self.buttons["next"].clicked.connect(self.next_wanted.emit)
+        for name, key in (("page", "Ctrl+O"), ("replay", "Ctrl+P"), ("good", "Ctrl+G"), ("bad", "Ctrl+R")):
+            QShortcut(QKeySequence(key), self).activated.connect(self.buttons[name].click)
         self._show_buttons()
 
     def _build(self) -> None:
@@ -176,7 +179,7 @@ class ResultPage(QWidget):
             if method is None:
                 self.tiles[name].show_value(DASH, "too few impacts")
                 continue
-            detail = f"± {method.standard_error:.4f} · {method.r / test.r_max:.2f} r_max"
+            detail = f"{plus_minus(method.standard_error)} · {method.r / test.r_max:.2f} r_max"
             self.tiles[name].show_value(f"{method.r:.3f}", detail)
         deviation = period_deviation(test)
         shown = DASH if deviation is None else f"{number(100 * deviation, 1)} %"

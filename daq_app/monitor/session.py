@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +28,7 @@ from daq_app.acquisition.messages import (
 )
 from daq_app.config.rig import Rig
 from daq_app.monitor.minmax_ring import MinMaxRing
-from daq_app.monitor.motion_trace import MotionTrace
+from daq_app.monitor.motion_trace import Array, MotionTrace
 
 STALE_AFTER_S = 0.5
 """A measured value older than this is not shown as live."""
@@ -94,7 +94,7 @@ class Session:
         self.tilt_rad = math.nan
         self.rotation_rad = math.nan
         self.velocity_rad_s = math.nan
-        self.estimate_received_s = -math.inf
+        self._running: dict[str, dict[int, tuple[float, float]]] = {"eav": {}, "crt": {}}
         self.revision: dict[type[BaseModel], int] = {}
         """How many messages of each kind came: pages redraw when the number moves."""
         self._received: dict[type[BaseModel], float] = {}
@@ -104,6 +104,26 @@ class Session:
         self._peak_rad = 0.0
         self._rest_sample: int | None = None
         self._armed_sample = 0
+        self.saw_arming = False
+        """Whether this window was there when the run was armed: only then is its peak the run's peak."""
+        self.zeroed: bool | None = None
+        """Whether a zero is in force; None as long as the acquisition has not said."""
+        self.run_zeroed: bool | None = None
+        """The same for the run whose figures are shown."""
+
+    def set_zeroed(self, zeroed: bool) -> None:
+        """Take over whether a zero is in force. It cannot change within a run."""
+        self.zeroed = zeroed
+        if self.run_zeroed is None or (self.state is not None and self.state.state in RECORDING):
+            self.run_zeroed = zeroed
+
+    def adopt_past(self, events: Iterable[EventMessage]) -> None:
+        """Take over what was said before this window came: since when the run under way is recorded."""
+        if self.saw_arming:
+            return
+        for event in events:
+            if event.kind == "armed":
+                self._armed_sample = event.sample
 
     def set_rig(self, rig: Rig, rate_hz: float) -> None:
         """Say what is wired: names, families and α for the displays. Forgets all data."""
@@ -128,7 +148,7 @@ class Session:
             case MotionMessage():
                 self._on_motion(message)
             case EstimateMessage():
-                self.estimate, self.estimate_received_s = message, published.received_s
+                self._on_estimate(message)
             case HealthMessage():
                 if message.recording and message.sample == self._last_health_sample:
                     return  # a repeated figure says nothing new about the disk: let it go stale
@@ -148,8 +168,22 @@ class Session:
             self._peak_rad = 0.0
             self._rest_sample = None
             self._armed_sample = message.since_sample
+            self.saw_arming = True
+            self.run_zeroed = self.zeroed
         if message.state is State.AT_REST and self._rest_sample is None:
             self._rest_sample = message.since_sample
+
+    def _on_estimate(self, message: EstimateMessage) -> None:
+        if self.estimate is None or self.estimate.release_sample != message.release_sample:
+            for means in self._running.values():
+                means.clear()
+        self.estimate = message
+        for name, points, mean, error in (
+            ("eav", message.eav, message.eav_mean, message.eav_standard_error),
+            ("crt", message.crt, message.crt_mean, message.crt_standard_error),
+        ):
+            if points and mean is not None:
+                self._running[name][points[-1].impact] = (mean, error or 0.0)
 
     def _on_block(self, message: BlockMessage, readings: NDArray[np.float32] | None) -> None:
         if readings is None or self.strips is None or readings.shape[0] != self.strips.n_channels:
@@ -215,6 +249,15 @@ class Session:
     def data_missing(self) -> bool:
         """The clock should run, and no block has come for too long: the display is not live."""
         return self.current_state in RUNNING and not self.fresh(BlockMessage)
+
+    def running_mean(self, name: str) -> tuple[Array, Array, Array]:
+        """(impact, mean r after it, its standard error) of ``eav`` or ``crt``, as the acquisition told them.
+
+        A window that came in mid-run knows them from then on.
+        """
+        means = self._running[name]
+        values = np.array(list(means.values())).reshape(-1, 2)
+        return np.array(list(means), dtype=np.float64), values[:, 0], values[:, 1]
 
     @property
     def newest_sample(self) -> int:

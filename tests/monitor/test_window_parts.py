@@ -7,12 +7,18 @@ import math
 import numpy as np
 import pytest
 
-from daq_app.acquisition.messages import EstimatePoint, EventMessage, HealthMessage, State, StateMessage
+from daq_app.acquisition.messages import (
+    EstimateMessage,
+    EstimatePoint,
+    EventMessage,
+    HealthMessage,
+    State,
+    StateMessage,
+)
 
 # qtbot: this module needs Qt; tests/monitor/conftest.py skips it where Qt cannot start.
 from daq_app.monitor.actions import ActionBar
 from daq_app.monitor.background import Background
-from daq_app.monitor.estimate_plots import running_mean
 from daq_app.monitor.main_window import MainWindow
 from daq_app.monitor.notices import NoticeLine
 from daq_app.monitor.plot_base import envelope
@@ -70,12 +76,12 @@ def test_every_state_has_its_own_word_and_shape_so_that_colour_is_not_needed():
     ("state", "sampling", "enabled"),
     [
         (State.IDLE, False, {"preview", "next"}),
-        (State.PREVIEWING, True, {"arm", "next", "marker"}),
+        (State.PREVIEWING, True, {"arm", "next", "marker", "note"}),
         (State.PREVIEWING, False, {"next"}),
-        (State.ARMED, True, {"stop", "abort", "marker"}),
-        (State.HOLDING, True, {"stop", "abort", "marker"}),
-        (State.ROCKING, True, {"stop", "marker"}),
-        (State.AT_REST, True, {"stop", "marker"}),
+        (State.ARMED, True, {"stop", "abort", "marker", "note"}),
+        (State.HOLDING, True, {"stop", "abort", "marker", "note"}),
+        (State.ROCKING, True, {"stop", "marker", "note"}),
+        (State.AT_REST, True, {"stop", "marker", "note"}),
         (State.SAVING, True, set()),
         (State.SAVED, True, {"arm", "next"}),
         (State.FAILED, False, {"preview", "next"}),
@@ -244,13 +250,32 @@ def test_drawing_decimation_keeps_every_extreme():
     np.testing.assert_array_equal(short[1], y[:100])
 
 
-def test_running_mean_and_its_standard_error():
-    points = [EstimatePoint(impact=k + 1, r=r) for k, r in enumerate((0.9, 0.92, 0.88))]
-    impacts, mean, error = running_mean(points)
-    assert impacts.tolist() == [1, 2, 3]
-    np.testing.assert_allclose(mean, [0.9, 0.91, 0.9])
-    assert error[0] == 0
-    assert error[2] == pytest.approx(np.std([0.9, 0.92, 0.88], ddof=1) / math.sqrt(3))
+def test_the_running_mean_is_the_one_that_the_acquisition_tells(window):
+    def heard(impacts, mean, error, release=1000):
+        points = [EstimatePoint(impact=k + 1, r=0.9) for k in range(impacts)]
+        estimate = EstimateMessage(
+            theta0_rad=0.07,
+            release_sample=release,
+            impact_samples=[1000.0 + k for k in range(impacts)],
+            peaks_rad=[0.07] * (impacts + 1),
+            impact_velocities_rad_s=[0.1] * impacts,
+            eav=[],
+            crt=points,
+            crt_mean=mean,
+            crt_standard_error=error,
+            r_max=0.93,
+        )
+        window.session.feed(Published(estimate, window.clock.now))
+
+    heard(1, 0.91, None)
+    heard(3, 0.92, 0.004)
+    impacts, mean, error = window.session.running_mean("crt")
+    assert (impacts.tolist(), mean.tolist(), error.tolist()) == ([1, 3], [0.91, 0.92], [0.0, 0.004])
+    assert window.session.running_mean("eav")[0].size == 0
+    window.live.restitution.draw()
+    assert window.live.restitution._means["crt"].getData()[1].tolist() == [0.91, 0.92]
+    heard(1, 0.80, None, release=9000)
+    assert window.session.running_mean("crt")[1].tolist() == [0.80]
 
 
 # -- preparing -----------------------------------------------------------------------------------
@@ -341,7 +366,7 @@ def test_events_that_matter_are_told_and_routine_ones_are_not(window):
 
 
 def test_arming_without_a_name_is_refused_with_what_to_do(window):
-    window._arm()
+    window.orders.arm()
     assert window.notices.current == ("warning", "Give the test a name before arming.")
 
 
@@ -369,11 +394,13 @@ def test_a_no_go_must_be_overruled_on_purpose(window, monkeypatch):
     window.prepare.check = SensorCheck((ChannelCheck("WP-3", "wire", (bad,), 0.0, 0.0, 1.0, 0.0),))
     window.prepare.card.propose("FR1-L3-1")
     asked = []
-    monkeypatch.setattr(window, "_request", lambda name, arguments=None: asked.append((name, arguments)))
-    window._arm()
+    monkeypatch.setattr(
+        window.orders, "request", lambda name, arguments=None: asked.append((name, arguments))
+    )
+    window.orders.arm()
     assert asked == []
     assert "no-go" in window.notices.current[1]
-    window._arm()
+    window.orders.arm()
     assert asked[0][1]["test"] == "FR1-L3-1"
     assert "Sensor check: no-go" in asked[0][1]["notes"]
 
@@ -392,3 +419,85 @@ def test_axes_say_what_they_show_also_after_a_change_of_theme(window, stand_in):
         for name in ("left", "bottom", "right"):
             assert plot.plot_item.getAxis(name).autoSIPrefixScale == 1.0
     assert window.live.motion.velocity.plot_item.getAxis("bottom").labelText == "time since release  (s)"
+
+
+# -- truth ---------------------------------------------------------------------------------------
+
+
+def test_an_r_without_a_zero_says_so_in_words(window, stand_in):
+    window.session.set_zeroed(False)
+    play(window, stand_in, stand_in.release_s + 4.0)
+    window.live.draw_slow()
+    tile = window.live.counters.tiles["crt"]
+    assert "no zero" in tile.detail and "3 %" in tile.detail
+    assert "No zero has been taken" in window.live._caption.text()
+    # A zero that is taken afterwards does not mend what this run has shown.
+    window.session.feed(Published(StateMessage(state=State.SAVED), window.clock.now))
+    window.session.set_zeroed(True)
+    window.live.draw_slow()
+    assert "no zero" in tile.detail
+
+
+def test_a_standard_error_that_rounds_to_nothing_is_not_shown_as_none(window, stand_in):
+    window.session.set_zeroed(True)
+    play(window, stand_in, stand_in.release_s + 4.0)
+    estimate = window.session.estimate
+    sure = estimate.model_copy(update={"crt_standard_error": 2e-6, "eav_standard_error": 0.0021})
+    window.session.feed(Published(sure, window.clock.now))
+    window.live.draw_slow()
+    assert window.live.counters.tiles["crt"].detail.startswith("± < 0.0001")
+    assert window.live.counters.tiles["eav"].detail.startswith("± 0.0021")
+
+
+def test_a_window_opened_in_mid_run_dates_the_recording_from_its_arming(window):
+    past = [
+        {"kind": "armed", "sample": 40_000, "text": "Armed", "severity": "info"},
+        {"kind": "recovered", "sample": 0, "text": "Left by an earlier session", "severity": "warning"},
+    ]
+    window._adopt_past(past)
+    assert window.notices.current == ("warning", "Left by an earlier session")
+    window.session.feed(Published(StateMessage(state=State.ROCKING), window.clock.now))
+    health = HealthMessage(
+        sample=60_400,
+        acknowledged_sample=60_000,
+        recording=True,
+        backlog_samples=0,
+        buffer_samples=80_000,
+        gaps=0,
+        lost_samples=0,
+    )
+    window.session.feed(Published(health, window.clock.now))
+    window.header.refresh(window.colours)
+    assert window.header.words["recording_detail"] == "5.0 s safe on disk"
+    window.live.draw_slow()
+    assert window.live.counters.tiles["impacts"].value == "–"
+    assert window.live.counters.tiles["elapsed"].detail == "no impact heard yet"
+
+
+def test_a_value_that_goes_stale_leaves_the_screen_with_the_next_frame(window, stand_in):
+    play(window, stand_in, 3.0)
+    window.stack.addWidget(window.live)  # a window without a link has no live page
+    window.stack.setCurrentWidget(window.live)
+    window._on_frame()
+    assert window.live.counters.tiles["rotation"].detail != "not live"
+    window.clock.now += 0.51
+    window._on_frame()
+    assert window.live.counters.tiles["rotation"].detail == "not live"
+    assert all(text == "–" for text in window.health.texts)
+
+
+def test_a_note_is_typed_in_a_line_not_in_a_box(qtbot, window, monkeypatch):
+    from PySide6.QtCore import Qt
+
+    asked = []
+    monkeypatch.setattr(window.orders, "request", lambda name, more=None: asked.append((name, more)))
+    window.actions_bar.refresh(State.ROCKING, sampling=True, may_command=True)
+    window.actions_bar.buttons["note"].click()
+    assert not window.note_entry.isHidden()
+    qtbot.keyClicks(window.note_entry.line, "stone fell at B")
+    qtbot.keyClick(window.note_entry.line, Qt.Key.Key_Escape)
+    assert window.note_entry.isHidden() and asked == []
+    window.actions_bar.buttons["note"].click()
+    qtbot.keyClick(window.note_entry.line, Qt.Key.Key_Return)
+    assert asked == [("note", {"text": "stone fell at B"})]
+    assert window.note_entry.isHidden() and window.note_entry.line.text() == ""

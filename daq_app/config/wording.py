@@ -1,0 +1,18 @@
+"""Numbers as people read them, the same in the window, the terminal and the reports."""
+
+from __future__ import annotations
+
+import math
+
+
+def plus_minus(error: float | None, decimals: int = 4) -> str:
+    """A standard error behind its value: ``± 0.0021``; what rounds to nothing is ``± < 0.0001``.
+
+    Empty where there is none: a zero of all digits would claim a certainty that no measurement has.
+    """
+    if error is None or not math.isfinite(error):
+        return ""
+    least = 10.0**-decimals
+    if float(f"{abs(error):.{decimals}f}") == 0.0:
+        return f"± < {least:.{decimals}f}"
+    return f"± {abs(error):.{decimals}f}"
