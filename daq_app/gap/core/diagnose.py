@@ -13,7 +13,7 @@ from daq_app.gap.core.decision import Material, Thresholds, decide
 from daq_app.gap.core.effects import Library
 from daq_app.gap.core.evidence import NULL, Ranked, credible_set, family_of, pair_candidates, rank
 from daq_app.gap.core.features import Run
-from daq_app.gap.core.fit import Fit, effects_of, frozen_columns
+from daq_app.gap.core.fit import Fit, effects_of
 from daq_app.gap.core.goodness import Goodness, check
 from daq_app.gap.core.held_out import GapSize, HeldOutRun, gap_size
 from daq_app.gap.core.likelihood import Covariance
@@ -121,7 +121,7 @@ class _Study:
     def fit_all(self) -> None:
         """Null, singles and probes; then pairs where they are wanted."""
         self.fits[NULL] = self._fit([NULL], [None], "without any effect")[0]
-        self.workers.frozen = frozen_columns(self.model, self.runs, self.fits[NULL])
+        self.workers.frozen = self.fits[NULL].columns
         singles = [(effect.name,) for effect in self.library.named]
         probes = [(effect.name,) for effect in self.library.probes]
         both = singles + probes

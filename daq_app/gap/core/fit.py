@@ -1,9 +1,4 @@
-"""Fitting one hypothesis: bounded Levenberg–Marquardt within a search for the scatter sizes.
-
-Given the scatter sizes the features are Gaussian, so the inner step is least squares on whitened
-residuals with the priors as further rows. The sizes themselves maximise the Laplace marginal
-likelihood (restricted maximum likelihood: the unknowns are integrated out, not profiled).
-"""
+"""Fitting one hypothesis from several starts, and what the fit says: values, evidence, residuals."""
 
 from __future__ import annotations
 
@@ -17,16 +12,16 @@ from scipy.special import log_ndtr, ndtr
 
 from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.features import FloatArray, Run
-from daq_app.gap.core.likelihood import Covariance, log_density
+from daq_app.gap.core.likelihood import Covariance
 from daq_app.gap.core.model import Model
-from daq_app.gap.core.problem import Linearised, Problem
+from daq_app.gap.core.problem import Columns, Problem
+from daq_app.gap.core.search import TOLERANCE, Search
 
-SCATTER_STEP = 0.05
-"""Step of the differences in the logarithm of a scatter size."""
 _MAX_STARTS = 6
-Frozen = dict[tuple[str, int | None], FloatArray]
-_TOLERANCE = 1e-3
-"""A change of the log posterior below this ends a search."""
+_FOLLOWED = 3
+_POLISH_ROUNDS = 8
+_LOOSE = 0.05
+"""Tolerance of the search in a hypothesis that has yet to show that it is worth more."""
 
 
 @dataclass(slots=True)
@@ -48,6 +43,8 @@ class Fit:
     starts: int = 1
     starts_agreeing: int = 1
     converged: bool = True
+    columns: Columns = field(default_factory=dict, repr=False)
+    """Jacobian at the end, where it was worked out exactly."""
     values: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     """Shared parameters: (value, low, high) of the 95 % interval."""
     local_values: tuple[dict[str, tuple[float, float, float]], ...] = ()
@@ -68,150 +65,6 @@ class Fit:
         return math.sqrt(max(float(u @ np.linalg.solve(block, u)), 0.0) / max(len(index), 1))
 
 
-class _Search:
-    """State of one search from one start."""
-
-    def __init__(self, problem: Problem, u: FloatArray, log_sigma: FloatArray) -> None:
-        self.problem = problem
-        self.scatters = problem.model.scatters
-        self.u = u
-        self.log_sigma = log_sigma
-        self.weights = [run.features.independent_fraction for run in problem.runs]
-        self.predictions = [problem.predict(i, u) for i in range(len(problem.runs))]
-        self.lines: list[Linearised] = []
-        self.damping = 1e-3
-        self.frozen: Frozen | None = None
-        self.objective = self._objective(u, log_sigma)
-
-    def sigmas(self, log_sigma: FloatArray) -> dict[str, float]:
-        return {s.name: math.exp(float(v)) for s, v in zip(self.scatters, log_sigma, strict=True)}
-
-    def scatter_prior(self, log_sigma: FloatArray) -> float:
-        terms = (
-            ((v - math.log(s.median)) / s.log_sd) ** 2 for s, v in zip(self.scatters, log_sigma, strict=True)
-        )
-        return 0.5 * float(sum(terms))
-
-    def _objective(self, u: FloatArray, log_sigma: FloatArray) -> float:
-        """−log posterior at the current predictions."""
-        sigmas = self.sigmas(log_sigma)
-        total = 0.5 * float(u @ u) + self.scatter_prior(log_sigma)
-        for run, prediction, weight in zip(self.problem.runs, self.predictions, self.weights, strict=True):
-            covariance = Covariance(run.features.sd, prediction, sigmas)
-            total -= weight * log_density(run.features.values - prediction.features, covariance)
-        return total if math.isfinite(total) else math.inf
-
-    def linearise(self) -> None:
-        self.lines = [
-            self.problem.linearise(i, self.u, prediction, self.frozen)
-            for i, prediction in enumerate(self.predictions)
-        ]
-
-    def normal_equations(self, log_sigma: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-        """Hessian (with priors), gradient of −log posterior, and log likelihood of the linearisation."""
-        sigmas = self.sigmas(log_sigma)
-        p = len(self.problem)
-        hessian, gradient, log_like = np.eye(p), self.u.copy(), 0.0
-        for i, (line, run, weight) in enumerate(
-            zip(self.lines, self.problem.runs, self.weights, strict=True)
-        ):
-            covariance = Covariance(run.features.sd, line.prediction, sigmas)
-            columns = self.problem.columns(i)
-            gram = covariance.gram(np.column_stack([line.jacobian[:, columns], line.residual]))
-            hessian[np.ix_(columns, columns)] += weight * gram[:-1, :-1]
-            gradient[columns] -= weight * gram[:-1, -1]
-            n = line.residual.size
-            log_like -= 0.5 * weight * (gram[-1, -1] + covariance.log_det + n * math.log(2 * math.pi))
-        return hessian, gradient, float(log_like)
-
-    def step(self) -> float:
-        """One accepted Levenberg–Marquardt step; returns the gain (0 when none was found)."""
-        self.linearise()
-        hessian, gradient, _ = self.normal_equations(self.log_sigma)
-        low, high = self.problem.low, self.problem.high
-        free = ~(((self.u <= low) & (gradient > 0)) | ((self.u >= high) & (gradient < 0)))
-        if not free.any():
-            return 0.0
-        before = self.objective
-        for _ in range(8):
-            damped = hessian + self.damping * np.diag(np.diag(hessian))
-            delta = np.zeros_like(self.u)
-            delta[free] = -np.linalg.solve(damped[np.ix_(free, free)], gradient[free])
-            trial = np.clip(self.u + delta, low, high)
-            kept = self.predictions
-            self.predictions = [self.problem.predict(i, trial) for i in range(len(self.problem.runs))]
-            objective = self._objective(trial, self.log_sigma)
-            if math.isfinite(objective) and objective < before:
-                self.u, self.objective = trial, objective
-                # Down to nothing: any damping left would leave a stiff direction short of its optimum.
-                self.damping = 0.0 if self.damping < 1e-7 else self.damping / 10
-                return before - objective
-            self.predictions = kept
-            self.damping = max(self.damping * 10, 1e-6)
-        return 0.0
-
-    def marginal(self, log_sigma: FloatArray) -> float:
-        """−log Laplace marginal of the scatter sizes at the current linearisation."""
-        hessian, _, log_like = self.normal_equations(log_sigma)
-        sign, log_det = np.linalg.slogdet(hessian)
-        if sign <= 0:
-            return math.inf
-        return -log_like + 0.5 * float(self.u @ self.u) + 0.5 * float(log_det) + self.scatter_prior(log_sigma)
-
-    def update_scatter(self) -> None:
-        """A few damped Newton steps in the logarithms, each coordinate with its own curvature.
-
-        The sizes hardly interact (each has its own features), so the diagonal of the curvature is enough.
-        """
-        here = self.marginal(self.log_sigma)
-        for _ in range(4 if self.scatters else 0):
-            slope, curvature = self.scatter_slopes(here)
-            move = np.where(curvature > 0.05, -slope / np.maximum(curvature, 0.05), -np.sign(slope))
-            trial = np.clip(self.log_sigma + np.clip(move, -1.0, 1.0), *self._scatter_bounds())
-            value = self.marginal(trial)
-            if value > here:
-                trial = 0.5 * (trial + self.log_sigma)
-                value = self.marginal(trial)
-            moved = float(np.abs(trial - self.log_sigma).max())
-            if value > here:
-                break
-            self.log_sigma, here = trial, value
-            if moved < 0.02:
-                break
-        self.objective = self._objective(self.u, self.log_sigma)
-
-    def _scatter_bounds(self) -> tuple[FloatArray, FloatArray]:
-        medians = np.array([math.log(s.median) for s in self.scatters])
-        reach = np.array([4 * s.log_sd for s in self.scatters])
-        return medians - reach, medians + reach
-
-    def scatter_slopes(self, here: float) -> tuple[FloatArray, FloatArray]:
-        """First and second derivatives of `marginal` along each logarithm."""
-        slope, curvature = np.zeros(len(self.scatters)), np.zeros(len(self.scatters))
-        for k in range(len(self.scatters)):
-            offset = np.zeros(len(self.scatters))
-            offset[k] = SCATTER_STEP
-            ahead, behind = self.marginal(self.log_sigma + offset), self.marginal(self.log_sigma - offset)
-            slope[k] = (ahead - behind) / (2 * SCATTER_STEP)
-            curvature[k] = (ahead - 2 * here + behind) / SCATTER_STEP**2
-        return slope, curvature
-
-    def run(self, rounds: int, steps: int) -> bool:
-        """Alternate steps and scatter updates; True when neither changes anything any more."""
-        for _ in range(rounds):
-            gained = 0.0
-            for _ in range(steps):
-                gain = self.step()
-                gained += gain
-                if gain < _TOLERANCE:
-                    break
-            before = self.log_sigma.copy()
-            self.update_scatter()
-            if gained < _TOLERANCE and np.all(np.abs(self.log_sigma - before) < 0.01):
-                return True
-        return False
-
-
 def fit(
     model: Model,
     runs: Sequence[Run],
@@ -219,57 +72,67 @@ def fit(
     known: Mapping[tuple[str, int | None], float] | None = None,
     sigmas: Mapping[str, float] | None = None,
     multistart: bool = True,
-    frozen: Frozen | None = None,
+    frozen: Columns | None = None,
     polish: bool = True,
 ) -> Fit:
     """Fit a hypothesis to runs.
 
-    `frozen` are columns of the Jacobian from the fit without the effect (`frozen_columns`): the
-    search uses them until its last steps. Without `polish` even those use them, which is good enough
-    to see that a hypothesis has no chance.
-
     `known` are unit coordinates to start from (usually the fit without the effect), `sigmas` the
     scatter sizes to start from. With `multistart` the effect's parameters are started from zero and
-    from each of their declared starts; the two best are followed to convergence.
+    from each of their declared starts; the three that promise most are followed.
+
+    `frozen` are columns of the Jacobian from the fit without the effect (`Fit.columns`): the
+    search uses them until its last steps. Without `polish` even those use them, which is good enough
+    to see that a hypothesis has no chance.
     """
     problem = Problem(model, runs, effects)
     base = problem.start(known or {})
     start_sigma = np.array([math.log((sigmas or {}).get(s.name, s.median)) for s in model.scatters])
     starts = _starts(problem, base) if multistart and effects else [base]
-    searches = [_Search(problem, u, start_sigma.copy()) for u in starts]
+    linear = _linear(problem, frozen)
+    searches = [Search(problem, u, start_sigma.copy(), frozen or linear) for u in starts]
     # A start may lie where the model diverges; it is dropped as long as another one does not.
     searches = [s for s in searches if math.isfinite(s.objective)] or searches[:1]
+    followed, agreeing = _lead(searches, problem)
+    best = followed[0]
+    converged = _polish(best, linear) if polish else best.run(4, 4, _LOOSE)
+    return _finish(best, converged, len(followed), agreeing, exact=polish)
+
+
+def _polish(search: Search, linear: Columns) -> bool:
+    """Follow a search to its end: fresh columns, many steps with these, until fresh ones gain nothing."""
+    nothing = np.zeros(len(search.problem), dtype=bool)
+    for _ in range(_POLISH_ROUNDS):
+        search.known = dict(linear)
+        arrived = search.objective - search.promise(nothing) < TOLERANCE
+        sigma = search.log_sigma.copy()
+        search.known = search.problem.columns_of(search.lines)
+        search.run(6, 6)
+        if arrived and np.all(np.abs(search.log_sigma - sigma) < 0.01):
+            return True
+    return False
+
+
+def _linear(problem: Problem, frozen: Columns | None) -> Columns:
+    """Those of the known columns that hold everywhere."""
+    names = {q.key for q in problem.unknowns if q.parameter.linear}
+    return {key: column for key, column in (frozen or {}).items() if key[0] in names}
+
+
+def _lead(searches: list[Search], problem: Problem) -> tuple[list[Search], int]:
+    """The searches that were followed, best first, and how many of them reached the same optimum.
+
+    Where a start leads is told by one linear step in the unknowns of the model with the effect held; the
+    three that promise most are followed.
+    """
+    if len(searches) > _FOLLOWED:
+        held = np.array([bool(q.effect) for q in problem.unknowns])
+        searches = sorted(searches, key=lambda search: search.promise(held))[:_FOLLOWED]
     for search in searches:
-        search.frozen = frozen
-        if len(searches) > 1:
-            search.run(rounds=1, steps=3 if frozen else 2)
-    searches.sort(key=lambda s: s.objective)
-    leaders = searches[:2]
-    if frozen:
-        for search in leaders:
-            search.run(rounds=3, steps=5)
-        searches.sort(key=lambda s: s.objective)
-        leaders = searches[:1]
-    converged = []
-    for search in leaders:
-        if polish:
-            search.frozen = None
-        converged.append(search.run(rounds=6, steps=6))
-    finals = [s.objective for s in leaders] + [s.objective for s in searches[len(leaders) :]]
-    best = int(np.argmin(finals[: len(leaders)]))
-    agreeing = sum(1 for value in finals if value - finals[best] < 0.5)
-    return _finish(leaders[best], converged[best], len(searches), agreeing)
-
-
-def frozen_columns(model: Model, runs: Sequence[Run], found: Fit, effects: Sequence[Effect] = ()) -> Frozen:
-    """Columns of the Jacobian at a fit, by (key, run index)."""
-    problem = Problem(model, runs, effects)
-    columns: Frozen = {}
-    for i in range(len(problem.runs)):
-        line = problem.linearise(i, found.u)
-        for k in problem.columns(i):
-            columns[(problem.unknowns[k].key, i)] = line.jacobian[:, k]
-    return columns
+        search.run(4, 4, _LOOSE)
+    searches = sorted(searches, key=lambda search: search.objective)
+    best = searches[0].objective
+    return searches, sum(1 for search in searches if search.objective - best < 0.5)
 
 
 def _starts(problem: Problem, base: FloatArray) -> list[FloatArray]:
@@ -287,14 +150,16 @@ def _starts(problem: Problem, base: FloatArray) -> list[FloatArray]:
         u[own] = combination
         for k in per_run:
             u[k] = problem.unknowns[k].parameter.start_coordinates()[0]
-        starts.append(np.clip(u, problem.low, problem.high))
+        u = np.clip(u, problem.low, problem.high)
+        if not any(np.array_equal(u, other) for other in starts):
+            starts.append(u)
     return starts
 
 
-def _finish(search: _Search, converged: bool, starts: int, agreeing: int) -> Fit:
+def _finish(search: Search, converged: bool, starts: int, agreeing: int, exact: bool) -> Fit:
     """Evidence, covariance and residuals at the end of a search."""
     problem = search.problem
-    search.linearise()
+    search.linearise(exact)
     hessian, gradient, log_like = search.normal_equations(search.log_sigma)
     covariance: FloatArray = np.linalg.inv(hessian).astype(np.float64)
     _, log_det = np.linalg.slogdet(hessian)
@@ -328,6 +193,7 @@ def _finish(search: _Search, converged: bool, starts: int, agreeing: int) -> Fit
         starts=starts,
         starts_agreeing=agreeing,
         converged=converged,
+        columns=problem.columns_of(search.lines) if exact else {},
         values=shared,
         local_values=tuple(local),
     )
@@ -359,7 +225,7 @@ def _log_mass(low: float, high: float) -> float:
     return upper + math.log1p(-math.exp(min(lower - upper, -1e-12)))
 
 
-def _scatter_evidence(search: _Search) -> float:
+def _scatter_evidence(search: Search) -> float:
     """Laplace term of the scatter sizes: prior at the mode and the width of their posterior."""
     total = -search.scatter_prior(search.log_sigma)
     _, curvature = search.scatter_slopes(search.marginal(search.log_sigma))

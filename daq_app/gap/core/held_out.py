@@ -13,7 +13,7 @@ from daq_app.gap.core.features import FloatArray, Run
 from daq_app.gap.core.fit import Fit, fit
 from daq_app.gap.core.likelihood import Covariance
 from daq_app.gap.core.model import Model, Prediction
-from daq_app.gap.core.problem import Problem
+from daq_app.gap.core.problem import Columns, Problem
 
 _LOCAL_STEPS = 8
 
@@ -60,38 +60,52 @@ def score(
     results: list[HeldOutRun] = []
     for fold in folds(runs, by):
         training = [run for i, run in enumerate(runs) if i not in fold]
-        start = _renumber(whole, fold, len(runs))
-        trained = fit(model, training, effects, start, whole.sigmas, multistart=False)
-        results += [_predict(model, runs[i], effects, trained) for i in fold]
+        start, columns = _renumber(whole, fold, len(runs))
+        trained = fit(
+            model,
+            training,
+            effects,
+            start,
+            whole.sigmas,
+            multistart=False,
+            frozen=columns,
+            polish=not columns,
+        )
+        results += [_predict(model, runs[i], effects, trained, _of_run(whole, i)) for i in fold]
     return results
 
 
-def _renumber(whole: Fit, fold: Sequence[int], count: int) -> dict[tuple[str, int | None], float]:
-    """The whole fit's coordinates with run indices as they are once the fold is left out."""
-    place = {old: new for new, old in enumerate(i for i in range(count) if i not in fold)}
-    known = whole.known()
-    return {
-        (key, None if run is None else place[run]): value
-        for (key, run), value in known.items()
-        if run is None or run in place
-    }
+def _of_run(whole: Fit, run: int) -> Columns:
+    """The Jacobian of one run at the whole fit, as that of a problem with this run alone."""
+    return {(key, 0): column for (key, index), column in whole.columns.items() if index == run}
 
 
-def _predict(model: Model, run: Run, effects: Sequence[Effect], trained: Fit) -> HeldOutRun:
+def _renumber(
+    whole: Fit, fold: Sequence[int], count: int
+) -> tuple[dict[tuple[str, int | None], float], Columns]:
+    """The whole fit's coordinates and Jacobian with run indices as they are once the fold is left out."""
+    place: dict[int | None, int | None] = {None: None}
+    place |= {old: new for new, old in enumerate(i for i in range(count) if i not in fold)}
+    known = {(key, place[run]): value for (key, run), value in whole.known().items() if run in place}
+    columns = {(key, place[run]): column for (key, run), column in whole.columns.items() if run in place}
+    return known, columns
+
+
+def _predict(model: Model, run: Run, effects: Sequence[Effect], trained: Fit, columns: Columns) -> HeldOutRun:
     problem = Problem(model, [run], effects)
     shared = [k for k, q in enumerate(problem.unknowns) if q.run is None]
     local = [k for k, q in enumerate(problem.unknowns) if q.run is not None]
     order = {key: k for k, (key, index) in enumerate(trained.keys) if index is None}
     pick = [order[problem.unknowns[k].key] for k in shared]
     u = problem.start({(key, None): trained.u[k] for key, k in order.items()})
-    line = problem.linearise(0, u)
+    line = problem.linearise(0, u, known=columns)
     for _ in range(_LOCAL_STEPS if local else 0):
         jacobian = line.jacobian[:, local]
         covariance = Covariance(run.features.sd, line.prediction, trained.sigmas)
         hessian = covariance.gram(jacobian) + np.eye(len(local))
         step = np.linalg.solve(hessian, jacobian.T @ covariance.solve(line.residual) - u[local])
         u[local] = np.clip(u[local] + step, problem.low[local], problem.high[local])
-        line = problem.linearise(0, u)
+        line = problem.linearise(0, u, known=columns)
         if float(np.abs(step).max()) < 1e-3:
             break
     # Predictive covariance: scatter and noise, what training left open, and the run's own prior.

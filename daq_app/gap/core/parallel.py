@@ -12,9 +12,10 @@ from typing import Any, TypeVar
 
 from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.features import Run
-from daq_app.gap.core.fit import Fit, Frozen, fit
+from daq_app.gap.core.fit import Fit, fit
 from daq_app.gap.core.held_out import HeldOutRun, score
 from daq_app.gap.core.model import Model
+from daq_app.gap.core.problem import Columns
 
 T = TypeVar("T")
 
@@ -33,7 +34,7 @@ class FitTask:
     polish: bool = True
     multistart: bool = True
 
-    def run(self, model: Model, runs: Sequence[Run], frozen: Frozen | None = None) -> Fit:
+    def run(self, model: Model, runs: Sequence[Run], frozen: Columns | None = None) -> Fit:
         return fit(model, runs, self.effects, self.known, self.sigmas, self.multistart, frozen, self.polish)
 
 
@@ -45,7 +46,7 @@ class ScoreTask:
     whole: Fit
     by: str
 
-    def run(self, model: Model, runs: Sequence[Run], frozen: Frozen | None = None) -> list[HeldOutRun]:
+    def run(self, model: Model, runs: Sequence[Run], frozen: Columns | None = None) -> list[HeldOutRun]:
         return score(model, runs, self.effects, self.whole, self.by)
 
 
@@ -53,7 +54,7 @@ _STATE: dict[str, Any] = {}
 """In a worker process: the model and runs, sent once instead of with every task."""
 
 
-def _prepare(model: Model, runs: Sequence[Run], frozen: Frozen | None) -> None:
+def _prepare(model: Model, runs: Sequence[Run], frozen: Columns | None) -> None:
     _STATE["model"], _STATE["runs"], _STATE["frozen"] = model, runs, frozen
 
 
@@ -96,7 +97,7 @@ class Workers:
         self._progress = progress or (lambda done, total, text: None)
         self._cancelled = cancelled or (lambda: False)
         self._pool: ProcessPoolExecutor | None = None
-        self.frozen: Frozen | None = None
+        self.frozen: Columns | None = None
         """Columns of the Jacobian without any effect; set before the first tasks on several cores."""
 
     def __enter__(self) -> Workers:

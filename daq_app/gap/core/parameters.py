@@ -29,6 +29,8 @@ class Parameter:
     """An effect's parameter that takes its own value in every run."""
     starts: tuple[float, ...] = ()
     """Values from which a fit is started; empty means one prior sd to either side, within bounds."""
+    linear: bool = False
+    """The prediction is a straight line in it whose slope no other parameter changes: one column for all."""
 
     def __post_init__(self) -> None:
         if self.sd <= 0:
@@ -76,8 +78,19 @@ class Parameter:
         return inside or (0.0,)
 
 
-def signed(name: str, reach: float, unit: str = "", meaning: str = "", *, per_run: bool = False) -> Parameter:
-    """A strength of either sign: prior N(0, (reach/2)²), bounded at 6·reach."""
+def signed(
+    name: str,
+    reach: float,
+    unit: str = "",
+    meaning: str = "",
+    *,
+    per_run: bool = False,
+    linear: bool = False,
+) -> Parameter:
+    """A strength of either sign: prior N(0, (reach/2)²), bounded at 6·reach.
+
+    A linear one is started from 0 alone: from anywhere else its fit would arrive at the same place.
+    """
     return Parameter(
         name,
         0.0,
@@ -87,7 +100,8 @@ def signed(name: str, reach: float, unit: str = "", meaning: str = "", *, per_ru
         6 * reach,
         meaning=meaning,
         per_run=per_run,
-        starts=(-reach / 4, reach / 4),
+        starts=(0.0,) if linear else (-reach / 4, reach / 4),
+        linear=linear,
     )
 
 

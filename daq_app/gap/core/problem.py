@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,8 @@ from daq_app.gap.core.parameters import Parameter
 
 STEP = 1e-4
 """Half width of central differences, in prior standard deviations."""
+Columns = dict[tuple[str, int | None], FloatArray]
+"""Columns of Jacobians, shape (n,) each, by (key, run index)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +77,15 @@ class Problem:
             self.unknowns[k].key: self.unknowns[k].parameter.value(float(u[k])) for k in self._columns[run]
         }
 
+    def columns_of(self, lines: Iterable[Linearised], linear_only: bool = False) -> Columns:
+        """Columns of Jacobians for later use: all, or those of linear parameters, which never change."""
+        return {
+            (self.unknowns[k].key, run): line.jacobian[:, k]
+            for run, line in enumerate(lines)
+            for k in self._columns[run]
+            if self.unknowns[k].parameter.linear or not linear_only
+        }
+
     def predict(self, run: int, u: FloatArray) -> Prediction:
         return self.model.predict(self.runs[run], self.values(run, u))
 
@@ -83,23 +94,30 @@ class Problem:
         run: int,
         u: FloatArray,
         prediction: Prediction | None = None,
-        frozen: Mapping[tuple[str, int | None], FloatArray] | None = None,
+        known: Columns | None = None,
+        exact: bool = True,
     ) -> Linearised:
-        """Residual and Jacobian of one run by central differences (one-sided at a bound).
+        """Residual and Jacobian of one run.
 
-        `frozen` are columns known from another point, shape (n,) by (key, run): a search far from
-        its end takes them instead of computing them anew.
+        Differences are central (one-sided at a bound) where `exact`, else forward: half the work, and
+        good enough to walk by. `known` are columns taken from elsewhere, shape (n,) by (key, run).
         """
         here = prediction or self.predict(run, u)
         jacobian = np.zeros((here.features.size, len(self)))
         for k in self._columns[run]:
-            known = frozen.get((self.unknowns[k].key, run)) if frozen else None
-            if known is not None:
-                jacobian[:, k] = known
-                continue
-            ahead, behind = min(u[k] + STEP, self.high[k]), max(u[k] - STEP, self.low[k])
-            jacobian[:, k] = (self._at(run, u, k, ahead) - self._at(run, u, k, behind)) / (ahead - behind)
+            column = known.get((self.unknowns[k].key, run)) if known else None
+            jacobian[:, k] = self._slope(run, u, k, here, exact) if column is None else column
         return Linearised(self.runs[run].features.values - here.features, jacobian, here)
+
+    def _slope(self, run: int, u: FloatArray, k: int, here: Prediction, exact: bool) -> FloatArray:
+        ahead, behind = min(u[k] + STEP, self.high[k]), max(u[k] - STEP, self.low[k])
+        if exact:
+            slope: FloatArray = (self._at(run, u, k, ahead) - self._at(run, u, k, behind)) / (ahead - behind)
+        elif ahead > u[k]:
+            slope = (self._at(run, u, k, ahead) - here.features) / (ahead - u[k])
+        else:
+            slope = (here.features - self._at(run, u, k, behind)) / (u[k] - behind)
+        return slope
 
     def _at(self, run: int, u: FloatArray, k: int, value: float) -> FloatArray:
         moved = u.copy()

@@ -122,7 +122,7 @@ def _probes() -> Iterable[Effect]:
     yield Effect(
         "free_restoring",
         "interface",
-        tuple(signed(f"t{i}", 0.01, "s", text) for i, text in enumerate(places)),
+        tuple(signed(f"t{i}", 0.01, "s", text, linear=True) for i, text in enumerate(places)),
         "half-cycle times + f(peak), the same up and down",
         "non-parametric",
         kind="probe",
@@ -130,7 +130,7 @@ def _probes() -> Iterable[Effect]:
     yield Effect(
         "free_dissipation",
         "dissipation",
-        tuple(signed(f"t{i}", 0.005, "s", text) for i, text in enumerate(places[:6])),
+        tuple(signed(f"t{i}", 0.005, "s", text, linear=True) for i, text in enumerate(places[:6])),
         "times of the fall + f(peak), of the rise − f(peak)",
         "non-parametric",
         kind="probe",
@@ -140,7 +140,7 @@ def _probes() -> Iterable[Effect]:
         yield Effect(
             f"free_{family}",
             kind,
-            tuple(signed(f"c{i}", 40.0, "1", f"coefficient {i}") for i in range(count)),
+            tuple(signed(f"c{i}", 40.0, "1", f"coefficient {i}", linear=True) for i in range(count)),
             f"every coefficient of the {family} family is free",
             "non-parametric",
             kind="probe",

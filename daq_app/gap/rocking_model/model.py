@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -12,12 +12,13 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import sensor_response as response
 from daq_app.gap.rocking_model.records import Survey
 from daq_app.gap.rocking_model.run_features import RockingRun
-from daq_app.gap.rocking_model.vector import kernel_vector, restitution_of
+from daq_app.gap.rocking_model.vector import acts_on, kernel_vector, restitution_of
 from sim_hardware.dynamics import shooting
 
 SCATTER_R = "scatter of r"
 SCATTER_TIME = "scatter of times"
 SCATTER_SENSOR = "scatter of sensors"
+_REMEMBERED = 6
 
 
 class RockingModel:
@@ -69,17 +70,35 @@ class RockingModel:
             ),
             Parameter("cal_wire", 0.0, tolerance / math.sqrt(5), "1", meaning="calibration of the wires"),
             Parameter(
-                "cal_tiltmeter", 0.0, tolerance / math.sqrt(2), "1", meaning="calibration of the tiltmeters"
+                "cal_tiltmeter",
+                0.0,
+                tolerance / math.sqrt(2),
+                "1",
+                meaning="calibration of the tiltmeters",
+                linear=True,
             ),
             Parameter(
                 "cal_accelerometer", 0.0, tolerance / 2, "1", meaning="calibration of the accelerometers"
             ),
-            Parameter("tilt_response", 0.0, 0.01, "s", meaning="error of the tiltmeters' time constant"),
-            Parameter("onset", 0.0, 2.5e-3, "s", meaning="start of the ringing after the impact"),
-            Parameter("base_follow", 0.0, 8e-3, "m/rad", meaning="translation from wire calibrations"),
-            Parameter("twist_follow", 0.0, 2e-3, "1/m", meaning="twist from LVDT calibrations"),
-            Parameter("mount_height", 0.0, 0.05, "m", meaning="height of the LVDTs' points above the joint"),
-            Parameter("wire_even", 0.0, 5e-3, "1/rad", meaning="even part from wire anchors"),
+            Parameter(
+                "tilt_response", 0.0, 0.01, "s", meaning="error of the tiltmeters' time constant", linear=True
+            ),
+            Parameter(
+                "onset", 0.0, 2.5e-3, "s", meaning="start of the ringing after the impact", linear=True
+            ),
+            Parameter(
+                "base_follow", 0.0, 8e-3, "m/rad", meaning="translation from wire calibrations", linear=True
+            ),
+            Parameter("twist_follow", 0.0, 2e-3, "1/m", meaning="twist from LVDT calibrations", linear=True),
+            Parameter(
+                "mount_height",
+                0.0,
+                0.05,
+                "m",
+                meaning="height of the LVDTs' points above the joint",
+                linear=True,
+            ),
+            Parameter("wire_even", 0.0, 5e-3, "1/rad", meaning="even part from wire anchors", linear=True),
         )
 
     def local_nuisance(self, run: Run) -> tuple[Parameter, ...]:
@@ -99,14 +118,36 @@ class RockingModel:
         predicted = np.empty(n)
         loading_r, loading_t, loading_s = np.zeros(n), np.zeros(n), np.zeros(n)
         count = len(run.places)
-        predicted[:count], peaks, slopes = self._swings(run, values)
+        predicted[:count], peaks, slopes = self._remembered(run, "swings", values, self._swings)
         loading_t[:count] = 1.0
         last = count + run.peaks.size
         predicted[count:last] = peaks
         loading_r[count:last] = 1.0 / slopes
-        predicted[last:], loading_s[last:] = response.block_coefficients(run, values)
+        predicted[last:], loading_s[last:] = self._remembered(
+            run, "blocks", values, response.block_coefficients
+        )
         loadings = {SCATTER_R: loading_r, SCATTER_TIME: loading_t, SCATTER_SENSOR: loading_s}
         return Prediction(predicted, loadings, run.block_loadings)
+
+    @staticmethod
+    def _remembered(
+        run: RockingRun,
+        part: str,
+        values: Mapping[str, float],
+        work_out: Callable[[RockingRun, Mapping[str, float]], tuple[FloatArray, ...]],
+    ) -> tuple[FloatArray, ...]:
+        """A part of the prediction, kept for the last few values of what it depends on.
+
+        Differences move one parameter at a time, and most parameters move one part only.
+        """
+        kept: dict[tuple[tuple[str, float], ...], tuple[FloatArray, ...]] = run.cache.setdefault(part, {})
+        key = tuple(item for item in values.items() if acts_on(part, item[0], run.reference))
+        found = kept.get(key)
+        if found is None:
+            if len(kept) >= _REMEMBERED:
+                del kept[next(iter(kept))]
+            found = kept[key] = work_out(run, values)
+        return found
 
     def _swings(
         self, run: RockingRun, values: Mapping[str, float]

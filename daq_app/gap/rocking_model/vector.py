@@ -26,6 +26,23 @@ PROBE_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45)
 """Knots of the free r(v), rad/s."""
 
 
+_BLOCKS_ONLY = frozenset(
+    ("cal_tiltmeter", "cal_accelerometer", "tilt_response", "onset", "base_follow", "twist_follow")
+) | {"mount_height", "wire_even"}
+_SWINGS_ONLY = frozenset(("p", "r", "zero", "theta0", "omega0", "viscous.zeta", "coulomb.mu"))
+_FAMILIES = frozenset(("lvdt", "wire", "tiltmeter", "accelerometer"))
+
+
+def acts_on(part: str, key: str, reference: str) -> bool:
+    """Whether a value moves the ``swings`` or the ``blocks`` of a prediction; yes unless known otherwise."""
+    if part == "blocks":
+        return key not in _SWINGS_ONLY
+    if key in _BLOCKS_ONLY:
+        return False
+    target = key.rpartition(".")[0].rpartition("@")[2] if "@" in key else ""
+    return target == reference or target not in _FAMILIES
+
+
 def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> tuple[bytes, FloatArray, float]:
     """(key, vector, clock factor): the key names everything that the half-cycles depend on."""
     vector = np.zeros(par.N_PARAMETERS)
