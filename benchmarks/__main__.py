@@ -1,7 +1,7 @@
-"""``python -m benchmarks [NAME…] [--json FILE]``: runs the benchmarks, prints a table, writes JSON.
+"""``python -m benchmarks [NAME…] [--json FILE] [--page FILE]``: runs benchmarks, prints a table, writes JSON.
 
 Each module ``benchmarks/bench_NAME.py`` has ``figures() -> list[Figure]``. Nothing here is a test:
-a missed aim is printed as missed.
+a missed aim is printed as missed. Figures of benchmarks that were not run stay as they are in the JSON.
 """
 
 from __future__ import annotations
@@ -9,18 +9,21 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import os
 import platform
 import sys
 import time
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
 from benchmarks.figure import Figure
+from benchmarks.tables import page, terminal_table
 
 _DEFAULT_JSON = Path("benchmarks.json")
+_FORMAT = 2
 
 
 def _available() -> list[str]:
@@ -33,18 +36,14 @@ def _run(name: str, console: Console) -> list[Figure]:
     return figures
 
 
-def _table(results: dict[str, list[Figure]]) -> Table:
-    table = Table(title="Benchmarks")
-    for column in ("benchmark", "figure", "value", "aim", "met", "runs", "note"):
-        table.add_column(column, justify="right" if column in ("value", "aim", "runs") else "left")
-    for name, figures in results.items():
-        for figure in figures:
-            sign = "≤" if figure.better == "low" else "≥"
-            met = {None: "", True: "yes", False: "NO"}[figure.meets_aim]
-            aim = "" if figure.aim is None else f"{sign} {figure.aim:g}"
-            value = f"{figure.value:.4g} {figure.unit}"
-            table.add_row(name, figure.name, value, aim, met, str(figure.runs), figure.note)
-    return table
+def _known(path: Path) -> dict[str, Any]:
+    """What an earlier run wrote; empty where there is none that can be read."""
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    fits = isinstance(document, dict) and document.get("format") == _FORMAT
+    return dict(document["benchmarks"]) if fits else {}
 
 
 def main() -> int:
@@ -53,20 +52,26 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"any of {', '.join(names)}; all if none")
     parser.add_argument("--json", type=Path, default=_DEFAULT_JSON, help="where to write the figures")
+    parser.add_argument("--page", type=Path, help="a Markdown page to write all known figures to")
     options = parser.parse_args()
     unknown = [name for name in options.names if name not in names]
     if unknown:
         parser.error(f"no such benchmark: {', '.join(unknown)}; there are {', '.join(names)}")
     console = Console(width=None if sys.stdout.isatty() else 140)
     results = {name: _run(name, console) for name in options.names or names}
-    console.print(_table(results))
-    document = {
-        "machine": {"platform": platform.platform(), "python": platform.python_version()},
-        "measured": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-        "figures": {name: [asdict(figure) for figure in figures] for name, figures in results.items()},
-    }
+    console.print(terminal_table(results))
+    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
+    measured = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
+    known = _known(options.json)
+    for name, figures in results.items():
+        entry = {"measured": measured, "machine": machine, "figures": [asdict(f) for f in figures]}
+        known[name] = entry
+    document = {"format": _FORMAT, "benchmarks": known}
     options.json.write_text(json.dumps(document, indent=1), encoding="utf-8")
     console.print(f"written to {options.json}")
+    if options.page:
+        options.page.write_text(page(document), encoding="utf-8")
+        console.print(f"written to {options.page}")
     return 0
 
 

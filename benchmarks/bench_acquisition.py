@@ -29,7 +29,7 @@ from daq_app.runfile import RunHeader
 from drivers import open_driver
 
 RIG = Path(__file__).parents[1] / "configs" / "fr1.toml"
-_SPEEDS = (10, 20, 30, 40, 50, 60, 80)
+_SPEEDS = (10, 20, 30, 40, 44, 48, 52, 60, 80)
 _THROUGHPUT_S = 5.0
 _REAL_RATE_S = 20.0
 _BACKLOG_SAMPLES = 20_000
