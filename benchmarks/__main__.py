@@ -60,7 +60,8 @@ def main() -> int:
     console = Console(width=None if sys.stdout.isatty() else 140)
     results = {name: _run(name, console) for name in options.names or names}
     console.print(terminal_table(results))
-    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
+    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, "
+    machine += f"Python {platform.python_version()}"
     measured = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
     known = _known(options.json)
     for name, figures in results.items():

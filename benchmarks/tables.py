@@ -36,7 +36,8 @@ def page(document: Mapping[str, Any]) -> str:
     lines = [
         "# Benchmarks",
         "",
-        "What was measured, on how many runs; nothing here is a test, and a missed aim says NO. Measure again with",
+        "What was measured, on how many runs; nothing here is a test, and a missed aim says NO.",
+        "Measure again with",
         "",
         "```",
         "python -m benchmarks [NAME…] --page docs/benchmarks.md",
