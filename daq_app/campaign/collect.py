@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-import os
+import zlib
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
-from dataclasses import dataclass
-from multiprocessing import get_context
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +14,13 @@ import numpy as np
 from daq_app.campaign.names import TestName
 from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.campaign.summary import MethodResult, TestSummary
+from daq_app.campaign.workers import run_all
 from daq_app.config import Rig
 from daq_app.rocking.analysis import AnalysisOptions, analyse_record
 from daq_app.rocking.record import TestRecord
 from daq_app.rocking.results import Series, TestAnalysis
 from daq_app.runfile import RunFileError, open_run
+from daq_app.runfile.folder import RUN_SUFFIX
 
 _KEYS = {"CRT": "crt", "EAV": "eav"}
 _SHOWN_RATE_HZ = 200.0
@@ -37,6 +38,8 @@ class Failure:
     test: str
     path: Path
     reason: str
+    flagged_bad: bool = False
+    """Somebody or the recorder had rejected it before: nobody expected an analysis."""
 
 
 def collect(
@@ -50,25 +53,14 @@ def collect(
 
     Ctrl-C ends it cleanly: `KeyboardInterrupt` once the workers have stopped.
     """
-    options = options or AnalysisOptions()
+    work = partial(summarise_run, options=options or AnalysisOptions())
     jobs = [test for test in recorded if test.path is not None and test.verdict is not TestVerdict.LOST]
-    count = min(workers or os.cpu_count() or 1, max(len(jobs), 1))
-    answers: dict[int, TestSummary | Failure] = {}
-    # Spawned, not forked: the parent may hold threads (a window, a reader), which a fork would break.
-    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
-        pending = {pool.submit(summarise_run, test, options): index for index, test in enumerate(jobs)}
-        try:
-            open_jobs = set(pending)
-            while open_jobs:
-                done, open_jobs = wait(open_jobs, return_when=FIRST_COMPLETED)
-                for future in done:
-                    answers[pending[future]] = future.result()
-                    if progress:
-                        progress(len(answers), len(jobs), str(jobs[pending[future]].name))
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-    ordered = [answers[index] for index in sorted(answers)]
+
+    def done(number: int, test: RecordedTest) -> None:
+        if progress:
+            progress(number, len(jobs), str(test.name))
+
+    ordered = run_all(work, jobs, workers, done)
     summaries = [answer for answer in ordered if isinstance(answer, TestSummary)]
     return summaries, [answer for answer in ordered if isinstance(answer, Failure)]
 
@@ -76,16 +68,28 @@ def collect(
 def summarise_run(test: RecordedTest, options: AnalysisOptions) -> TestSummary | Failure:
     """Analyse one run file. Whatever is wrong with it comes back as a `Failure`, in words."""
     assert test.path is not None
+    bad = test.verdict is TestVerdict.BAD
+
+    def failed(reason: str) -> Failure:
+        return Failure(str(test.name), Path(test.path or ""), reason, bad)
+
+    if test.path.suffix != RUN_SUFFIX:
+        return failed("only a journal so far: `daq-app recover` makes its run file")
     try:
         with open_run(test.path) as run:
             if run.rig is None:
-                return Failure(str(test.name), test.path, "the run does not say which rig it was made with")
-            analysis = analyse_record(TestRecord.from_run(run, run.rig), options)
+                return failed("the run does not say which rig it was made with")
+            analysis = analyse_record(TestRecord.from_run(run, run.rig), options_for(test.name, options))
             if not analysis.found:
-                return Failure(str(test.name), test.path, "; ".join(note.text for note in analysis.notes))
+                return failed("; ".join(note.text for note in analysis.notes))
             return summarise(test, run.rig, analysis)
     except (RunFileError, ValueError) as error:
-        return Failure(str(test.name), test.path, str(error))
+        return failed(str(error))
+
+
+def options_for(name: TestName, options: AnalysisOptions) -> AnalysisOptions:
+    """Noise of its own for each test's simulated bias: corrections must not share one error."""
+    return replace(options, seed=zlib.crc32(str(name).encode()))
 
 
 def summarise(test: RecordedTest, rig: Rig, analysis: TestAnalysis) -> TestSummary:

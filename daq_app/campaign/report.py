@@ -14,6 +14,7 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
 from daq_app.campaign import figures, tables
+from daq_app.campaign.collect import Failure
 from daq_app.campaign.status import CampaignStatus
 from daq_app.campaign.summary import TestSummary
 
@@ -83,11 +84,17 @@ def _richest_level(tests: Sequence[TestSummary], specimen: str) -> str:
 
 
 def write_report(
-    folder: Path, title: str, status: CampaignStatus, tests: Sequence[TestSummary], footer: str = ""
+    folder: Path,
+    title: str,
+    status: CampaignStatus,
+    tests: Sequence[TestSummary],
+    footer: str = "",
+    failures: Sequence[Failure] = (),
 ) -> list[Path]:
     """Write ``report.html``, ``report.pdf``, the CSV files and each figure as SVG into `folder`.
 
-    Returns the files written. Raises `ValueError` if there is no analysed test at all.
+    `failures` are runs that could not be analysed: they are named. Returns the files written. Raises
+    `ValueError` if there is no analysed test at all.
     """
     if not tests:
         raise ValueError("no run of this campaign could be analysed: there is nothing to report")
@@ -115,6 +122,7 @@ def write_report(
             figures=pictures,
             methods=[m for m in tables.METHODS if any(m in t.methods for t in tests)],
             left_out=[test for test in tests if not test.good],
+            failures=failures,
             footer=footer,
         )
     )

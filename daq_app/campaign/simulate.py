@@ -8,24 +8,33 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+import psutil
 
 from daq_app.acquisition.offline import Readings, record_offline
+from daq_app.acquisition.tare import NotSteady
 from daq_app.campaign.plan import Campaign
-from daq_app.config import ConfigError, Problem, load_rig, plan_tasks
+from daq_app.campaign.workers import run_all
+from daq_app.config import ConfigError, Problem, Rig, TaskPlan, load_rig, plan_tasks
+from daq_app.runfile import RunFileError
+from daq_app.runfile.durable import replace_durably
+from daq_app.runfile.folder import RUN_SUFFIX
 from sim_hardware.direct import synthesise_test
 
 TRUTH_FILE: Final = "truth.json"
 IMPACTS_A_TEST: Final = 25
 """Impacts that a test adds to what the wall has had, for effects that wear (Table of physics.md)."""
 
+_WORKSHOP: Final = ".simulate-"
 _AFTER_REST_S: Final = 2.0
 """Readings beyond the recording's own end, so that the detector of rest has something to see."""
 
@@ -54,16 +63,19 @@ class CampaignTruth:
 
 
 @dataclass(frozen=True, slots=True)
-class _Job:
+class PlannedSimulation:
+    """One test to simulate, and its truth."""
+
     rig: str
+    """Path of the rig file."""
     test: str
     theta0_over_alpha: float
     r: float
+    """Mean of r over the impacts of this test."""
     impact_scatter: float
     seed: int
     impacts_before: int
     effects: Mapping[str, Mapping[str, float]]
-    out: str
 
 
 def simulate_campaign(
@@ -76,34 +88,29 @@ def simulate_campaign(
 ) -> list[Path]:
     """Write one run for every planned test into `out`, and `truth.json` beside them.
 
-    Runs that exist already are kept, so an interrupted campaign goes on where it stopped. Raises
-    `ConfigError` where the campaign names no rig for a specimen or `truth` has none.
+    Runs that exist already are kept, so an interrupted campaign goes on where it stopped; a run
+    appears only when it is whole. Raises `ConfigError` where the campaign names no rig for a specimen
+    or `truth` has none, or where `out` holds a campaign with another truth.
     """
-    jobs = _jobs(campaign, truth, out)
+    tests = tests_of(campaign, truth)
     out.mkdir(parents=True, exist_ok=True)
-    (out / TRUTH_FILE).write_text(json.dumps(_document(truth, jobs), indent=1), encoding="utf-8")
-    todo = [job for job in jobs if not Path(job.out).exists()]
-    done = len(jobs) - len(todo)
-    with ProcessPoolExecutor(workers or os.cpu_count() or 1, mp_context=get_context("spawn")) as pool:
-        pending = {pool.submit(_run_job, job): job for job in todo}
-        open_jobs = set(pending)
-        try:
-            while open_jobs:
-                finished, open_jobs = wait(open_jobs, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    future.result()
-                    done += 1
-                    if progress:
-                        progress(done, len(jobs), pending[future].test)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-    return [Path(job.out) for job in jobs]
+    _keep_truth(out / TRUTH_FILE, _document(truth, tests))
+    todo = [test for test in tests if not (out / f"{test.test}{RUN_SUFFIX}").exists()]
+    kept = len(tests) - len(todo)
+
+    def done(number: int, test: PlannedSimulation) -> None:
+        if progress:
+            progress(kept + number, len(tests), test.test)
+
+    with _workshop(out) as workshop:
+        run_all(partial(_write_run, workshop=workshop, out=out), todo, workers, done)
+    return [out / f"{test.test}{RUN_SUFFIX}" for test in tests]
 
 
-def _jobs(campaign: Campaign, truth: CampaignTruth, out: Path) -> list[_Job]:
+def tests_of(campaign: Campaign, truth: CampaignTruth) -> list[PlannedSimulation]:
+    """What is to be simulated, in the order of the plan; r of each test scatters as the seed decides."""
     rng = np.random.default_rng(truth.seed)
-    jobs, impacts = [], dict.fromkeys(campaign.specimens, 0)
+    tests, impacts = [], dict.fromkeys(campaign.specimens, 0)
     for number, planned in enumerate(campaign.tests):
         specimen = planned.name.specimen
         rig, own = campaign.rig_path(specimen), truth.specimens.get(specimen)
@@ -113,8 +120,8 @@ def _jobs(campaign: Campaign, truth: CampaignTruth, out: Path) -> list[_Job]:
             raise ConfigError(
                 [Problem(campaign.name, f"rigs.{specimen}", wrong, "Name one for each specimen")]
             )
-        jobs.append(
-            _Job(
+        tests.append(
+            PlannedSimulation(
                 rig=str(rig),
                 test=str(planned.name),
                 theta0_over_alpha=planned.theta0_over_alpha,
@@ -123,14 +130,75 @@ def _jobs(campaign: Campaign, truth: CampaignTruth, out: Path) -> list[_Job]:
                 seed=truth.seed * 1000 + number,
                 impacts_before=impacts[specimen],
                 effects=truth.effects,
-                out=str(out / f"{planned.name}.h5"),
             )
         )
         impacts[specimen] += IMPACTS_A_TEST
-    return jobs
+    return tests
 
 
-def _document(truth: CampaignTruth, jobs: list[_Job]) -> dict[str, object]:
+def readings_of(test: PlannedSimulation) -> tuple[Rig, TaskPlan, Readings]:
+    """The rig of a test, its task plan, and what its channels read from the wall upright to rest."""
+    rig = load_rig(Path(test.rig))
+    simulation = rig.simulation.model_copy(update={"restitution_scatter": test.impact_scatter})
+    rig = rig.model_copy(update={"simulation": simulation})
+    plan = plan_tasks(rig, test.rig)
+    made = synthesise_test(
+        rig,
+        plan,
+        test.theta0_over_alpha,
+        test.seed,
+        restitution=test.r,
+        effects=test.effects,
+        impacts_before=test.impacts_before,
+        post_rest_s=rig.acquisition.post_rest_s + _AFTER_REST_S,
+    )
+    return rig, plan, Readings(made.readings, "simulated")
+
+
+def _write_run(test: PlannedSimulation, workshop: Path, out: Path) -> None:
+    rig, plan, readings = readings_of(test)
+    name = f"{test.test}{RUN_SUFFIX}"
+    text = Path(test.rig).read_text(encoding="utf-8")
+    try:
+        record_offline(rig, text, plan, readings, workshop / name, test.test)
+    except NotSteady as error:
+        raise RunFileError(
+            f"{test.test} cannot be recorded. {error}", advice="Choose another seed."
+        ) from None
+    replace_durably(workshop / name, out / name)
+
+
+@contextmanager
+def _workshop(out: Path) -> Iterator[Path]:
+    """A folder for what is not whole yet; those of simulations that were killed are removed."""
+    for left in out.glob(f"{_WORKSHOP}*"):
+        number = left.name.removeprefix(_WORKSHOP).partition("-")[0]
+        if not (number.isdigit() and psutil.pid_exists(int(number))):
+            shutil.rmtree(left, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=f"{_WORKSHOP}{os.getpid()}-", dir=out) as name:
+        yield Path(name)
+
+
+def _keep_truth(path: Path, document: dict[str, object]) -> None:
+    """Write the truth, or see that the one there is the same: runs of two truths must not be mixed."""
+    text = json.dumps(document, indent=1)
+    try:
+        same = json.loads(path.read_text(encoding="utf-8")) == json.loads(text)
+    except FileNotFoundError:
+        part = path.with_name(path.name + ".part")
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
+        return
+    except ValueError:
+        same = False
+    if not same:
+        wrong = "the folder holds a simulated campaign with another seed, r, scatter or plan"
+        raise ConfigError(
+            [Problem(str(path), "the truth", wrong, "Choose another folder, or empty this one")]
+        )
+
+
+def _document(truth: CampaignTruth, tests: list[PlannedSimulation]) -> dict[str, object]:
     return {
         "seed": truth.seed,
         "specimens": {
@@ -138,24 +206,5 @@ def _document(truth: CampaignTruth, jobs: list[_Job]) -> dict[str, object]:
             for name, own in truth.specimens.items()
         },
         "effects": {name: dict(values) for name, values in truth.effects.items()},
-        "tests": {job.test: {"r": job.r, "theta0_over_alpha": job.theta0_over_alpha} for job in jobs},
+        "tests": {test.test: {"r": test.r, "theta0_over_alpha": test.theta0_over_alpha} for test in tests},
     }
-
-
-def _run_job(job: _Job) -> None:
-    rig = load_rig(Path(job.rig))
-    simulation = rig.simulation.model_copy(update={"restitution_scatter": job.impact_scatter})
-    rig = rig.model_copy(update={"simulation": simulation})
-    plan = plan_tasks(rig, job.rig)
-    made = synthesise_test(
-        rig,
-        plan,
-        job.theta0_over_alpha,
-        job.seed,
-        restitution=job.r,
-        effects=job.effects,
-        impacts_before=job.impacts_before,
-        post_rest_s=rig.acquisition.post_rest_s + _AFTER_REST_S,
-    )
-    text = Path(job.rig).read_text(encoding="utf-8")
-    record_offline(rig, text, plan, Readings(made.readings, "simulated"), Path(job.out), job.test)

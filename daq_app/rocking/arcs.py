@@ -183,15 +183,23 @@ def _averaged(
 
 
 def _best_fit(x: Floats, y: Floats, kappa: float) -> _Fit:
-    """The candidate with the smallest BIC."""
+    """The candidate with the smallest BIC; the stiffest unless another is clearly better."""
     full = _Basis(kappa, _POWERS[-1]).design(x)
-    fits = []
-    for powers in _POWERS:
-        if x.size >= 3 * (len(powers) + 3):
-            columns = [0, 1, 2, *(3 + _POWERS[-1].index(n) for n in powers)]
-            fits.append(_fit(full[:, columns], y, _Basis(kappa, powers)))
-    best = min(fits, key=lambda fit: fit.score)
-    return best if best.score < fits[0].score - _CLEARLY else fits[0]
+    allowed = [powers for powers in _POWERS if x.size >= 3 * (len(powers) + 3)]
+
+    def fit(powers: tuple[int, ...]) -> _Fit:
+        columns = [0, 1, 2, *(3 + _POWERS[-1].index(n) for n in powers)]
+        return _fit(full[:, columns], y, _Basis(kappa, powers))
+
+    stiff, freest = fit(allowed[0]), fit(allowed[-1])
+    # Every candidate leaves at least what one that holds all their powers leaves: often none between
+    # can be clearly better.
+    spared = (len(allowed[-1]) - 1) * math.log(y.size)
+    holds_all = set().union(*allowed) <= set(allowed[-1])
+    if holds_all and freest.score - spared >= stiff.score - _CLEARLY:
+        return stiff
+    best = min((stiff, *map(fit, allowed[1:-1]), freest), key=lambda candidate: candidate.score)
+    return best if best.score < stiff.score - _CLEARLY else stiff
 
 
 def _fit(design: Floats, y: Floats, basis: _Basis) -> _Fit:

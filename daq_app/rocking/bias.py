@@ -24,7 +24,7 @@ from daq_app.rocking.velocity import VelocityFilter
 
 Floats = NDArray[np.float64]
 
-_FIT_RUNS = 2
+_FIT_RUNS = 3
 """The fit of the whole motion costs more and scatters less: fewer runs are enough."""
 
 
@@ -94,9 +94,10 @@ def _one(wanted: BiasSettings, rng: np.random.Generator, *, with_fit: bool) -> d
     peaks = filtered_peaks(time, velocity, track.impacts_s)
     noise = np.full(peaks.size, wanted.velocity_filter.noise_rad_s(wanted.noise_rad)).tolist()
     corrected = corrected_peaks(peaks, wanted.velocity_filter, p, alpha)
+    by_speeds, by_peaks = track.eav(), track.crt()
     found = {
-        "eav": track.eav().r,
-        "crt": track.crt().r,
+        "eav": by_speeds.r,
+        "crt": by_peaks.r,
         "crt_exact": track.crt_exact().r,
         "eav_filtered": eav(peaks.tolist(), noise).r,
         "eav_filtered_corrected": eav(corrected.tolist(), noise).r,
@@ -111,7 +112,7 @@ def _one(wanted: BiasSettings, rng: np.random.Generator, *, with_fit: bool) -> d
             peaks_rad=track.peaks_rad,
             speeds_rad_s=track.speeds_before_rad_s,
             r=found["crt"] or wanted.r,
-            scatter=None,
+            scatter=max(by_speeds.scatter, by_peaks.scatter),
             noise_rad=wanted.noise_rad,
             p_rad_s=p,
             alpha_rad=alpha,

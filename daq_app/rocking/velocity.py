@@ -92,9 +92,14 @@ class VelocityFilter:
         The loss has two sources: the jump to r·θ̇⁻ just after, and the corner that a decelerating
         rotation makes. Both grow as half-cycles shorten. Found by filtering exact Housner motion.
         """
-        log_peaks, ratios = _ratio_table(self, round(restitution, 4), round(p_rad_s, 6), round(alpha_rad, 6))
+        # Tables at every hundredth of r, and between them a line: the ratio is smooth in r.
+        low = min(max(math.floor(restitution * 100.0), 1), 99)
+        (log_peaks, below), (_, above) = (
+            _ratio_table(self, r / 100.0, round(p_rad_s, 6), round(alpha_rad, 6)) for r in (low, low + 1)
+        )
+        share = restitution * 100.0 - low
         wanted = np.log(np.abs(np.asarray(peak_before_rad, dtype=np.float64)))
-        return np.asarray(np.interp(wanted, log_peaks, ratios))
+        return np.asarray(np.interp(wanted, log_peaks, (1.0 - share) * below + share * above))
 
 
 @lru_cache(maxsize=64)

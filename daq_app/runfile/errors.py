@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class RunFileError(Exception):
     """A run, a journal or a foreign file that cannot be used, and what to do about it."""
@@ -10,6 +12,17 @@ class RunFileError(Exception):
         self.message = message
         self.advice = advice
         super().__init__(f"{message}. {advice}" if advice else message)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Errors of worker processes arrive whole: by default only `args` would be handed to `__init__`."""
+        return _rebuilt, (type(self), self.args, self.__dict__)
+
+
+def _rebuilt(kind: type[RunFileError], args: tuple[Any, ...], state: dict[str, Any]) -> RunFileError:
+    error = kind.__new__(kind)
+    error.args = args
+    error.__dict__.update(state)
+    return error
 
 
 class BusyError(RunFileError):

@@ -6,7 +6,9 @@ import csv
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+from click.testing import Result
 from typer.testing import CliRunner
 
 from daq_app.cli.app import build_app
@@ -28,28 +30,18 @@ tests = 1
 """
 
 
+def simulate(plan: Path, runs: Path, *more: str) -> Result:
+    command = ["campaign", "simulate", str(runs), "--plan", str(plan), "--r", "FR1=0.88"]
+    return CliRunner().invoke(build_app(), [*command, "--impact-scatter", "0.001", "--workers", "1", *more])
+
+
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory: pytest.TempPathFactory, configs: Path) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("small")
     plan = folder / "small.toml"
     plan.write_text(PLAN.format(rig=(configs / "fr1.toml").as_posix()), encoding="utf-8")
     runs = folder / "runs"
-    done = CliRunner().invoke(
-        build_app(),
-        [
-            "campaign",
-            "simulate",
-            str(runs),
-            "--plan",
-            str(plan),
-            "--r",
-            "FR1=0.88",
-            "--impact-scatter",
-            "0.001",
-            "--workers",
-            "1",
-        ],
-    )
+    done = simulate(plan, runs)
     assert done.exit_code == 0, done.output
     return plan, runs
 
@@ -87,12 +79,35 @@ def test_report_finds_the_true_r_of_each_test(campaign: tuple[Path, Path]) -> No
 
 
 @pytest.mark.heavy
-def test_simulating_again_keeps_what_is_there(campaign: tuple[Path, Path]) -> None:
+def test_simulating_again_goes_on_where_a_killed_one_stopped(campaign: tuple[Path, Path]) -> None:
     plan, runs = campaign
-    before = (runs / "FR1-L1-1.h5").stat().st_mtime_ns
-    done = CliRunner().invoke(build_app(), ["campaign", "simulate", str(runs), "--plan", str(plan)])
+    before = {path.name: path.stat().st_mtime_ns for path in runs.glob("FR1-L3-*.h5")}
+    whole = (runs / "FR1-L1-1.h5").read_bytes()
+    left = runs / ".simulate-999999999-abc"  # no process has this number
+    left.mkdir()
+    (runs / "FR1-L1-1.h5").rename(left / "FR1-L1-1.h5")
+    (left / "FR1-L3-9.journal").write_bytes(b"half a journal")
+    status = CliRunner().invoke(build_app(), ["campaign", "status", str(runs), "--plan", str(plan), "--json"])
+    assert json.loads(status.stdout)["counts"] == {"done": 2, "to be repeated": 0, "missing": 1}
+    assert json.loads(status.stdout)["extra"] == []
+    done = simulate(plan, runs)
     assert done.exit_code == 0, done.output
-    assert (runs / "FR1-L1-1.h5").stat().st_mtime_ns == before
+    assert {path.name: path.stat().st_mtime_ns for path in runs.glob("FR1-L3-*.h5")} == before
+    assert not left.exists()
+    with open_run(runs / "FR1-L1-1.h5") as again:
+        readings = again.readings()
+    (runs / "FR1-L1-1.h5").write_bytes(whole)
+    with open_run(runs / "FR1-L1-1.h5") as first:
+        np.testing.assert_array_equal(readings, first.readings())
+
+
+@pytest.mark.heavy
+def test_another_truth_is_not_mixed_in(campaign: tuple[Path, Path]) -> None:
+    plan, runs = campaign
+    done = simulate(plan, runs, "--seed", "2")
+    assert done.exit_code == 2
+    assert "another seed" in done.stderr
+    assert json.loads((runs / "truth.json").read_text(encoding="utf-8"))["seed"] == 1
 
 
 @pytest.mark.parametrize("option", ["FR1=1.2", "FR9=0.9", "FR1", "FR1=abc"])

@@ -275,4 +275,4 @@ def test_known_delays_of_a_family_are_taken_out(made):
 def test_the_simulated_bias_has_this_tests_noise(whole):
     _, analysis = whole
     assert 1e-5 < analysis.bias["eav_filtered"].scatter < 5e-3
-    assert analysis.bias["eav"].runs == 6 and analysis.bias["fit"].runs == 2
+    assert analysis.bias["eav"].runs == 6 and analysis.bias["fit"].runs == 3

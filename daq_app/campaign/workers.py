@@ -1,0 +1,78 @@
+"""Many tests on all cores: one process per core, progress, and a clean stop."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from multiprocessing import get_context
+from typing import Final, TypeVar
+
+_Job = TypeVar("_Job")
+_Answer = TypeVar("_Answer")
+
+_THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def run_all(
+    work: Callable[[_Job], _Answer],
+    jobs: Sequence[_Job],
+    workers: int | None = None,
+    done: Callable[[int, _Job], None] | None = None,
+) -> list[_Answer]:
+    """`work(job)` of every job, in the order of the jobs; `work` and the jobs must be picklable.
+
+    `done` is called with (number of jobs done, the job just done). The first exception of a job ends
+    it all and is raised; so does Ctrl-C, as soon as the jobs at work have ended.
+    """
+    if not jobs:
+        return []
+    answers: dict[int, _Answer] = {}
+    with process_pool(min(workers or os.cpu_count() or 1, len(jobs))) as pool:
+        places = {pool.submit(work, job): index for index, job in enumerate(jobs)}
+        waiting = set(places)
+        while waiting:
+            finished, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+            for future in finished:
+                index = places[future]
+                answers[index] = future.result()
+                if done:
+                    done(len(answers), jobs[index])
+    return [answers[index] for index in range(len(jobs))]
+
+
+@contextmanager
+def process_pool(workers: int | None = None) -> Iterator[ProcessPoolExecutor]:
+    """A pool whose jobs have one thread each; whatever ends it, no job that waits is begun."""
+    # Spawned, not forked: the parent may hold threads (a window, a reader), which a fork would break.
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_leave_interrupts)
+    try:
+        with _one_thread_each():
+            yield pool
+    except BaseException:
+        pool.shutdown(cancel_futures=True)
+        raise
+    pool.shutdown()
+
+
+def _leave_interrupts() -> None:
+    """Ctrl-C reaches every process of the terminal: the parent decides, the workers do not die noisily."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Workers inherit these when they start: a process per core with a thread per core each is slow."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    for name, value in before.items():
+        os.environ[name] = value or "1"
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

@@ -1,0 +1,42 @@
+"""Jobs in many processes: order, progress, and errors that arrive as they were raised."""
+
+from __future__ import annotations
+
+import os
+import pickle
+
+import pytest
+
+from daq_app.campaign.workers import run_all
+from daq_app.runfile.errors import JournalDiskFull
+
+
+def _negative(number: int) -> tuple[int, str]:
+    return -number, os.environ["OMP_NUM_THREADS"]
+
+
+def _full(number: int) -> int:
+    if number == 1:
+        raise JournalDiskFull("no space left", advice="Free some.", safe_sample=41)
+    return number
+
+
+def test_answers_come_in_order_and_workers_have_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    told: list[tuple[int, int]] = []
+    answers = run_all(_negative, [3, 1, 2], 2, lambda done, job: told.append((done, job)))
+    assert answers == [(-3, "1"), (-1, "1"), (-2, "1")]
+    assert [done for done, _ in told] == [1, 2, 3]
+    assert sorted(job for _, job in told) == [1, 2, 3]
+    assert "OMP_NUM_THREADS" not in os.environ
+
+
+def test_an_error_of_a_worker_arrives_whole() -> None:
+    with pytest.raises(JournalDiskFull) as caught:
+        run_all(_full, [0, 1, 2], 1)
+    assert (caught.value.advice, caught.value.safe_sample) == ("Free some.", 41)
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+
+
+def test_nothing_to_do_starts_nothing() -> None:
+    assert run_all(_negative, []) == []
