@@ -92,7 +92,8 @@ BY_CODE: Final[dict[int, Advice]] = {
     ),
     -200088: Advice(
         "The device server does not know this task any more (it was restarted or reset)",
-        "Start the acquisition again; what had been read is saved",
+        "The tasks are started again and the gap is recorded; what had been read is saved",
+        recoverable=True,
     ),
     -200019: _TOO_FAST,
     -200361: _TOO_FAST,
@@ -190,6 +191,22 @@ def advice_for(code: int) -> Advice:
     if -88999 <= code <= -88000:
         return _LOST
     return _UNKNOWN
+
+
+_AWAY_STATUS: Final = (
+    *("UNAVAILABLE", "DEADLINE_EXCEEDED", "CANCELLED"),
+    *("RESOURCE_EXHAUSTED", "UNAUTHENTICATED", "PERMISSION_DENIED"),
+)
+"""These say nothing about the task that was asked for."""
+
+
+def has_ended(error: ni_errors.Error) -> bool:
+    """Whether `error`, met while looking at a running task, means that the task has ended for good."""
+    if isinstance(error, ni_errors.RpcError):
+        return getattr(error.rpc_code, "name", "") not in _AWAY_STATUS
+    if isinstance(error, ni_errors.DaqError):
+        return advice_for(int(error.error_code)) is _LOST or int(error.error_code) in (-200088, -200222)
+    return False
 
 
 def translate(error: Exception, *, doing: str, partial: Block | None = None) -> DriverError:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import time
 import warnings
-from collections.abc import Callable
 from pathlib import PurePath
 
 import nidaqmx
@@ -13,10 +12,12 @@ import numpy as np
 from nidaqmx import errors as ni_errors
 
 from daq_app.config.plan import TaskPlan
+from drivers.clock_line import ClockLine
 from drivers.connection import Connection
-from drivers.error_advice import translate
+from drivers.devices import Inspection, check_devices
+from drivers.error_advice import has_ended, translate
 from drivers.ledger import TaskLedger
-from drivers.protocol import Block, DeviceInfo, DriverError, Opened
+from drivers.protocol import Block, ClockReading, DeviceInfo, DriverError, Opened
 from drivers.stream import TaskStream
 from drivers.tasks import commit, create_task, log_to_tdms, read_ranges
 
@@ -28,10 +29,6 @@ _REPLY_MARGIN_S = 2.0
 _CATCH_UP_READS = 10
 """Most read periods fetched in one call when samples have piled up."""
 _CLOSE_LIMIT_S = 2.0
-
-
-Inspection = Callable[[tuple[DeviceInfo, ...]], list[str]]
-"""Looks at the devices before any task is made; one sentence for each that is not as it should be."""
 
 
 class _OutOfStepError(DriverError):
@@ -61,17 +58,28 @@ class NidaqmxDriver:
         self._plan: TaskPlan | None = None
         self._streams: list[TaskStream] = []
         self._next_sample = 0
+        self._origin = 0
+        """Number that sample 0 of the running tasks has in the whole stream: they may have been restarted."""
         self._backlog = 0
         self._overloaded: tuple[str, ...] = ()
+        self._clock: ClockReading | None = None
+        self._line = ClockLine(1.0)
         self._last_housekeeping = 0.0
         self._buffer_samples = 0
+        self._rate_hz = 0.0
+        self._backup_stem = ""
 
     def open(self, plan: TaskPlan) -> Opened:
         """Reserve and commit the tasks. Raises `DriverError`, leaving nothing reserved."""
         self._plan = plan
+        opened = self._make_tasks(plan)
+        self._rate_hz = opened.rate_hz
+        return opened
+
+    def _make_tasks(self, plan: TaskPlan) -> Opened:
         self._connection.limit_calls_to()
         try:
-            devices = self._check_devices(plan)
+            devices = check_devices(self._connection, plan, self._object_to)
             self._clear_what_was_left(plan)
             for planned in plan.tasks:
                 self._streams.append(TaskStream(planned, create_task(self._connection, planned)))
@@ -83,40 +91,6 @@ class NidaqmxDriver:
         except Exception as error:
             self._close_tasks()
             raise translate(error, doing="opening the tasks") from error
-
-    def _check_devices(self, plan: TaskPlan) -> tuple[DeviceInfo, ...]:
-        """What sits where the plan expects it; one error that lists all missing devices."""
-        present = {device.name: device for device in self._connection.system().devices}
-        wanted = sorted(
-            {item.channel.physical_channel.split("/")[0] for task in plan.tasks for item in task.channels}
-        )
-        missing = [name for name in wanted if name not in present]
-        if missing:
-            there = ", ".join(sorted(present)) or "none"
-            raise DriverError(
-                f"{'Devices are' if len(missing) > 1 else 'A device is'} missing: {', '.join(missing)}. "
-                f"Present: {there}",
-                advice="Check that the chassis is switched on and every module sits in its slot, and compare "
-                "the names in the rig file with those in NI MAX",
-                code=-200220,
-                device=missing[0],
-            )
-        devices = tuple(
-            DeviceInfo(
-                name=name,
-                product=str(present[name].product_type),
-                serial=f"{int(present[name].serial_num):08X}",
-                simulated=bool(present[name].is_simulated),
-            )
-            for name in wanted
-        )
-        objections = self._object_to(devices) if self._object_to is not None else []
-        if objections:
-            raise DriverError(
-                "The hardware is not what the rig file says: " + "; ".join(objections),
-                advice="Nothing was started",
-            )
-        return devices
 
     def _clear_what_was_left(self, plan: TaskPlan) -> None:
         """Clear the tasks of a session of ours that was killed: they hold the hardware."""
@@ -154,6 +128,11 @@ class NidaqmxDriver:
 
     def start(self) -> None:
         """Start the clock: slaves armed first, the master last."""
+        self._start_tasks()
+        self._next_sample = self._origin = 0
+        self._line = ClockLine(self._rate_hz)
+
+    def _start_tasks(self) -> None:
         by_role = sorted(self._streams, key=lambda stream: stream.planned.role == "master")
         try:
             for stream in by_role:
@@ -162,7 +141,6 @@ class NidaqmxDriver:
         except Exception as error:
             self.stop()
             raise translate(error, doing="starting the tasks") from error
-        self._next_sample = 0
         self._backlog = 0
         self._last_housekeeping = time.monotonic()
 
@@ -208,8 +186,10 @@ class NidaqmxDriver:
             read_time_ns=time.time_ns(),
             backlog_samples=self._backlog,
             overloaded=self._overloaded,
+            clock=self._clock,
         )
         self._overloaded = ()
+        self._clock = None
         self._next_sample += n_samples
         self._backlog = max(0, self._backlog - n_samples)
         return block
@@ -233,48 +213,84 @@ class NidaqmxDriver:
         overloaded: list[str] = []
         backlog = []
         for stream in self._streams:
-            backlog.append(stream.total_acquired() - stream.position)
+            before = time.monotonic()
+            total = stream.total_acquired()
+            if stream.planned.role == "master":
+                self._clock = ClockReading(before, time.monotonic(), self._origin + total)
+                self._line.add(self._clock)
+            backlog.append(total - stream.position)
             overloaded.extend(stream.overloaded())
         # Counted before this read's block is handed out, so that `_block` subtracts it once.
         self._backlog = max(backlog) + min(stream.n_pending for stream in self._streams)
         self._overloaded = tuple(overloaded)
 
-    def recover(self) -> None:
-        """See the protocol: same tasks, over a new socket, at the oldest sample that still exists."""
-        plan = self._opened_plan()
+    def recover(self) -> str:
+        """See the protocol: same tasks over a new socket, or the same plan started again."""
+        if self._plan is None:
+            raise DriverError("The tasks are not open", advice="Open the hardware first")
         try:
             self._connection.limit_calls_to()
             if self._connection.is_remote:
-                self._attach_again()
-            for stream in self._streams:
-                if stream.task.is_task_done():
-                    raise DriverError(
-                        "The device has stopped sampling",
-                        advice="What had been read is saved. Start the acquisition again",
-                    )
-            # The oldest samples are being overwritten while we ask for them: leave a margin.
-            margin = max(2 * plan.read_samples, self._buffer_samples // 20)
-            oldest = max(stream.total_acquired() for stream in self._streams) - self._buffer_samples + margin
-            position = max(self._next_sample, oldest)
-            for stream in self._streams:
-                stream.seek(position)
+                self._connection.reconnect()
+            if self._tasks_run_on():
+                self._go_on_in_the_buffer(self._plan)
+                return ""
         except Exception as error:
             raise translate(error, doing="taking up reading again") from error
-        self._next_sample = position
+        return self._start_again(self._plan)
+
+    def _tasks_run_on(self) -> bool:
+        """Whether the tasks still sample; false where device or server have dropped them."""
+        try:
+            for stream in self._streams:
+                if self._connection.is_remote:
+                    stream.attach(self._connection.attach_task(stream.planned.name))
+                if stream.task.is_task_done():
+                    return False
+        except ni_errors.Error as error:
+            if has_ended(error):
+                return False
+            raise
+        return bool(self._streams)
+
+    def _go_on_in_the_buffer(self, plan: TaskPlan) -> None:
+        # The oldest samples are being overwritten while we ask for them: leave a margin.
+        margin = max(2 * plan.read_samples, self._buffer_samples // 20)
+        oldest = max(stream.total_acquired() for stream in self._streams) - self._buffer_samples + margin
+        position = max(self._next_sample - self._origin, oldest)
+        for stream in self._streams:
+            stream.seek(position)
+        self._next_sample = self._origin + position
         self._last_housekeeping = time.monotonic()
 
-    def _attach_again(self) -> None:
-        self._connection.reconnect()
-        for stream in self._streams:
-            try:
-                stream.attach(self._connection.attach_task(stream.planned.name))
-            except ni_errors.RpcError as error:
-                if getattr(error.rpc_code, "name", "") in ("UNAVAILABLE", "DEADLINE_EXCEEDED"):
-                    raise
+    def _start_again(self, plan: TaskPlan) -> str:
+        """New tasks in place of those that have ended; their samples take their place by the clock."""
+        self._close_tasks()
+        try:
+            opened = self._make_tasks(plan)
+            if opened.rate_hz != self._rate_hz:
+                self._close_tasks()
                 raise DriverError(
-                    "The device server has forgotten the running task: it was restarted or reset",
-                    advice="What had been read is saved. Start the acquisition again",
-                ) from error
+                    f"The hardware came back with {opened.rate_hz:g} Hz where it had {self._rate_hz:g} Hz",
+                    advice="What had been read is saved. Check the modules, then start the acquisition again",
+                )
+            before = time.monotonic()
+            self._start_tasks()
+            after = time.monotonic()
+        except DriverError as error:
+            # Hardware that is away today may be back in a second; who waits for it sets the limit.
+            error.recoverable = error.recoverable or error.code is not None
+            raise
+        estimate = self._line.sample_at(before, after)
+        index, uncertain_s = (self._next_sample, 0.0) if estimate is None else estimate
+        self._origin = self._next_sample = max(index, self._next_sample)
+        remark = (
+            "The tasks were started again; the length of the gap, and with it every later time, is known "
+            f"to {1e3 * uncertain_s:.1f} ms"
+        )
+        if self._backup_stem:
+            self.start_backup(f"{self._backup_stem}-from-{self._origin}")
+        return remark
 
     def start_backup(self, stem: str) -> tuple[str, ...]:
         """Begin one TDMS file per task, written by the NI driver itself; answers the paths.
@@ -283,6 +299,7 @@ class NidaqmxDriver:
         """
         if self._backup_folder is None:
             return ()
+        self._backup_stem = stem.partition("-from-")[0]
         paths = []
         try:
             for stream in self._streams:
@@ -296,6 +313,7 @@ class NidaqmxDriver:
 
     def stop_backup(self) -> None:
         """Pause the NI driver's own recording until the next test."""
+        self._backup_stem = ""
         if self._backup_folder is None:
             return
         try:

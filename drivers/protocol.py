@@ -17,6 +17,16 @@ from daq_app.config.plan import TaskPlan
 
 
 @dataclass(frozen=True, slots=True)
+class ClockReading:
+    """How many samples the device had taken, at an instant between two of our monotonic clock."""
+
+    before_s: float
+    after_s: float
+    samples: int
+    """Per channel, counted like `Block.first_sample`."""
+
+
+@dataclass(frozen=True, slots=True)
 class Block:
     """Consecutive samples of every channel."""
 
@@ -30,6 +40,8 @@ class Block:
     """Samples per channel left in the driver's buffer after this read."""
     overloaded: tuple[str, ...] = ()
     """Channels that the hardware reported as overloaded since the last block."""
+    clock: ClockReading | None = None
+    """Taken now and then, where the device can tell."""
 
     @property
     def n_samples(self) -> int:
@@ -123,12 +135,13 @@ class Driver(Protocol):
         """
         ...
 
-    def recover(self) -> None:
-        """Make reading possible again after an error that is `recoverable`, with the clock still running.
+    def recover(self) -> str:
+        """Make reading possible again after an error that is `recoverable`.
 
         The next block begins at the oldest sample that was not read yet and still exists: a
-        `first_sample` beyond the last block's end is the gap. Raises `DriverError` where the
-        tasks are gone or the way to them is still closed (then `recoverable`: try again later).
+        `first_sample` beyond the last block's end is the gap. Tasks that have ended are started again; the
+        gap is then as long as the clocks say, and the answer is a sentence on how well that is known
+        (empty where the sample clock ran on). Raises `DriverError`; `recoverable`: try again later.
         """
         ...
 

@@ -132,8 +132,9 @@ class ReplayDriver:
         if wait > 0:
             self._sleep(wait)
 
-    def recover(self) -> None:
+    def recover(self) -> str:
         """Nothing breaks that could be mended: does nothing."""
+        return ""
 
     def stop(self) -> None:
         """Stop the clock."""

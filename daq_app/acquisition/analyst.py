@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.acquisition.channel_watch import ChannelWatch
 from daq_app.acquisition.desk import Publisher
 from daq_app.acquisition.items import (
     Arrived,
@@ -39,13 +40,20 @@ from drivers import Block, Opened
 
 _REPEAT_STATE_S: Final = 1.0
 _TARE_S: Final = 1.0
+_SAME_RATE: Final = 1e-6
 
 
 class Analyst(threading.Thread):
     """Takes items from `inbox`, publishes, and posts events and ends back to the recorder."""
 
     def __init__(
-        self, rig: Rig, publisher: Publisher, post: Callable[[Item], None], *, release_within_s: float
+        self,
+        rig: Rig,
+        publisher: Publisher,
+        post: Callable[[Item], None],
+        *,
+        release_within_s: float,
+        planned_rate_hz: float = 0.0,
     ) -> None:
         super().__init__(name="analyst", daemon=True)
         self.inbox: queue.SimpleQueue[Item | None] = queue.SimpleQueue()
@@ -59,13 +67,18 @@ class Analyst(threading.Thread):
         self._publisher = publisher
         self._post = post
         self._release_within_s = release_within_s
+        self._planned_rate_hz = planned_rate_hz
         self._opened: Opened | None = None
         self._live: LiveView | None = None
         self._overload: OverloadWatch | None = None
+        self._channels: ChannelWatch | None = None
         self._sequence: Sequence | None = None
         self._sample = 0
         self._since = 0
         self._last_state_s = 0.0
+        self._fault = ""
+        self._standing: dict[str, EventMessage] = {}
+        """What was wrong before arming and still is: every run must say it."""
         self._collecting: tuple[Ask, list[NDArray[np.float64]], int] | None = None
 
     def run(self) -> None:
@@ -79,8 +92,24 @@ class Analyst(threading.Thread):
                 continue
             if item is None:
                 return
-            self._take(item)
+            try:
+                self._take(item)
+            except Exception as error:
+                # A fault of ours must not end the thread that knows when the test is over.
+                self._tell_fault(error)
             self._repeat_state()
+
+    def _tell_fault(self, error: Exception) -> None:
+        said = f"{type(error).__name__}: {error}"
+        if said == self._fault:
+            return
+        self._fault = said
+        self._note(
+            "analysis",
+            f"A step of the analysis failed ({said}). Recording goes on; stop by hand if the end of the test "
+            "is not noticed, and please report this",
+            "error",
+        )
 
     def _take(self, item: Item) -> None:
         match item:
@@ -104,7 +133,10 @@ class Analyst(threading.Thread):
                 if self._sequence is None:
                     self.run_path = item.path
                     self._go(State.SAVED if item.ok else State.FAILED, item.text)
-            case Noted() | End():
+            case Noted(event=event):
+                if event.kind == "clock" and event.data.get("clock") in ("rate", "drift"):
+                    self._standing[str(event.data["clock"])] = event
+            case End():
                 return
 
     # -- blocks ----------------------------------------------------------------------------------
@@ -117,6 +149,12 @@ class Analyst(threading.Thread):
             self.overloaded = self._overload.check(block)
             if text := self._overload.news():
                 self._note("overload", text, "warning")
+        if self._channels is not None:
+            # Impacts ring and leap by themselves: then only what cannot be motion is looked at.
+            moving = self.state in (State.RELEASED, State.ROCKING)
+            for doubt in self._channels.check(block, moving=moving):
+                data: dict[str, float | str] = {"channel": doubt.channel_id, "doubt": doubt.name}
+                self._note("channel", doubt.text, "warning", doubt.sample, data)
         if self._live is None:
             return
         # A backlog means that viewers are behind anyway: the newest matters, the test's course always.
@@ -146,6 +184,15 @@ class Analyst(threading.Thread):
         self._opened = opened
         self._sample = 0
         self._overload = OverloadWatch(self._rig.channel_ids, opened.ranges)
+        self._channels = ChannelWatch(self._rig, opened.rate_hz, opened.ranges)
+        self._standing = {}
+        planned = self._planned_rate_hz
+        if planned and abs(opened.rate_hz / planned - 1.0) > _SAME_RATE:
+            text = (
+                f"The hardware samples at {opened.rate_hz:g} Hz where {planned:g} Hz were planned. Times "
+                "use the rate that was read back. Check that the modules are the ones of the rig file"
+            )
+            self._note("clock", text, "warning", data={"clock": "rate", "value": opened.rate_hz})
         self._new_live()
         self._go(State.PREVIEWING, f"Sampling at {opened.rate_hz:g} Hz")
 
@@ -162,11 +209,17 @@ class Analyst(threading.Thread):
             self._rig.acquisition, self._opened.rate_hz, self._sample, self._release_within_s
         )
         self._note("armed", f"Armed for {self.test}", "info")
+        for event in self._standing.values():
+            self._note(event.kind, event.text, event.severity, data=event.data)
+        # Whatever is wrong with a channel now has been told before; this run must say it as well.
+        for watch in (self._overload, self._channels):
+            if watch is not None:
+                watch.forget()
         self._go(State.ARMED, f"Armed for {self.test}; recording", self._sample)
 
     def _on_source_ended(self, ended: SourceEnded) -> None:
         self._refuse_tare("the acquisition has stopped")
-        self._opened = self._live = self._overload = None
+        self._opened = self._live = self._overload = self._channels = None
         if ended.error is not None:
             self._note("driver", str(ended.error), "error")
         if self._sequence is not None:

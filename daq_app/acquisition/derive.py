@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -107,22 +108,38 @@ def _signals(series: Series | None) -> dict[str, DerivedSignal]:
     }
 
 
+_SPOILS_TIME: Final = ("stood_still", "asleep")
+"""News of the sample clock after which times within the run are wrong."""
+
+
 def _quality(contents: JournalContents, analysis: TestAnalysis) -> dict[str, Any] | None:
-    """Whether this run is a whole test; None for one that was never released."""
-    kinds = {event.kind for event in contents.events}
+    """Whether this run is a whole test, and every doubt; None for an aborted arming."""
     ends = [event for event in contents.events if event.kind == "end"]
     outcome = str(ends[-1].data.get("outcome", "")) if ends else "cut off"
-    if outcome == "aborted" or not (analysis.found or kinds & {"released", "rocking", "at_rest"}):
+    if outcome == "aborted":
         return None
-    reasons = []
+    hard = []
     if contents.gaps:
-        reasons.append(f"{contents.lost_samples} samples are missing in {len(contents.gaps)} gap(s)")
+        hard.append(f"{contents.lost_samples} samples are missing in {len(contents.gaps)} gap(s)")
     if outcome != "complete":
-        reasons.append({"timeout": "the wall did not come to rest in time"}.get(outcome, f"it was {outcome}"))
+        hard.append({"timeout": "the wall did not come to rest in time"}.get(outcome, f"it was {outcome}"))
     if contents.damage:
-        reasons.append(f"the journal is damaged: {contents.damage[0]}")
+        hard.append(f"the journal is damaged: {contents.damage[0]}")
+    hard += _told(contents, "clock", lambda data: data.get("clock") in _SPOILS_TIME)
     if not analysis.found:
-        reasons.append("no release and impact were found")
-    reasons += sorted({event.text for event in contents.events if event.kind == "overload"})
-    hard = bool(contents.gaps or contents.damage or outcome != "complete" or not analysis.found)
-    return {"verdict": "bad" if hard else "good", "reasons": reasons}
+        hard.append("no release and impact were found")
+    doubts = [
+        *_told(contents, "clock", lambda data: data.get("clock") not in _SPOILS_TIME),
+        *_told(contents, "channel"),
+        *_told(contents, "overload"),
+        *_told(contents, "alarm", lambda data: data.get("alarm") == "wall_clock"),
+    ]
+    channels = sorted({str(e.data["channel"]) for e in contents.events if e.kind == "channel"})
+    return {"verdict": "bad" if hard else "good", "reasons": hard + doubts, "doubtful_channels": channels}
+
+
+def _told(
+    contents: JournalContents, kind: str, which: Callable[[dict[str, Any]], bool] = lambda data: True
+) -> list[str]:
+    """What was said of that kind while the run was recorded, each sentence once."""
+    return sorted({event.text for event in contents.events if event.kind == kind and which(event.data)})

@@ -52,9 +52,10 @@ def _put_away(journal: Path) -> None:
 
 def recover_job(journal: Path) -> Finished:
     """Make the run of an orphan journal. No text where there was nothing to do."""
+    from daq_app.acquisition.derive import derive
     from daq_app.runfile import recover
 
-    (found,) = recover(journal)
+    (found,) = recover(journal, derive=lambda contents: derive(contents)[0])
     if found.outcome == "in use":
         return Finished(True, "")
     if found.outcome in ("recovered", "saved already", "empty"):

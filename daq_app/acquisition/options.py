@@ -13,6 +13,20 @@ READY: Final = "Acquisition listening on "
 """First words of the line on the process's standard output that says where; then the address."""
 
 
+def _speed(text: str) -> str:
+    if text == "max" or (_is_number(text) and 0 < float(text) < float("inf")):
+        return text
+    raise argparse.ArgumentTypeError("it is a factor above 0, or max")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
     """Parse; exits with code 2 and a sentence for bad options."""
     parser = argparse.ArgumentParser(
@@ -47,7 +61,7 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
         help="where to go on if the disk of OUT fails (best on another disk; default: %(default)s)",
     )
     add("--backup", type=Path, metavar="DIR", help="let the NI driver write TDMS files there as well")
-    add("--speed", default="1", help="time factor of a simulated device or a replay, or max")
+    add("--speed", type=_speed, default="1", help="time factor of a simulated device or a replay, or max")
     add("--seed", type=int, help="seed of the simulated wall's noise and scatter")
     add("--theta0-over-alpha", type=float, metavar="X", help="release rotation of the simulated wall")
     return parser.parse_args(argv)

@@ -31,6 +31,10 @@ class OverloadWatch:
         self._now = frozenset(found)
         return found
 
+    def forget(self) -> None:
+        """Tell everything again that is still so."""
+        self._now = frozenset()
+
     def news(self) -> str:
         """A sentence on channels that were not overloaded in the block before; empty for none."""
         if not self._news:

@@ -61,6 +61,7 @@ class Process:
                 spare_folder=options.spare,
                 patience=Patience(reconnect_limit_s=options.reconnect_within),
                 truth=planned_truth(connection, rig, options),
+                speed=float("inf") if options.speed == "max" else float(options.speed),
             ),
             self._desk.publisher,
             finaliser,
@@ -97,7 +98,11 @@ class Process:
         return 0
 
     def _tick(self) -> None:
-        self.session.tick()
+        try:
+            self.session.tick()
+        except Exception as error:
+            # Whatever is wrong with watching, it must not end what is being watched.
+            self.session.tell_fault(f"Watching failed ({type(error).__name__}: {error}); recording goes on")
         if self._unattended is not None and not self._interrupted:
             self._unattended.advance()
             self._leaving = self._leaving or self._unattended.exit_code is not None

@@ -6,19 +6,23 @@ away) and says where samples are lost; everything else ends the stream with the 
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Literal
 
+from daq_app.acquisition.clock_watch import ClockWatch
 from daq_app.acquisition.items import Arrived, Item, Lost, Noted, SourceEnded, Started
 from daq_app.acquisition.messages import EventMessage
 from daq_app.config.plan import TaskPlan
 from drivers import Block, Driver, DriverError
 
+_OVERDUE_S: Final = 0.4
+"""Several read periods: from then on a read that has found nothing is told."""
 _STUCK_RECOVERIES: Final = 20
 """So many recoveries in a row without one sample between them will not help any more."""
 
@@ -45,8 +49,13 @@ class Reader(threading.Thread):
         plan: TaskPlan,
         sink: Callable[[Item], None],
         patience: Patience | None = None,
+        speed: float = 1.0,
     ) -> None:
+        """`speed` is how much faster than real time a simulated device or a replay runs."""
         super().__init__(name="reader", daemon=True)
+        self._speed = speed
+        self._clock_watch: ClockWatch | None = None
+        self._overdue = False
         self._make_driver = make_driver
         self._plan = plan
         self._sink = sink
@@ -91,6 +100,8 @@ class Reader(threading.Thread):
             self.buffer_samples = opened.buffer_samples
             driver.start()
             self._last_arrival_s = time.monotonic()
+            if math.isfinite(self._speed):
+                self._clock_watch = ClockWatch(opened.rate_hz, self._speed)
             self._sink(Started(opened))
             self._read_on(driver)
         except DriverError as caught:
@@ -115,6 +126,7 @@ class Reader(threading.Thread):
                 self._after(error, driver)
             else:
                 self._recoveries = 0
+                self._overdue = False
                 self._deliver(block)
 
     def _deliver(self, block: Block) -> None:
@@ -126,12 +138,21 @@ class Reader(threading.Thread):
         self.backlog_samples = block.backlog_samples
         self._last_arrival_s = time.monotonic()
         self._sink(Arrived(block, now))
+        if block.clock is not None and self._clock_watch is not None:
+            news = self._clock_watch.take(block.clock)
+            if news is not None:
+                self._note(
+                    "warning", news.text, "clock", news.sample, {"clock": news.name, "value": news.value}
+                )
 
     def _after(self, error: DriverError, driver: Driver) -> None:
         """Keep what was read, then wait, mend, or raise."""
         if error.partial is not None:
             self._deliver(error.partial)
         if error.retryable:
+            if not self._overdue and (error.partial is not None or self.silent_for_s > _OVERDUE_S):
+                self._overdue = True
+                self._note("warning", str(error))
             if self.silent_for_s > self._patience.silence_limit_s:
                 raise DriverError(
                     f"No samples for {self.silent_for_s:.0f} s: {error.message}",
@@ -153,7 +174,7 @@ class Reader(threading.Thread):
         since = time.monotonic()
         while not self._stop_asked.is_set():
             try:
-                driver.recover()
+                remark = driver.recover()
             except DriverError as again:
                 if not again.recoverable:
                     raise
@@ -167,16 +188,23 @@ class Reader(threading.Thread):
                 self._stop_asked.wait(self._patience.retry_pause_s)
             else:
                 away = time.monotonic() - since
-                self._note("info", f"Reading goes on after {away:.1f} s")
+                self._note("info", f"Reading goes on after {away:.1f} s. {remark or ''}".strip())
+                if remark:
+                    self._loss_reason = f"{error.message}. {remark}"
+                    if self._clock_watch is not None:
+                        self._clock_watch.restart()
                 return
 
-    def _note(self, severity: str, text: str) -> None:
-        event = EventMessage(
-            kind="driver",
-            sample=self._next_sample,
-            text=text,
-            severity="warning" if severity == "warning" else "info",
-        )
+    def _note(
+        self,
+        severity: Literal["info", "warning"],
+        text: str,
+        kind: str = "driver",
+        sample: int | None = None,
+        data: dict[str, float | str] | None = None,
+    ) -> None:
+        at = self._next_sample if sample is None else sample
+        event = EventMessage(kind=kind, sample=at, text=text, severity=severity, data=data or {})
         self._sink(Noted(event))
 
     def _serve_requests(self, driver: Driver) -> None:

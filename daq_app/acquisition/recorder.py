@@ -6,12 +6,14 @@ A full disk or a slow one costs no sample: blocks wait in memory until the disk 
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -31,6 +33,8 @@ _GROUP_S: Final = 0.05
 """Longest wait of a written block for its flush while more blocks keep coming."""
 _SLOW_FLUSH_S: Final = 0.5
 _RETRY_S: Final = 0.2
+_MOST_FAULTS: Final = 50
+"""Failures in a row, of no kind that a disk has, after which a journal is closed."""
 _LOOK_S: Final = 1.0
 _MEMORY_LIMIT_BYTES: Final = 512 * 2**20
 """Blocks held in memory while the disk takes none: six minutes of 41 channels at 4000 Hz."""
@@ -80,8 +84,9 @@ class Recorder(threading.Thread):
         self._journal: JournalWriter | None = None
         self._waiting: deque[Arrived | Lost | Noted | End] = deque()
         """Not yet in the journal."""
-        self._unsafe: deque[Arrived | Lost | Noted] = deque()
-        """In the journal but not known to be on the device."""
+        self._unsafe: deque[tuple[int, Arrived | Lost | Noted]] = deque()
+        """In the journal but not known to be on the device, with the number of frames up to it."""
+        self._faults = 0
         self._last_flush_s = 0.0
         self._last_look_s = 0.0
         self._last_read_ns = 0
@@ -94,15 +99,40 @@ class Recorder(threading.Thread):
             try:
                 item = self.inbox.get(timeout=_RETRY_S if busy else None)
             except queue.Empty:
-                self._commit()
+                self._guarded(self._commit)
                 continue
             if item is None:
                 break
-            self._take(item)
+            self._guarded(partial(self._take, item))
             overdue = time.monotonic() - self._last_flush_s > _GROUP_S
             if (self._waiting or self._unsafe) and (overdue or self.inbox.empty()):
-                self._commit()
-        self._shut()
+                self._guarded(self._commit)
+        self._guarded(self._shut)
+
+    def _guarded(self, step: Callable[[], None]) -> None:
+        """This thread never dies of an error: what waits stays in memory and is tried again.
+
+        Memory that is short may come back; anything else that repeats itself is no trouble of the moment.
+        """
+        try:
+            step()
+            self._faults = 0
+        except MemoryError:
+            with contextlib.suppress(MemoryError):
+                self._raise_alarm(
+                    "memory",
+                    "The memory of this computer is full: samples wait to be written. Close other programs",
+                )
+        except Exception as error:
+            self._faults += 1
+            self._raise_alarm(
+                "recorder",
+                f"Writing failed ({type(error).__name__}: {error}). It is tried again; if this stays, stop "
+                "the test: what is on disk is safe",
+            )
+            if self._faults > _MOST_FAULTS:
+                self._faults = 0
+                self._give_up(f"writing failed again and again ({type(error).__name__}: {error})")
 
     def _take(self, item: Item) -> None:
         match item:
@@ -127,8 +157,10 @@ class Recorder(threading.Thread):
             case End():
                 self._enqueue(item)
                 return
-        self._write()
-        self._forward(item)
+        try:
+            self._write()
+        finally:
+            self._forward(item)
 
     def _enqueue(self, item: Arrived | Lost | Noted | End) -> None:
         if self._journal is None:
@@ -167,13 +199,13 @@ class Recorder(threading.Thread):
                     return
                 self._append(self._journal, item)
             except JournalDiskFull as error:
-                self._raise_alarm("disk", str(error))
+                self._raise_alarm("full", str(error))
                 return
             except JournalDeviceError as error:
                 self._move_to_spare(str(error))
                 return
             self._waiting.popleft()
-            self._unsafe.append(item)
+            self._unsafe.append((self._journal.frames, item))
             if isinstance(item, Arrived):
                 self.status.waiting_bytes -= item.block.readings.nbytes
         if self._journal is not None:
@@ -202,7 +234,7 @@ class Recorder(threading.Thread):
         try:
             acknowledged = journal.sync(_SLOW_FLUSH_S)
         except JournalSlowDisk as error:
-            self._raise_alarm("disk", str(error))
+            self._raise_alarm("slow", str(error))
             return
         except JournalDeviceError as error:
             self._move_to_spare(str(error))
@@ -212,16 +244,14 @@ class Recorder(threading.Thread):
             return
         self.status.acknowledged_sample = acknowledged
         now = time.perf_counter()
-        while self._unsafe:
-            item = self._unsafe[0]
+        while self._unsafe and self._unsafe[0][0] <= journal.acknowledged_frames:
+            _, item = self._unsafe.popleft()
             if isinstance(item, Arrived):
-                if item.block.first_sample + item.block.n_samples > acknowledged:
-                    break
                 self.latency.add(now - item.arrived_s)
-            self._unsafe.popleft()
         if self._alarm and not self._waiting:
-            self._alarm = ""
-            self._say("disk", "The disk takes data again; nothing was lost", "info")
+            kind, self._alarm = _kind_of(self._alarm), ""
+            again = "The disk takes data again" if kind == "disk" else "Samples are written again"
+            self._say(kind, f"{again}; nothing was lost", "info")
 
     def _still_there(self, journal: JournalWriter) -> bool:
         """Whether the journal still has its name; looked at once a second. If not, its content is rescued."""
@@ -231,7 +261,7 @@ class Recorder(threading.Thread):
         self._last_look_s = now
         if journal.is_in_place():
             return True
-        self._move_to_spare(f"{journal.path} was deleted or moved while it was recorded", rescue=True)
+        self._move_to_spare(f"{journal.path} was deleted or moved while it was recorded.")
         return False
 
     def _close(self, end: End) -> None:
@@ -250,16 +280,50 @@ class Recorder(threading.Thread):
         if recorded is not None:
             self._hand_over(recorded)
 
-    def _move_to_spare(self, why: str, *, rescue: bool = False) -> None:
-        """Go on in another folder from the first sample that is not known to be safe.
+    def _move_to_spare(self, why: str) -> None:
+        """Go on in another folder, with what is safe copied there; one run comes of it.
 
-        `rescue` copies what the old file holds first: its name is gone, its content is not.
+        Where the old file can no longer be read, a run of its own begins with the first sample that is not
+        known to be safe.
         """
         journal, spare = self._journal, self._spare_folder
         assert journal is not None
-        if spare is None or (spare == journal.path.parent and not rescue):
+        if spare is None or spare == journal.path.parent:
             self._give_up(why)
             return
+        old, moved, safe_frames = journal.path, journal, journal.acknowledged_frames
+        try:
+            spare.mkdir(parents=True, exist_ok=True)
+            try:
+                journal.move_to(spare / old.name)
+            except (OSError, RunFileError):
+                moved = self._continued(journal, spare, why)
+                journal.abandon()
+        except (OSError, RunFileError) as second:
+            self._give_up(f"{why} And the spare folder: {second}")
+            return
+        self._journal = moved
+        if moved is journal:
+            # All of it is in the new file; under its old name it would be taken for a run that was cut off.
+            with contextlib.suppress(OSError):
+                old.replace(old.with_suffix(".journal-moved"))
+        # What has been acknowledged meanwhile is in the copy, or safe in the old file.
+        again = [item for frames, item in self._unsafe if frames > safe_frames]
+        self._unsafe.clear()
+        self._waiting.extendleft(reversed(again))
+        for item in again:  # written once more, and counted then
+            match item:
+                case Arrived(block=block):
+                    self.status.waiting_bytes += block.readings.nbytes
+                case Lost(n_samples=count):
+                    self.status.gaps -= 1
+                    self.status.lost_samples -= count
+        self.status.journal = moved.path
+        self._raise_alarm("moved", f"{why} Recording goes on in {moved.path}")
+        self._write()
+
+    @staticmethod
+    def _continued(journal: JournalWriter, spare: Path, why: str) -> JournalWriter:
         old = journal.header
         header = old.model_copy(
             update={
@@ -268,23 +332,7 @@ class Recorder(threading.Thread):
                 "start_utc_ns": time.time_ns(),
             }
         )
-        try:
-            spare.mkdir(parents=True, exist_ok=True)
-            if rescue:
-                journal.copy_to(spare / journal.path.name)
-            self._journal = JournalWriter(spare / f"{header.run_id}{journal.path.suffix}", header)
-        except (OSError, RunFileError) as second:
-            self._give_up(f"{why}; and the spare folder: {second}")
-            return
-        journal.abandon()
-        self._waiting.extendleft(reversed(self._unsafe))
-        self.status.waiting_bytes += sum(
-            item.block.readings.nbytes for item in self._unsafe if isinstance(item, Arrived)
-        )
-        self._unsafe.clear()
-        self.status.journal = self._journal.path
-        self._raise_alarm("disk", f"{why} Recording goes on in {self._journal.path}")
-        self._write()
+        return JournalWriter(spare / f"{header.run_id}{journal.path.suffix}", header)
 
     def _give_up(self, why: str) -> None:
         """No disk takes the data: say so, and keep what is on disk for recovery."""
@@ -299,12 +347,12 @@ class Recorder(threading.Thread):
         end = End("failed", self.status.sample, f"Recording failed: {why}. {lost} samples could not be kept")
         self._release(Recorded(journal.path, journal.header, end))
 
-    def _raise_alarm(self, kind: str, text: str) -> None:
+    def _raise_alarm(self, trouble: str, text: str) -> None:
         """Once per trouble, not at each try."""
-        if self._alarm == kind:
+        if self._alarm == trouble:
             return
-        self._alarm = kind
-        self._say(kind, text, "error")
+        self._alarm = trouble
+        self._say(_kind_of(trouble), text, "error")
 
     def _say(self, kind: str, text: str, severity: str, sample: int | None = None) -> None:
         at = self.status.sample if sample is None else sample
@@ -329,3 +377,8 @@ class Recorder(threading.Thread):
             if self._journal is not None:
                 time.sleep(_RETRY_S)
         self._give_up("the disk took no data while the process ended")
+
+
+def _kind_of(trouble: str) -> str:
+    """The kind of event that tells of a trouble."""
+    return trouble if trouble in ("memory", "recorder") else "disk"

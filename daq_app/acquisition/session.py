@@ -52,6 +52,8 @@ class SessionSettings:
     truth: dict[str, Any] | None = None
     """What a simulated wall is made from; goes into every run."""
     patience: Patience = field(default_factory=Patience)
+    speed: float = 1.0
+    """How much faster than real time the simulated device or the replay runs."""
 
 
 class Session:
@@ -64,7 +66,11 @@ class Session:
         self._saving: list[Future[Finished]] = []
         self.recorder = Recorder(self._forward, self._announce, self._hand_over, settings.spare_folder)
         self.analyst = Analyst(
-            settings.rig, publisher, self.recorder.inbox.put, release_within_s=settings.release_within_s
+            settings.rig,
+            publisher,
+            self.recorder.inbox.put,
+            release_within_s=settings.release_within_s,
+            planned_rate_hz=settings.plan.rate_hz,
         )
         self.watchdog = Watchdog(self.recorder, settings.folder, self._say)
         self._wakefulness = Wakefulness()
@@ -112,6 +118,19 @@ class Session:
         else:
             self._wakefulness.let_go()
         self._publisher.send("health", self.watchdog.look(self._reader, self.analyst.overloaded))
+
+    def tell_fault(self, text: str) -> None:
+        """Say that something of ours failed, once for each text."""
+        if all(event.text != text for event in self.recent_events):
+            self._say(
+                EventMessage(
+                    kind="alarm",
+                    sample=self.recorder.status.sample,
+                    text=text,
+                    severity="error",
+                    data={"alarm": "fault"},
+                )
+            )
 
     @property
     def state(self) -> State:
@@ -194,6 +213,7 @@ class Session:
             self._settings.plan,
             self.recorder.inbox.put,
             self._settings.patience,
+            self._settings.speed,
         )
         self._reader.start()
         return "Sampling begins"

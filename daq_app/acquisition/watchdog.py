@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
+from daq_app.acquisition.machine_watch import MachineWatch
 from daq_app.acquisition.messages import EventMessage, HealthMessage
 from daq_app.acquisition.preflight import LOW_SPACE_BYTES
 from daq_app.acquisition.reader import Reader
@@ -26,6 +27,7 @@ class Watchdog:
     folder: Path
     say: Callable[[EventMessage], None]
     clock: Callable[[], float] = time.monotonic
+    machine: MachineWatch = field(default_factory=MachineWatch)
     _alarms: set[str] = field(default_factory=set)
     _acknowledged: int = 0
     _acknowledged_s: float = 0.0
@@ -36,6 +38,7 @@ class Watchdog:
         """Judge the present state; call it five times a second."""
         status = self.recorder.status
         self._look_at_space(status.recording)
+        self._look_at_machine(status.sample)
         if reader is not None and reader.is_alive() and reader.buffer_samples:
             self._alarm(
                 "silence",
@@ -59,6 +62,13 @@ class Watchdog:
             free_bytes=self._free_bytes,
             block_to_disk_ms_p99=self.recorder.latency.percentile_ms(99),
         )
+
+    def _look_at_machine(self, sample: int) -> None:
+        for news in self.machine.look():
+            data: dict[str, float | str] = {"alarm": news.name, "value": news.value}
+            self.say(
+                EventMessage(kind="alarm", sample=sample, text=news.text, severity=news.severity, data=data)
+            )
 
     def _look_at_disk(self, recording: bool, acknowledged: int, waiting_bytes: int) -> None:
         now = self.clock()

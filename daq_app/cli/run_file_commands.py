@@ -16,7 +16,7 @@ from rich.text import Text
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
 from daq_app.config import parse_rig
 from daq_app.config.toml_file import read_text
-from daq_app.runfile import Recovery, VerifyReport, recover, verify
+from daq_app.runfile import DerivedData, JournalContents, Recovery, VerifyReport, recover, verify
 from daq_app.runfile.exporters import ExportFormat, export_run
 from daq_app.runfile.importers import import_file, load_import_map
 
@@ -107,7 +107,7 @@ def recover_command(
     """
     with reported():
         with Console(stderr=True).status("recovering …"):
-            results = recover(folder, thorough=not quick)
+            results = recover(folder, thorough=not quick, derive=_derived)
         if as_json:
             typer.echo(json.dumps([_recovery_dict(result) for result in results], ensure_ascii=False))
         elif not results:
@@ -119,6 +119,12 @@ def recover_command(
                 typer.echo(f"{result.journal}: {result.outcome}: {result.text}")
     if any(result.outcome == "failed" for result in results):
         raise typer.Exit(EXIT_FAILED)
+
+
+def _derived(contents: JournalContents) -> DerivedData | None:
+    from daq_app.acquisition.derive import derive  # loads the analysis: only where there is a run to make
+
+    return derive(contents)[0]
 
 
 def _recovery_dict(result: Recovery) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from daq_app.runfile.errors import (
     RunFileError,
 )
 from daq_app.runfile.frames import MAX_PAYLOAD_BYTES, TAG_BYTES, FrameType, pack_frame
+from daq_app.runfile.journal_scan import scan_frames
 from daq_app.runfile.locks import lock_file
 from daq_app.runfile.model import MAX_GAP_SAMPLES, RunHeader, to_json
 
@@ -55,6 +56,8 @@ class JournalWriter:
         self._sequence = 0
         self._next_sample: int | None = None
         self._acknowledged = 0
+        self._safe = (0, 0)
+        """Bytes and frames known to be on the device."""
         self._bytes = 0
         self._failed: JournalDeviceError | None = None
         self._closed = False
@@ -68,15 +71,7 @@ class JournalWriter:
         self._header_payload = header.model_dump_json().encode()
         if len(self._header_payload) > MAX_PAYLOAD_BYTES:
             raise RunFileError(f"{path}: the run's header is too long", advice="Shorten notes or truth.")
-        flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
-        try:
-            self._fd = os.open(path, flags, 0o644)
-        except FileExistsError as error:
-            raise RunFileError(f"{path} exists already", advice="A journal is never overwritten.") from error
-        except OSError as error:
-            raise RunFileError(
-                f"{path} cannot be created ({error.strerror})", advice="Choose a folder on a writable disk."
-            ) from error
+        self._fd = _create(path)
         try:
             lock_file(self._fd, str(path))
             self._append(FrameType.HEADER, self._header_payload)
@@ -100,6 +95,16 @@ class JournalWriter:
     @property
     def size_bytes(self) -> int:
         return self._bytes
+
+    @property
+    def frames(self) -> int:
+        """Frames written."""
+        return self._sequence
+
+    @property
+    def acknowledged_frames(self) -> int:
+        """Frames known to be on the device."""
+        return self._safe[1]
 
     def append_block(self, first_sample: int, readings: NDArray[np.float64]) -> None:
         """Write readings (n_channels, n_samples), rows as in the header.
@@ -188,23 +193,57 @@ class JournalWriter:
         except OSError:
             return False
 
-    def copy_to(self, path: Path) -> None:
-        """Copy what has been written to a new file and flush it; the way out for a file that was deleted.
+    def move_to(self, path: Path) -> None:
+        """Go on in a new file at `path`: the way out of a disk that fails or a file that was deleted.
 
-        Raises `OSError`.
+        It begins with everything that was acknowledged. What had been written but not acknowledged is not
+        taken along: append it again. Every frame is checked while it is copied. Raises `RunFileError` or
+        `OSError`, with the old file still in use.
         """
-        with path.open("xb") as out:
-            position = os.lseek(self._fd, 0, os.SEEK_CUR)
-            try:
-                os.lseek(self._fd, 0, os.SEEK_SET)
-                left = self._bytes
-                while left > 0 and (piece := os.read(self._fd, min(left, 2**20))):
-                    out.write(piece)
-                    left -= len(piece)
-            finally:
-                os.lseek(self._fd, position, os.SEEK_SET)
-            out.flush()
-            fsync_data(out.fileno())
+        n_bytes, n_frames = self._safe
+        fd = _create(path)
+        try:
+            lock_file(fd, str(path))
+            self._copy(fd, n_bytes)
+            with path.open("rb") as copied:
+                frames = scan_frames(copied, n_bytes).frames
+            if [frame.sequence for frame in frames] != list(range(n_frames)):
+                raise RunFileError(
+                    f"{self.path} can no longer be read in full", advice="What is left of it is kept."
+                )
+            fsync_data(fd)
+            fsync_folder(path.parent)
+        except BaseException:
+            os.close(fd)
+            path.unlink(missing_ok=True)
+            raise
+        old_pool, old_fd = self._sync_pool, self._fd
+        with self._append_lock:
+            # A flush of the old file may hang for ever: it is left to itself, with a lock of its own.
+            self._sync_lock, self._sync_pool, self._pending_sync = threading.Lock(), None, None
+            self._fd, self.path = fd, path
+            self._bytes, self._sequence = n_bytes, n_frames
+            self._next_sample = max(
+                (f.end_sample for f in frames if f.type in (FrameType.DATA, FrameType.GAP)), default=None
+            )
+            self._failed = None
+        if old_pool is not None:
+            old_pool.shutdown(wait=False)
+        with contextlib.suppress(OSError):
+            os.close(old_fd)
+
+    def _copy(self, fd: int, n_bytes: int) -> None:
+        position = os.lseek(self._fd, 0, os.SEEK_CUR)
+        try:
+            os.lseek(self._fd, 0, os.SEEK_SET)
+            left = n_bytes
+            while left > 0 and (piece := os.read(self._fd, min(left, 2**20))):
+                view = memoryview(piece)
+                while view:
+                    view = view[os.write(fd, view) :]
+                left -= len(piece)
+        finally:
+            os.lseek(self._fd, position, os.SEEK_SET)
 
     def close(self) -> None:
         """Write the end frame and a last copy of the header, flush, unlock. Safe twice."""
@@ -307,12 +346,30 @@ class JournalWriter:
                 return self._acknowledged
             if self._failed is not None:
                 raise self._failed
-            written = self._next_sample or 0
+            fd = self._fd
+            with self._append_lock:
+                written, safe = self._next_sample or 0, (self._bytes, self._sequence)
             started = time.perf_counter()
             try:
-                fsync_data(self._fd)
+                fsync_data(fd)
             except OSError as error:
+                if fd != self._fd:  # a flush of the file that was left behind
+                    return self._acknowledged
                 raise self._refuse_for_good(error) from error
             self.last_sync_s = time.perf_counter() - started
-            self._acknowledged = max(self._acknowledged, written)
+            if fd == self._fd:
+                self._acknowledged, self._safe = max(self._acknowledged, written), max(self._safe, safe)
             return self._acknowledged
+
+
+def _create(path: Path) -> int:
+    """A new file, open for reading and writing. Raises `RunFileError`."""
+    flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+    try:
+        return os.open(path, flags, 0o644)
+    except FileExistsError as error:
+        raise RunFileError(f"{path} exists already", advice="A journal is never overwritten.") from error
+    except OSError as error:
+        raise RunFileError(
+            f"{path} cannot be created ({error.strerror})", advice="Choose a folder on a writable disk."
+        ) from error

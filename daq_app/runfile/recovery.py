@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -11,6 +12,7 @@ from daq_app.runfile.folder import RUN_SUFFIX, find_journals
 from daq_app.runfile.hdf5_read import open_run
 from daq_app.runfile.journal_read import JournalContents, read_journal
 from daq_app.runfile.locks import journal_locked
+from daq_app.runfile.model import DerivedData
 from daq_app.runfile.saving import finalise_contents, is_run_of
 from daq_app.runfile.verification import verify_run
 
@@ -30,26 +32,33 @@ class Recovery:
     lost_samples: int = 0
 
 
-def recover(path: Path | str, *, thorough: bool = False) -> tuple[Recovery, ...]:
+Derive = Callable[[JournalContents], DerivedData | None]
+"""What is computed from the samples of a run when it is made; must not raise."""
+
+
+def recover(
+    path: Path | str, *, thorough: bool = False, derive: Derive | None = None
+) -> tuple[Recovery, ...]:
     """Make a run of one journal, or of every journal in a folder and below that has none yet.
 
     A run that is there already is recognised by its header; with `thorough` every sample of it is
     checked too (a second per minute of recording).  A journal being recorded is left alone.  A run
-    file that is there but damaged is set aside under another name, never deleted.  Raises
+    file that is there but damaged is set aside under another name, never deleted.  With `derive` the
+    run gets its derived signals and its verdict, as one that was closed in good order.  Raises
     `RunFileError` only if `path` does not exist; everything else is told per journal.
     """
     path = Path(path)
     if path.is_dir():
-        return tuple(_recover_one(journal, thorough) for journal in find_journals(path))
+        return tuple(_recover_one(journal, thorough, derive) for journal in find_journals(path))
     if not path.exists():
         raise RunFileError(f"{path} does not exist", advice="Give a journal or the folder of the runs.")
-    return (_recover_one(path, thorough),)
+    return (_recover_one(path, thorough, derive),)
 
 
-def _recover_one(journal: Path, thorough: bool) -> Recovery:
+def _recover_one(journal: Path, thorough: bool, derive: Derive | None) -> Recovery:
     try:
         with journal_locked(journal), read_journal(journal) as contents:
-            return _make_run(journal, contents, thorough)
+            return _make_run(journal, contents, thorough, derive)
     except BusyError:
         return Recovery(
             journal, "in use", f"{journal.name} is being recorded or recovered by another process"
@@ -59,7 +68,7 @@ def _recover_one(journal: Path, thorough: bool) -> Recovery:
         return Recovery(journal, "failed", str(error) or type(error).__name__)
 
 
-def _make_run(journal: Path, contents: JournalContents, thorough: bool) -> Recovery:
+def _make_run(journal: Path, contents: JournalContents, thorough: bool, derive: Derive | None) -> Recovery:
     if contents.n_samples == 0:
         return Recovery(journal, "empty", f"{journal.name} holds no samples: the recording ended before any")
     out = journal.with_suffix(RUN_SUFFIX)
@@ -73,7 +82,7 @@ def _make_run(journal: Path, contents: JournalContents, thorough: bool) -> Recov
                 return _told(journal, contents, "saved already", out, f"{out.name} is its run")
         if out.exists():
             aside = _set_aside(out)
-    finalise_contents(contents, out)
+    finalise_contents(contents, out, derive(contents) if derive is not None else None)
     text = f"{out.name} was made, {contents.n_samples} samples per channel"
     if contents.lost_samples:
         text += f", {contents.lost_samples} of them missing and listed as gaps"

@@ -22,6 +22,7 @@ from sim_hardware.daqmx_server.inventory import Inventory
 from sim_hardware.daqmx_server.max_export import load_max_export
 from sim_hardware.daqmx_server.server import DaqmxServer
 from sim_hardware.faults.script import load_faults
+from sim_hardware.marked_line import MarkedLine
 from sim_hardware.signals import SignalSource
 
 _PARENT_POLL_S = 0.5
@@ -54,9 +55,10 @@ def parser() -> argparse.ArgumentParser:
     options.add_argument("--theta0-over-alpha", type=float, metavar="X", help="release rotation over alpha")
     options.add_argument(
         "--wall",
-        choices=("scripted", "commanded"),
+        choices=("scripted", "commanded", "marked"),
         default="scripted",
-        help="pulled and released by the rig file's times, or by commands of the control service",
+        help="pulled and released by the rig file's times, or by commands of the control service; "
+        "marked: no wall, every sample of an LVDT tells its own place",
     )
     options.add_argument(
         "--max-export", type=Path, metavar="FILE.ini", help="take the devices from NI MAX, not from the rig"
@@ -87,6 +89,8 @@ def build_bench(arguments: argparse.Namespace) -> Bench:
 
 
 def _wall(rig: Rig, arguments: argparse.Namespace) -> SignalSource:
+    if arguments.wall == "marked":
+        return MarkedLine(rig)
     from sim_hardware.virtual_rig import VirtualRig  # compiles its kernel: only once it is wanted
 
     wall: SignalSource = VirtualRig.from_rig(

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from daq_app.acquisition.items import Arrived, Begin, End, Item, RequestRefused
+from daq_app.acquisition.items import Arrived, Begin, End, Item, Lost, Noted, RequestRefused
 from daq_app.acquisition.messages import EventMessage
 from daq_app.acquisition.recorder import Recorded, Recorder
-from daq_app.runfile import RunHeader, read_journal
+from daq_app.runfile import JournalWriter, RunHeader, read_journal
 from drivers import Block
 
 N_CHANNELS = 4
@@ -31,6 +31,7 @@ class Disk:
         self.full = False
         self.broken: bool | Path = False
         """All files, or that one."""
+        self.flush_breaks: Path | None = None
         self.flush_takes = threading.Event()
         self.flush_takes.set()
         write, fsync = os.write, os.fsync
@@ -45,6 +46,8 @@ class Disk:
         def slow_fsync(fd: int) -> None:
             if not self.flush_takes.wait(10.0):
                 raise OSError(errno.EIO, "Input/output error")
+            if self.flush_breaks is not None and _is(fd, self.flush_breaks):
+                raise OSError(errno.EIO, "Input/output error")
             fsync(fd)
 
         monkeypatch.setattr("os.write", failing_write)
@@ -54,7 +57,7 @@ class Disk:
 
 
 def _is(fd: int, path: Path | bool) -> bool:
-    return isinstance(path, Path) and os.path.samestat(os.fstat(fd), path.stat())
+    return isinstance(path, Path) and path.exists() and os.path.samestat(os.fstat(fd), path.stat())
 
 
 class Bench:
@@ -203,11 +206,90 @@ def test_a_broken_disk_moves_the_recording_to_the_spare_folder(
     disk.broken = journal
     lab.blocks(5, 10)
     lab.until(lambda: lab.heard("error", "Recording goes on in"))
+    lab.recorder.inbox.put(Noted(EventMessage(kind="marker", sample=1500, text="after")))
     recorded = lab.end()
-    assert recorded.journal.parent == tmp_path / "spare"
+    assert recorded.journal == tmp_path / "spare" / journal.name
+    assert contents(recorded.journal) == {n: float(n) for n in range(1500)}, "one run, with all of it"
+    assert [path.name for path in tmp_path.glob("run.*")] == ["run.journal-moved"]
+    with read_journal(recorded.journal) as opened:
+        assert not opened.damage and opened.gaps == ()
+        assert [event.kind for event in opened.events].count("marker") == 1
+
+
+def test_what_was_not_acknowledged_is_written_once_more_when_the_disk_breaks(
+    bench: Callable[..., Bench], disk: Disk, tmp_path: Path
+) -> None:
+    """Gaps and events in the unsafe part: nothing twice, nothing missing, and the counts stay right."""
+    lab = bench(tmp_path / "spare")
+    journal = lab.begin()
+    lab.blocks(0, 5)
+    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    disk.flush_takes.clear()
+    lab.recorder.inbox.put(Lost(500, 100, "overwritten"))
+    lab.recorder.inbox.put(Noted(EventMessage(kind="marker", sample=550, text="between")))
+    lab.blocks(6, 3)
+    lab.until(lambda: lab.heard("error", "not confirmed"))
+    disk.flush_breaks = journal
+    disk.flush_takes.set()
+    lab.until(lambda: lab.heard("error", "Recording goes on in"))
+    lab.blocks(9, 3)
+    lab.until(lambda: lab.recorder.status.acknowledged_sample == 1200)
+    assert (lab.recorder.status.gaps, lab.recorder.status.lost_samples) == (1, 100)
+    recorded = lab.end()
+    expected = {n: float(n) for n in range(1200) if not 500 <= n < 600}
+    assert contents(recorded.journal) == expected
+    with read_journal(recorded.journal) as opened:
+        assert [(gap.first_sample, gap.n_samples) for gap in opened.gaps] == [(500, 100)]
+        assert [event.kind for event in opened.events].count("marker") == 1
+        assert not opened.damage
+
+
+def test_an_old_file_that_cannot_be_read_any_more_is_continued_in_a_run_of_its_own(
+    bench: Callable[..., Bench], disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lab = bench(tmp_path / "spare")
+    journal = lab.begin()
+    lab.blocks(0, 5)
+    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+
+    def unreadable(fd: int, size: int) -> bytes:
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr("os.read", unreadable)
+    disk.broken = journal
+    lab.blocks(5, 10)
+    lab.until(lambda: lab.heard("error", "Recording goes on in"))
+    recorded = lab.end()
+    monkeypatch.undo()
     assert "Continues run run after" in recorded.header.notes
     found = {**contents(journal), **contents(recorded.journal)}
     assert found == {n: float(n) for n in range(1500)}
+
+
+@pytest.mark.parametrize("error", [MemoryError(), RuntimeError("a fault of ours")])
+def test_the_recorder_outlives_errors_that_no_disk_has(
+    bench: Callable[..., Bench], error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lab = bench()
+    journal = lab.begin()
+    lab.blocks(0, 5)
+    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    real = JournalWriter.append_block
+    broken = threading.Event()
+    broken.set()
+
+    def failing(writer: JournalWriter, first: int, block: Any) -> None:
+        if broken.is_set():
+            raise error
+        real(writer, first, block)
+
+    monkeypatch.setattr(JournalWriter, "append_block", failing)
+    lab.blocks(5, 5)
+    lab.until(lambda: lab.heard("error", "memory" if isinstance(error, MemoryError) else "a fault of ours"))
+    broken.clear()
+    lab.until(lambda: lab.recorder.status.acknowledged_sample == 1000)
+    lab.end()
+    assert contents(journal) == {n: float(n) for n in range(1000)}
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows does not delete a file that is open")
@@ -225,8 +307,8 @@ def test_a_folder_deleted_under_the_run_costs_nothing(bench: Callable[..., Bench
         following += 1
         lab.until(lambda: lab.recorder.status.sample == following * 100)  # noqa: B023
     recorded = lab.end()
-    found = {**contents(tmp_path / "spare" / journal.name), **contents(recorded.journal)}
-    assert found == {n: float(n) for n in range(following * 100)}
+    assert recorded.journal == tmp_path / "spare" / journal.name
+    assert contents(recorded.journal) == {n: float(n) for n in range(following * 100)}
 
 
 def test_when_no_disk_takes_it_the_operator_hears_what_was_lost(
