@@ -53,7 +53,7 @@ from daq_app.monitor.session import RECORDING, Session
 from daq_app.monitor.settings import TYPE_SIZES, WindowSettings
 from daq_app.monitor.theme import THEMES, Colours, apply_theme
 
-FRAME_MS: Final = 22
+FRAME_MS: Final = 25
 SLOW_MS: Final = 160
 _QUIET_EVENTS: Final = frozenset({"impact", "marker", "tare", "saved", *State})
 """Events that the pages show anyway, unless they are more than information."""

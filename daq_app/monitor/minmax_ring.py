@@ -65,10 +65,26 @@ class MinMaxRing:
         if tail.shape[1]:
             self._merge((end - 1) // size, tail[:, None, :])
 
-    def columns(self) -> tuple[Array, Array]:
-        """(low, high), each (n_channels, n_columns), oldest column first, newest last; copies."""
+    def columns(self, merge: int = 1) -> tuple[Array, Array]:
+        """(low, high), each (n_channels, n_columns), oldest column first, newest last; copies.
+
+        With `merge` above 1, that many neighbours become one column, for a picture with fewer
+        pixels. The groups lie on the sample grid like the columns, so that the picture does not
+        shimmer as it moves on; the newest group may still be filling.
+        """
         shift = -((self._newest + 1) % self.n_columns)
-        return np.roll(self._low, shift, axis=1), np.roll(self._high, shift, axis=1)
+        low, high = np.roll(self._low, shift, axis=1), np.roll(self._high, shift, axis=1)
+        if merge == 1:
+            return low, high
+        head = -(self._newest + 1 - self.n_columns) % merge
+        tail = -(self.n_columns - head) % merge
+        padding = ((0, 0), (0, tail))
+
+        def grouped(values: Array) -> NDArray[np.float32]:
+            padded = np.pad(values[:, head:], padding, constant_values=np.nan)
+            return padded.reshape(self.n_channels, -1, merge)
+
+        return np.fmin.reduce(grouped(low), axis=2), np.fmax.reduce(grouped(high), axis=2)
 
     def _advance(self, column: int) -> None:
         """Make `column` the newest, emptying the columns between."""

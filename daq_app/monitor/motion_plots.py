@@ -118,7 +118,7 @@ class MotionPlots(QWidget):
             origin, start = now, -WINDOW_S
         samples, rotation, velocity = session.trace.window(origin + start * rate, until)
         time = (samples - origin) / rate
-        columns = max(200, int(self.rotation.width()))
+        columns = max(200, self.rotation.width() // 2)  # the pen is two pixels wide
         for curve, values in zip(self._curves, (rotation * 1e3, velocity), strict=True):
             x, y = envelope(time, values, columns)
             curve.setData(x, y, connect="finite" if np.isnan(y).any() else "all")

@@ -7,13 +7,14 @@ an impact that lasts one sample is as visible as one that lasts a second.
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetrics, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFontMetrics, QMouseEvent, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QWidget
 
 from daq_app.acquisition.messages import BlockMessage
@@ -34,6 +35,13 @@ _TITLE_PX = 18
 _LEAST_ROW_PX = 28
 _LEAST_CELL_PX = 112
 _GAP_PX = 4
+_LABEL_PX = 13.0
+_LEAST_TRACE_PX = 4
+_LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +105,10 @@ class StripPanel(QWidget):
         self._cells: list[Cell] = []
         self._titles: list[tuple[Family, QRectF]] = []
         self._arranged_for: object = None
-        self._spans: NDArray[np.float64] = np.empty((0, 2))
+        self._spans: Array = np.empty((0, 2))
+        self._least: Array = np.empty(0)
+        self._still: QPixmap | None = None
+        self._still_for: object = None
         self.paints = 0
         """How often the panel was painted."""
         self.setMinimumHeight(_TITLE_PX + 3 * _LEAST_ROW_PX)
@@ -122,79 +133,101 @@ class StripPanel(QWidget):
             return
         self._arranged_for = key
         self._cells, self._titles = ([], []) if rig is None else arrange(rig, self.width(), self.height())
-        self._spans = np.full((len(rig.channels) if rig is not None else 0, 2), np.nan)
+        channels = rig.channels if rig is not None else ()
+        self._spans = np.full((len(channels), 2), np.nan)
+        self._least = np.array([_SMALLEST_SPAN_SI[channel.family] for channel in channels])
 
     def paintEvent(self, event: QPaintEvent) -> None:
         self.paints += 1
         self._arrange()
-        colours = self._colours
-        painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(colours.ground))
         session = self._session
-        small = font(8)
-        painter.setFont(small)
-        if session.strips is None:
-            painter.setPen(QColor(colours.muted))
+        painter = QPainter(self)
+        painter.drawPixmap(0, 0, self._still_picture())
+        if session.strips is not None:
+            live = session.fresh(BlockMessage)
+            self._paint_traces(painter, live)
+            self._paint_values(painter, live)
+        painter.end()
+
+    def _still_picture(self) -> QPixmap:
+        """Everything that changes rarely: grounds, names, titles, the frames of overloaded channels."""
+        scale = self.devicePixelRatioF()
+        key = (self._arranged_for, self._colours, self._session.overloaded, scale)
+        if self._still is not None and key == self._still_for:
+            return self._still
+        still = QPixmap(round(self.width() * scale), round(self.height() * scale))
+        still.setDevicePixelRatio(scale)
+        still.fill(QColor(self._colours.ground))
+        painter = QPainter(still)
+        if self._session.strips is None:
+            painter.setPen(QColor(self._colours.muted))
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, "No rig is known yet")
-            painter.end()
-            return
         bold = font(8.5, bold=True)
         painter.setFont(bold)
-        painter.setPen(QColor(colours.muted))
+        painter.setPen(QColor(self._colours.muted))
         for family, box in self._titles:
             text = QFontMetrics(bold).elidedText(
                 FAMILY_TITLES[family], Qt.TextElideMode.ElideRight, int(box.width() - 4)
             )
-            painter.drawText(box, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, text)
-        painter.setFont(small)
-        low, high = session.strips.columns()
-        live = session.fresh(BlockMessage)
+            painter.drawText(box, _LEFT, text)
+        painter.setFont(font(8))
         for cell in self._cells:
-            self._paint_cell(painter, cell, low[cell.index], high[cell.index], live)
+            self._paint_still_cell(painter, cell)
         painter.end()
+        self._still, self._still_for = still, key
+        return still
 
-    def _paint_cell(
-        self, painter: QPainter, cell: Cell, low: NDArray[np.float32], high: NDArray[np.float32], live: bool
-    ) -> None:
-        colours, session, box = self._colours, self._session, cell.box
-        overloaded = cell.channel.id in session.overloaded
-        painter.fillRect(box, QColor(colours.surface))
+    def _paint_still_cell(self, painter: QPainter, cell: Cell) -> None:
+        colours = self._colours
+        overloaded = cell.channel.id in self._session.overloaded
+        painter.fillRect(cell.box, QColor(colours.surface))
         if overloaded:
             painter.setPen(QPen(QColor(colours.bad), 2))
-            painter.drawRect(box)
-        label_px = 13.0
-        _, factor = shown_unit(cell.channel.si_unit)
-        trace_box = box.adjusted(2, label_px, -2, -2)
-        colour = QColor(colours.family(cell.channel.family) if live else colours.muted)
-        if trace_box.height() > 4:
-            bottom, top = self._span(cell, low, high)
-            path = strip_path(low, high, trace_box, bottom, top)
-            painter.setPen(QPen(colour, 1))
-            painter.drawPath(path)
+            painter.drawRect(cell.box)
         painter.setPen(QColor(colours.bad if overloaded else colours.text))
-        name = f"⚠ {cell.channel.id}" if overloaded else cell.channel.id
-        head = QRectF(box.left() + 4, box.top(), box.width() - 8, label_px)
-        painter.drawText(head, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, name)
-        mean = session.block_mean
-        value = number(float(mean[cell.index]) * factor, 2) if live and mean is not None else DASH
-        painter.setPen(QColor(colours.muted))
-        painter.drawText(head, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, value)
+        painter.drawText(_head(cell), _LEFT, f"⚠ {cell.channel.id}" if overloaded else cell.channel.id)
 
-    def _span(self, cell: Cell, low: NDArray[np.float32], high: NDArray[np.float32]) -> tuple[float, float]:
-        """Vertical range of a strip: grows at once, shrinks only when far too large."""
-        smallest = float(np.nanmin(low, initial=np.inf))
-        largest = float(np.nanmax(high, initial=-np.inf))
-        if not smallest <= largest:
-            return -1.0, 1.0
-        least = _SMALLEST_SPAN_SI[cell.channel.family]
-        need = max(largest - smallest, least)
-        bottom, top = self._spans[cell.index]
-        keeps = bottom <= smallest and largest <= top and (top - bottom) < 4 * need
-        if not keeps:
-            centre = (largest + smallest) / 2
-            bottom, top = centre - 0.6 * need, centre + 0.6 * need
-            self._spans[cell.index] = bottom, top
-        return float(bottom), float(top)
+    def _paint_traces(self, painter: QPainter, live: bool) -> None:
+        """The lines of a family as one path: a path per channel costs three times as much."""
+        strips = self._session.strips
+        assert strips is not None
+        width = _trace_box(self._cells[0]).width() if self._cells else 1.0
+        low, high = strips.columns(max(1, round(strips.n_columns / max(width, 1.0))))
+        self._follow_spans(low, high)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        for family, _ in self._titles:
+            cells = [cell for cell in self._cells if cell.channel.family == family]
+            rows = [cell.index for cell in cells]
+            boxes = np.array([_trace_box(cell).getRect() for cell in cells])
+            if boxes[0, 3] <= _LEAST_TRACE_PX:
+                continue
+            colour = self._colours.family(family) if live else self._colours.muted
+            painter.setPen(QPen(QColor(colour), 1))
+            painter.drawPath(strip_path(low[rows], high[rows], boxes, self._spans[rows]))
+
+    def _paint_values(self, painter: QPainter, live: bool) -> None:
+        mean = self._session.block_mean
+        painter.setFont(font(8))
+        painter.setPen(QColor(self._colours.muted))
+        for cell in self._cells:
+            _, factor = shown_unit(cell.channel.si_unit)
+            value = number(float(mean[cell.index]) * factor, 2) if live and mean is not None else DASH
+            painter.drawText(_head(cell), _RIGHT, value)
+
+    def _follow_spans(self, low: Floats, high: Floats) -> None:
+        """Vertical ranges of the strips: grow at once, shrink only when far too large."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # a channel without any sample yet
+            smallest, largest = np.nanmin(low, axis=1), np.nanmax(high, axis=1)
+        known = smallest <= largest
+        need = np.maximum(largest - smallest, self._least)
+        bottom, top = self._spans[:, 0], self._spans[:, 1]
+        with np.errstate(invalid="ignore"):
+            keeps = (bottom <= smallest) & (largest <= top) & (top - bottom < 4 * need)
+        moved = known & ~keeps
+        centre = (largest[moved] + smallest[moved]) / 2
+        self._spans[moved, 0] = centre - 0.6 * need[moved]
+        self._spans[moved, 1] = centre + 0.6 * need[moved]
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """A click on a strip names its channel."""
@@ -204,15 +237,30 @@ class StripPanel(QWidget):
                 return
 
 
-def strip_path(
-    low: NDArray[np.float32], high: NDArray[np.float32], box: QRectF, bottom: float, top: float
-) -> pg.QtGui.QPainterPath:
-    """A line through the smallest and largest value of each column that holds data, within `box`."""
-    known = np.flatnonzero(~np.isnan(low))
-    scale = box.height() / (top - bottom)
-    x = np.repeat(box.left() + (known + 0.5) * (box.width() / low.size), 2)
-    extremes = np.stack((low[known], high[known]), axis=1).ravel().astype(np.float64)
-    y = box.bottom() - (extremes - bottom) * scale
-    joined = np.ones(x.size, dtype=np.int32)
-    joined[1::2] = np.diff(known, append=-1) == 1  # a gap in the data is a gap in the line
-    return pg.arrayToQPath(x, y, connect=joined, finiteCheck=False)
+def _head(cell: Cell) -> QRectF:
+    """Where a strip's name and value stand."""
+    return QRectF(cell.box.left() + 4, cell.box.top(), cell.box.width() - 8, _LABEL_PX)
+
+
+def _trace_box(cell: Cell) -> QRectF:
+    return cell.box.adjusted(2, _LABEL_PX, -2, -2)
+
+
+def strip_path(low: Floats, high: Floats, boxes: Array, spans: Array) -> pg.QtGui.QPainterPath:
+    """Lines through the smallest and largest value of each column that holds data.
+
+    `low`, `high`: (channels, columns); `boxes`: (channels, 4) left, top, width, height in pixels;
+    `spans`: (channels, 2) values at the bottom and the top of a box.
+    """
+    columns = low.shape[1]
+    rows, places = np.nonzero(~np.isnan(low))
+    left, top, width, height = boxes[rows].T
+    bottom_value, top_value = spans[rows].T
+    x = left + (places + 0.5) * (width / columns)
+    scale = height / (top_value - bottom_value)
+    extremes = np.stack((low[rows, places], high[rows, places]), axis=1)
+    y = (top + height)[:, None] - (extremes - bottom_value[:, None]) * scale[:, None]
+    joined = np.ones((x.size, 2), dtype=np.int32)
+    # A gap in the data is a gap in the line, and a channel is not joined to the next.
+    joined[:, 1] = np.diff(rows * (columns + 1) + places, append=-1) == 1
+    return pg.arrayToQPath(np.repeat(x, 2), y.ravel(), connect=joined.ravel(), finiteCheck=False)

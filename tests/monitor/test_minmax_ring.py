@@ -81,3 +81,27 @@ def test_a_restarted_clock_drops_the_old_points():
     trace.append(np.array([50.0, 60.0]), np.ones(2), np.ones(2))
     trace.append(np.array([0.0, 10.0]), np.zeros(2), np.zeros(2))
     assert trace.window(0)[0].tolist() == [0.0, 10.0]
+
+
+@given(
+    merge=st.integers(1, 5),
+    sizes=st.lists(st.integers(1, 90), min_size=1, max_size=12),
+    start=st.integers(0, 99),
+)
+@settings(deadline=None)
+def test_merged_columns_hold_the_same_extremes_on_a_grid_that_stands_still(merge, sizes, start):
+    rng = np.random.default_rng(sum(sizes) + start)
+    ring = MinMaxRing(2, 24, 5)
+    first = start
+    for size in sizes:
+        ring.append(first, rng.normal(size=(2, size)).astype(np.float32))
+        first += size
+    low, high = ring.columns()
+    newest = (first - 1) // 5
+    group = np.arange(newest - 23, newest + 1) // merge
+    wanted = [g for g in np.unique(group) if g * merge >= newest - 23]
+    merged_low, merged_high = ring.columns(merge)
+    assert merged_low.shape[1] == len(wanted)
+    for place, g in enumerate(wanted):
+        np.testing.assert_array_equal(merged_low[:, place], np.fmin.reduce(low[:, group == g], axis=1))
+        np.testing.assert_array_equal(merged_high[:, place], np.fmax.reduce(high[:, group == g], axis=1))
