@@ -1,37 +1,118 @@
-"""The root command `daq-app`, and how the groups of commands find their way into it."""
+"""The root command `daq-app`. A command's module is loaded only when that command is used.
+
+The modules load NumPy, SciPy, HDF5 and more: seconds, that nobody should wait for on `--help`.
+"""
 
 from __future__ import annotations
 
 import importlib
-from typing import Final
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
-_GROUPS: Final = (
-    "daq_app.cli.monitor_commands",
-    "daq_app.cli.config_commands",
-    "daq_app.cli.record_commands",
-    "daq_app.cli.campaign_commands",
-    "daq_app.cli.analyse_commands",
-    "daq_app.cli.theory_commands",
-    "daq_app.cli.run_file_commands",
-    "daq_app.cli.gap_commands",
-    "daq_app.cli.gap_blind_commands",
-)
-"""Modules with a ``register(app)`` function, in the order of the help page."""
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    modules: tuple[str, ...]
+    """Modules of daq_app.cli with a ``register(app)`` function that make the command."""
+    help: str
+    """First sentence of its help, as the command itself has it (a test compares them)."""
+
+
+_COMMANDS: Final[Mapping[str, _Entry]] = {
+    "monitor": _Entry(
+        ("monitor_commands",),
+        "Open the operator's window: on a rig, or on an acquisition that runs already.",
+    ),
+    "view": _Entry(
+        ("monitor_commands",),
+        "Look at a run: time cursor, zoom, channels, export of pictures and data.",
+    ),
+    "config": _Entry(("config_commands",), "Check and show rig files."),
+    "run": _Entry(
+        ("record_commands",),
+        "Take one release test: zero, arm, hold, release, rest, and the table of r.",
+    ),
+    "simulate": _Entry(
+        ("record_commands",),
+        "Write the run of a simulated test without real time, through the same sensors and modules.",
+    ),
+    "keys": _Entry(("record_commands",), "Keys for viewers beyond this machine."),
+    "campaign": _Entry(("campaign_commands",), "Plan and follow a campaign of tests."),
+    "analyse": _Entry(
+        ("analyse_commands",),
+        "Analyse a recorded test: θ0, impacts, peaks, speeds, periods, r by each method, base joint.",
+    ),
+    "theory": _Entry(
+        ("theory_commands",),
+        "p, α, r_max (both forms), periods T(φ), the decay T_n and φ_n, and the semi-rigid joint.",
+    ),
+    "verify": _Entry(
+        ("run_file_commands",),
+        "Say of each run and journal that every sample is there or known to be missing, or what is wrong.",
+    ),
+    "recover": _Entry(
+        ("run_file_commands",),
+        "Make a run of every journal that has none yet, or whose run is damaged. Safe to repeat.",
+    ),
+    "export": _Entry(
+        ("run_file_commands",),
+        "Write a run, or a part of it, as CSV, MATLAB, TDMS, Parquet, netCDF or NumPy file.",
+    ),
+    "import": _Entry(("run_file_commands",), "Turn a recording of another program into a run."),
+    "gap": _Entry(
+        ("gap_commands", "gap_blind_commands"),
+        "Where simulator and recordings differ, which effect explains it, how far it shrinks.",
+    ),
+}
+"""In the order of the help page."""
+
+
+class LazyCommands(TyperGroup):
+    """Knows every command's name and first sentence; loads the command itself when it is called."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Names in the order of the help page."""
+        return list(_COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command if it was loaded; otherwise its name and first sentence, enough for a help page."""
+        entry = _COMMANDS.get(cmd_name)
+        if entry is None or cmd_name in self.commands:
+            return self.commands.get(cmd_name)
+        return TyperCommand(cmd_name, help=entry.help)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Load what the command line names, then do as any group does."""
+        if args and args[0] in _COMMANDS:
+            self.commands[args[0]] = load_command(args[0])
+        return super().resolve_command(ctx, args)
+
+
+def load_command(name: str) -> Any:
+    """The command of that name. `KeyError` if there is none."""
+    app = typer.Typer(rich_markup_mode="rich")
+    for module in _COMMANDS[name].modules:
+        importlib.import_module(f"daq_app.cli.{module}").register(app)
+    return typer.main.get_group(app).commands[name]
 
 
 def build_app() -> typer.Typer:
     """The whole command tree."""
     app = typer.Typer(
-        name="daq-app",
-        rich_markup_mode="rich",
-        pretty_exceptions_enable=False,
-        help="Record, watch and analyse free-rocking tests of masonry walls.",
+        name="daq-app", cls=LazyCommands, rich_markup_mode="rich", pretty_exceptions_enable=False
     )
-    for name in _GROUPS:
-        importlib.import_module(name).register(app)
+    app.callback(invoke_without_command=True)(_root)
     return app
+
+
+def _root(context: typer.Context) -> None:
+    """Record, watch and analyse free-rocking tests of masonry walls. Without a command: the window."""
+    if context.invoked_subcommand is None:
+        importlib.import_module("daq_app.cli.monitor_commands").monitor()
 
 
 def main() -> None:

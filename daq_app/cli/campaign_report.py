@@ -5,21 +5,21 @@ from __future__ import annotations
 import json
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
-from daq_app.campaign import collect as gathering
 from daq_app.campaign.plan import load_campaign
 from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.status import CampaignStatus
-from daq_app.campaign.summary import TestSummary
-from daq_app.campaign.tables import RestitutionRow, table_4_1
 from daq_app.cli.campaign_progress import DEFAULT_PLAN, progress_bar
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
-from daq_app.rocking.analysis import AnalysisOptions
+
+if TYPE_CHECKING:
+    from daq_app.campaign.summary import TestSummary
+    from daq_app.campaign.tables import RestitutionRow
 
 
 def report(
@@ -37,9 +37,13 @@ def report(
     Runs with a bad verdict are shown and left out of the means. Exit code 1 when a run that nobody had
     flagged bad could not be analysed.
     """
-    with reported():
-        from daq_app.campaign.report import write_report
+    # Imported here: `--help` should not load SciPy.
+    from daq_app.campaign import collect as gathering
+    from daq_app.campaign.report import write_report
+    from daq_app.campaign.tables import table_4_1
+    from daq_app.rocking.analysis import AnalysisOptions
 
+    with reported():
         campaign = load_campaign(plan_file)
         recorded = read_recorded(folder)
         status = CampaignStatus(campaign, recorded)

@@ -1,4 +1,4 @@
-"""`daq-app` without arguments, `daq-app monitor` and `daq-app view`: the operator's window."""
+"""`daq-app monitor` (also `daq-app` without arguments) and `daq-app view`: the operator's window."""
 
 from __future__ import annotations
 
@@ -35,16 +35,9 @@ _ServerKey = Annotated[Path | None, typer.Option(metavar="FILE", help="The recor
 
 
 def register(app: typer.Typer) -> None:
-    """Add ``monitor`` and ``view``, and the window for a call without a command."""
+    """Add ``monitor`` and ``view``."""
     app.command("monitor", epilog="Example: daq-app monitor configs/fr1.toml --out runs")(monitor)
     app.command("view", epilog="Example: daq-app view runs/FR1-L3-2.h5")(view)
-    app.callback(invoke_without_command=True)(_default)
-
-
-def _default(context: typer.Context) -> None:
-    """Record, watch and analyse free-rocking tests of masonry walls. Without a command: the window."""
-    if context.invoked_subcommand is None:
-        monitor()
 
 
 def monitor(

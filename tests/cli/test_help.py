@@ -1,0 +1,53 @@
+"""Help: quick, complete, with an example at every command."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from daq_app.cli.app import LazyCommands, build_app, load_command
+
+NAMES = LazyCommands(name="daq-app").list_commands(None)
+
+
+def _commands(path: str, command: Any) -> Iterator[tuple[str, Any]]:
+    inner = getattr(command, "commands", {})
+    if not inner:
+        yield path, command
+    for name, below in inner.items():
+        yield from _commands(f"{path} {name}", below)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_list_of_commands_is_true_and_each_shows_an_example(name: str) -> None:
+    command = load_command(name)
+    listed = LazyCommands(name="daq-app").get_command(None, name)
+    assert " ".join(command.help.split("\n\n")[0].split()) == listed.help
+    for path, leaf in _commands(f"daq-app {name}", command):
+        assert leaf.help, path
+        assert f"Example: {path} " in leaf.epilog, path
+
+
+def test_help_loads_no_numerical_library() -> None:
+    heavy = ("numpy", "scipy", "h5py", "pydantic", "matplotlib", "nidaqmx", "PySide6")
+    code = (
+        "import sys; from typer.testing import CliRunner; from daq_app.cli.app import build_app\n"
+        "answer = CliRunner().invoke(build_app(), ['--help']); assert answer.exit_code == 0\n"
+        f"print([name for name in {heavy!r} if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_help_lists_every_command_and_an_unknown_one_is_told() -> None:
+    page = CliRunner().invoke(build_app(), ["--help"]).stdout
+    for name in NAMES:
+        assert f" {name} " in page
+    wrong = CliRunner().invoke(build_app(), ["analyze"])
+    assert wrong.exit_code == 2
+    assert "No such command" in wrong.stderr
