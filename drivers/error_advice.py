@@ -29,8 +29,8 @@ class Advice:
 
 _LOST = Advice(
     "The device does not answer any more",
-    "Check its power, its cable or network and the module's seat; it is ready again when NI MAX (or "
-    "`daq-app devices`) shows it as present",
+    "Check its power, its cable or network and the module's seat; it is looked for, and "
+    "reading goes on by itself when it is back",
     recoverable=True,
 )
 _OVERWRITTEN = Advice(

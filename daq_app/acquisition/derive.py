@@ -108,7 +108,7 @@ def _signals(series: Series | None) -> dict[str, DerivedSignal]:
     }
 
 
-_SPOILS_TIME: Final = ("stood_still", "asleep")
+_SPOILS_TIME: Final = ("stood_still",)
 """News of the sample clock after which times within the run are wrong."""
 
 
