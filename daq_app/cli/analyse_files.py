@@ -7,9 +7,11 @@ import io
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from daq_app.cli.analyse_joint import joint_figure, profile_csv
 
 if TYPE_CHECKING:
     from daq_app.rocking.results import TestAnalysis
@@ -31,6 +33,10 @@ def write_outputs(analysis: TestAnalysis, folder: Path, stem: str) -> list[Path]
     if analysis.series is not None:
         written.append(_write(folder / f"{stem}.signals.csv", _series_csv(analysis)))
         written.append(_picture(analysis, folder / f"{stem}.svg"))
+    if analysis.joint is not None:
+        written.append(_write(folder / f"{stem}.joint.csv", profile_csv(analysis.joint)))
+        if analysis.series is not None:
+            written.append(_save(joint_figure(analysis), folder / f"{stem}.joint.svg"))
     return written
 
 
@@ -89,6 +95,9 @@ def _picture(analysis: TestAnalysis, path: Path) -> Path:
     velocity.plot(time, series.velocity_rad_s[::step], lw=0.8, color="tab:red")
     velocity.set_ylabel(r"$\dot{\theta}$, rad/s")
     velocity.set_xlabel("time from the release, s")
+    velocity.sharex(rotation)
+    if analysis.found:
+        rotation.set_xlim(-1.0, analysis.half_cycles[-1].start_s - start + 1.0)
     cycles = [c for c in analysis.half_cycles if math.isfinite(c.peak_rad)]
     peak_times = [c.start_s - start + (0.0 if c.n == 0 else 0.5 * c.duration_s) for c in cycles]
     rotation.plot(peak_times, [c.peak_rad / alpha for c in cycles], "k.", ms=4)
@@ -106,10 +115,14 @@ def _picture(analysis: TestAnalysis, path: Path) -> Path:
     points.axhline(analysis.theory.r_max, color="0.5", ls="--", lw=0.8, label="r_max (1.2)")
     points.set_xlabel("impact")
     points.set_ylabel("r")
-    points.legend(loc="lower left")
+    points.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False)
     for axes in (rotation, velocity, points):
         axes.grid(alpha=0.3)
     rotation.set_title(analysis.label)
+    return _save(figure, path)
+
+
+def _save(figure: Any, path: Path) -> Path:
     temporary = path.with_name(path.name + ".tmp")
     figure.savefig(temporary, format="svg")
     return temporary.replace(path)

@@ -120,7 +120,7 @@ def _restitution_table(analysis: TestAnalysis) -> Table:
         if key == "fit":
             if analysis.fit is not None:
                 r, error = analysis.fit.r, analysis.fit.standard_error
-                interval = f"{r - 1.96 * error:.4f} … {r + 1.96 * error:.4f}"
+                interval = "{:.4f} … {:.4f}".format(*analysis.fit.interval95())
                 share = _number(r / analysis.theory.r_max, 3)
                 table.add_row(
                     name, f"{r:.4f}", f"{error:.5f}", interval, share, "", bias, str(analysis.fit.impacts)

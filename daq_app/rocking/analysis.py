@@ -219,6 +219,8 @@ def _half_cycles(
     impacts = track.impacts_s
     starts = [track.release.time_s, *impacts]
     before, after = [math.nan, *track.speeds_before_rad_s], [math.nan, *track.speeds_after_rad_s]
+    sigma_before = [math.nan, *track.sigma_speeds_before_rad_s]
+    sigma_after = [math.nan, *track.sigma_speeds_after_rad_s]
     filtered = [math.nan, *peaks.tolist()]
     heard = [None, *onsets]
     peak, sigma = [*track.peaks_rad, math.nan], [*track.sigma_peaks_rad, math.nan]
@@ -236,7 +238,9 @@ def _half_cycles(
                 sigma_peak_rad=sigma[n],
                 phi=phi,
                 speed_before_rad_s=before[n],
+                sigma_speed_before_rad_s=sigma_before[n],
                 speed_after_rad_s=after[n],
+                sigma_speed_after_rad_s=sigma_after[n],
                 speed_filtered_rad_s=filtered[n],
                 jump_ratio=abs(after[n] / before[n]) if before[n] else math.nan,
                 accelerometer_s=math.nan if shock is None else shock.time_s,

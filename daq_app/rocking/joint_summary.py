@@ -18,6 +18,8 @@ Floats = NDArray[np.float64]
 
 _CLEAR_RAD = 8e-3
 """The pivot is read where the rotation is larger than this."""
+_ABOUT_S = 0.02
+"""Reach of the median about a peak."""
 
 
 def summarise_joint(record: TestRecord, signals: Signals, track: MotionTrack) -> JointSummary:
@@ -38,9 +40,12 @@ def summarise_joint(record: TestRecord, signals: Signals, track: MotionTrack) ->
     half = specimen.base_width_m / 2.0
     clear = np.abs(joint.rotation_rad[moving]) > _CLEAR_RAD
     return JointSummary(
+        half_width_m=half,
+        profile_ids=ids,
         profile_x_m=tuple(positions[:, 0].tolist()),
         profile_y_m=tuple(positions[:, 1].tolist()),
         profile_opening_m=tuple(_median(signals.openings_m[:, hold]).tolist()),
+        profile_opposite_m=tuple(_median(signals.openings_m[:, _first_peak(signals, track)]).tolist()),
         pivot_left_m=left,
         pivot_right_m=right,
         inset_left_m=math.nan if left is None else half + left.value,
@@ -53,6 +58,15 @@ def summarise_joint(record: TestRecord, signals: Signals, track: MotionTrack) ->
         suspects=joint.suspects,
         clipped=joint.clipped,
     )
+
+
+def _first_peak(signals: Signals, track: MotionTrack) -> slice:
+    """Samples about the first peak after impact 1; none where that half-cycle is not known."""
+    arc = track.arcs[1] if len(track.arcs) > 1 else None
+    if arc is None or not math.isfinite(arc.peak_s):
+        return slice(0, 0)
+    low, high = np.searchsorted(signals.time_s, [arc.peak_s - _ABOUT_S, arc.peak_s + _ABOUT_S])
+    return slice(int(low), int(high))
 
 
 def _median(rows: Floats) -> Floats:

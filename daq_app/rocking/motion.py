@@ -124,6 +124,11 @@ class MotionTrack:
         after: Sequence[Arc | None] = [*self.arcs[1:], None]
         return [math.nan if arc is None else arc.speed_start_rad_s for arc in after[: len(self.arcs)]]
 
+    @property
+    def sigma_speeds_after_rad_s(self) -> list[float]:
+        after: Sequence[Arc | None] = [*self.arcs[1:], None]
+        return [math.nan if arc is None else arc.sigma_speed_start_rad_s for arc in after[: len(self.arcs)]]
+
     def eav(self) -> RestitutionEstimate:
         """EAV (4.4) from one-sided fits."""
         return eav(self.speeds_before_rad_s, self.sigma_speeds_before_rad_s)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from scipy.special import stdtrit
 
 from daq_app.rocking.motion_model import ALPHA_PRIOR, FIXED, P_PRIOR, POINT_S, ZERO_PRIOR_RAD, MotionModel
 
@@ -47,6 +48,11 @@ class MotionFit:
     def explains_the_motion(self) -> bool:
         """Whether the misfit is no more than twice the noise."""
         return self.residual_rad < 2.0 * self.noise_rad
+
+    def interval95(self) -> tuple[float, float]:
+        """95 % confidence interval (Student t: what r scatters by is known from these impacts only)."""
+        reach = float(stdtrit(max(self.impacts - 1, 1), 0.975)) * self.standard_error
+        return self.r - reach, self.r + reach
 
 
 def fit_motion(

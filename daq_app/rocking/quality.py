@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from daq_app.config.rig import Family
 from daq_app.rocking.motion import MotionTrack
 from daq_app.rocking.record import TestRecord
 from daq_app.rocking.results import QualityNote, TestAnalysis
@@ -28,7 +29,7 @@ def quality_notes(
     onsets: list[Onset | None],
 ) -> tuple[QualityNote, ...]:
     """All notes, warnings first."""
-    notes = [*_sensors(record, signals), *_course(times)]
+    notes = [*_sensors(record, signals), *_course(times), _alignment(record)]
     if track is not None and analysis is not None:
         notes += [*_agreement(signals, analysis), *_motion(times, track, analysis), *_shocks(record, onsets)]
     return tuple(sorted(notes, key=lambda note: note.severity != "warning"))
@@ -77,6 +78,24 @@ def _sensors(record: TestRecord, signals: Signals) -> list[QualityNote]:
         if joint.clipped:
             notes.append(_info(f"LVDTs that reached the end of their range: {', '.join(joint.clipped)}"))
     return notes
+
+
+def _alignment(record: TestRecord) -> QualityNote:
+    """By what the families are shifted onto one time base; the offsets are those of the run's task plan."""
+    told = []
+    families: tuple[tuple[Family, str], ...] = (
+        ("wire", "wires"),
+        ("lvdt", "LVDTs"),
+        ("accelerometer", "accelerometers"),
+        ("tiltmeter", "tiltmeters"),
+    )
+    for family, name in families:
+        offsets = [record.offset_s(channel_id) * 1e3 for channel_id in record.family(family)]
+        if offsets and max(map(abs, offsets)) > 0:
+            told.append(f"{name} {min(offsets):+.3f} to {max(offsets):+.3f}")
+    if not told:
+        return _info("no known skews or delays: all channels are taken as sampled at the same instants")
+    return _info("channels aligned by their known skews and delays, ms: " + ", ".join(told))
 
 
 def _course(times: TestTimes) -> list[QualityNote]:

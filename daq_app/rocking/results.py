@@ -47,8 +47,10 @@ class HalfCycle:
     """|peak| / α."""
     speed_before_rad_s: float
     """θ̇⁻ at impact n, one-sided fit."""
+    sigma_speed_before_rad_s: float
     speed_after_rad_s: float
     """θ̇⁺ at impact n, one-sided fit."""
+    sigma_speed_after_rad_s: float
     speed_filtered_rad_s: float
     """Peak of the filtered velocity at impact n (the paper's way)."""
     jump_ratio: float
@@ -74,10 +76,16 @@ class Bias:
 class JointSummary:
     """The base joint over the test."""
 
+    half_width_m: float
+    """Of the base: its edges are at ± this."""
+    profile_ids: tuple[str, ...]
+    """LVDTs, in the order of the profile."""
     profile_x_m: tuple[float, ...]
     profile_y_m: tuple[float, ...]
     profile_opening_m: tuple[float, ...]
     """Opening at each LVDT in the hold."""
+    profile_opposite_m: tuple[float, ...]
+    """Opening at each LVDT at the first peak on the other side; NaN where that half-cycle is not known."""
     pivot_left_m: ValueWithSigma | None
     """Neutral axis while the wall leans to −x (median over the motion, scatter)."""
     pivot_right_m: ValueWithSigma | None
@@ -184,6 +192,7 @@ class TestAnalysis:
             result["estimates"][name]["interval95"] = None if interval is None else list(interval)
         if self.fit is not None:
             result["fit"]["explains_the_motion"] = self.fit.explains_the_motion
+            result["fit"]["interval95"] = list(self.fit.interval95())
         return result
 
 

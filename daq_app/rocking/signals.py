@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,6 +37,7 @@ class Signals:
     wires_m: Floats
     tilts_rad: Floats
     openings_m: Floats
+    """Brought onto the wires' instants."""
     rotation_rad: Floats
     """From the wires; NaN in gaps."""
     bridged_rad: Floats
@@ -104,12 +106,14 @@ def read_signals(record: TestRecord) -> Signals:
     accelerometers = record.family("accelerometer")
     empty = np.empty((0, record.n_samples))
     tilts, lvdts = record.family("tiltmeter", "x"), record.family("lvdt")
+    base = geometry.time_offset_s(record.time_offsets_s)
+    lags = [(record.offset_s(channel_id) - base) * record.rate_hz for channel_id in lvdts]
     return _combine(
         record,
         geometry,
         record.load(ids),
         record.load(tilts) if tilts else empty,
-        record.load(lvdts) if lvdts else empty,
+        _aligned(record.load(lvdts), lags) if lvdts else empty,
         record.load(accelerometers) if accelerometers else empty,
         tuple(record.offset_s(channel_id) for channel_id in accelerometers),
     )
@@ -137,8 +141,6 @@ def _combine(
         base = None  # too few LVDTs for a profile: said in the quality notes
     if base is not None:
         joint = base.motion(openings_m)
-        lag = float(np.mean([record.offset_s(channel_id) for channel_id in lvdts])) - offset
-        joint = replace(joint, rotation_rad=_shifted(joint.rotation_rad, lag * record.rate_hz))
         lvdt_noise = _white_noise(joint.rotation_rad)
         fused = fuse(rotation, joint.rotation_rad, noise, max(lvdt_noise, 1e-7))
     bad = ~np.isfinite(rotation)
@@ -229,9 +231,19 @@ def _white_noise(signal: Floats) -> float:
     return float(np.median(np.abs(second - np.median(second)))) * 1.4826 / math.sqrt(6.0)
 
 
-def _shifted(signal: Floats, samples: float) -> Floats:
-    """Value at each instant of a signal whose samples were taken `samples` later (|samples| small)."""
-    if samples == 0.0:
-        return signal
-    whole = np.arange(signal.size)
-    return np.asarray(np.interp(whole - samples, whole, signal))
+def _aligned(rows: Floats, lags: Sequence[float]) -> Floats:
+    """Values (channels, n) at each instant, of channels sampled `lags` samples later; linear between samples.
+
+    Skews within a family matter as much as those between families: LVDTs along the wall that are read one
+    after the other would show a rocking wall twisting.
+    """
+    aligned = np.empty_like(rows)
+    last = rows.shape[1] - 1
+    for row, lag in enumerate(lags):
+        whole = math.floor(lag)
+        share = lag - whole
+        index = np.clip(np.arange(-whole, rows.shape[1] - whole), 0, last)
+        aligned[row] = rows[row, index]
+        if share:
+            aligned[row] += share * (rows[row, np.maximum(index - 1, 0)] - aligned[row])
+    return aligned

@@ -92,10 +92,27 @@ def test_analyse_writes_files_that_open(run, tmp_path):
     names = {path.name for path in out.iterdir()}
     assert names == {
         f"FR1-L3-2.{end}"
-        for end in ("analysis.json", "half_cycles.csv", "restitution.csv", "signals.csv", "svg")
+        for end in (
+            "analysis.json",
+            "half_cycles.csv",
+            "restitution.csv",
+            "signals.csv",
+            "joint.csv",
+            "svg",
+            "joint.svg",
+        )
     }
+    profile = np.genfromtxt(out / "FR1-L3-2.joint.csv", delimiter=",", names=True, usecols=(1, 2, 3, 4))
+    assert profile.size == 24
+    # Leaning to −x the face at +x is open by b sin θ0, the other closed; at the next peak the other way.
+    hold, opposite = profile["opening_hold_m"], profile["opening_first_opposite_peak_m"]
+    right = profile["x_m"] > 0
+    assert hold[right] == pytest.approx(0.651 * np.sin(0.35 * 0.215), rel=0.01)
+    assert opposite[~right].min() > 0.02
+    assert max(np.abs(hold[~right]).max(), np.abs(opposite[right]).max()) < 1e-4
     with (out / "FR1-L3-2.half_cycles.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
+    assert 0 < float(rows[1]["sigma_speed_before_rad_s"]) < 1e-3
     assert float(rows[1]["jump_ratio"]) == pytest.approx(0.895, abs=0.005)
     signals = np.genfromtxt(out / "FR1-L3-2.signals.csv", delimiter=",", names=True)
     assert np.min(signals["rotation_rad"]) == pytest.approx(-0.35 * 0.215, rel=0.01)

@@ -272,7 +272,20 @@ def test_known_delays_of_a_family_are_taken_out(made):
     np.testing.assert_allclose(shocks, test.motion.impacts_s[:12], atol=5e-4)
 
 
+def test_lvdts_read_one_after_the_other_show_no_twist(made):
+    """Skews of 0 to 0.15 ms along the wall would make twist follow the speed: 0.04 mrad/m at the impacts."""
+    test = made(phi=0.35, r=0.895, side=-1, seed=8, full=True)
+    series = analyse_record(record_of(test), QUICK).series
+    moving = (series.time_s > test.motion.release_s) & (series.time_s < test.motion.impacts_s[5])
+    speed, twist = series.velocity_rad_s[moving], series.twist_rad_per_m[moving]
+    known = np.isfinite(twist)
+    slope = float(np.polyfit(speed[known], twist[known], 1)[0])
+    assert abs(slope * np.abs(speed).max()) < 8e-6
+
+
 def test_the_simulated_bias_has_this_tests_noise(whole):
     _, analysis = whole
     assert 1e-5 < analysis.bias["eav_filtered"].scatter < 5e-3
     assert analysis.bias["eav"].runs == 6 and analysis.bias["fit"].runs == 3
+    low, high = analysis.fit.interval95()
+    assert high - low > 2 * 1.96 * analysis.fit.standard_error  # Student's, not the normal distribution's
