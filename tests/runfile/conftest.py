@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 from numpy.typing import NDArray
 
-from daq_app.config import Rig, load_rig
-from daq_app.runfile import JournalWriter, RunHeader
+from daq_app.config import ConfigError, Rig, load_rig
+from daq_app.runfile import JournalWriter, RunFileError, RunHeader, open_run, verify
+from daq_app.runfile.importers import ImportMap, ImportReport, import_file
 
 Readings = NDArray[np.float64]
 MakeJournal = Callable[..., Readings]
@@ -79,3 +82,64 @@ def make_journal(header: RunHeader) -> MakeJournal:
         return np.concatenate(pieces, axis=1) if pieces else np.empty((header.n_channels, 0))
 
     return make
+
+
+Bring = Callable[..., ImportReport]
+
+
+@pytest.fixture
+def bring(rig: Rig, configs: Path, tmp_path: Path) -> Bring:
+    """`bring(path, channels={…}, source={…})` imports into a folder of runs and proves the result."""
+    runs = tmp_path / "runs"
+    runs.mkdir()
+    text = (configs / "fr1.toml").read_text(encoding="utf-8")
+
+    def do(
+        path: Path, channels: dict[str, Any] | None = None, source: dict[str, Any] | None = None, **run: str
+    ) -> ImportReport:
+        named = {
+            key: {"from": value} if isinstance(value, str) else value
+            for key, value in (channels or {}).items()
+        }
+        import_map = ImportMap.model_validate({"channels": named, "source": source or {}, "run": run})
+        before = sorted(runs.iterdir())
+        try:
+            report = import_file(path, rig, text, runs, import_map)
+        except (RunFileError, ConfigError):
+            assert sorted(runs.iterdir()) == before, "something was left behind"
+            raise
+        checked = verify(report.run)
+        assert checked.ok, checked.problems
+        assert sorted(runs.iterdir()) == sorted([*before, report.run])
+        return report
+
+    return do
+
+
+@pytest.fixture(scope="session")
+def si_of() -> Callable[[ImportReport, str], Readings]:
+    """SI values of a channel of an imported run."""
+
+    def read(report: ImportReport, channel_id: str) -> Readings:
+        with open_run(report.run) as run:
+            return run.si([channel_id])[0]
+
+    return read
+
+
+@pytest.fixture(scope="session")
+def write_tdms() -> Callable[..., Path]:
+    """`write_tdms(path, {name: values}, pieces=3, **properties)` as LabVIEW streams it: piece by piece."""
+
+    def write(path: Path, channels: dict[str, Readings], pieces: int = 3, **properties: Any) -> Path:
+        known = {"wf_increment": 1 / 4000.0, "unit_string": "V"} | properties
+        with TdmsWriter(str(path)) as writer:
+            for part in range(pieces):
+                objects = [
+                    ChannelObject("Measurement", name, np.array_split(values, pieces)[part], properties=known)
+                    for name, values in channels.items()
+                ]
+                writer.write_segment([RootObject({}), GroupObject("Measurement"), *objects])
+        return path
+
+    return write
