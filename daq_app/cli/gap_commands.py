@@ -56,7 +56,7 @@ def diagnose(
     rig: Annotated[
         Path | None, typer.Option(help="Rig file to compare with; the one kept in each run if left out.")
     ] = None,
-    report: Annotated[Path | None, typer.Option(help="Write a one-page report (HTML).")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write a one-page report: HTML, and a PDF.")] = None,
     json_out: Annotated[Path | None, typer.Option("--json", help="Write the whole result as JSON.")] = None,
     pairs: Annotated[
         bool, typer.Option("--pairs", help="Always fit pairs of effects, not only when needed.")
@@ -102,7 +102,7 @@ def diagnose(
         if json_out is not None:
             result.save(json_out)
         if report is not None:
-            write_report(result, report)
+            write_report(result, report, loaded)
     _print(result)
     good = result.decision.verdict in ("effect", "pair", "parameters", "nothing_missing")
     raise typer.Exit(0 if good else EXIT_FAILED)

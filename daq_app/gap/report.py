@@ -1,134 +1,202 @@
-"""The one-page report of a diagnosis as HTML with its pictures inside."""
+"""The one-page report of a diagnosis: HTML with its pictures inside, and the same page as PDF."""
 
 from __future__ import annotations
 
-import base64
 import io
+import textwrap
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from jinja2 import Environment
+from jinja2 import Environment, PackageLoader, select_autoescape
+from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
-from daq_app.gap.core import Diagnosis
+from daq_app.campaign.report import CaptionedFigure
+from daq_app.gap import report_figures as draw
+from daq_app.gap.core import CannotDiagnose, Diagnosis
+from daq_app.gap.report_figures import ProbeMap
+from daq_app.gap.rocking_model.library import rocking_library
+from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.run_features import extract
+from daq_app.gap.traces import Trace, traces
 
-_PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Sim-to-real gap</title>
-<style>body{font:15px/1.45 sans-serif;max-width:1060px;margin:2em auto;padding:0 1em;color:#222}
-h1{font-size:1.35em}h2{font-size:1.05em;margin-top:1.6em}table{border-collapse:collapse}
-td,th{padding:.2em .8em;border-bottom:1px solid #ddd;text-align:left}
-.verdict{background:#eef4fb;padding:.8em 1em}
-img{max-width:100%}.limit{color:#8a4b00}</style>
-<h1>Sim-to-real gap: {{ d.decision.verdict | replace("_", " ") }}</h1>
-<p class="verdict"><b>{{ d.decision.sentence }}</b><br>{{ d.where.sentence }}<br>
-{% if d.gap %}On runs that were not used for the fit the gap falls from {{ "%.2f"|format(d.gap.before) }} to
-{{ "%.2f"|format(d.gap.after) }} times noise and scatter (floor {{ "%.1f"|format(d.gap.floor) }}); closure
-{{ "%.0f"|format(100 * d.gap.closure) }} %.<br>{% endif %}
-Next: {{ d.next_measurement }}</p>
-{% for limit in d.limits %}<p class="limit">{{ limit }}</p>{% endfor %}
-<h2>Where: size of the gap before and after, in units of noise and scatter</h2><img src="{{ where }}">
-<h2>Which: evidence of each hypothesis relative to the best</h2><img src="{{ evidence }}">
-{% if closure %}<h2>How far: held-out gap per level</h2><img src="{{ closure }}">{% endif %}
-{% if probes %}<h2>What the free forms of each family found</h2><img src="{{ probes }}">{% endif %}
-<h2>Parameters</h2><table><tr><th>name<th>value<th>95 % interval<th>unit<th>meaning</tr>
-{% for p in estimates %}<tr><td>{{ p.name }}<td>{{ "%.5g"|format(p.value) }}
-<td>{{ "%.5g"|format(p.low) }} … {{ "%.5g"|format(p.high) }}
-<td>{{ p.unit }}<td>{{ p.meaning }}</tr>{% endfor %}
-</table>
-<h2>What remains</h2><p>{{ d.remaining.sentence }}
-Goodness of fit: {{ "passed" if d.goodness.passed else "failed" }}
-({{ d.goodness.worst }}).</p>
-<p>Runs: {{ d.runs | join(", ") }}. {{ "%.1f"|format(d.seconds) }} s.</p></html>
-"""
+_A4_IN: Final = (8.27, 11.69)
+_LISTED: Final = 7
+"""Parameters in the PDF; the HTML has all."""
 
 
-def write_report(result: Diagnosis, path: Path) -> None:
-    """Write the report; pictures are part of the file."""
-    page = Environment(autoescape=True).from_string(_PAGE)
-    html = page.render(
-        d=result,
-        where=_where(result),
-        evidence=_evidence(result),
-        closure=_closure(result),
-        probes=_probes(result),
-        estimates=(*result.effect_parameters, *result.parameters),
+def write_report(result: Diagnosis, path: Path, runs: Sequence[GapRun] = ()) -> list[Path]:
+    """Write `path` (HTML) and the same page as PDF beside it; returns both. Raises `OSError`.
+
+    `runs` are the recordings that were diagnosed: with them the page has measured against
+    simulated rotations, and the sensor map has the names of its coefficients.
+    """
+    shown = traces(result, runs)
+    maps = draw.probe_maps(result, _meanings(runs))
+    html = (
+        Environment(loader=PackageLoader("daq_app.gap"), autoescape=select_autoescape(), trim_blocks=True)
+        .get_template("gap.html")
+        .render(
+            d=result,
+            verdict=_verdict(result),
+            estimates=(*result.effect_parameters, *result.parameters),
+            pictures=_pictures(result, shown, maps),
+        )
     )
-    path.write_text(html, encoding="utf-8")
+    return [
+        _replace(path, html.encode("utf-8")),
+        _replace(path.with_suffix(".pdf"), _pdf(result, shown, maps)),
+    ]
 
 
-def _image(figure: Figure) -> str:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+def _verdict(result: Diagnosis) -> str:
+    return result.decision.verdict.replace("_", " ")
 
 
-def _axes(width: float, height: float) -> tuple[Figure, Any]:
-    figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, figure.subplots()
+def _meanings(runs: Sequence[GapRun]) -> dict[str, str]:
+    """What each parameter of a probe means; coefficients have the names of the first run's."""
+    meanings = {
+        probe.key(parameter): parameter.meaning
+        for probe in rocking_library().probes
+        for parameter in probe.parameters
+    }
+    for run in runs:
+        try:
+            blocks = extract(run).blocks
+        except CannotDiagnose:
+            continue
+        for block in blocks:
+            for i, name in enumerate(block.names):
+                meanings[f"free_{block.family}.c{i}"] = f"{block.family}: {name}"
+        break
+    return meanings
 
 
-def _where(result: Diagnosis, most: int = 14) -> str:
-    after = {(c.channel, c.phase, c.observable): c.in_noise for c in result.remaining.cells}
-    cells = result.where.cells[:most][::-1]
-    figure, axes = _axes(9.5, 0.6 + 0.28 * len(cells))
-    names = [f"{c.observable} · {c.channel} · {c.phase}" for c in cells]
-    rows = range(len(cells))
-    axes.barh(rows, [c.in_noise for c in cells], color="#c7d7ea", label="before")
-    axes.barh(
-        rows,
-        [after.get((c.channel, c.phase, c.observable), 0.0) for c in cells],
-        0.4,
-        color="#d1495b",
-        label="after",
-    )
-    axes.set_yticks(list(rows), names, fontsize=8)
-    axes.axvline(1.0, color="k", lw=0.8, ls=":")
-    axes.set_xlabel("rms over noise and scatter")
-    axes.legend(fontsize=8)
-    return _image(figure)
+def _pictures(result: Diagnosis, shown: Sequence[Trace], maps: Sequence[ProbeMap]) -> Mapping[str, str]:
+    where, (before, after) = _grid(5.2, 0.9 + 0.22 * len(draw.map_table(result.where)[0]), 1, 2)
+    draw.draw_maps(before, after, result)
+    evidence, (axes,) = _grid(5.2, 2.6, 1, 1)
+    draw.draw_evidence(draw.bare(axes), result)
+    pictures = {"map": _svg("gap_map", where), "evidence": _svg("gap_evidence", evidence)}
+    if shown:
+        figure = Figure(figsize=(10.6, 3.9), layout="constrained")
+        _draw_traces(figure, result, shown)
+        pictures["traces"] = _svg("gap_traces", figure)
+    if result.gap is not None:
+        figure, (axes,) = _grid(5.2, 2.6, 1, 1)
+        draw.draw_closure(draw.bare(axes), result)
+        pictures["closure"] = _svg("gap_closure", figure)
+    if maps:
+        rows = -(-len(maps) // 2)
+        figure, panels = _grid(5.2, 1.9 * rows, rows, min(2, len(maps)))
+        _draw_maps(panels, maps)
+        pictures["probes"] = _svg("gap_probes", figure)
+    return pictures
 
 
-def _evidence(result: Diagnosis, most: int = 10) -> str:
-    ranked = sorted(result.which, key=lambda r: -r.log_evidence)[:most][::-1]
-    best = ranked[-1].log_evidence
-    figure, axes = _axes(9.5, 0.6 + 0.28 * len(ranked))
-    axes.barh(range(len(ranked)), [max(r.log_evidence - best, -60.0) for r in ranked], color="#7a9cc6")
-    names = [" + ".join(r.effects) or "nothing missing" for r in ranked]
-    axes.set_yticks(range(len(ranked)), names, fontsize=8)
-    axes.set_xlabel("log evidence less that of the best (cut at −60)")
-    return _image(figure)
+def _draw_traces(figure: Any, result: Diagnosis, shown: Sequence[Trace]) -> None:
+    panels = figure.subplots(2, len(shown), squeeze=False, height_ratios=(2.0, 1.0))
+    for column, trace in enumerate(shown):
+        name = draw.effect_name(result.which[0].effects)
+        draw.draw_trace(panels[0, column], panels[1, column], trace, name)
 
 
-def _closure(result: Diagnosis) -> str:
-    if result.gap is None:
-        return ""
-    levels = list(result.gap.per_level)
-    figure, axes = _axes(7.0, 2.6)
-    place = range(len(levels))
-    axes.bar([k - 0.2 for k in place], [result.gap.per_level[k][0] for k in levels], 0.38, label="before")
-    axes.bar([k + 0.2 for k in place], [result.gap.per_level[k][1] for k in levels], 0.38, label="after")
-    axes.axhline(result.gap.floor, color="k", lw=0.8, ls=":", label="floor")
-    axes.set_xticks(list(place), levels)
-    axes.set_ylabel("gap")
-    axes.legend(fontsize=8)
-    return _image(figure)
-
-
-def _probes(result: Diagnosis) -> str:
-    shapes = {name: shape for name, shape in result.probe_shapes.items() if shape}
-    if not shapes:
-        return ""
-    columns = min(len(shapes), 4)
-    rows = -(-len(shapes) // columns)
-    figure = Figure(figsize=(2.6 * columns, 2.2 * rows), layout="constrained")
-    grid = figure.subplots(rows, columns, squeeze=False)
-    for axes, (name, shape) in zip(grid.flat, shapes.items(), strict=False):
-        values = list(shape.values())
-        middle = [v for v, _, _ in values]
-        errors = [[v - low for v, low, _ in values], [high - v for v, _, high in values]]
-        axes.errorbar(range(len(values)), middle, yerr=errors, fmt="o-", ms=3, lw=1)
-        axes.axhline(0.0, color="k", lw=0.6)
-        axes.set_title(name, fontsize=8)
-        axes.tick_params(labelsize=7)
-    for axes in list(grid.flat)[len(shapes) :]:
+def _draw_maps(panels: Sequence[Any], maps: Sequence[ProbeMap]) -> None:
+    for axes, probe in zip(panels, maps, strict=False):
+        probe.draw(draw.bare(axes))
+    for axes in panels[len(maps) :]:
         axes.set_visible(False)
-    return _image(figure)
+
+
+def _grid(width: float, height: float, rows: int, columns: int) -> tuple[Figure, list[Any]]:
+    figure = Figure(figsize=(width, max(height, 1.6)), layout="constrained")
+    return figure, list(figure.subplots(rows, columns, squeeze=False).ravel())
+
+
+def _svg(name: str, figure: Figure) -> str:
+    return CaptionedFigure(name, figure, "").svg
+
+
+def _pdf(result: Diagnosis, shown: Sequence[Trace], maps: Sequence[ProbeMap]) -> bytes:
+    """Everything on one A4 page."""
+    page = Figure(figsize=_A4_IN, layout="constrained")
+    page.get_layout_engine().set(rect=(0.03, 0.015, 0.94, 0.97))  # type: ignore[union-attr, call-arg]
+    parts = page.subfigures(5, 1, height_ratios=(1.75, 2.2, 3.0 if shown else 0.01, 3.0, 1.45))
+    _write_head(parts[0], result)
+    left, right = parts[1].subfigures(1, 2)
+    left.suptitle("Where: largest gap, 1 is noise and scatter", fontsize=9, weight="bold")
+    right.suptitle("Which: evidence", fontsize=9, weight="bold")
+    draw.draw_maps(*left.subplots(1, 2), result)
+    draw.draw_evidence(draw.bare(right.subplots()), result)
+    if shown:
+        parts[2].suptitle("Measured and simulated rotation", fontsize=9, weight="bold")
+        _draw_traces(parts[2], result, shown)
+    left, right = parts[3].subfigures(1, 2, width_ratios=(1.0, 1.7))
+    if result.gap is not None:
+        left.suptitle("How far: held-out gap", fontsize=9, weight="bold")
+        draw.draw_closure(draw.bare(left.subplots()), result)
+    if maps:
+        right.suptitle("Maps of the free forms", fontsize=9, weight="bold")
+        rows = -(-len(maps) // 2)
+        panels = right.subplots(rows, min(2, len(maps)), squeeze=False).ravel()
+        _draw_maps(list(panels), maps)
+    _write_parameters(parts[4], result)
+    buffer = io.BytesIO()
+    with PdfPages(buffer, metadata={"Title": f"Sim-to-real gap: {_verdict(result)}"}) as pages:
+        pages.savefig(page)
+    return buffer.getvalue()
+
+
+def _write_head(part: Any, result: Diagnosis) -> None:
+    part.text(0.04, 0.93, f"Sim-to-real gap: {_verdict(result)}", fontsize=14, weight="bold", va="top")
+    lines = _wrapped(result.decision.sentence) + _wrapped(f"Where: {result.where.sentence}")
+    if result.gap is not None:
+        lines += _wrapped(
+            f"How far: the held-out gap falls from {result.gap.before:.2f} to {result.gap.after:.2f} times "
+            f"noise and scatter (floor {result.gap.floor:.1f}); closure {100 * result.gap.closure:.0f} %."
+        )
+    lines += _wrapped(f"Measure next: {result.next_measurement}")
+    for limit in result.limits:
+        lines += _wrapped(f"Limit: {limit}")
+    part.text(0.04, 0.74, "\n".join(lines[:9]), fontsize=8.5, va="top", linespacing=1.35, parse_math=False)
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(text, 125) or [""]
+
+
+def _write_parameters(part: Any, result: Diagnosis) -> None:
+    """The parameters of the effect, then those of the wall."""
+    estimates = (*result.effect_parameters, *result.parameters)[:_LISTED]
+    axes = part.subplots()
+    axes.axis("off")
+    cells = [
+        [p.name, f"{p.value:.5g}", f"{p.low:.5g} … {p.high:.5g}", p.unit, p.meaning[:48]] for p in estimates
+    ]
+    table = axes.table(
+        cellText=cells,
+        colLabels=["parameter", "value", "95 % interval", "unit", "meaning"],
+        loc="upper left",
+        cellLoc="left",
+        edges="horizontal",
+        colWidths=(0.24, 0.12, 0.22, 0.08, 0.34),
+    )
+    table.auto_set_font_size(False)
+    table.set_fontsize(7)
+    runs = ", ".join(result.runs)
+    part.text(
+        0.04,
+        0.02,
+        textwrap.shorten(f"Runs: {runs}. What remains: {result.remaining.sentence}", 150),
+        fontsize=7,
+        parse_math=False,
+    )
+
+
+def _replace(path: Path, content: bytes) -> Path:
+    """Whole or not at all."""
+    part = path.with_name(path.name + ".tmp")
+    part.write_bytes(content)
+    part.replace(path)
+    return path

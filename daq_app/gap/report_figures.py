@@ -1,0 +1,223 @@
+"""The pictures of a diagnosis: each draws into axes that it is given, for the page and for the PDF."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from daq_app.gap.core import Diagnosis
+from daq_app.gap.core.where import GapMap
+from daq_app.gap.traces import Trace
+
+BEFORE, AFTER, MEASURED = "#8fa6bf", "#c8442e", "#1c232b"
+_PHASES: Final = ("held", "release", "swing", "peak", "impact", "tail", "run", "rest")
+_KNOT: Final = re.compile(r"^(.*?) at ([\d.]+) (.+)$")
+_MOST_SENSOR_ROWS: Final = 12
+
+Shape = Mapping[str, tuple[float, float, float]]
+
+
+def effect_name(effects: Sequence[str]) -> str:
+    """The hypothesis in words."""
+    return " + ".join(effects) or "nothing missing"
+
+
+def map_table(found: GapMap) -> tuple[list[str], list[str], np.ndarray]:
+    """(channels, phases, largest gap of each pair in units of noise and scatter; NaN where nothing is)."""
+    channels = list(dict.fromkeys(cell.channel for cell in found.cells))
+    phases = sorted(
+        {cell.phase for cell in found.cells},
+        key=lambda phase: (_PHASES.index(phase) if phase in _PHASES else len(_PHASES), phase),
+    )
+    table = np.full((len(channels), len(phases)), np.nan)
+    for cell in found.cells:
+        place = channels.index(cell.channel), phases.index(cell.phase)
+        table[place] = np.fmax(table[place], cell.in_noise)
+    return channels, phases, table
+
+
+def draw_maps(before: Axes, after: Axes, result: Diagnosis) -> None:
+    """Channel against phase, without and with what was found; 1 is noise and scatter."""
+    channels, phases, first = map_table(result.where)
+    left_channels, left_phases, left = map_table(result.remaining)
+    second = np.full(first.shape, np.nan)
+    for i, channel in enumerate(channels):
+        for j, phase in enumerate(phases):
+            if channel in left_channels and phase in left_phases:
+                second[i, j] = left[left_channels.index(channel), left_phases.index(phase)]
+    for axes, table, title in ((before, first, "before"), (after, second, "after")):
+        shade = np.log10(np.clip(table, 0.5, 50.0))
+        axes.imshow(shade, cmap="OrRd", vmin=np.log10(0.8), vmax=np.log10(30.0), aspect="auto")
+        for (i, j), value in np.ndenumerate(table):
+            if np.isfinite(value):
+                dark = shade[i, j] > 0.9
+                axes.text(
+                    j, i, f"{value:.1f}", ha="center", va="center", fontsize=7, color="w" if dark else "k"
+                )
+        axes.set_xticks(range(len(phases)), phases, fontsize=7, rotation=30)
+        axes.set_title(title, fontsize=8)
+        axes.tick_params(length=0)
+    before.set_yticks(range(len(channels)), channels, fontsize=7)
+    after.set_yticks([])
+
+
+def draw_evidence(axes: Axes, result: Diagnosis, most: int = 9) -> None:
+    """Log evidence less that of the best."""
+    ranked = sorted(result.which, key=lambda r: -r.log_evidence)[:most][::-1]
+    best = ranked[-1].log_evidence
+    lengths = [max(r.log_evidence - best, -60.0) for r in ranked]
+    names = [effect_name(r.effects) for r in ranked]
+    colours = [AFTER if r.effects == result.which[0].effects else BEFORE for r in ranked]
+    axes.barh(range(len(ranked)), [length + 60.0 for length in lengths], left=-60.0, color=colours)
+    axes.set_yticks(range(len(ranked)), names, fontsize=7)
+    axes.set_xlim(-60.0, 8.0)
+    for row, entry in enumerate(ranked):
+        if entry.probability >= 0.005:
+            axes.text(1.0, row, f"{entry.probability:.2f}", va="center", fontsize=7)
+    axes.set_xlabel("log evidence less that of the best (cut at −60); figures: probability", fontsize=7)
+    axes.tick_params(labelsize=7)
+
+
+def draw_closure(axes: Axes, result: Diagnosis) -> None:
+    """Held-out gap per level, before and after."""
+    assert result.gap is not None
+    levels = list(result.gap.per_level)
+    place = np.arange(len(levels))
+    axes.bar(
+        place - 0.2, [result.gap.per_level[k][0] for k in levels], 0.38, color=BEFORE, label="without it"
+    )
+    axes.bar(place + 0.2, [result.gap.per_level[k][1] for k in levels], 0.38, color=AFTER, label="with it")
+    axes.axhline(result.gap.floor, color="k", lw=0.8, ls=":", label="floor")
+    axes.set_xticks(place, levels)
+    axes.set_ylabel("gap over noise and scatter", fontsize=7)
+    axes.tick_params(labelsize=7)
+    axes.legend(fontsize=6.5, frameon=False)
+
+
+def draw_trace(upper: Axes, lower: Axes, trace: Trace, name: str) -> None:
+    """θ(t) measured, without and with the effect; residuals below."""
+    time = trace.time_s
+    upper.plot(time, 1e3 * trace.measured_rad, color=MEASURED, lw=1.4, label=f"measured ({trace.shown})")
+    upper.plot(time, 1e3 * trace.baseline_rad, color=BEFORE, lw=1.0, ls="--", label="simulated without")
+    upper.plot(time, 1e3 * trace.augmented_rad, color=AFTER, lw=0.8, label=f"simulated with {name}")
+    upper.set_title(f"{trace.run}, {trace.level}", fontsize=8)
+    upper.set_ylabel("θ (mrad)", fontsize=7)
+    upper.legend(fontsize=6, frameon=False, loc="upper right")
+    without, with_it = (1e3 * rms for rms in trace.rms_rad)
+    for simulated, colour, rms in (
+        (trace.baseline_rad, BEFORE, without),
+        (trace.augmented_rad, AFTER, with_it),
+    ):
+        lower.plot(
+            time, 1e3 * (trace.measured_rad - simulated), color=colour, lw=0.9, label=f"{rms:.2f} mrad rms"
+        )
+    lower.axhline(0.0, color="k", lw=0.5)
+    lower.set_ylabel("measured − simulated", fontsize=7)
+    lower.set_xlabel("time since release (s)", fontsize=7)
+    lower.legend(fontsize=6, frameon=False, loc="upper right")
+    for axes in (upper, lower):
+        axes.tick_params(labelsize=7)
+        axes.grid(color="#e4e4e4", lw=0.5)
+    upper.sharex(lower)
+    upper.tick_params(labelbottom=False)
+
+
+class ProbeMap:
+    """One free form as curves (values at knots) or as bars (values with a name)."""
+
+    def __init__(self, title: str, shape: Shape, meanings: Mapping[str, str], unit: str) -> None:
+        self.title = title
+        self.unit = unit
+        self.curves: dict[str, list[tuple[float, float, float, float]]] = {}
+        self.axis = ""
+        self.bars: list[tuple[str, float, float, float]] = []
+        for key, (value, low, high) in shape.items():
+            meaning = meanings.get(key, key.rpartition(".")[2])
+            knot = _KNOT.match(meaning)
+            if knot is None:
+                self.bars.append((meaning, value, low, high))
+            else:
+                self.axis = knot[3]
+                self.curves.setdefault(knot[1], []).append((float(knot[2]), value, low, high))
+
+    def draw(self, axes: Axes) -> None:
+        """Draw the curves, or the bars where there is no curve."""
+        if self.curves:
+            self._draw_curves(axes)
+        else:
+            self._draw_bars(axes)
+        axes.set_title(self.title, fontsize=7.5)
+        axes.tick_params(labelsize=6.5)
+
+    def _draw_curves(self, axes: Axes) -> None:
+        for name, rows in self.curves.items():
+            x, value, low, high = np.array(sorted(rows)).T
+            axes.errorbar(
+                x,
+                value,
+                yerr=np.abs([value - low, high - value]),
+                fmt="o-",
+                ms=2.5,
+                lw=0.9,
+                capsize=1.5,
+                label=name,
+            )
+        axes.axhline(0.0, color="k", lw=0.5)
+        axes.set_xlabel(self.axis, fontsize=6.5)
+        axes.set_ylabel(self.unit, fontsize=6.5)
+        axes.legend(fontsize=5.5, frameon=False)
+
+    def _draw_bars(self, axes: Axes) -> None:
+        rows = sorted(self.bars, key=lambda bar: abs(bar[1]) / max(bar[3] - bar[2], 1e-12))
+        rows = rows[-_MOST_SENSOR_ROWS:]
+        values = np.array([row[1] for row in rows])
+        errors = np.abs([[row[1] - row[2] for row in rows], [row[3] - row[1] for row in rows]])
+        axes.barh(range(len(rows)), values, color=BEFORE, xerr=errors, error_kw={"lw": 0.7, "capsize": 1.5})
+        axes.set_yticks(range(len(rows)), [row[0] for row in rows], fontsize=6)
+        axes.axvline(0.0, color="k", lw=0.5)
+        axes.set_xlabel(self.unit, fontsize=6.5)
+
+
+_MAPS: Final[dict[str, tuple[str, str]]] = {
+    "free_restitution": ("loss–velocity: change of r", "change of r"),
+    "free_restoring": ("moment–rotation: shift of half-cycle times, up and down alike", "s"),
+    "free_dissipation": ("loss within swings: falls later, rises earlier", "s"),
+}
+
+
+def probe_maps(
+    result: Diagnosis, meanings: Mapping[str, str], units: Mapping[str, str] | None = None
+) -> list[ProbeMap]:
+    """The maps of the free forms: r(v), restoring moment, loss, and one map over all sensor coefficients.
+
+    `meanings`: probe parameter → its meaning; ``X at 0.15 α`` makes a curve. `units` go over the
+    units of probes that are not known here.
+    """
+    maps: list[ProbeMap] = []
+    sensors: dict[str, tuple[float, float, float]] = {}
+    for name, shape in result.probe_shapes.items():
+        if not shape:
+            continue
+        if name in _MAPS:
+            title, unit = _MAPS[name]
+            maps.append(ProbeMap(title, shape, meanings, unit))
+        elif any(_KNOT.match(meanings.get(key, "")) for key in shape):
+            maps.append(ProbeMap(name, shape, meanings, (units or {}).get(name, "")))
+        else:
+            sensors.update(shape)
+    order = list(_MAPS)
+    maps.sort(key=lambda m: next((i for i, k in enumerate(order) if _MAPS[k][0] == m.title), len(order)))
+    if sensors:
+        maps.append(ProbeMap("sensor map: free coefficients", sensors, meanings, "3 × repeatability"))
+    return maps
+
+
+def bare(axes: Axes) -> Any:
+    """Take away the frame at the top and the right."""
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    return axes

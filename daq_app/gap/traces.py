@@ -1,0 +1,303 @@
+"""Measured rotation beside the simulator's, without and with what the diagnosis found.
+
+Both simulations come from the simulator that drives the simulated hardware. r scatters from impact to
+impact on any real wall, and every miss of it shifts all that follows; so each impact gets the r that
+leads to the peak that was measured next, in both simulations, and what is left is what no r explains.
+Both may bend α and p within the survey's tolerance to meet the instants of the impacts.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.signal import bessel, bilinear, lfilter
+
+from daq_app.gap.core import CannotDiagnose, Diagnosis
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.records import GapRun, Survey
+from daq_app.gap.rocking_model.rotation import joint_rotation, wall_rotation, zeroed
+from daq_app.gap.rocking_model.swings import Swings, find_swings
+from sim_hardware.dynamics import Body, Motion, Release, Restitution
+from sim_hardware.dynamics import parameters as par
+from sim_hardware.dynamics.effects import MOTION_EFFECTS
+from sim_hardware.dynamics.motion import motion_vector, simulate_vector
+
+TRACE_HZ: Final = 200.0
+_BEFORE_S, _AFTER_S = 0.4, 0.3
+_MASS_KG = 5000.0  # free in a motion that is described by α, p and R
+_MOTION: Final = frozenset(spec.name for spec in MOTION_EFFECTS)
+_TIME_SD_S: Final = 3e-4
+"""Error of a crossing time that the fit of α, p and the release weighs against the survey."""
+_ROUNDS: Final = 6
+"""Corrections of r until every peak is met: each brings the error down by about ten."""
+
+Effects = Mapping[str, Mapping[str, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """One run at `TRACE_HZ`; times from the release, rotations in rad, all of shape (n,)."""
+
+    run: str
+    level: str
+    shown: str
+    """Which sensors the rotation is read from."""
+    time_s: FloatArray
+    measured_rad: FloatArray
+    baseline_rad: FloatArray
+    augmented_rad: FloatArray
+
+    @property
+    def rms_rad(self) -> tuple[float, float]:
+        """Rms of measured minus baseline, and of measured minus augmented."""
+        left = (self.measured_rad - self.baseline_rad, self.measured_rad - self.augmented_rad)
+        return tuple(float(np.sqrt(np.nanmean(part**2))) for part in left)  # type: ignore[return-value]
+
+
+def traces(result: Diagnosis, runs: Sequence[GapRun], most: int = 2) -> list[Trace]:
+    """Traces of the run with the largest and of the one with the smallest release (at most `most`).
+
+    Runs that cannot be followed (no motion, channels that reach their range) are passed over.
+    """
+    found = []
+    for run in runs:
+        try:
+            found.append((run, *_rotations(run, result)))
+        except CannotDiagnose:
+            continue
+    found.sort(key=lambda entry: -abs(float(entry[1].peak_rad[0])))
+    chosen = found if len(found) <= most else [*found[: most - 1], found[-1]]
+    return [_trace(result, *entry) for entry in chosen]
+
+
+def _effects_of(result: Diagnosis) -> dict[str, dict[str, float]]:
+    """The effects of the best hypothesis; parameters that each run has for itself are fitted here."""
+    effects: dict[str, dict[str, float]] = {name: {} for name in result.which[0].effects}
+    for estimate in result.effect_parameters:
+        name, _, parameter = estimate.name.rpartition(".")
+        effects.setdefault(name, {})[parameter] = estimate.value
+    return effects
+
+
+def _rotations(run: GapRun, result: Diagnosis) -> tuple[Swings, FloatArray, float, str, FloatArray, float]:
+    """(swings and impacts of the true motion, start of the cut record, family shown, its θ, its response)."""
+    families = {name.partition("@")[2] for name in _effects_of(result)}
+    shown = next((f for f in ("wire", "tiltmeter", "lvdt") if f in families), "lvdt")
+    lvdts = joint_rotation(run).theta
+    cut = _start_of_hold(run, lvdts)
+    rows, heights, _ = wall_rotation(run)
+    wires = np.average(rows, axis=0, weights=heights**2) if len(rows) else lvdts
+    # What the effect does not touch tells the motion; what it touches is shown.
+    true = wires if shown == "lvdt" and "lvdt" in families else lvdts
+    swings = find_swings(true[cut:], _noise(true), run.rate_hz, run.name)
+    chosen = {"lvdt": lvdts, "wire": wires, "tiltmeter": lvdts}[shown]
+    response = 0.0
+    if shown == "tiltmeter":
+        rows_of = run.indices("tiltmeter", "x")
+        chosen = np.mean([zeroed(run, i) for i in rows_of], axis=0)
+        response = run.sensors[rows_of[0]].time_constant_s
+    impacts_s = _impacts(true[cut:], swings, run.rate_hz)
+    return swings, impacts_s, cut / run.rate_hz, shown, chosen, response
+
+
+def _noise(theta: FloatArray) -> float:
+    rest = theta[-1000:]
+    return float(np.std(np.diff(rest)) / math.sqrt(2.0)) + 1e-12
+
+
+def _start_of_hold(run: GapRun, theta: FloatArray) -> int:
+    """Sample one second before the wall leaves its largest rotation."""
+    size = np.abs(theta)
+    held = np.flatnonzero(size >= 0.98 * size.max())
+    after = np.flatnonzero(size < 0.5 * size.max())
+    after = after[after > held[0]]
+    release = int(held[held < after[0]][-1]) if after.size else int(held[-1])
+    return max(0, release - round(run.rate_hz))
+
+
+def _trace(
+    result: Diagnosis,
+    run: GapRun,
+    swings: Swings,
+    impacts_s: FloatArray,
+    start_s: float,
+    shown: str,
+    theta: FloatArray,
+    slow_s: float,
+) -> Trace:
+    effects = _effects_of(result)
+    values = {p.name: p.value for p in result.parameters}
+    motion_effects = {name: terms for name, terms in effects.items() if name in _MOTION}
+    sensor_effects = {name: terms for name, terms in effects.items() if name not in _MOTION}
+    fitted = replace(
+        run.survey,
+        alpha_rad=values["alpha"],
+        p_rad_s=values["p"],
+        half_base_m=values.get("half_base", run.survey.half_base_m),
+    )
+    follow = partial(_follow, swings, impacts_s, r=values["r"], impacts_before=run.impacts_before)
+    augmented = follow(fitted, motion_effects, bend=True)
+    if motion_effects:
+        baseline = follow(fitted, {}, bend=True)
+    elif sensor_effects:
+        baseline = augmented  # the motion is the same, a family shows it differently
+    else:
+        baseline = follow(run.survey, {}, bend=False)  # "other parameters": than those of the rig file
+    time = np.arange(-_BEFORE_S, swings.rest_s - swings.release_s + _AFTER_S, 1.0 / TRACE_HZ)
+    samples = np.arange(theta.size) / run.rate_hz - (start_s + swings.release_s)
+    heights = np.array([run.sensors[i].position_m[2] for i in run.indices("wire")] or [1.0])
+    see = partial(
+        _seen,
+        time=time,
+        slow_s=slow_s,
+        rest_s=swings.rest_s - swings.release_s,
+        height_m=float(np.sum(heights**2) / np.sum(heights)),
+    )
+    return Trace(
+        run.name,
+        run.level,
+        shown,
+        time,
+        np.interp(time, samples, _smoothed(theta, run.rate_hz), left=math.nan, right=math.nan),
+        see(baseline, sensor_effects={}),
+        see(augmented, sensor_effects=sensor_effects),
+    )
+
+
+def _smoothed(theta: FloatArray, rate_hz: float) -> FloatArray:
+    """Running mean over one step of the trace."""
+    width = max(1, round(rate_hz / TRACE_HZ))
+    return np.asarray(np.convolve(theta, np.ones(width) / width, "same"))
+
+
+@dataclass(frozen=True, slots=True)
+class _Followed:
+    motion: Motion
+    delay_s: float
+
+
+def _follow(
+    swings: Swings,
+    impacts_s: FloatArray,
+    survey: Survey,
+    effects: Effects,
+    *,
+    r: float,
+    bend: bool,
+    impacts_before: float,
+) -> _Followed:
+    """The simulation set to one run by least squares of its impact times; `bend` lets α and p move."""
+    spread = np.array([0.01, survey.alpha_tolerance, survey.p_tolerance, 0.03])
+    free = np.array([True, bend, bend, "initial_velocity" in effects])
+
+    def simulate(u: FloatArray) -> _Followed:
+        full = np.zeros(4)
+        full[free] = u
+        delay, alpha, p, omega = full * spread
+        terms = {**effects, "initial_velocity": {"omega": omega}} if free[3] else effects
+        slender = survey.alpha_rad * (1.0 + alpha)
+        # α may bend, the base stays as wide as it was surveyed.
+        r0 = survey.half_base_m / math.sin(slender)
+        vector = motion_vector(
+            Body(slender, survey.p_rad_s * (1.0 + p), r0, _MASS_KG),
+            Release(float(swings.peak_rad[0])),
+            Restitution(min(r, 1.0)),
+            terms,
+            duration_s=float(swings.peak_s[-1]) + 3.0,
+            impacts_before=impacts_before,
+        )
+        return _Followed(_meet_the_peaks(vector, swings), delay)
+
+    def misfit(u: FloatArray) -> FloatArray:
+        followed = simulate(u)
+        found = followed.motion.impact_time_s[followed.motion.impact_kind == 0][: impacts_s.size]
+        late = np.full(impacts_s.size, 0.1)  # an impact that the simulation never comes to
+        late[: found.size] = found + followed.delay_s - impacts_s[: found.size]
+        return np.concatenate([late / _TIME_SD_S, u])
+
+    return simulate(least_squares(misfit, np.zeros(int(free.sum())), diff_step=1e-3, max_nfev=20).x)
+
+
+def _impacts(theta: FloatArray, swings: Swings, rate_hz: float) -> FloatArray:
+    """(n,) instants from the release at which θ passes zero between two peaks."""
+    places = np.round((swings.release_s + swings.peak_s) * rate_hz).astype(int)
+    found = []
+    for start, stop in itertools.pairwise(places):
+        # Of several passages (noise, bounce) the last leads to the next peak.
+        passed = np.flatnonzero(np.diff(np.sign(theta[start:stop])) != 0)
+        if passed.size == 0:
+            raise CannotDiagnose("Two peaks lie on one side of the upright wall.")
+        at = start + int(passed[-1])
+        share = theta[at] / (theta[at] - theta[at + 1])
+        found.append((at + float(share)) / rate_hz - swings.release_s)
+    return np.array(found)
+
+
+def _meet_the_peaks(vector: FloatArray, swings: Swings) -> Motion:
+    """The motion whose every impact has the r that leads to the next measured peak.
+
+    The share of energy that an impact must keep follows from the peaks on both sides of it
+    (E = 1 − (1−φ)², Eqn 4.2); the few corrections make up for what the effects do in between.
+    """
+    vector = vector.copy()
+    alpha = float(vector[par.ALPHA])
+
+    def energy(peaks: FloatArray) -> FloatArray:
+        phi = np.clip(np.abs(peaks) / alpha, 1e-6, 0.95)
+        return np.asarray(1.0 - (1.0 - phi) ** 2)
+
+    wanted = np.log(energy(swings.peak_rad))
+    factors = np.zeros(wanted.size - 1)  # ln of each impact's r over the mean r
+    vector[par.SCATTER] = 1.0
+    motion = simulate_vector(vector, np.expm1(factors))
+    for _ in range(_ROUNDS):
+        known = min(wanted.size, motion.peak_rotation_rad.size)
+        if known < 2:
+            break
+        off = wanted[:known] - np.log(energy(motion.peak_rotation_rad[:known]))
+        factors[: known - 1] += 0.5 * np.diff(off)
+        factors = np.clip(factors, -0.7, 0.7)
+        motion = simulate_vector(vector, np.expm1(factors))
+    return motion
+
+
+def _seen(
+    followed: _Followed,
+    time: FloatArray,
+    sensor_effects: Effects,
+    slow_s: float,
+    rest_s: float,
+    height_m: float,
+) -> FloatArray:
+    """A motion as the family that is shown would show it; `height_m` is where the wires look."""
+    fine = np.arange(time[0], time[-1] + 0.5e-3, 0.5e-3)
+    terms = {name.partition("@")[0]: values for name, values in sensor_effects.items()}
+    clock = 1.0 + terms.get("clock", {}).get("error", 0.0)
+    late = followed.delay_s + terms.get("lag", {}).get("tau", 0.0)
+    theta = followed.motion.rotation(fine * clock - late)
+    theta = _first_order(theta, slow_s, fine)
+    theta = _first_order(theta, terms.get("slow_response", {}).get("tau", 0.0), fine)
+    if delay := terms.get("filter_delay", {}).get("tau", 0.0):
+        b, a = bilinear(*bessel(2, 1.0 / delay, analog=True, norm="delay"), fs=1.0 / (fine[1] - fine[0]))
+        theta = theta[0] + lfilter(b, a, theta - theta[0])
+    theta = theta * (1.0 + terms.get("gain", {}).get("error", 0.0))
+    theta = theta + terms.get("wire_cosine", {}).get("kappa", 0.0) * height_m * theta**2
+    # A drift of all LVDTs lifts the joint and turns nothing; one of the wires looks like a rotation.
+    for name, per in (("drift@wire", height_m), ("drift@tiltmeter", 1.0)):
+        theta = theta + sensor_effects.get(name, {}).get("rate", 0.0) / per * (fine - rest_s)
+    return np.asarray(np.interp(time, fine, theta))
+
+
+def _first_order(theta: FloatArray, tau_s: float, time: FloatArray) -> FloatArray:
+    """τ q̇' = q − q', at rest at the start."""
+    if tau_s <= 0.0:
+        return theta
+    share = 1.0 - math.exp(-(time[1] - time[0]) / tau_s)
+    return np.asarray(theta[0] + lfilter([share], [1.0, share - 1.0], theta - theta[0]))
