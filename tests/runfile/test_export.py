@@ -172,6 +172,31 @@ def test_a_file_that_is_there_is_not_replaced_unasked(tmp_path: Path, run: Path)
     export_run(run, tmp_path, "npz", overwrite=True)
 
 
+@pytest.mark.parametrize("format_", FORMATS)
+@pytest.mark.parametrize("kind", ["missing", "text", "cut short", "no folder"])
+def test_bad_input_is_told_and_leaves_nothing(tmp_path: Path, run: Path, format_: str, kind: str) -> None:
+    source, out = tmp_path / "bad.h5", tmp_path / "out"
+    out.mkdir()
+    if kind == "text":
+        source.write_text("hello")
+    elif kind == "cut short":
+        source.write_bytes(run.read_bytes()[:20_000])
+    elif kind == "no folder":
+        source, out = run, out / "nowhere" / f"x{FORMATS[format_]}"
+    with pytest.raises(RunFileError):
+        export_run(source, out, format_)
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["same.h5", "another.h5", "journal.journal"])
+def test_a_recording_is_never_replaced(tmp_path: Path, run: Path, name: str) -> None:
+    for path in ("same.h5", "another.h5", "journal.journal"):
+        (tmp_path / path).write_bytes(run.read_bytes())
+    with pytest.raises(RunFileError, match="is a recording"):
+        export_run(tmp_path / "same.h5", tmp_path / name, "netcdf", overwrite=True)
+    assert (tmp_path / name).read_bytes() == run.read_bytes()
+
+
 def test_a_run_without_rig_exports_readings_only(tmp_path: Path, header: RunHeader) -> None:
     from daq_app.runfile import JournalWriter
 

@@ -44,15 +44,21 @@ def test_damaged_files_give_an_error_or_a_run(tmp_path: Path, bring, make_journa
     make_journal(tmp_path / "a.journal", n_blocks=2, block=50)
     run = finalise(tmp_path / "a.journal", tmp_path / "a.h5")
     rng = np.random.default_rng(4)
-    for format_ in ("tdms", "mat", "npz", "csv"):
-        sound = export_run(run, tmp_path, format_).read_bytes()
+    rows = "".join(f"\t{n / 1000}\t{-n / 1000}\n" for n in range(100))
+    lvm = (
+        "LabVIEW Measurement\t\nSeparator\tTab\nX_Columns\tNo\n***End_of_Header***\t\n"
+        "Channels\t2\nY_Unit_Label\tVolts\tVolts\nDelta_X\t0.01\t0.01\n***End_of_Header***\t\n"
+        f"X_Value\tWP-1\tWP-2\tComment\n{rows}"
+    )
+    for format_ in ("tdms", "mat", "npz", "csv", "lvm"):
+        sound = lvm.encode() if format_ == "lvm" else export_run(run, tmp_path, format_).read_bytes()
         for trial in range(8):
             data = bytearray(sound)
             for place in rng.integers(0, len(data), int(rng.integers(1, 4))):
                 data[place] = int(rng.integers(256))
             if trial % 4 == 0:
                 del data[int(rng.integers(len(data))) :]
-            path = tmp_path / f"{format_}-{trial}{FORMATS[format_]}"
+            path = tmp_path / f"{format_}-{trial}.{format_}"
             path.write_bytes(data)
             try:
                 bring(path)
@@ -87,6 +93,12 @@ def test_doubts_about_values(tmp_path: Path, bring, write_tdms) -> None:
     with open_run(tmp_path / "runs" / "t.h5") as run:
         assert run.header.origin is not None
         assert "WP-1 never changes" in json.dumps(run.header.origin["doubts"])
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".journal"])
+def test_what_needs_no_import_is_told(tmp_path: Path, bring, suffix: str) -> None:
+    with pytest.raises(RunFileError, match="need no import"):
+        bring(tmp_path / f"x{suffix}")
 
 
 def test_an_existing_run_is_never_overwritten(tmp_path: Path, bring, write_tdms) -> None:

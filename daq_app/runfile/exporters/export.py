@@ -10,6 +10,7 @@ from typing import Final, Literal
 from daq_app.runfile.durable import replace_durably
 from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.exporters.selection import Selection, Units
+from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX
 from daq_app.runfile.hdf5_read import open_run
 
 ExportFormat = Literal["csv", "mat", "tdms", "parquet", "netcdf", "npz"]
@@ -45,8 +46,14 @@ def export_run(
     if suffix is None:
         raise RunFileError(f"there is no export format {format_}", advice=f"Formats: {', '.join(FORMATS)}.")
     final = out / f"{path.stem}{suffix}" if out.is_dir() else out
+    if final.exists() and (final.suffix in (RUN_SUFFIX, JOURNAL_SUFFIX) or final.samefile(path)):
+        raise RunFileError(
+            f"{final} is a recording, which an export never replaces", advice="Choose another name."
+        )
     if final.exists() and not overwrite:
         raise RunFileError(f"{final} exists already", advice="Choose another name, or overwrite it.")
+    if not final.parent.is_dir():
+        raise RunFileError(f"the folder {final.parent} does not exist", advice="Make it first.")
     temporary = final.with_name(final.name + ".part")
     with open_run(path) as run:
         selection = Selection.of(run, units, from_s, to_s, report)

@@ -23,6 +23,8 @@ from daq_app.runfile.source import Provenance
 
 _HASH_BYTES: Final = 2**20
 
+_Opener = Callable[[Path, SourceMap], Reader]
+
 
 @dataclass(frozen=True, slots=True)
 class ImportReport:
@@ -36,7 +38,7 @@ class ImportReport:
     channel_ids: tuple[str, ...]
 
 
-def _opener(suffix: str) -> Callable[[Path, SourceMap], Reader]:
+def _opener(suffix: str) -> _Opener:
     """The reader of a format. Imported on demand: SciPy and npTDMS are slow to load."""
     match suffix:
         case ".tdms":
@@ -49,6 +51,11 @@ def _opener(suffix: str) -> Callable[[Path, SourceMap], Reader]:
             from daq_app.runfile.importers.from_mat import open_mat as reader  # type: ignore[assignment]
         case ".npz":
             from daq_app.runfile.importers.from_npz import NpzReader as reader  # type: ignore[assignment]
+        case ".h5" | ".journal":
+            raise RunFileError(
+                "runs and journals of this program need no import",
+                advice="Use it as it is; `daq-app recover` makes a run of a journal.",
+            )
         case _:
             raise RunFileError(
                 f"files of the kind {suffix or '(no suffix)'} cannot be imported",
@@ -67,6 +74,7 @@ def import_file(
     like one of its own; ``RunHeader.origin`` says so for each channel.  Raises `RunFileError` (or
     `ConfigError`) and leaves nothing behind.
     """
+    opener = _opener(path.suffix.lower())
     import_map = import_map or ImportMap()
     final = out / f"{_file_stem(import_map.run.test or path.stem)}.h5" if out.is_dir() else out
     if final.exists():
@@ -76,7 +84,7 @@ def import_file(
     if not final.parent.is_dir():
         raise RunFileError(f"the folder {final.parent} does not exist", advice="Make it first.")
     try:
-        return _convert(path, rig, rig_text, final, import_map)
+        return _convert(path, opener, rig, rig_text, final, import_map)
     except OSError as error:
         raise RunFileError(
             f"{path} cannot be brought to {final} ({error.strerror or error})",
@@ -84,9 +92,11 @@ def import_file(
         ) from error
 
 
-def _convert(path: Path, rig: Rig, rig_text: str, final: Path, import_map: ImportMap) -> ImportReport:
+def _convert(
+    path: Path, opener: _Opener, rig: Rig, rig_text: str, final: Path, import_map: ImportMap
+) -> ImportReport:
     digest = _sha256(path)
-    with closing(_opener(path.suffix.lower())(path, import_map.source)) as reader:
+    with closing(opener(path, import_map.source)) as reader:
         mapped = map_channels(path, reader, rig, import_map)
         names = list(dict.fromkeys(item.foreign.name for item in mapped))
         time_name = import_map.source.time_column or reader.time_channel

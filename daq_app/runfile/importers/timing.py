@@ -53,7 +53,7 @@ def timing_of(
     if n_rows == 0:
         raise RunFileError(f"{path} holds no samples of these channels")
     pieces = tuple(reader.findings.pieces) or ((0, n_rows),)
-    rate_hz = _stated_rate(path, mapped, source, time_name, doubts)
+    rate_hz = _stated_rate(path, mapped, source, time_name, reader.time_hint, doubts)
     if source.rate_hz is None and time_name:
         rate_hz, pieces = _from_column(path, spool, time_name, rate_hz, n_rows, doubts)
     elif rate_hz is not None:
@@ -127,6 +127,7 @@ def _stated_rate(
     mapped: tuple[MappedChannel, ...],
     source: SourceMap,
     time_name: str | None,
+    time_hint: str | None,
     doubts: list[str],
 ) -> float | None:
     """The rate of the map, or of the increments in the file's head if they agree."""
@@ -146,10 +147,12 @@ def _stated_rate(
             )
         return source.rate_hz
     if disagree and time_name is None:
+        column = f", or time_column = {time_hint!r}, which the file has" if time_hint else ""
         raise RunFileError(
             f"{path}: the channels disagree about the time between samples ({listing} s); "
             "a run has one rate for all",
-            advice="Map only channels that agree, or give the true rate_hz under [source] in the map.",
+            advice="Map only channels that agree, or give the true rate_hz under [source] in the map"
+            + column,
         )
     if disagree:
         doubts.append(f"the channels disagree about the time between samples ({listing} s)")
