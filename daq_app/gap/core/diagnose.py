@@ -211,6 +211,7 @@ class _Study:
             self.probes,
             self._goodness,
             null_gap=self._gap(found, self.fits[NULL].known()),
+            best_gap=self._leftover(best),
             nominal_gap=self._gap(
                 found, {key: u for key, u in self.fits[NULL].known().items() if key[1] is not None}
             ),

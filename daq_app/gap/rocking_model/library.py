@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 from daq_app.gap.core import Confusion, Effect, Library, Parameter
 from daq_app.gap.core.parameters import between, positive, signed
@@ -29,33 +30,63 @@ _MOTION = (
     "bounce",
     "sliding",
     "compliance",
+    "flexible_wall",
+    "yaw",
+    "twist",
     "residual_cable",
     "initial_velocity",
     "slow_release",
+    "ambient",
 )
 """Effects on the motion that leave a mark on the features used here."""
-_FREE = {"bounce": ("tau",), "residual_cable": ("k",), "restitution_slope": ("k",)}
+_FREE = {
+    "bounce": ("tau",),
+    "restitution_slope": ("k",),
+    "twist": ("kick", "frequency", "zeta"),
+    "ambient": ("amplitude", "frequency"),
+}
 """Which parameters are fitted where not all are; the others keep the simulator's defaults."""
-_LOGARITHMIC = {("winkler", "theta_c"), ("slow_release", "tau"), ("residual_cable", "slack")}
-_PER_RUN = {("initial_velocity", "omega")}
+_LOGARITHMIC = {("winkler", "theta_c"), ("slow_release", "tau"), ("residual_cable", "slack")} | {
+    (name, parameter)
+    for name in ("flexible_wall", "yaw", "twist", "ambient", "wire_inertia")
+    for parameter in ("frequency", "zeta")
+}
+_PER_RUN = {("initial_velocity", "omega"), ("residual_cable", "slack")}
+"""A cable is paid out anew for every test: where it grips is each run's own."""
 _SENSORS = {
     "gain": ("lvdt", "wire", "tiltmeter", "accelerometer"),
     "lag": ("lvdt", "wire", "accelerometer"),
     "slow_response": ("lvdt", "wire"),
-    "filter_delay": ("wire",),
+    "filter_delay": ("lvdt", "wire"),
     "drift": ("lvdt", "wire", "tiltmeter"),
     "wire_cosine": ("wire",),
+    "wire_inertia": ("wire",),
 }
-_DRIFT_REACH = {"lvdt": 1e-3, "wire": 2e-3, "tiltmeter": 1e-3}
+_ONE_CHANNEL: dict[str, tuple[str, ...]] = {
+    "lvdt": ("gain", "lag", "slow_response", "filter_delay", "drift"),
+    "wire": ("gain", "lag", "slow_response", "filter_delay", "drift", "wire_cosine", "wire_inertia"),
+    "accelerometer": ("gain", "drift"),
+}
+_INERTIA_STARTS = {"frequency": (8.0, 14.0, 24.0), "zeta": (0.1, 0.3)}
+_MARK_REACH = {
+    "hum": {"lvdt": 1e-3, "wire": 4e-3, "accelerometer": 1.0},
+    "quantisation": {"lvdt": 2e-3, "wire": 8e-3},
+    "dropout": {"lvdt": 0.2, "wire": 0.2},
+    "polarity": {"": 1.0},
+    "swap": {"": 1.0},
+}
+SMALLEST = {("residual_cable", "slack"): 4e-3}
+"""Lower end of a range that the simulator lets begin at zero."""
+_DRIFT_REACH = {"lvdt": 1e-3, "wire": 2e-3, "tiltmeter": 1e-3, "accelerometer": 1e-2}
 
 
 def _parameter(spec: EffectSpec, parameter: SpecParameter) -> Parameter:
     """The prior of one of the simulator's parameters: its range is about two prior sd."""
-    if (spec.name, parameter.name) in _LOGARITHMIC:
-        return between(
-            parameter.name, max(parameter.low, 1e-6), parameter.high, parameter.unit, parameter.text
-        )
     per_run = (spec.name, parameter.name) in _PER_RUN
+    if (spec.name, parameter.name) in _LOGARITHMIC:
+        low = max(parameter.low, SMALLEST.get((spec.name, parameter.name), 1e-6))
+        found = between(parameter.name, low, parameter.high, parameter.unit, parameter.text)
+        return replace(found, per_run=per_run)
     if parameter.low < 0:
         return signed(parameter.name, parameter.high, parameter.unit, parameter.text, per_run=per_run)
     return positive(parameter.name, parameter.high, parameter.unit, parameter.text, per_run=per_run)
@@ -74,26 +105,44 @@ def _motion_effect(spec: EffectSpec, known: set[str]) -> Effect:
     )
 
 
+def _sensor_effect(name: str, target: str, family: str, known: set[str]) -> Effect:
+    """An effect on the sensors of a family or on one channel."""
+    spec = next(spec for spec in SENSOR_EFFECTS if spec.name == name)
+    parameters = tuple(_parameter(spec, p) for p in spec.parameters)
+    if name == "drift":
+        unit = {"tiltmeter": "rad/s", "accelerometer": "m/s³"}.get(family, "m/s")
+        parameters = (signed("rate", _DRIFT_REACH[family], unit, "drift of the zero"),)
+    elif name == "wire_inertia":
+        parameters = tuple(replace(p, starts=_INERTIA_STARTS[p.name]) for p in parameters)
+    return Effect(
+        f"{name}@{target}",
+        "sensor",
+        parameters,
+        spec.equation,
+        spec.reference,
+        f"{spec.summary} ({target})",
+        tuple(Confusion(other, spec.separated_by) for other in spec.confusable if other in known),
+    )
+
+
+def mark_effect(mark: str, family: str) -> Effect:
+    """The effect behind a mark of the electronics: ``hum@LV-A03``."""
+    name, _, target = mark.partition("@")
+    spec = next(spec for spec in SENSOR_EFFECTS if spec.name == name)
+    strength = spec.strength
+    if name == "saturation":
+        parameter = between(strength.name, strength.low, strength.high, strength.unit, strength.text)
+    else:
+        reach = _MARK_REACH[name].get(family, _MARK_REACH[name].get("", 1.0))
+        parameter = positive(strength.name, reach, strength.unit, strength.text)
+    return Effect(mark, "sensor", (parameter,), spec.equation, spec.reference, f"{spec.summary} ({target})")
+
+
 def _sensor_effects(known: set[str]) -> Iterable[Effect]:
     by_name = {spec.name: spec for spec in SENSOR_EFFECTS}
     for name, families in _SENSORS.items():
-        spec = by_name[name]
         for family in families:
-            parameter = _parameter(spec, spec.strength)
-            if name == "drift":
-                reach = _DRIFT_REACH[family]
-                parameter = signed(
-                    "rate", reach, "rad/s" if family == "tiltmeter" else "m/s", "drift of the zero"
-                )
-            yield Effect(
-                f"{name}@{family}",
-                "sensor",
-                (parameter,),
-                spec.equation,
-                spec.reference,
-                f"{spec.summary} ({family})",
-                tuple(Confusion(other, spec.separated_by) for other in spec.confusable if other in known),
-            )
+            yield _sensor_effect(name, family, family, known)
     clock = by_name["clock"]
     yield Effect(
         "clock",
@@ -147,8 +196,25 @@ def _probes() -> Iterable[Effect]:
         )
 
 
-def rocking_library() -> Library:
-    """All effects and probes."""
+def rocking_library(
+    channels: Mapping[str, str] | None = None, marks: Mapping[str, str] | None = None
+) -> Library:
+    """All effects and probes.
+
+    `channels` are those that disagree with their family and `marks` the conditions found in these runs
+    (``hum@LV-A03``), each with its family: their effects are added, under the name of the channel.
+    """
     specs = [spec for spec in MOTION_EFFECTS if spec.name in _MOTION]
     known = {spec.name for spec in specs}
-    return Library([*(_motion_effect(spec, known) for spec in specs), *_sensor_effects(known), *_probes()])
+    single = [
+        _sensor_effect(name, channel, family, known)
+        for channel, family in (channels or {}).items()
+        for name in _ONE_CHANNEL[family]
+    ]
+    if marks is None:
+        marks = {
+            f"{name}@{family}": family for name, reach in _MARK_REACH.items() for family in reach if family
+        } | {"saturation@lvdt": "lvdt", "saturation@wire": "wire", "polarity": "", "swap": ""}
+    conditions = [mark_effect(mark, family) for mark, family in marks.items()]
+    motion = (_motion_effect(spec, known) for spec in specs)
+    return Library([*motion, *_sensor_effects(known), *single, *conditions, *_probes()])

@@ -10,6 +10,7 @@ import numpy as np
 from daq_app.gap.core import Parameter, Prediction, Run, Scatter
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import sensor_response as response
+from daq_app.gap.rocking_model.extra_response import with_measured_inputs
 from daq_app.gap.rocking_model.records import Survey
 from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.vector import acts_on, kernel_vector, restitution_of
@@ -34,12 +35,14 @@ class RockingModel:
         Scatter(SCATTER_R, 0.004, 0.7, 0.02, "1", "relative scatter of r from impact to impact"),
         Scatter(SCATTER_TIME, 3e-5, 1.0, 1e-3, "s", "what half-cycle times scatter by beyond sensor noise"),
         Scatter(
-            SCATTER_SENSOR, 0.5, 0.35, 2.5, "1", "repeatability of sensor coefficients, in their own units"
+            SCATTER_SENSOR, 0.7, 0.15, 1.6, "1", "repeatability of sensor coefficients, in their own units"
         ),
     )
 
-    def __init__(self, survey: Survey) -> None:
+    def __init__(self, survey: Survey, channels: Mapping[str, float] | None = None) -> None:
+        """`channels` are examined on their own: the relative tolerance of each one's calibration."""
         self.survey = survey
+        self.channels = dict(channels or {})
 
     @property
     def nuisance(self) -> tuple[Parameter, ...]:
@@ -84,7 +87,7 @@ class RockingModel:
                 "tilt_response", 0.0, 0.01, "s", meaning="error of the tiltmeters' time constant", linear=True
             ),
             Parameter(
-                "onset", 0.0, 2.5e-3, "s", meaning="start of the ringing after the impact", linear=True
+                "onset", 1.5e-3, 1e-3, "s", meaning="middle of the impact after the contact", linear=True
             ),
             Parameter(
                 "base_follow", 0.0, 8e-3, "m/rad", meaning="translation from wire calibrations", linear=True
@@ -99,6 +102,10 @@ class RockingModel:
                 linear=True,
             ),
             Parameter("wire_even", 0.0, 5e-3, "1/rad", meaning="even part from wire anchors", linear=True),
+            *(
+                Parameter(f"cal_{name}", 0.0, own, "1", meaning=f"calibration of {name}", linear=True)
+                for name, own in self.channels.items()
+            ),
         )
 
     def local_nuisance(self, run: Run) -> tuple[Parameter, ...]:
@@ -114,6 +121,7 @@ class RockingModel:
 
     def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
         assert isinstance(run, RockingRun)
+        values = with_measured_inputs(run, values)
         n = len(run.features)
         predicted = np.empty(n)
         loading_r, loading_t, loading_s = np.zeros(n), np.zeros(n), np.zeros(n)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +59,7 @@ class Survey:
     alpha_tolerance: float = 0.03
     """Relative prior sd of α (the height of the centre of mass is hard to survey)."""
     p_tolerance: float = 0.02
-    half_base_tolerance_m: float = 1e-3
+    half_base_tolerance_m: float = 3e-3
 
     @classmethod
     def from_specimen(cls, specimen: Specimen) -> Survey:
@@ -88,14 +88,36 @@ class GapRun:
     survey: Survey
     time_offset_s: FloatArray = field(default_factory=lambda: np.zeros(0))
     impacts_before: float = 0.0
+    excluded: tuple[str, ...] = ()
+    """Channels that are examined on their own and not used with their family."""
 
     def indices(self, family: Family, axis: str | None = None) -> list[int]:
-        """Places of the channels of a family (and axis)."""
+        """Places of the channels of a family (and axis), without the excluded ones."""
         return [
             i
             for i, sensor in enumerate(self.sensors)
-            if sensor.family == family and (axis is None or sensor.axis == axis)
+            if sensor.family == family
+            and (axis is None or sensor.axis == axis)
+            and sensor.id not in self.excluded
         ]
+
+    def at_clock(self) -> GapRun:
+        """The run with all channels at the instants of the sample clock."""
+        if not self.time_offset_s.size or not np.any(self.time_offset_s):
+            return self
+        channels = np.array([self.aligned(i) for i in range(len(self.sensors))])
+        return replace(self, channels=channels, time_offset_s=np.zeros(0))
+
+    def including(self, ids: Sequence[str]) -> GapRun:
+        """The run with these channels back among their family."""
+        if not set(ids) & set(self.excluded):
+            return self
+        return replace(self, excluded=tuple(name for name in self.excluded if name not in ids))
+
+    def excluding(self, ids: Iterable[str]) -> GapRun:
+        """The run without these channels."""
+        more = tuple(name for name in dict.fromkeys(ids) if name not in self.excluded)
+        return replace(self, excluded=self.excluded + more) if more else self
 
     def aligned(self, index: int) -> FloatArray:
         """A channel at the instants of the sample clock, shape (n,)."""

@@ -113,6 +113,11 @@ def _clipped(values: FloatArray, limits: tuple[float, float]) -> NDArray[np.bool
     return np.asarray(np.convolve(at_end, np.ones(81), "same") > 0) if at_end.any() else at_end
 
 
+def reaches_its_range(values: FloatArray, limits: tuple[float, float]) -> bool:
+    """Whether a channel is ever at the end of its declared range."""
+    return bool(_clipped(values, limits).any())
+
+
 def _outlier(used: list[int], misfit: FloatArray, values: FloatArray) -> int | None:
     """The channel that disagrees most with the others, if it does so grossly."""
     rms = np.sqrt(np.mean(misfit**2, axis=1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from daq_app.gap.core import FeatureSet, Label
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import swings as sw
+from daq_app.gap.rocking_model.floor_vibration import Vibration, quiet
+from daq_app.gap.rocking_model.impact_timing import acceleration_delay
 from daq_app.gap.rocking_model.records import GapRun, Survey
 from daq_app.gap.rocking_model.rotation import Rotation, joint_rotation, sample_noise, wall_rotation
 from daq_app.gap.rocking_model.sensor_blocks import GRID_HZ, Block, Grid, blocks_of, coarse, make_grid
@@ -44,16 +47,69 @@ class RockingRun:
     block_loadings: FloatArray
     """(n, k): measurement covariance of the blocks as loadings."""
     notes: tuple[str, ...] = ()
+    vibration: Vibration | None = None
     cache: dict[Any, Any] = field(default_factory=dict, compare=False)
 
+    def with_blocks(self, more: Sequence[Block]) -> RockingRun:
+        """The run with further blocks of features after those it has."""
+        blocks = (*self.blocks, *more)
+        old = self.features
+        values, sds, labels = list(old.values), list(old.sd), list(old.labels)
+        for block in more:
+            share = 1.0 if block.independent else _SMALLEST_LOADING
+            for name, unit, value, variance in zip(
+                block.names, block.units, block.values, np.diag(block.covariance), strict=True
+            ):
+                values.append(float(value))
+                sds.append(share * float(np.sqrt(variance)) + 1e-15)
+                size = float(abs(self.swings.peak_rad[0]))
+                labels.append(Label(block.family, "run", name, unit, size, 0.5))
+        first = len(self.places) + self.peaks.size
+        loadings = _block_loadings(blocks, first, len(values))
+        features = FeatureSet(np.array(values), np.array(sds), tuple(labels))
+        return replace(self, features=features, blocks=blocks, block_loadings=loadings, cache={})
 
-def extract(run: GapRun) -> RockingRun:
+
+def scalar_block(
+    family: str, entries: Sequence[tuple[str, str, float, float]], grid: Grid, kind: str = ""
+) -> Block:
+    """A block of plain numbers: (name, unit, value, variance) each."""
+    return Block(
+        family,
+        tuple(e[0] for e in entries),
+        tuple(e[1] for e in entries),
+        np.array([e[2] for e in entries]),
+        np.diag([e[3] for e in entries]),
+        np.zeros((len(entries), grid.valid.size)),
+        np.ones(grid.valid.size, dtype=bool),
+        kind=kind,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Examined:
+    """A run cut to its test, its joint, and its features."""
+
+    run: GapRun
+    joint: Rotation
+    features: RockingRun
+
+
+def extract(run: GapRun, reference: str = "") -> RockingRun:
     """Features of a run. Raises `CannotDiagnose` where it holds no rocking motion."""
+    return examine(run, reference).features
+
+
+def examine(run: GapRun, reference: str = "") -> Examined:
+    """Features of a run with what they were made from; `reference` ``wire`` overrides the LVDTs."""
     run, joint = _from_hold(run)
-    reference, theta, noise, notes = _reference(run, joint)
+    reference, theta, noise, notes = _reference(run, joint, reference)
     swings = sw.find_swings(theta, noise, run.rate_hz, run.name)
     grid = make_grid(theta, joint.valid, swings, run.rate_hz)
-    blocks = tuple(blocks_of(run, joint, grid, swings, reference).values())
+    blocks = tuple(blocks_of(run, joint, grid, swings, reference, quiet(run, grid)).values())
+    late = acceleration_delay(run, grid)
+    if late is not None:
+        blocks = (*blocks, scalar_block("impact timing", (("delay", "s", late[0], late[1]),), grid))
     values, sds, labels, places = _times(swings, reference, run.survey)
     peaks = np.arange(1, swings.peak_s.size)
     amplitude, order = swings.peak_rad, swings.peak_s / max(swings.peak_s[-1], 1e-9)
@@ -64,40 +120,31 @@ def extract(run: GapRun) -> RockingRun:
         labels.append(
             Label(reference, "peak", "log peak after impact", "1", float(amplitude[k - 1]), float(order[k]))
         )
-    first = len(values)
-    for block in blocks:
-        for name, unit, value, variance in zip(
-            block.names, block.units, block.values, np.diag(block.covariance), strict=True
-        ):
-            values.append(float(value))
-            sds.append(_SMALLEST_LOADING * float(np.sqrt(variance)) + 1e-15)
-            labels.append(Label(block.family, "run", name, unit, float(abs(amplitude[0])), 0.5))
-    loadings = _block_loadings(blocks, first, len(values))
-    features = FeatureSet(np.array(values), np.array(sds), tuple(labels))
-    return RockingRun(
+    features = RockingRun(
         run.name,
         run.level,
-        features,
+        FeatureSet(np.array(values), np.array(sds), tuple(labels)),
         run.survey,
         swings,
         places,
         np.flatnonzero(places[:, 0] != places[:, 2]),
         peaks,
-        blocks,
+        (),
         grid,
         reference,
         run.impacts_before,
         _wire_height(run),
-        loadings,
+        np.zeros((len(values), 0)),
         notes,
     )
+    return Examined(run, joint, features.with_blocks(blocks))
 
 
-BEFORE_RELEASE_S = 1.0
+BEFORE_RELEASE_S = 2.0
 
 
 def _from_hold(run: GapRun) -> tuple[GapRun, Rotation]:
-    """The record from one second before the release on: the pull and the wait before are no test."""
+    """The record from two seconds before the release on: the pull and the wait before are no test."""
     joint = joint_rotation(run)
     step = max(round(run.rate_hz / GRID_HZ), 1)
     theta = np.abs(coarse(joint.theta, run.rate_hz))
@@ -107,23 +154,32 @@ def _from_hold(run: GapRun) -> tuple[GapRun, Rotation]:
     # The release ends the first stay near the largest rotation; a later peak never comes that high.
     after = below[below > held[0]]
     release = held[held < after[0]][-1] if after.size else held[-1]
-    start = int(release * step - BEFORE_RELEASE_S * run.rate_hz)
+    # The pull must not be taken for the hold: at most as long as the wall has been held still.
+    still = (
+        release - int(np.flatnonzero(theta[:release] < 0.97 * largest)[-1])
+        if np.any(theta[:release] < 0.97 * largest)
+        else release
+    )
+    wanted = min(BEFORE_RELEASE_S * run.rate_hz, max(still * step - 0.1 * run.rate_hz, run.rate_hz))
+    start = int(release * step - wanted)
     if start < 0.5 * run.rate_hz:
         return run, joint
     cut = replace(run, channels=np.ascontiguousarray(run.channels[:, start:]))
     return cut, joint_rotation(cut)
 
 
-def _reference(run: GapRun, joint: Rotation) -> tuple[str, FloatArray, float, tuple[str, ...]]:
+def _reference(run: GapRun, joint: Rotation, wanted: str) -> tuple[str, FloatArray, float, tuple[str, ...]]:
     """The rotation that the dynamics are read from: LVDTs, or wires where the LVDTs reach their range."""
     notes = tuple(f"{run.name}: {name} left out, it disagrees with its family." for name in joint.left_out)
-    if joint.whole:
+    if joint.whole and wanted != "wire":
         return "lvdt", joint.theta, joint.noise_rad, notes
     rows, heights, _ = wall_rotation(run)
     if len(rows) == 0:
-        return "lvdt", joint.theta, joint.noise_rad, (*notes, f"{run.name}: LVDTs reach their range.")
+        limit = () if joint.whole else (f"{run.name}: LVDTs reach their range.",)
+        return "lvdt", joint.theta, joint.noise_rad, (*notes, *limit)
     theta = np.average(rows, axis=0, weights=heights**2)
-    note = f"{run.name}: LVDTs reach their range; its motion is read from the wires."
+    why = "LVDTs reach their range" if not joint.whole else "the LVDTs are not fit for it"
+    note = f"{run.name}: {why}; its motion is read from the wires."
     return "wire", theta, sample_noise(theta, run.rate_hz), (*notes, note)
 
 
@@ -195,9 +251,13 @@ def _block_loadings(blocks: tuple[Block, ...], first: int, n: int) -> FloatArray
     row = first
     for block in blocks:
         k = len(block.names)
+        if block.independent:
+            row += k
+            continue
         matrix = np.zeros((n, k))
-        jitter = 1e-12 * np.diag(np.diag(block.covariance))
-        matrix[row : row + k] = np.linalg.cholesky(block.covariance + jitter)
+        sd = np.sqrt(np.diag(block.covariance)) + 1e-30
+        correlation = block.covariance / np.outer(sd, sd)
+        matrix[row : row + k] = sd[:, None] * np.linalg.cholesky(correlation + 1e-9 * np.eye(k))
         columns.append(matrix)
         row += k
     return np.hstack(columns) if columns else np.zeros((n, 0))

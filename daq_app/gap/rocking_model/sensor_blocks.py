@@ -8,11 +8,12 @@ same coefficients by passing its own difference through the same regression.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, lfilter, sosfilt, sosfiltfilt
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.records import GapRun
@@ -25,11 +26,6 @@ SMOOTH_HZ = 30.0
 POLYNOMIAL_DEGREE = 8
 SMALLEST_GRID_RAD = 8e-4
 MASK_S = 0.05
-RING_HZ = 150.0
-ONSET_WINDOW_S = 0.06
-ONSETS = 16
-ONSET_ERROR_S = 4e-4
-"""How well the start of the ringing is defined at all."""
 """Accelerations near an impact are left out."""
 
 
@@ -45,6 +41,12 @@ class Grid:
     valid: NDArray[np.bool_]
     impact_s: FloatArray
     """Impacts as the reference rotation has them, s from release, up to where half-cycles can be told."""
+    raw: FloatArray
+    """The reference rotation as measured, averaged over the grid's intervals."""
+    rest_s: float
+    """When the wall comes to rest, s from release."""
+    speed: FloatArray
+    """θ̇ at every sample of the record, shape (n,): what jumps at impacts must not be averaged over them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +64,30 @@ class Block:
     covariance: FloatArray
     projection: FloatArray
     pick: NDArray[np.bool_]
+    kind: str = ""
+    """Which rule predicts it; empty where the family's name says so."""
+    expected: FloatArray | None = None
+    """Of a single channel: what the others make of it, on the whole grid."""
+    design: FloatArray | None = None
+    """Of a single channel: the shapes of the regression at the samples of `pick`."""
+    noise: float = 1.0
+    """Of a single channel: rms at rest."""
+    ring: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Of a ring-down: frequency in Hz, damping ratio, rate of the grid in Hz."""
+    levers: tuple[float, ...] = ()
+    """Of a ring-down: what a rotation error of the family makes of each coefficient's signal, m. Of a
+    single channel: the relative error of its prediction."""
+    tags: Mapping[str, str] = field(default_factory=dict)
+    """Sensor family behind a channel or a mark."""
+
+    @property
+    def independent(self) -> bool:
+        """Whether its coefficients' errors are independent: then no loadings are needed for them."""
+        return not np.any(self.covariance - np.diag(np.diag(self.covariance)))
+
+    @property
+    def rule(self) -> str:
+        return self.kind or self.family
 
     def coefficients(self, series: FloatArray) -> FloatArray:
         """What the regression makes of a difference given on the whole grid."""
@@ -108,7 +134,9 @@ def make_grid(theta: FloatArray, valid: NDArray[np.bool_], swings: Swings, rate_
     distance = np.abs(time_s[:, None] - impact_s[None, :]).min(axis=1) if impact_s.size else time_s + 1e9
     good = coarse(valid.astype(float), rate_hz) > 0.999
     parts = [coarse(v, rate_hz) for v in (smooth, omega, alpha)]
-    return Grid(time_s, parts[0], parts[1], parts[2], distance < MASK_S, good, impact_s)
+    raw = coarse(theta, rate_hz)
+    rest = swings.rest_s - swings.release_s
+    return Grid(time_s, parts[0], parts[1], parts[2], distance < MASK_S, good, impact_s, raw, rest, omega)
 
 
 def _impact_samples(theta: FloatArray, smooth: FloatArray, release: int) -> list[int]:
@@ -175,18 +203,34 @@ def regress(
     return Block(family, names, units, values[kept], covariance[np.ix_(kept, kept)], projection[kept], pick)
 
 
-def blocks_of(run: GapRun, joint: Rotation, grid: Grid, swings: Swings, reference: str) -> dict[str, Block]:
-    """All blocks that the run's channels allow, by name."""
+def blocks_of(
+    run: GapRun,
+    joint: Rotation,
+    grid: Grid,
+    swings: Swings,
+    reference: str,
+    calm: NDArray[np.bool_],
+) -> dict[str, Block]:
+    """All blocks that the run's channels allow, by name; `calm` are samples at which nothing rings."""
+    before = grid.time_s < -0.1
+    middle = float(np.median(grid.raw[before])) if before.any() else 0.0
+    held = calm & (np.abs(grid.raw - middle) < 0.01 * abs(middle))
+    # A wall that sways in the hand accelerates more than its gravity differs from the model's.
+    mean_error = 3.0 * swings.hold_rate_sd / max(float(held.sum()) / GRID_HZ, 0.05)
+    held &= mean_error < 0.005 * 9.81 * abs(middle)
     rocking = (grid.time_s > -0.2) & (grid.time_s < swings.rest_s - swings.release_s + 0.2)
     pick = rocking & grid.valid
     last = grid.impact_s[-1] if grid.impact_s.size else 0.0
     found: dict[str, Block | None] = {
         "wire": _wire_block(run, joint, grid, pick, reference),
         "tiltmeter": _tilt_block(run, grid, rocking),
+        # While the wall is held there is gravity alone: its gain is then known apart from inertia's.
         "accelerometer": _acceleration_block(
-            run, grid, rocking & (grid.time_s > 0.05) & (grid.time_s < last) & ~grid.near_impact
+            run,
+            grid,
+            (held & (grid.time_s < -0.1))
+            | (rocking & (grid.time_s > 0.05) & (grid.time_s < last) & ~grid.near_impact),
         ),
-        "impact marks": _impact_block(run, grid, swings),
         "base": _translation_block(run, grid, swings, rocking),
     }
     if reference == "lvdt":
@@ -259,38 +303,14 @@ def _acceleration_block(run: GapRun, grid: Grid, pick: NDArray[np.bool_]) -> Blo
         "gain of gravity": (gravity, "1"),
         "gain of inertia": (inertia, "1"),
     }
+    # The held wall sways: only the mean of that part says what gravity alone shows.
+    held = pick & (grid.time_s < 0.0)
+    if held.any():
+        measured[held], gravity[held] = measured[held].mean(), gravity[held].mean()
+        expected = gravity + inertia - grid.omega**2 * arm
+        columns["gain of gravity"], columns["gain of inertia"] = (gravity, "1"), (inertia, "1")
     # No lag here: between impacts the specific force hardly changes. The impacts themselves tell it.
     return regress("accelerometer", measured - expected, columns, pick, ("zero",))
-
-
-def _impact_block(run: GapRun, grid: Grid, swings: Swings) -> Block | None:
-    """Onset of the ringing in the accelerometers after the reference rotation passes upright."""
-    chosen = [i for i in run.indices("accelerometer") if np.all(np.isfinite(run.channels[i]))]
-    if not chosen or grid.impact_s.size < 3:
-        return None
-    high_pass = butter(2, RING_HZ, "high", fs=run.rate_hz, output="sos")
-    energy = np.zeros(run.channels.shape[1])
-    for i in chosen:
-        energy += sosfilt(high_pass, run.aligned(i)) ** 2  # causal: nothing rings before the impact
-    level = np.sqrt(energy / len(chosen))
-    quiet = float(np.median(level[: int(0.5 * run.rate_hz)]))
-    half = int(ONSET_WINDOW_S * run.rate_hz)
-    delays = []
-    for time in grid.impact_s[:ONSETS]:
-        at = round((time + swings.release_s) * run.rate_hz)
-        window = level[max(at - half, 0) : at + half]
-        if window.size == 2 * half and window.max() > 8 * quiet:
-            onset = int(np.argmax(window > max(0.25 * window.max(), 5 * quiet)))
-            delays.append((onset - half) / run.rate_hz)
-    if len(delays) < 3:
-        return None
-    middle = float(np.median(delays))
-    spread = 1.48 * float(np.median(np.abs(np.array(delays) - middle)))
-    variance = 1.57 * spread**2 / len(delays) + ONSET_ERROR_S**2
-    projection = np.zeros((1, int(grid.valid.size)))
-    everywhere = np.ones(grid.valid.size, dtype=bool)
-    values, covariance = np.array([middle]), np.array([[variance]])
-    return Block("impact marks", ("onset",), ("s",), values, covariance, projection, everywhere)
 
 
 def _lift_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:

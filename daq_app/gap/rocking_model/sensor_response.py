@@ -7,12 +7,11 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model import extra_response as extra
 from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.sensor_blocks import (
-    GRID_HZ,
     Block,
     first_order,
     impacts_of,
@@ -31,7 +30,7 @@ REPEATABILITY: dict[tuple[str, str], float] = {
     ("tiltmeter", "drift"): 1e-5,
     ("accelerometer", "gain of gravity"): 1e-2,
     ("accelerometer", "gain of inertia"): 3e-3,
-    ("impact marks", "onset"): 5e-4,
+    ("impact timing", "delay"): 3e-4,
     ("base", "slip per speed"): 2e-4,
     ("base", "follows rotation"): 1e-3,
     ("joint", "pivot"): 3e-4,
@@ -42,6 +41,10 @@ REPEATABILITY: dict[tuple[str, str], float] = {
     ("twist", "follows rotation"): 3e-4,
 }
 """Unit in which coefficients scatter from run to run; the model's scatter multiplies it."""
+
+
+RING_SCATTER = 0.06
+"""Relative repeatability of a ring-down, of which the scatter takes about half."""
 
 
 def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
@@ -124,17 +127,34 @@ def _free_basis(run: RockingRun) -> tuple[NDArray[np.intp], NDArray[np.intp], Fl
 
 def block_coefficients(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
     """Predicted coefficients of all blocks of a run, and the unit of their scatter, each (k,)."""
-    predicted, scatter = [], []
-    for block in run.blocks:
-        coefficients = _PREDICT[block.family](run, block, values).copy()
-        for i, name in enumerate(block.names):
-            unit = REPEATABILITY[(block.family, name)]
-            scatter.append(unit)
-            coefficients[i] += 3 * unit * values.get(f"free_{block.family}.c{i}", 0.0)
-        predicted.append(coefficients)
-    if not predicted:
+    if not run.blocks:
         return np.zeros(0), np.zeros(0)
-    return np.concatenate(predicted), np.array(scatter)
+    if "units" not in run.cache:
+        run.cache["units"] = [
+            np.array([repeatability(block, i) for i in range(len(block.names))]) for block in run.blocks
+        ]
+    units: list[FloatArray] = run.cache["units"]
+    predicted = []
+    for block, unit in zip(run.blocks, units, strict=True):
+        coefficients = _PREDICT[block.rule](run, block, values)
+        if f"free_{block.family}.c0" in values:
+            free = [values.get(f"free_{block.family}.c{i}", 0.0) for i in range(unit.size)]
+            coefficients = coefficients + 3.0 * unit * np.array(free)
+        predicted.append(coefficients)
+    return np.concatenate(predicted), np.concatenate(units)
+
+
+def repeatability(block: Block, i: int) -> float:
+    """Unit in which a coefficient scatters from run to run; 0 for what does not."""
+    match block.rule:
+        case "conditions" | "floor":
+            return 0.0
+        case "bending" | "turning":
+            # Kicks differ from impact to impact as r does; frequency and damping do not.
+            return 0.0 if block.names[i] in ("frequency", "damping") else RING_SCATTER * abs(block.values[i])
+        case "channel":
+            return 0.1 * float(np.sqrt(block.covariance[i, i])) if i == len(block.names) - 1 else 0.0
+    return REPEATABILITY[(block.family, block.names[i])]
 
 
 def _family_difference(run: RockingRun, family: str, values: Mapping[str, float]) -> FloatArray | None:
@@ -153,6 +173,7 @@ def _family_difference(run: RockingRun, family: str, values: Mapping[str, float]
         ("filter_delay", "tau"),
         ("drift", "rate"),
         ("wire_cosine", "kappa"),
+        ("wire_inertia", "frequency"),
     ):
         value = values.get(f"{name}@{family}.{parameter}")
         if value is None:
@@ -164,30 +185,16 @@ def _family_difference(run: RockingRun, family: str, values: Mapping[str, float]
         elif name == "slow_response":
             add(first_order(grid.theta, value) - grid.theta)
         elif name == "filter_delay":
-            add(_bessel(grid.theta, value) - grid.theta)
+            add(extra.bessel(grid.theta, value) - grid.theta)
+        elif name == "wire_inertia":
+            zeta = values.get(f"wire_inertia@{family}.zeta", 0.2)
+            add(extra.resonator(grid.theta, 2.0 * np.pi * value, zeta) - grid.theta)
         elif name == "drift":
             scale = {"wire": run.wire_height_m, "lvdt": np.inf}.get(family, 1.0)
             add(value / scale * (grid.time_s - (run.swings.rest_s - run.swings.release_s)))
         else:
             add(run.wire_height_m * value * grid.theta**2)
     return total
-
-
-def _bessel(values: FloatArray, delay_s: float) -> FloatArray:
-    """Second-order Bessel low-pass of group delay `delay_s`, as two real steps of the coarse grid."""
-    if delay_s <= 1e-5:
-        return values
-    omega, zeta = np.sqrt(3.0) / delay_s, np.sqrt(3.0) / 2.0
-    step = 2.0 * GRID_HZ
-    b0 = omega**2
-    a = np.array(
-        [step**2 + 2 * zeta * omega * step + b0, 2 * b0 - 2 * step**2, step**2 - 2 * zeta * omega * step + b0]
-    )
-    b = np.array([b0, 2 * b0, b0]) / a[0]
-    a = a / a[0]
-    shifted = values - values[0]
-    found: FloatArray = lfilter(b, a, shifted) + values[0]
-    return found
 
 
 def _difference_of(
@@ -261,11 +268,14 @@ def _accelerometer(run: RockingRun, block: Block, values: Mapping[str, float]) -
     return np.array([found.get(name, 0.0) for name in block.names])
 
 
-def _impact_marks(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+def _impact_timing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     """Accelerometers against the reference rotation: their own delay less that of the reference."""
     delays = ("lag", "slow_response", "filter_delay")
     late = sum(values.get(f"{effect}@accelerometer.tau", 0.0) for effect in delays)
     late -= sum(values.get(f"{effect}@{run.reference}.tau", 0.0) for effect in delays)
+    if f"wire_inertia@{run.reference}.frequency" in values:
+        zeta = values.get(f"wire_inertia@{run.reference}.zeta", 0.2)
+        late -= 2.0 * zeta / (2.0 * np.pi * values[f"wire_inertia@{run.reference}.frequency"])
     return np.array([values["onset"] + late])
 
 
@@ -309,11 +319,24 @@ def _twist(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatA
     return found
 
 
+def _bending(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    return extra.bending(run, block, values, _difference_of(run, "wire", "lvdt", values))
+
+
+def _turning(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    return extra.turning(run, block, values)
+
+
 _PREDICT = {
     "wire": _wire,
     "tiltmeter": _tiltmeter,
     "accelerometer": _accelerometer,
-    "impact marks": _impact_marks,
+    "impact timing": _impact_timing,
+    "channel": extra.channel,
+    "bending": _bending,
+    "turning": _turning,
+    "conditions": extra.conditions,
+    "floor": extra.floor,
     "joint": _joint,
     "base": _base,
     "twist": _twist,

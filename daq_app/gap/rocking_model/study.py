@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from daq_app.gap.core import CannotDiagnose, Diagnosis, Options, diagnose
+from daq_app.gap.core import CannotDiagnose, Diagnosis, Library, Options, diagnose
 from daq_app.gap.core.result import Decision
+from daq_app.gap.rocking_model.conditions import Mark
+from daq_app.gap.rocking_model.extra_response import MARKS
+from daq_app.gap.rocking_model.inspection import (
+    calibrations,
+    choose_reference,
+    completed,
+    found_channels,
+    found_marks,
+    inspect,
+    without_suspects,
+)
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun, check_consistent
-from daq_app.gap.rocking_model.run_features import RockingRun, extract
+from daq_app.gap.rocking_model.run_features import Examined, RockingRun, examine
 
 FAR_FROM_SURVEY = 4.0
 """Prior sd by which α, p or the base may differ from the survey before the rig file is doubted."""
@@ -24,24 +35,58 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
     Raises `CannotDiagnose` where no run can be used, or where runs do not belong together.
     """
     check_consistent(runs)
-    found: list[RockingRun] = []
     limits: list[str] = []
-    impacts = 0.0
+    usable: list[GapRun] = []
     for run in runs:
         try:
+            usable.append(_without_gaps(run))
+        except CannotDiagnose as problem:
+            if len(runs) == 1:
+                raise
+            limits.append(f"Left out. {problem}")
+    if not usable:
+        raise CannotDiagnose("None of the runs can be used.", " ".join(limits))
+    inspected = inspect(usable)
+    reference = choose_reference(inspected)
+    examined: list[Examined] = []
+    marks: list[Sequence[Mark]] = []
+    impacts = 0.0
+    for run, seen in zip(inspected.runs, inspected.marks, strict=True):
+        try:
             whole = run if run.impacts_before else replace(run, impacts_before=impacts)
-            features = extract(_without_gaps(whole))
+            entry = examine(whole, reference)
         except CannotDiagnose as problem:
             if len(runs) == 1:
                 raise
             limits.append(f"Left out. {problem}")
             continue
-        found.append(features)
-        limits += features.notes
-        impacts = features.impacts_before + features.swings.peak_s.size
-    if not found:
+        examined.append(entry)
+        marks.append(seen)
+        impacts = entry.features.impacts_before + entry.features.swings.peak_s.size
+    if not examined:
         raise CannotDiagnose("None of the runs can be used.", " ".join(limits))
-    return found, limits
+    examined, channels = without_suspects(examined, reference)
+    for entry in examined:
+        limits += entry.features.notes
+    limits += _stated(marks, channels)
+    return completed(examined, marks, channels), limits
+
+
+def _stated(marks: Sequence[Sequence[Mark]], channels: Mapping[str, str]) -> list[str]:
+    """What the inspection took out of the families, in words."""
+    words = [
+        f"{name} disagrees with the other {family} channels; it is examined on its own."
+        for name, family in channels.items()
+    ]
+    seen: dict[str, list[Mark]] = {}
+    for row in marks:
+        for mark in row:
+            if mark.value > 0.0:
+                seen.setdefault(mark.key, []).append(mark)
+    for key, found in seen.items():
+        middle = float(np.median([m.value for m in found]))
+        words.append(f"{key}: {found[0].observable} {middle:.3g} {found[0].unit} in {len(found)} runs.")
+    return words
 
 
 def _without_gaps(run: GapRun) -> GapRun:
@@ -70,9 +115,22 @@ def diagnose_runs(runs: Sequence[GapRun], options: Options | None = None) -> Dia
         limits.append(
             "All releases are to one side: release effects cannot be told from a difference of sides."
         )
-    model = RockingModel(prepared[0].survey)
-    result = diagnose(model, prepared, rocking_library(), options, limits)
+    model, library = model_and_library(prepared)
+    result = diagnose(model, prepared, library, options, limits)
     return _doubt_the_survey(result)
+
+
+def model_and_library(prepared: Sequence[RockingRun]) -> tuple[RockingModel, Library]:
+    """The model with the calibrations of the channels that are examined on their own, and the effects.
+
+    Effects that these runs cannot show at all are left out: vibration of the floor where none is seen.
+    """
+    channels, marks = found_channels(prepared), found_marks(prepared)
+    named = {key: family for key, family in marks.items() if key.partition("@")[0] in MARKS}
+    library = rocking_library(channels, named)
+    if not any(run.vibration is not None and run.vibration.found for run in prepared):
+        library = library.without("ambient")
+    return RockingModel(prepared[0].survey, calibrations(prepared)), library
 
 
 def _doubt_the_survey(result: Diagnosis) -> Diagnosis:

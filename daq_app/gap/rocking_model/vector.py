@@ -29,18 +29,20 @@ PROBE_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45)
 _BLOCKS_ONLY = frozenset(
     ("cal_tiltmeter", "cal_accelerometer", "tilt_response", "onset", "base_follow", "twist_follow")
 ) | {"mount_height", "wire_even"}
+_STILL = ("flexible_wall.", "yaw.", "twist.", "sliding.")
+"""Effects that do not move the rotation of the joint."""
 _SWINGS_ONLY = frozenset(("p", "r", "zero", "theta0", "omega0", "viscous.zeta", "coulomb.mu"))
-_FAMILIES = frozenset(("lvdt", "wire", "tiltmeter", "accelerometer"))
 
 
 def acts_on(part: str, key: str, reference: str) -> bool:
     """Whether a value moves the ``swings`` or the ``blocks`` of a prediction; yes unless known otherwise."""
     if part == "blocks":
         return key not in _SWINGS_ONLY
-    if key in _BLOCKS_ONLY:
+    if key in _BLOCKS_ONLY or key.startswith(_STILL):
         return False
-    target = key.rpartition(".")[0].rpartition("@")[2] if "@" in key else ""
-    return target == reference or target not in _FAMILIES
+    if key.startswith("cal_") and key != "cal_wire":
+        return False  # of one channel, which is not used with its family
+    return "@" not in key or key.rpartition(".")[0].rpartition("@")[2] == reference
 
 
 def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> tuple[bytes, FloatArray, float]:

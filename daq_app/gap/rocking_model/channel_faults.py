@@ -1,0 +1,232 @@
+"""One channel that disagrees with its own family: which, and in what (gain, lag, curvature, drift).
+
+Each channel is predicted from the others of its family by geometry alone, so that whatever the wall or
+the whole family does cancels. What is left is regressed on a few shapes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from daq_app.config.rig import Family
+from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.rotation import wall_rotation, zeroed
+from daq_app.gap.rocking_model.sensor_blocks import GRID_HZ, SMOOTH_HZ, Block, Grid, coarse
+
+SHAPES = ("gain", "lag", "curvature", "drift")
+_UNITS: dict[Family, tuple[str, str, str, str]] = {
+    "lvdt": ("1", "s", "1/m", "m/s"),
+    "wire": ("1", "s", "1/m", "m/s"),
+    "accelerometer": ("1", "s", "s²/m", "m/s³"),
+}
+TOLERANCE: dict[Family, tuple[float, float, float, float]] = {
+    "lvdt": (3.2e-3, 3e-4, 0.06, 4e-6),
+    "wire": (3.2e-3, 3e-4, 0.02, 1.2e-5),
+    "accelerometer": (3.2e-3, 2e-3, 2e-3, 1.5e-3),
+}
+"""What healthy channels differ by: calibration, and how well the others predict them."""
+CALIBRATION = 3e-3
+"""Relative tolerance of one channel's calibration."""
+SUSPECT = 4.0
+"""Tolerances by which a channel must be off to be looked at on its own."""
+STRUCTURE = 0.5
+"""Excess of the logarithm of what remains over noise from which a channel is suspect for it alone."""
+STRUCTURE_SD = 0.2
+SCREENED = 3
+"""Runs that are looked at before all are."""
+
+
+@dataclass(frozen=True, slots=True)
+class Others:
+    """A channel beside what the others of its family make of it, on the grid; both (m,), SI."""
+
+    measured: FloatArray
+    expected: FloatArray
+    pick: NDArray[np.bool_]
+    spread: float
+    """How many times one channel's calibration error the relative error of the prediction is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Deviation:
+    """Coefficients of one channel in one run, as `SHAPES`, with covariance, and what remains over noise."""
+
+    values: FloatArray
+    covariance: FloatArray
+    projection: FloatArray
+    design: FloatArray
+    """Orthonormal basis of the shapes at the samples used."""
+    remains: float
+    """ln of the rms that the shapes leave, over the rms at rest."""
+    noise: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Family:
+    """Signals of a family on the grid with their geometry: signals ≈ design @ motion, row by row."""
+
+    ids: tuple[str, ...]
+    signals: FloatArray
+    design: FloatArray
+    pick: NDArray[np.bool_]
+
+
+def suspects(runs: Sequence[GapRun], grids: Sequence[Grid]) -> dict[Family, str]:
+    """The one channel of each family that disagrees with all others, where the others agree."""
+    found: dict[Family, str] = {}
+    for family in TOLERANCE:
+        data = [_family(run, grid, family) for run, grid in zip(runs, grids, strict=True)]
+        usable = [d for d in data if d is not None]
+        if len(usable) < len(data) or not usable:
+            continue
+        some = usable[:: max(len(usable) // SCREENED, 1)][:SCREENED]
+        sizes = _sizes(some, family, ())
+        order = [name for name in sorted(sizes, key=lambda name: -sizes[name]) if sizes[name] > 0.5 * SUSPECT]
+        for name in order[:3]:
+            # A bad channel spoils the prediction of the others: right is the one without which all agree.
+            rest = _sizes(usable, family, (name,))
+            own = rest.pop(name)
+            if own > SUSPECT and max(rest.values()) < max(SUSPECT, 0.4 * own):
+                found[family] = name
+                break
+    return found
+
+
+def _sizes(data: Sequence[_Family], family: Family, without: tuple[str, ...]) -> dict[str, float]:
+    """How far off each channel is, in tolerances: the middle of all runs."""
+    rows: dict[str, list[float]] = {}
+    for entry in data:
+        beside = {name: _beside(entry, name, without) for name in entry.ids}
+        table = {name: deviation(other) for name, other in beside.items()}
+        usual = float(np.median([found.remains for found in table.values()]))
+        for name, found in table.items():
+            tolerance = np.array(TOLERANCE[family]) * beside[name].spread
+            sd = np.hypot(tolerance, np.sqrt(np.diag(found.covariance)))
+            size = float(np.abs(found.values / sd).max())
+            rows.setdefault(name, []).append(max(size, SUSPECT * (found.remains - usual) / STRUCTURE))
+    return {name: float(np.median(values)) for name, values in rows.items()}
+
+
+def channel_block(run: GapRun, grid: Grid, family: Family, name: str) -> Block | None:
+    """The coefficients of one channel as a block of features."""
+    data = _family(run, grid, family, include=(name,))
+    if data is None or name not in data.ids:
+        return None
+    beside = _beside(data, name, (name,))
+    found = deviation(beside)
+    usual = float(np.median([deviation(_beside(data, n, (name,))).remains for n in data.ids if n != name]))
+    k = len(SHAPES)
+    covariance = np.zeros((k + 1, k + 1))
+    covariance[:k, :k] = found.covariance
+    covariance[k, k] = STRUCTURE_SD**2
+    return Block(
+        name,
+        (*SHAPES, "what remains"),
+        (*_UNITS[family], "1"),
+        np.append(found.values, max(found.remains - usual, 0.0)),
+        covariance,
+        found.projection,
+        beside.pick,
+        kind="channel",
+        expected=beside.expected,
+        design=found.design,
+        noise=found.noise * float(np.exp(max(usual, 0.0))),
+        tags={name: family},
+        levers=(CALIBRATION * beside.spread,),
+    )
+
+
+def deviation(beside: Others) -> Deviation:
+    """Regress what a channel shows beyond the others' prediction on the shapes."""
+    e = beside.expected
+    columns = np.column_stack(
+        [
+            e,
+            -np.gradient(e, 1.0 / GRID_HZ),
+            e**2,
+            np.arange(e.size) / GRID_HZ,
+            np.ones_like(e),
+        ]
+    )[beside.pick]
+    scale = np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
+    inverse = np.linalg.pinv(columns / scale, rcond=1e-9) / scale[:, None]
+    difference = (beside.measured - e)[beside.pick]
+    left = difference - columns @ (inverse @ difference)
+    variance = float(left @ left) / max(left.size - columns.shape[1], 1)
+    fraction = max(independent_fraction(left), 0.01)
+    rest = (beside.measured - e)[-round(0.4 * GRID_HZ) :]
+    noise = float(np.std(rest - np.linspace(rest[:8].mean(), rest[-8:].mean(), rest.size))) + 1e-12
+    kept = slice(0, len(SHAPES))
+    covariance = variance / fraction * (inverse @ inverse.T)[kept, kept]
+    return Deviation(
+        (inverse @ difference)[kept],
+        covariance,
+        inverse[kept],
+        np.linalg.qr(columns / scale)[0],
+        0.5 * float(np.log(variance / noise**2)),
+        noise,
+    )
+
+
+def _beside(data: _Family, name: str, without: tuple[str, ...]) -> Others:
+    place = data.ids.index(name)
+    others = [i for i, other in enumerate(data.ids) if other != name and other not in without]
+    weights = data.design[place] @ np.linalg.pinv(data.design[others])
+    expected = weights @ data.signals[others]
+    # A channel far from the others is predicted by a difference of them: their errors grow.
+    sizes = np.sqrt(np.mean(data.signals[others] ** 2, axis=1))
+    own = float(np.sqrt(np.mean(expected**2))) + 1e-300
+    spread = float(np.sqrt(1.0 + np.sum((weights * sizes / own) ** 2)))
+    return Others(data.signals[place], expected, data.pick, spread)
+
+
+def _family(run: GapRun, grid: Grid, family: Family, include: tuple[str, ...] = ()) -> _Family | None:
+    whole = run.including(include)
+    moving = (grid.time_s > -0.5) & (grid.time_s < grid.rest_s + 0.2)
+    match family:
+        case "lvdt":
+            return _lvdts(whole, moving & grid.valid)
+        case "wire":
+            return _wires(whole, moving)
+        case "accelerometer":
+            return _accelerometers(whole, moving & ~grid.near_impact)
+    return None
+
+
+def _lvdts(run: GapRun, pick: NDArray[np.bool_]) -> _Family | None:
+    chosen = [i for i in run.indices("lvdt") if np.all(np.isfinite(run.channels[i]))]
+    if len(chosen) < 8:
+        return None
+    place = np.array([run.sensors[i].position_m for i in chosen])
+    design = np.column_stack([np.ones(len(chosen)), -place[:, 0], -place[:, 0] * place[:, 1]])
+    signals = np.array([coarse(zeroed(run, i), run.rate_hz) for i in chosen])
+    return _Family(tuple(run.sensors[i].id for i in chosen), signals, design, pick)
+
+
+def _wires(run: GapRun, pick: NDArray[np.bool_]) -> _Family | None:
+    rows, heights, names = wall_rotation(run)
+    if len(names) < 4:
+        return None
+    signals = np.array([z * coarse(row, run.rate_hz) for z, row in zip(heights, rows, strict=True)])
+    return _Family(names, signals, np.column_stack([np.ones(len(names)), heights]), pick)
+
+
+def _accelerometers(run: GapRun, pick: NDArray[np.bool_]) -> _Family | None:
+    chosen = [
+        i
+        for i in run.indices("accelerometer", "x")
+        if np.all(np.isfinite(run.channels[i])) and not run.sensors[i].ac_coupled
+    ]
+    if len(chosen) < 4:
+        return None
+    low_pass = butter(4, SMOOTH_HZ, fs=GRID_HZ, output="sos")
+    signals = np.array([sosfiltfilt(low_pass, coarse(zeroed(run, i), run.rate_hz)) for i in chosen])
+    heights = np.array([run.sensors[i].position_m[2] for i in chosen])
+    names = tuple(run.sensors[i].id for i in chosen)
+    return _Family(names, signals, np.column_stack([np.ones(len(chosen)), heights]), pick)

@@ -1,0 +1,238 @@
+"""What the electronics do to a channel, seen in its own samples: hum, stairs, frozen samples, spikes.
+
+None of these needs a fit of the wall. Each becomes a mark: a number with its error that is zero on a
+healthy channel, and which only the effect of that name predicts to be anything else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from daq_app.config.rig import Family
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.records import GapRun
+
+MAINS_HZ = 50.0
+FEWEST_STEPS = 0.004
+"""Share of samples at which a reading in stairs goes on by a step."""
+SMALLEST_STEP = 5e-4
+"""Smallest step that matters, as a share of the span of the reading."""
+FROZEN_S = 0.008
+"""Equal readings in a row for longer than this are no chance."""
+SPIKE_SIZE = 9.0
+"""A sample this many noise sd off its neighbours is a spike."""
+RANGE_MARGIN = 0.03
+"""Share of the range next to its end where a reading may stand still: the sensor is at its stop."""
+_FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer")
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """One condition of one channel or family in one run: 0 ± sd on a healthy one."""
+
+    key: str
+    """``hum@LV-A03``: the effect that explains it; or a plain word that no effect explains."""
+    observable: str
+    unit: str
+    value: float
+    sd: float
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """What the samples of one channel in one run say."""
+
+    hum_si: float
+    hum_sd: float
+    hum_wave: FloatArray | None
+    """The hum itself, shape (n,), where there is any."""
+    step_si: float
+    step_sd: float
+    frozen_share: float
+    spikes_per_s: float
+
+
+def inspect_channel(run: GapRun, index: int) -> Condition:
+    """Examine one channel of one run; NaN anywhere means that nothing is examined."""
+    values = run.channels[index]
+    if not np.all(np.isfinite(values)):
+        return Condition(0.0, 1.0, None, 0.0, 1.0, 0.0, 0.0)
+    rate, accelerometer = run.rate_hz, run.sensors[index].family == "accelerometer"
+    noise = _white_noise(values, rate)
+    hum, hum_sd, wave = _hum(values, rate)
+    if accelerometer:
+        return Condition(hum, hum_sd, wave, 0.0, 1.0, 0.0, 0.0)
+    clean = values if wave is None else values - wave
+    step, step_sd = _stairs(values, run.sensors[index].noise_si)
+    frozen = _frozen(values, rate, step, run.sensors[index].range_si)
+    spikes = _spikes(clean, noise, rate) if step == 0.0 and frozen == 0.0 else 0.0
+    return Condition(hum, hum_sd, wave, step, step_sd, frozen, spikes)
+
+
+def _white_noise(values: FloatArray, rate_hz: float) -> float:
+    """Rms of the sample-to-sample noise at rest, robust against spikes."""
+    rest = values[-int(0.45 * rate_hz) :]
+    second = rest[2:] - 2.0 * rest[1:-1] + rest[:-2]
+    return float(1.4826 * np.median(np.abs(second - np.median(second))) / np.sqrt(6.0)) + 1e-15
+
+
+def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray | None]:
+    """(amplitude, its sd, the wave over the record) of the mains frequency, from the rest at the end."""
+    count = round(0.6 * rate_hz)
+    rest = values[-count:] - values[-count:].mean()
+    t = (np.arange(values.size) - (values.size - count)) / rate_hz
+    design = _wave_columns(t[-count:], MAINS_HZ)
+    left = rest - design @ np.linalg.lstsq(design, rest, rcond=None)[0]
+    noise = float(np.sqrt(np.mean(left**2)))
+    sd = noise * np.sqrt(2.0 / count)
+    amplitude = float(np.hypot(*np.linalg.lstsq(design, rest, rcond=None)[0][:2]))
+    if amplitude < 6.0 * sd:
+        return amplitude, float(sd), None
+    # Over the whole record the frequency is sharp enough for the phase to hold.
+    high = values - sosfiltfilt(butter(2, 25.0, fs=rate_hz, output="sos"), values)
+    frequencies = np.linspace(MAINS_HZ - 0.6, MAINS_HZ + 0.6, 25)
+    power = [float(np.abs(np.sum(high * np.exp(-2j * np.pi * f * t)))) for f in frequencies]
+    best = float(frequencies[int(np.argmax(power))])
+    whole = _wave_columns(t, best)[:, :2]
+    wave = whole @ np.linalg.lstsq(whole, high, rcond=None)[0]
+    return amplitude, float(sd), np.asarray(wave, dtype=float)
+
+
+def _wave_columns(t: FloatArray, frequency: float) -> FloatArray:
+    return np.column_stack(
+        [np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t), np.ones_like(t), t]
+    )
+
+
+def _stairs(values: FloatArray, noise_si: float) -> tuple[float, float]:
+    """(step, its sd) of a reading that only takes values a step apart; 0 where it does not.
+
+    From sample to sample such a reading stays, or goes on by whole steps; noise does neither.
+    """
+    change = np.abs(np.diff(values))
+    top = float(np.quantile(change, 0.9995))
+    large = change > 0.4 * top
+    if top <= 0.0 or np.mean(large) < FEWEST_STEPS:
+        return 0.0, 1.0
+    step = float(np.median(change[large]))
+    rest = float(np.sqrt(np.mean(change[~large] ** 2)))
+    whole = change[large] / step
+    if rest > 0.05 * step or np.mean(np.abs(whole - np.round(whole)) < 0.15) < 0.9:
+        return 0.0, 1.0
+    if step < 3.0 * noise_si or step < SMALLEST_STEP * float(np.ptp(values)):
+        return 0.0, 1.0  # that is the converter's own step
+    return step, 0.02 * step
+
+
+def _frozen(values: FloatArray, rate_hz: float, step: float, limits: tuple[float, float]) -> float:
+    """Share of the record in which the reading stands still although it should not."""
+    inside = (values > limits[0] + RANGE_MARGIN * np.abs(limits[0])) & (
+        values < limits[1] * (1 - RANGE_MARGIN)
+    )
+    same = (np.diff(values) == 0.0) & inside[1:]
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
+    starts, stops = edges[::2], edges[1::2]
+    long = stops - starts > FROZEN_S * rate_hz
+    if step > 0.0:
+        # Stairs stand still too, but then the reading goes on by one step.
+        after = np.minimum(stops + 1, values.size - 1)
+        jumps = np.abs(values[after] - values[starts])
+        long &= jumps > 2.5 * step
+    return float(np.sum((stops - starts)[long])) / values.size
+
+
+def _spikes(values: FloatArray, noise: float, rate_hz: float) -> float:
+    """Samples per second that stand alone: far from the mean of both neighbours, which agree."""
+    middle = values[1:-1] - 0.5 * (values[2:] + values[:-2])
+    apart = np.abs(values[2:] - values[:-2])
+    alone = (np.abs(middle) > SPIKE_SIZE * 1.22 * noise) & (apart < 0.5 * np.abs(middle))
+    return float(np.sum(alone)) / values.size * rate_hz
+
+
+def conditions_of(runs: Sequence[GapRun]) -> list[dict[str, Condition]]:
+    """Conditions of every LVDT, wire and accelerometer, by id, run by run."""
+    return [
+        {
+            sensor.id: inspect_channel(run, i)
+            for i, sensor in enumerate(run.sensors)
+            if sensor.family in _FAMILIES and sensor.id not in run.excluded
+        }
+        for run in runs
+    ]
+
+
+def without_hum(run: GapRun, conditions: dict[str, Condition]) -> GapRun:
+    """The run less the hum of its channels."""
+    waves = {i: conditions[s.id].hum_wave for i, s in enumerate(run.sensors) if s.id in conditions}
+    if all(wave is None for wave in waves.values()):
+        return run
+    channels = run.channels.copy()
+    for i, wave in waves.items():
+        if wave is not None:
+            channels[i] -= wave
+    return replace(run, channels=channels)
+
+
+def marks_of(runs: Sequence[GapRun], conditions: Sequence[dict[str, Condition]]) -> list[list[Mark]]:
+    """Marks of all runs. Each condition carries the same key in every run: a channel, or its family."""
+    marks: list[list[Mark]] = [[] for _ in runs]
+    for family in _FAMILIES:
+        ids = [s.id for s in runs[0].sensors if s.family == family and s.id in conditions[0]]
+        rows = [[found[name] for name in ids] for found in conditions]
+        if not ids:
+            continue
+        table = {
+            "hum": [[(c.hum_si, c.hum_sd, c.hum_wave is not None) for c in row] for row in rows],
+            "quantisation": [[(c.step_si, c.step_sd, c.step_si > 0) for c in row] for row in rows],
+            "dropout": [[(c.frozen_share, 1e-3, c.frozen_share > 1e-3) for c in row] for row in rows],
+            "spikes": [[(c.spikes_per_s, 0.05, c.spikes_per_s > 0.3) for c in row] for row in rows],
+        }
+        for name, cells in table.items():
+            if family == "accelerometer" and name != "hum":
+                continue
+            key, chosen = _who(family, ids, [[cell[2] for cell in row] for row in cells])
+            for run_marks, row in zip(marks, cells, strict=True):
+                value, sd = _amount(name, [row[k] for k in chosen] if chosen else row)
+                run_marks.append(Mark(f"{name}@{key}", *_WORDS[name][family], value, sd))
+    return marks
+
+
+_WORDS: dict[str, dict[str, tuple[str, str]]] = {
+    "hum": {
+        "lvdt": ("hum of the mains", "m"),
+        "wire": ("hum of the mains", "m"),
+        "accelerometer": ("hum of the mains", "m/s²"),
+    },
+    "quantisation": {"lvdt": ("step of the reading", "m"), "wire": ("step of the reading", "m")},
+    "dropout": {"lvdt": ("share of frozen samples", "1"), "wire": ("share of frozen samples", "1")},
+    "spikes": {"lvdt": ("lone samples", "1/s"), "wire": ("lone samples", "1/s")},
+}
+
+
+def _who(family: str, ids: Sequence[str], seen: Sequence[Sequence[bool]]) -> tuple[str, list[int]]:
+    """(name, places): the one channel that has it, or the family when several or none have it."""
+    share = np.mean(np.asarray(seen, dtype=float), axis=0)
+    having = np.flatnonzero(share >= 0.5)
+    if having.size == 1:
+        return ids[int(having[0])], [int(having[0])]
+    return family, [int(k) for k in having]
+
+
+def _amount(name: str, cells: Iterable[tuple[float, float, bool]]) -> tuple[float, float]:
+    """(value, sd) over the channels chosen: their median, or nothing where none has it."""
+    values = [(value, sd) for value, sd, seen in cells if seen]
+    listed = list(cells) if not isinstance(cells, list) else cells
+    noise = float(np.median([sd for _, sd, _ in listed]))
+    if not values:
+        return 0.0, 3.0 * noise if name in ("hum",) else _NONE[name] * 1.0
+    middle = float(np.median([v for v, _ in values]))
+    spread = float(np.std([v for v, _ in values])) / np.sqrt(len(values))
+    return middle, float(np.hypot(np.median([s for _, s in values]), spread)) + 1e-3 * middle
+
+
+_NONE = {"quantisation": 1e-5, "dropout": 1e-3, "spikes": 0.05}
+"""Error of "there is none": well below what would be found."""

@@ -1,0 +1,174 @@
+"""What effects do to the blocks beyond the families: one channel, ring-downs, marks, the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.signal import lfilter
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.run_features import RockingRun
+from daq_app.gap.rocking_model.sensor_blocks import GRID_HZ, Block, first_order
+
+MARKS: dict[str, str] = {
+    "hum": "amplitude",
+    "quantisation": "step",
+    "dropout": "share",
+    "saturation": "limit",
+    "polarity": "on",
+    "swap": "places",
+}
+"""Effect behind a mark, and its parameter."""
+
+
+def bessel(values: FloatArray, delay_s: float) -> FloatArray:
+    """Second-order Bessel low-pass of group delay `delay_s` on the coarse grid."""
+    if delay_s <= 1e-5:
+        return values
+    return resonator(values, np.sqrt(3.0) / delay_s, np.sqrt(3.0) / 2.0)
+
+
+def resonator(values: FloatArray, natural: float, zeta: float) -> FloatArray:
+    """ÿ/ω² + 2ζẏ/ω + y = x on the coarse grid (bilinear, exact at ω); starts settled."""
+    step = natural / np.tan(min(0.5 * natural / GRID_HZ, 1.4))
+    b0 = natural**2
+    a = np.array(
+        [
+            step**2 + 2 * zeta * natural * step + b0,
+            2 * b0 - 2 * step**2,
+            step**2 - 2 * zeta * natural * step + b0,
+        ]
+    )
+    b = np.array([b0, 2 * b0, b0]) / a[0]
+    found: FloatArray = lfilter(b, a / a[0], values - values[0]) + values[0]
+    return found
+
+
+def responded(values: FloatArray, effect: str, given: Mapping[str, float]) -> FloatArray:
+    """A signal on the grid as a sensor with the effect shows it."""
+    match effect:
+        case "gain":
+            return values * (1.0 + given["error"])
+        case "lag":
+            k = np.arange(values.size, dtype=float)
+            return np.asarray(np.interp(k - given["tau"] * GRID_HZ, k, values))
+        case "slow_response":
+            return first_order(values, given["tau"])
+        case "filter_delay":
+            return bessel(values, given["tau"])
+        case "wire_inertia":
+            return resonator(values, 2.0 * np.pi * given["frequency"], given.get("zeta", 0.2))
+        case "wire_cosine":
+            return values + given["kappa"] * values**2
+        case "drift":
+            return values + given["rate"] * np.arange(values.size) / GRID_HZ
+    raise KeyError(effect)
+
+
+def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """Coefficients of one channel against its family, and the logarithm of what they leave over noise."""
+    assert block.expected is not None
+    assert block.design is not None
+    total: FloatArray | None = None
+    for key in {k.rpartition(".")[0] for k in values if k.rpartition(".")[0].endswith("@" + block.family)}:
+        effect = key.partition("@")[0]
+        if effect in MARKS:
+            continue
+        given = {k.rpartition(".")[2]: v for k, v in values.items() if k.rpartition(".")[0] == key}
+        series = responded(block.expected, effect, given) - block.expected
+        total = series if total is None else total + series
+    found = np.zeros(len(block.names))
+    if total is not None:
+        seen = total[block.pick]
+        found[:-1] = block.projection @ seen
+        left = seen - block.design @ (block.design.T @ seen)
+        found[-1] = 0.5 * np.log1p(float(left @ left) / seen.size / block.noise**2)
+    found[0] += values.get(f"cal_{block.family}", 0.0)
+    return found
+
+
+def bending(
+    run: RockingRun, block: Block, values: Mapping[str, float], wires: FloatArray | None
+) -> FloatArray:
+    """Ring-down of a cantilever mode, and what effects on the wires look like in the same columns."""
+    frequency, zeta, rate = block.ring
+    gain = values.get("flexible_wall.gain", 0.0) * np.sinc(frequency / rate)
+    found = np.zeros(len(block.names))
+    for k, name in enumerate(block.names):
+        match name:
+            case "sine in wires":
+                found[k] = gain
+            case "sine in accelerometers":
+                found[k] = -gain * (1.0 - 2.0 * zeta**2)
+            case "cosine in accelerometers":
+                found[k] = -2.0 * gain * zeta
+            case "frequency":
+                found[k] = values.get("flexible_wall.frequency", block.values[k])
+            case "damping":
+                found[k] = values.get("flexible_wall.zeta", block.values[k])
+    return found if wires is None else found + _in_wires(block, wires)
+
+
+def turning(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """Ring-down of yaw (the wall turns about the vertical) or of twist (θ differs along the length)."""
+    frequency, zeta, rate = block.ring
+    size = np.sinc(frequency / rate) / (2.0 * np.pi * frequency)
+    yaw, twist = size * values.get("yaw.kick", 0.0), size * values.get("twist.kick", 0.0)
+    levers = dict(zip(block.names, (*block.levers, 0.0, 0.0), strict=True))
+    other = "yaw" if "yaw.kick" in values else "twist"
+    found = np.zeros(len(block.names))
+    for k, name in enumerate(block.names):
+        lever = levers[name]
+        match name:
+            case "sine in wires":
+                found[k] = lever * twist - yaw
+            case "sine in lvdts":
+                found[k] = twist
+            case "sine in accelerometers":
+                found[k] = (yaw - lever * twist) * (1.0 - 2.0 * zeta**2)
+            case "cosine in accelerometers":
+                found[k] = 2.0 * zeta * (yaw - lever * twist)
+            case "frequency":
+                found[k] = values.get(f"{other}.frequency", block.values[k])
+            case "damping":
+                found[k] = values.get(f"{other}.zeta", block.values[k])
+    return found
+
+
+def _in_wires(block: Block, series: FloatArray) -> FloatArray:
+    """What a difference of the wires' rotation makes of the columns read from wires."""
+    found = np.zeros(len(block.names))
+    for k, name in enumerate(block.names):
+        if name.endswith("in wires"):
+            found[k] = block.levers[k] * float(block.projection[k] @ series)
+    return found
+
+
+def conditions(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """Marks: each follows from the one effect of its name."""
+    found = np.zeros(len(block.names))
+    for k, name in enumerate(block.names):
+        effect = name.partition("@")[0]
+        parameter = MARKS.get(effect)
+        value = values.get(f"{name}.{parameter}") if parameter else None
+        if value is not None:
+            found[k] = 1.0 / value if effect == "saturation" else value
+    return found
+
+
+def floor(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """The sinusoid of the floor while the wall does not move."""
+    found = {
+        "amplitude": values.get("ambient.amplitude", 0.0),
+        "frequency": values.get("ambient.frequency", run.vibration.frequency_hz if run.vibration else 0.0),
+    }
+    return np.array([found[name] for name in block.names])
+
+
+def with_measured_inputs(run: RockingRun, values: Mapping[str, float]) -> Mapping[str, float]:
+    """The values with what is not fitted but read from the run itself: the floor's frequency and phase."""
+    if "ambient.amplitude" not in values or run.vibration is None:
+        return values
+    seen = run.vibration
+    return {**values, "ambient.frequency": seen.frequency_hz, "ambient.phase": seen.phase}

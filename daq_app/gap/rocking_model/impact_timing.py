@@ -1,0 +1,86 @@
+"""How late the accelerometers are against the reference rotation, from the velocity jumps of the impacts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.rotation import zeroed
+from daq_app.gap.rocking_model.sensor_blocks import GRID_HZ, Grid, coarse
+
+MOST = 14
+"""Impacts used: the first ones are the loudest."""
+WINDOW_S = 0.11
+REACH_S = 0.065
+MODEL_ERROR_S = 3e-4
+"""How well the shape of an impact is known at all."""
+
+
+def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
+    """(delay, its variance): shift of the record that fits the rotation's own acceleration best.
+
+    What is compared are averages over 5 ms of z θ̈ − g sin θ with the jump of θ̇ at every impact: any
+    linear response of the accelerometers shifts its centroid by its delay. None without enough impacts.
+    """
+    chosen = [
+        i
+        for i in run.indices("accelerometer", "x")
+        if np.all(np.isfinite(run.channels[i])) and not run.sensors[i].ac_coupled
+    ]
+    if not chosen or grid.impact_s.size < 3:
+        return None
+    height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))
+    measured = np.mean([coarse(zeroed(run, i), run.rate_hz) for i in chosen], axis=0)
+    windows = _windows(grid)
+    if len(windows) < 3:
+        return None
+    fine = np.arange(grid.speed.size) / run.rate_hz + grid.time_s[0] - 0.5 / GRID_HZ
+    gravity = np.interp(fine, grid.time_s, 9.81 * np.sin(grid.theta))
+    velocity = height * grid.speed - np.cumsum(gravity) / run.rate_hz
+
+    def misfit(delay: float) -> FloatArray:
+        edges = np.append(grid.time_s - 0.5 / GRID_HZ, grid.time_s[-1] + 0.5 / GRID_HZ) - delay
+        expected = np.diff(np.interp(edges, fine, velocity)) * GRID_HZ
+        return np.array([_left(measured[part] - expected[part], basis) for part, basis in windows])
+
+    delays = np.arange(-REACH_S, REACH_S, 2e-3)
+    best = float(delays[int(np.argmin([misfit(float(d)).sum() for d in delays]))])
+    fine_delays = best + np.linspace(-3e-3, 3e-3, 25)
+    tables = np.array([misfit(float(d)) for d in fine_delays])
+    shift = _minimum(fine_delays, tables.sum(axis=1))
+    each = np.array([_minimum(fine_delays, tables[:, k]) for k in range(tables.shape[1])])
+    spread = 1.48 * float(np.median(np.abs(each - np.median(each))))
+    return shift, 1.57 * spread**2 / len(windows) + MODEL_ERROR_S**2
+
+
+def _windows(grid: Grid) -> list[tuple[slice, FloatArray]]:
+    """Samples around each impact that stands alone, with the slow shapes that are free there."""
+    found = []
+    gaps = np.diff(grid.impact_s, append=grid.impact_s[-1] + 0.5)
+    for k, (time, gap) in enumerate(zip(grid.impact_s, gaps, strict=True)):
+        before = time - grid.impact_s[k - 1] if k else 1.0
+        if min(gap, before) < 1.6 * WINDOW_S:
+            break
+        centre = int(np.searchsorted(grid.time_s, time))
+        part = slice(centre - round(WINDOW_S * GRID_HZ), centre + round(WINDOW_S * GRID_HZ))
+        if part.start < 0 or part.stop > grid.time_s.size:
+            continue
+        x = np.linspace(-1.0, 1.0, part.stop - part.start)
+        found.append((part, np.linalg.qr(np.vander(x, 2))[0]))
+        if len(found) == MOST:
+            break
+    return found
+
+
+def _left(difference: FloatArray, basis: FloatArray) -> float:
+    left = difference - basis @ (basis.T @ difference)
+    return float(left @ left)
+
+
+def _minimum(where: FloatArray, values: FloatArray) -> float:
+    """Lowest point of a sampled curve, by a parabola through its lowest sample and both neighbours."""
+    k = min(max(int(np.argmin(values)), 1), values.size - 2)
+    bend = values[k - 1] - 2.0 * values[k] + values[k + 1]
+    shift = 0.5 * (values[k - 1] - values[k + 1]) / bend if bend > 0 else 0.0
+    return float(where[k] + np.clip(shift, -1.0, 1.0) * (where[1] - where[0]))

@@ -1,0 +1,213 @@
+"""Before anything is fitted: wiring, electronics, single channels, ring-downs and the floor, over all runs.
+
+What is found is taken out of the families where it would spoil them, and comes back as blocks of
+features of its own, so that it competes with everything else for the explanation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from daq_app.config.rig import Family
+from daq_app.gap.core import CannotDiagnose
+from daq_app.gap.rocking_model.channel_faults import channel_block, suspects
+from daq_app.gap.rocking_model.conditions import Mark, conditions_of, marks_of, without_hum
+from daq_app.gap.rocking_model.floor_vibration import find_vibration
+from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.rings import Signal, bend_signals, ring_block, scan, turn_signals
+from daq_app.gap.rocking_model.run_features import Examined, RockingRun, examine, scalar_block
+from daq_app.gap.rocking_model.saturation import saturated
+from daq_app.gap.rocking_model.sensor_blocks import Block
+from daq_app.gap.rocking_model.wiring import Wiring, mend
+
+LATE_S = 2.5e-3
+"""Lag between LVDTs and wires from which it matters which of them the motion is read from."""
+_SPOILING = ("quantisation", "dropout", "saturation", "spikes")
+_COUNT_SD = 0.05
+_FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer", "tiltmeter")
+
+
+@dataclass(frozen=True, slots=True)
+class Inspected:
+    """Runs in which wiring and electronics are put right as far as they can be."""
+
+    runs: list[GapRun]
+    marks: list[list[Mark]]
+    reference: str
+    """``wire`` where the LVDTs are not fit to read the motion from, else empty."""
+
+
+def inspect(runs: Sequence[GapRun]) -> Inspected:
+    """Mend and mark. Raises nothing: what cannot be judged is left as it is."""
+    mended, wiring = mend(list(runs))
+    mended = [run.excluding(wiring.reversed_ids) for run in mended]
+    found = conditions_of(mended)
+    marks = marks_of(mended, found)
+    # Readings that stand still or go in steps must be seen as they were; all else is put on one clock.
+    clean = [without_hum(run, c).at_clock() for run, c in zip(mended, found, strict=True)]
+    families: dict[str, Family] = {s.id: s.family for s in runs[0].sensors}
+    single = {
+        mark.key.partition("@")[2]
+        for row in marks
+        for mark in row
+        if mark.value > 0 and _spoils(mark, families)
+    }
+    clean = [run.excluding(single) for run in clean]
+    clean, limits = saturated(clean)
+    marks = [[*row, *more] for row, more in zip(marks, limits, strict=True)]
+    clipped = {
+        mark.key.partition("@")[2]
+        for row in limits
+        for mark in row
+        if mark.value > 0 and mark.key.partition("@")[2] in families
+    }
+    clean = [run.excluding(clipped) for run in clean]
+    marks = [[*row, *_wiring_marks(wiring, families)] for row in marks]
+    coarse_lvdts = any(m.key == "quantisation@lvdt" and m.value > 0 for row in marks for m in row)
+    return Inspected(clean, marks, "wire" if coarse_lvdts else "")
+
+
+def _spoils(mark: Mark, families: dict[str, Family]) -> bool:
+    name, _, target = mark.key.partition("@")
+    return name in _SPOILING and target in families
+
+
+def _wiring_marks(wiring: Wiring, families: dict[str, Family]) -> list[Mark]:
+    """Counts of reversed and exchanged channels; the name says which, where there is one."""
+    turned, crossed = wiring.reversed_ids, wiring.exchanged
+    first = f"polarity@{turned[0]}" if len(turned) == 1 else "polarity"
+    second = f"swap@{families[crossed[0][0]]}" if crossed else "swap"
+    return [
+        Mark(first, "reversed channels", "1", float(len(turned)), _COUNT_SD),
+        Mark(second, "exchanged pairs of channels", "1", float(len(crossed)), _COUNT_SD),
+    ]
+
+
+def choose_reference(inspected: Inspected) -> str:
+    """The family that the motion is read from: the prompter one where LVDTs and wires differ in time."""
+    if inspected.reference:
+        return inspected.reference
+    run = max(inspected.runs, key=lambda r: float(np.nanmax(np.abs(r.channels[r.indices("lvdt")[0]]))))
+    try:
+        first = examine(run).features
+        lag = _coefficient(first, "wire", "lag")
+        if first.reference != "lvdt" or lag is None or abs(lag) < LATE_S:
+            return ""
+        second = examine(run, "wire").features
+    except (CannotDiagnose, IndexError):
+        return ""
+    delays = [_coefficient(f, "impact timing", "delay") for f in (first, second)]
+    if delays[0] is None or delays[1] is None or second.reference != "wire":
+        return ""
+    return "wire" if abs(delays[1]) < abs(delays[0]) else ""
+
+
+def _coefficient(run: RockingRun, family: str, name: str) -> float | None:
+    for block in run.blocks:
+        if block.family == family and name in block.names:
+            return float(block.values[block.names.index(name)])
+    return None
+
+
+def without_suspects(
+    examined: Sequence[Examined], reference: str
+) -> tuple[list[Examined], dict[str, Family]]:
+    """The runs with the channel of each family that disagrees with it taken out, and these channels."""
+    found = suspects([e.run for e in examined], [e.features.grid for e in examined])
+    if not found:
+        return list(examined), {}
+    again = []
+    for entry in examined:
+        run = entry.run.excluding(found.values())
+        fresh = examine(replace(run, impacts_before=entry.features.impacts_before), reference)
+        again.append(fresh)
+    return again, {name: family for family, name in found.items()}
+
+
+def completed(
+    examined: Sequence[Examined], marks: Sequence[Sequence[Mark]], channels: dict[str, Family]
+) -> list[RockingRun]:
+    """Features of all runs with the blocks of what was inspected over all of them."""
+    grids = [e.features.grid for e in examined]
+    height = examined[0].features.survey.height_m
+    more: list[list[Block]] = [[] for _ in examined]
+    for row, entry in zip(more, examined, strict=True):
+        for name, family in channels.items():
+            block = channel_block(entry.run, entry.features.grid, family, name)
+            if block is not None:
+                row.append(block)
+    bends = [bend_signals(e.run, e.joint, e.features.grid, height) for e in examined]
+    turns = [turn_signals(e.run, e.joint, e.features.grid) for e in examined]
+    _add_rings(more, examined, bends, "bending", slow=False)
+    _add_rings(more, examined, turns, "turning", slow=True)
+    vibrations = find_vibration([e.run for e in examined], grids)
+    runs = []
+    for row, entry, vibration, seen in zip(more, examined, vibrations, marks, strict=True):
+        grid = entry.features.grid
+        if vibration is not None:
+            shown = vibration.amplitude if vibration.found else 0.0
+            sd = vibration.amplitude_sd * (1.0 if vibration.found else 3.0)
+            entries = (
+                ("amplitude", "m/s²", shown, sd**2),
+                ("frequency", "Hz", vibration.frequency_hz, vibration.frequency_sd**2),
+            )
+            row.append(scalar_block("floor", entries, grid))
+        row.append(_mark_block(seen, entry))
+        features = replace(entry.features, vibration=vibration)
+        runs.append(features.with_blocks(row))
+    return runs
+
+
+def _mark_block(marks: Sequence[Mark], entry: Examined) -> Block:
+    families: dict[str, str] = {s.id: s.family for s in entry.run.sensors}
+    families |= {family: family for family in _FAMILIES}
+    block = scalar_block(
+        "conditions",
+        [(m.key, m.unit, m.value, m.sd**2) for m in marks],
+        entry.features.grid,
+        kind="conditions",
+    )
+    return replace(block, tags={m.key: families.get(m.key.partition("@")[2], "") for m in marks})
+
+
+def _add_rings(
+    more: list[list[Block]],
+    examined: Sequence[Examined],
+    signals: Sequence[list[Signal]],
+    name: str,
+    *,
+    slow: bool,
+) -> None:
+    grids = [e.features.grid for e in examined]
+    ring = scan(grids, signals, slow=slow)
+    if ring is None:
+        return
+    for row, entry, listed in zip(more, examined, signals, strict=True):
+        block = ring_block(name, entry.features.grid, listed, ring, slow=slow)
+        if block is not None:
+            row.append(block)
+
+
+def found_channels(runs: Sequence[RockingRun]) -> dict[str, str]:
+    """Channels with a block of their own, and their families."""
+    return {b.family: b.tags[b.family] for run in runs for b in run.blocks if b.kind == "channel"}
+
+
+def calibrations(runs: Sequence[RockingRun]) -> dict[str, float]:
+    """Of those channels: relative error with which the others of their family predict them."""
+    return {b.family: b.levers[0] for run in runs for b in run.blocks if b.kind == "channel"}
+
+
+def found_marks(runs: Sequence[RockingRun]) -> dict[str, str]:
+    """Conditions of the electronics that are there in any run, with the family of their channels."""
+    return {
+        name: block.tags[name]
+        for run in runs
+        for block in run.blocks
+        if block.kind == "conditions"
+        for name, value in zip(block.names, block.values, strict=True)
+        if value > 0.0
+    }

@@ -1,0 +1,286 @@
+"""Ring-down after impacts: does the wall bend or turn as an oscillator that every impact kicks?
+
+One oscillator is fitted to all runs (its frequency and damping, by a scan); each signal then has two
+coefficients per run, of the sine and the cosine of the ring-down per jump of the angular velocity.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.rotation import Rotation, wall_rotation, zeroed
+from daq_app.gap.rocking_model.sensor_blocks import GRID_HZ, Block, Grid, coarse
+
+BEND_HZ = np.geomspace(7.0, 42.0, 36)
+TURN_HZ = np.geomspace(1.5, 14.0, 40)
+DAMPING = (0.008, 0.02, 0.045, 0.09)
+DISPLACEMENT_MASK_S = 0.012
+ACCELERATION_MASK_S = 0.035
+_DEGREE = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """One signal in which a ring-down may show, on the grid, shape (m,)."""
+
+    family: str
+    values: FloatArray
+    pick: NDArray[np.bool_]
+    lever: float
+    """What a rotation error δ of the family makes of this signal, m: for effects on its sensors."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ring:
+    """The oscillator that fits best, and how well: gain in log likelihood over no ring-down."""
+
+    frequency_hz: float
+    zeta: float
+    gain: float
+    frequency_sd: float
+
+
+def bend_signals(run: GapRun, joint: Rotation, grid: Grid, height_m: float) -> list[Signal]:
+    """Bending of the wall as wires and accelerometers show it, in metres (m/s²) of its top."""
+    found = []
+    rows, heights, _ = wall_rotation(run)
+    if len(rows) >= 3:
+        shape = (heights / height_m) ** 2
+        beyond = np.array([z * coarse(r, run.rate_hz) for z, r in zip(heights, rows, strict=True)])
+        beyond = beyond - heights[:, None] * grid.theta
+        lever = float(shape @ heights / (shape @ shape))
+        values = shape @ beyond / (shape @ shape)
+        found.append(Signal("wire", values, _between(grid, DISPLACEMENT_MASK_S), lever))
+    chosen = _accelerometers(run)
+    if len(chosen) >= 3:
+        z = np.array([run.sensors[i].position_m[2] for i in chosen])
+        shape = (z / height_m) ** 2
+        measured = np.array([coarse(zeroed(run, i), run.rate_hz) for i in chosen])
+        beyond = measured - z[:, None] * grid.alpha + 9.81 * np.sin(grid.theta)
+        values = shape @ beyond / (shape @ shape)
+        found.append(Signal("accelerometer", values, _between(grid, ACCELERATION_MASK_S), 0.0))
+    return found
+
+
+def turn_signals(run: GapRun, joint: Rotation, grid: Grid) -> list[Signal]:
+    """Slope along the length of what wires, accelerometers (per metre) and the joint show."""
+    found = []
+    rows, heights, names = wall_rotation(run)
+    y = np.array([next(s.position_m[1] for s in run.sensors if s.id == name) for name in names])
+    if len(rows) >= 3 and float(np.ptp(y)) > 0.2:
+        beyond = np.array([z * coarse(r, run.rate_hz) for z, r in zip(heights, rows, strict=True)])
+        beyond = beyond - heights[:, None] * grid.theta
+        lever = float(y @ (heights * y) / (y @ y))
+        found.append(Signal("wire", y @ beyond / (y @ y), _between(grid, DISPLACEMENT_MASK_S), lever))
+    chosen = _accelerometers(run)
+    y = np.array([run.sensors[i].position_m[1] for i in chosen])
+    if len(chosen) >= 3 and float(np.ptp(y)) > 0.2:
+        z = np.array([run.sensors[i].position_m[2] for i in chosen])
+        measured = np.array([coarse(zeroed(run, i), run.rate_hz) for i in chosen])
+        beyond = measured - z[:, None] * grid.alpha + 9.81 * np.sin(grid.theta)
+        lever = float(y @ (z * y) / (y @ y))
+        found.append(
+            Signal("accelerometer", y @ beyond / (y @ y), _between(grid, ACCELERATION_MASK_S), lever)
+        )
+    if len(joint.used) >= 8:
+        pick = _between(grid, DISPLACEMENT_MASK_S) & grid.valid
+        found.append(Signal("lvdt", coarse(joint.twist, run.rate_hz), pick, 0.0))
+    return found
+
+
+def _accelerometers(run: GapRun) -> list[int]:
+    return [
+        i
+        for i in run.indices("accelerometer", "x")
+        if np.all(np.isfinite(run.channels[i])) and not run.sensors[i].ac_coupled
+    ]
+
+
+def _between(grid: Grid, mask_s: float) -> NDArray[np.bool_]:
+    """Samples between impacts, from the first impact until the swings end."""
+    if grid.impact_s.size < 2:
+        return np.zeros(grid.time_s.size, dtype=bool)
+    after = grid.time_s[:, None] - grid.impact_s[None, :]
+    near = np.any((after > -0.5 * mask_s - 0.005) & (after < mask_s), axis=1)
+    inside = (grid.time_s > grid.impact_s[0]) & (grid.time_s < grid.impact_s[-1])
+    return np.asarray(inside & ~near)
+
+
+def ring_columns(grid: Grid, frequency_hz: float, zeta: float) -> FloatArray:
+    """Sine and cosine of the ring-down per unit jump of θ̇, shape (m, 2).
+
+    The jump at an impact is taken from the reference motion on both sides of it.
+    """
+    natural = 2.0 * np.pi * frequency_hz
+    rate = -zeta * natural + 1j * natural * np.sqrt(1.0 - zeta**2)
+    jumps = jumps_of(grid)
+    wave = np.zeros(grid.time_s.size, dtype=complex)
+    state = 0.0 + 0.0j
+    edges = np.append(np.searchsorted(grid.time_s, grid.impact_s), grid.time_s.size)
+    for k, start in enumerate(grid.impact_s):
+        if k:
+            state = state * np.exp(rate * (start - grid.impact_s[k - 1]))
+        state += jumps[k]
+        part = slice(edges[k], edges[k + 1])
+        wave[part] = state * np.exp(rate * (grid.time_s[part] - start))
+    return np.column_stack([wave.imag, wave.real])
+
+
+def jumps_of(grid: Grid) -> FloatArray:
+    """Jump of θ̇ at each impact, from the motion a few samples to either side."""
+    at = np.searchsorted(grid.time_s, grid.impact_s)
+    before = np.clip(at - 3, 0, grid.omega.size - 1)
+    after = np.clip(at + 2, 0, grid.omega.size - 1)
+    # θ̇ changes along θ̈ on the way: carried to the impact from both sides.
+    lead, trail = grid.impact_s - grid.time_s[before], grid.impact_s - grid.time_s[after]
+    ends = grid.omega[after] + grid.alpha[after] * trail, grid.omega[before] + grid.alpha[before] * lead
+    jumps: FloatArray = ends[0] - ends[1]
+    return jumps
+
+
+def _cleaner(grid: Grid, pick: NDArray[np.bool_], slow: bool) -> list[tuple[NDArray[np.intp], FloatArray]]:
+    """Bases to be removed from a signal: smooth curves between impacts, or the rotation for slow turns."""
+    places = np.flatnonzero(pick)
+    if slow:
+        t = grid.time_s[places]
+        columns = np.column_stack(
+            [np.ones_like(t), t, grid.theta[places], grid.theta[places] ** 2, np.abs(grid.theta[places])]
+        )
+        return [(places, np.linalg.qr(columns / (np.abs(columns).max(axis=0) + 1e-30))[0])]
+    bases = []
+    edges = np.searchsorted(grid.time_s[places], grid.impact_s)
+    for start, stop in itertools.pairwise([*edges, places.size]):
+        part = places[start:stop]
+        if part.size > 2 * _DEGREE + 4:
+            x = np.linspace(-1.0, 1.0, part.size)
+            bases.append((part, np.linalg.qr(np.vander(x, _DEGREE + 1))[0]))
+    return bases
+
+
+def _clean(values: FloatArray, bases: list[tuple[NDArray[np.intp], FloatArray]]) -> FloatArray:
+    """What the bases leave of the columns of `values` (m, k), at their samples."""
+    parts = [values[part] - basis @ (basis.T @ values[part]) for part, basis in bases]
+    return np.concatenate(parts) if parts else np.zeros((0, values.shape[1]))
+
+
+def scan(grids: Sequence[Grid], signals: Sequence[list[Signal]], *, slow: bool) -> Ring | None:
+    """The oscillator that all runs and signals agree on best; None where there is nothing to scan."""
+    frequencies = TURN_HZ if slow else BEND_HZ
+    score = np.zeros((frequencies.size, len(DAMPING)))
+    for grid, listed in zip(grids, signals, strict=True):
+        waves = None
+        for signal in listed:
+            if signal.pick.sum() < 100:
+                continue
+            if waves is None:
+                waves = np.column_stack([ring_columns(grid, f, z) for f in frequencies for z in DAMPING])
+            bases = _cleaner(grid, signal.pick, slow)
+            both = _clean(np.column_stack([signal.values, waves]), bases)
+            if len(both) < 60:
+                continue
+            score += _gains(both[:, 0], both[:, 1:]).reshape(score.shape)
+    if not np.any(score > 0.0):
+        return None
+    i, j = np.unravel_index(int(np.argmax(score)), score.shape)
+    # Curvature of the log likelihood over ln f, by a parabola through the neighbours.
+    inner = min(max(int(i), 1), frequencies.size - 2)
+    bend = score[inner - 1, j] - 2.0 * score[inner, j] + score[inner + 1, j]
+    step = float(np.log(frequencies[1] / frequencies[0]))
+    shift = 0.5 * (score[inner - 1, j] - score[inner + 1, j]) / bend if bend < -1e-9 else 0.0
+    frequency = float(frequencies[inner] * np.exp(step * np.clip(shift, -1.0, 1.0)))
+    sd = frequency * step / np.sqrt(max(-bend, 0.05))
+    return Ring(frequency, DAMPING[int(j)], float(score[i, j]), float(min(sd, 0.3 * frequency)))
+
+
+def _gains(values: FloatArray, waves: FloatArray) -> FloatArray:
+    """Gain in log likelihood of each pair of columns; residuals' own correlation is allowed for."""
+    pairs = waves.reshape(waves.shape[0], -1, 2)
+    power = float(values @ values)
+    a, b = pairs[:, :, 0], pairs[:, :, 1]
+    aa, bb, ab = (a * a).sum(0), (b * b).sum(0), (a * b).sum(0)
+    av, bv = a.T @ values, b.T @ values
+    determinant = np.maximum(aa * bb - ab**2, 1e-12 * aa * bb + 1e-300)
+    explained = (bb * av**2 - 2 * ab * av * bv + aa * bv**2) / determinant
+    share = np.clip(explained / max(power, 1e-300), 0.0, 0.9999)
+    fraction = max(independent_fraction(values), 0.2)
+    gains: FloatArray = -0.5 * fraction * values.size * np.log1p(-share)
+    return gains
+
+
+def _colour(
+    grid: Grid,
+    signal: Signal,
+    bases: list[tuple[NDArray[np.intp], FloatArray]],
+    ring: Ring,
+    values: FloatArray,
+) -> float:
+    """Size of chance at frequencies around the ring's, over that of white noise; at least 1."""
+    factors = [f for f in (0.55, 0.62, 0.7, 0.78, 1.28, 1.43, 1.6, 1.8) if ring.frequency_hz * f < 60.0]
+    waves = np.column_stack([ring_columns(grid, ring.frequency_hz * f, 0.03) for f in factors])
+    waves = _clean(waves, bases)
+    own = _clean(ring_columns(grid, ring.frequency_hz, ring.zeta), bases)
+    # The ring itself, if there is one, must not count as its own surroundings.
+    left = values - own @ np.linalg.lstsq(own, values, rcond=None)[0]
+    size = np.sqrt(np.maximum((waves**2).sum(0), 1e-300))
+    z = (waves.T @ left) / size / max(float(np.std(left)), 1e-300)
+    return max(1.0, 1.48 * float(np.median(np.abs(z))))
+
+
+def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, slow: bool) -> Block | None:
+    """Coefficients of sine and cosine of every signal at the common oscillator; accelerations over ω²."""
+    names, units, values, variances, rows, levers = [], [], [], [], [], []
+    waves = ring_columns(grid, ring.frequency_hz, ring.zeta)
+    natural = 2.0 * np.pi * ring.frequency_hz
+    for signal in signals:
+        bases = _cleaner(grid, signal.pick, slow)
+        both = _clean(np.column_stack([signal.values, waves]), bases)
+        if len(both) < 60:
+            continue
+        places = np.concatenate([part for part, _ in bases])
+        inverse = np.linalg.pinv(both[:, 1:])
+        found = inverse @ both[:, 0]
+        left = both[:, 0] - both[:, 1:] @ found
+        fraction = max(independent_fraction(left), 0.05)
+        variance = float(left @ left) / max(left.size - 2, 1) / fraction * np.diag(inverse @ inverse.T)
+        # What is left of the motion is no white noise: neighbouring frequencies say how large chance is.
+        # And this frequency was chosen for its gain, which doubles it.
+        variance *= 2.0 * _colour(grid, signal, bases, ring, both[:, 0]) ** 2
+        scale = natural**2 if signal.family == "accelerometer" else 1.0
+        full = np.zeros((2, grid.time_s.size))
+        full[:, places] = inverse
+        # Removing the bases is part of the projection.
+        for part, basis in bases:
+            full[:, part] -= (full[:, part] @ basis) @ basis.T
+        for k, word in enumerate(("sine", "cosine")):
+            names.append(f"{word} in {signal.family}s")
+            units.append("m s/rad" if not slow else "s")
+            values.append(found[k] / scale)
+            variances.append(variance[k] / scale**2)
+            rows.append(full[k] / scale)
+            levers.append(signal.lever)
+    if not names:
+        return None
+    names += ["frequency", "damping"]
+    units += ["Hz", "1"]
+    values += [ring.frequency_hz, ring.zeta]
+    variances += [ring.frequency_sd**2, (0.4 * ring.zeta) ** 2]
+    rows += [np.zeros(grid.time_s.size)] * 2
+    return Block(
+        name,
+        tuple(names),
+        tuple(units),
+        np.array(values),
+        np.diag(variances),
+        np.array(rows),
+        np.ones(grid.time_s.size, dtype=bool),
+        kind=name,
+        ring=(ring.frequency_hz, ring.zeta, GRID_HZ),
+        levers=tuple(levers),
+    )

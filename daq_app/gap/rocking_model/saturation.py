@@ -1,0 +1,122 @@
+"""Does a channel stop short of its declared range? Seen against the rotation that the other family shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from daq_app.config.rig import Family
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.conditions import Mark
+from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.rotation import reaches_its_range, wire_reading, zeroed
+from daq_app.gap.rocking_model.sensor_blocks import GRID_HZ, coarse
+
+_OTHER: dict[Family, Family] = {"lvdt": "wire", "wire": "lvdt"}
+_BELOW = (0.3, 0.85)
+"""Part of a channel's travel over which it must be in proportion to the rotation."""
+_GOES_ON = 1.025
+"""How much further the rotation must go on than the channel."""
+
+
+def saturated(runs: Sequence[GapRun]) -> tuple[list[GapRun], list[list[Mark]]]:
+    """Runs with the ranges that the channels really have, and a mark per family: 1/limit, 0 for no limit."""
+    rotations = {family: [_rotation(run, family) for run in runs] for family in _OTHER}
+    marks: list[list[Mark]] = [[] for _ in runs]
+    limits: dict[str, float] = {}
+    for family, other in _OTHER.items():
+        ids = [runs[0].sensors[i].id for i in runs[0].indices(family)]
+        cells = [
+            [_limit(run, name, rotation) for name in ids]
+            for run, rotation in zip(runs, rotations[other], strict=True)
+        ]
+        table = np.array(cells).reshape(len(runs), len(ids), 2)
+        clipped = [k for k in range(len(ids)) if np.any(table[:, k, 0] > 0.0)]
+        # A faulty rotation makes all channels of the other family look wrong in the same way.
+        for k in clipped:
+            limits[ids[k]] = float(np.median(table[table[:, k, 0] > 0.0, k, 0]))
+        key = ids[clipped[0]] if len(clipped) == 1 else family
+        # Where several clip, the one that travels furthest stands for them.
+        place = max(clipped, key=lambda k: limits[ids[k]]) if clipped else -1
+        for run_marks, row in zip(marks, table, strict=True):
+            reach = row[place, 1] if clipped else float(np.median(row[:, 1])) if len(ids) else 0.0
+            limit = row[place, 0] if clipped else 0.0
+            value, sd = (1.0 / limit, 0.01 / limit) if limit else (0.0, 0.6 / max(reach, 1e-6))
+            run_marks.append(Mark(f"saturation@{key}", "inverse of the limit", "1/m", value, sd))
+    return [_narrowed(run, limits) for run in runs], marks
+
+
+def _narrowed(run: GapRun, limits: dict[str, float]) -> GapRun:
+    if not limits:
+        return run
+    sensors = tuple(
+        replace(
+            s,
+            range_si=(
+                max(s.range_si[0], -0.985 * limits[s.id]),
+                min(s.range_si[1], 0.985 * limits[s.id]),
+            ),
+        )
+        if s.id in limits
+        else s
+        for s in run.sensors
+    )
+    return replace(run, sensors=sensors)
+
+
+def _rotation(run: GapRun, family: Family) -> FloatArray | None:
+    """θ on the grid as the middle channel of a family shows it, from geometry alone."""
+    rows: list[tuple[float, FloatArray]] = []
+    for i in run.indices(family):
+        sensor = run.sensors[i]
+        if not np.all(np.isfinite(run.channels[i])) or reaches_its_range(run.aligned(i), sensor.range_si):
+            continue
+        values = coarse(zeroed(run, i), run.rate_hz)
+        if family == "wire" and sensor.anchor_m is not None:
+            grid = np.linspace(-0.15, 0.15, 301)
+            table = wire_reading(grid, sensor.position_m, sensor.anchor_m, run.survey.half_base_m)
+            order = 1.0 if table[-1] > table[0] else -1.0
+            values = np.interp(order * values, order * table, grid)
+        rows.append((sensor.position_m[0], values))
+    if family == "wire":
+        return np.median([v for _, v in rows], axis=0) if len(rows) >= 2 else None
+    faces = [[v for x, v in rows if side * x > 0] for side in (-1.0, 1.0)]
+    if min(len(face) for face in faces) < 2:
+        return None
+    middle = np.median(faces[0], axis=0) - np.median(faces[1], axis=0)
+    return np.asarray(middle / (2.0 * run.survey.half_base_m), dtype=float)
+
+
+def _limit(run: GapRun, name: str, rotation: FloatArray | None) -> tuple[float, float]:
+    """(limit, reach) of a channel in m; limit 0 where it follows as far as the rotation goes."""
+    i = next(k for k, sensor in enumerate(run.sensors) if sensor.id == name)
+    sensor = run.sensors[i]
+    if rotation is None or not np.all(np.isfinite(run.channels[i])):
+        return 0.0, 0.0
+    mine = np.abs(coarse(zeroed(run, i), run.rate_hz))
+    half = run.survey.half_base_m
+    if sensor.family == "wire" and sensor.anchor_m is not None:
+        expected = np.abs(wire_reading(rotation, sensor.position_m, sensor.anchor_m, half))
+    else:
+        expected = half * np.abs(rotation) - sensor.position_m[0] * rotation
+    largest = float(mine.max())
+    if reaches_its_range(run.aligned(i), sensor.range_si):
+        return 0.0, largest
+    # On the side of its largest reading only: the other side may have another gain.
+    side = np.sign(rotation[int(np.argmax(mine))])
+    same = np.sign(rotation) == side
+    below = same & (mine > _BELOW[0] * largest) & (mine < _BELOW[1] * largest)
+    top = same & (mine > 0.985 * largest)
+    if below.sum() < 20 or top.sum() < round(0.05 * GRID_HZ):
+        return 0.0, largest
+    gain = float(np.median(mine[below] / np.maximum(expected[below], 1e-9)))
+    reach = gain * expected[top]
+    noise = float(np.std(mine[-40:]))
+    goes_on = float(np.quantile(reach, 0.98)) > _GOES_ON * largest
+    # Standing still while the rotation moves on is clipping; following at another rate is not.
+    travel = float(np.quantile(reach, 0.99) - np.quantile(reach, 0.01))
+    moved = float(np.quantile(mine[top], 0.95) - np.quantile(mine[top], 0.05))
+    steady = travel > 0.02 * largest + 3.0 * noise and moved < 0.5 * travel + 2.0 * noise
+    return (float(np.median(mine[top])), largest) if goes_on and steady else (0.0, largest)
