@@ -13,6 +13,9 @@ import tomli_w
 from daq_app.config import ConfigError, load_rig
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.result import FORMAT_VERSION
+from sim_hardware.dynamics.effects import MOTION_EFFECTS
+from sim_hardware.dynamics.spec import find_effect
+from sim_hardware.sensors.effects import SENSOR_EFFECTS
 
 
 def read_result(path: Path) -> dict[str, Any]:
@@ -31,8 +34,21 @@ def effects_found(result: dict[str, Any]) -> dict[str, dict[str, float]]:
     effects: dict[str, dict[str, float]] = {}
     for estimate in result["effect_parameters"]:
         name, _, parameter = str(estimate["name"]).rpartition(".")
-        effects.setdefault(name, {})[parameter] = float(estimate["value"])
+        effects.setdefault(name, {})[parameter] = _possible(name, parameter, float(estimate["value"]))
     return effects
+
+
+def _possible(effect: str, parameter: str, value: float) -> float:
+    """A value as the simulator takes it: within what has a meaning, whole where it counts something."""
+    try:
+        spec = find_effect(effect, (*MOTION_EFFECTS, *SENSOR_EFFECTS)).parameter(parameter)
+    except ValueError as problem:
+        raise CannotDiagnose(
+            f"The simulator cannot switch on {effect}.{parameter}: {problem}.", "Apply it by hand."
+        ) from None
+    if parameter in ("on", "places"):
+        value = float(round(value))
+    return min(max(value, spec.minimum), spec.maximum)
 
 
 def apply_result(result: dict[str, Any], rig: Path, out: Path) -> dict[str, dict[str, float]]:

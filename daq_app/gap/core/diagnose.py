@@ -82,6 +82,19 @@ def _refuse(model: Model, runs: Sequence[Run]) -> None:
         )
 
 
+PER_RUN = " (mean of the runs; each has its own)"
+
+
+def _mean_of_runs(found: Fit, key: str) -> tuple[float, float, float]:
+    """A parameter that every run has for itself: mean over the runs with the interval of that mean."""
+    values = np.array([local[key] for local in found.local_values if key in local])
+    own = (values[:, 2] - values[:, 1]) / 3.92
+    between = float(values[:, 0].std(ddof=1)) if len(values) > 1 else 0.0
+    half = 1.96 * math.sqrt((float(np.mean(own**2)) + between**2) / len(values))
+    middle = float(values[:, 0].mean())
+    return middle, middle - half, middle + half
+
+
 class _Study:
     """The fits of one diagnosis."""
 
@@ -276,15 +289,15 @@ class _Study:
 
     def _estimates(self, found: Fit, *, nuisance: bool) -> tuple[Estimate, ...]:
         problem = Problem(self.model, self.runs[:1], effects_of(found.effects, self.library))
-        wanted = [q for q in problem.unknowns if q.run is None and bool(q.effect) != nuisance]
+        wanted = [q for q in problem.unknowns if bool(q.effect) != nuisance and (q.run is None or q.effect)]
         return tuple(
             Estimate(
                 q.key,
-                *found.values[q.key],
+                *(found.values[q.key] if q.run is None else _mean_of_runs(found, q.key)),
                 q.parameter.unit,
                 q.parameter.mean,
                 q.parameter.sd,
-                q.parameter.meaning,
+                q.parameter.meaning + ("" if q.run is None else PER_RUN),
             )
             for q in wanted
         )
