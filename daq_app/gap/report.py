@@ -122,12 +122,13 @@ def _pdf(result: Diagnosis, shown: Sequence[Trace], maps: Sequence[ProbeMap]) ->
     """Everything on one A4 page."""
     page = Figure(figsize=_A4_IN, layout="constrained")
     page.get_layout_engine().set(rect=(0.03, 0.015, 0.94, 0.97))  # type: ignore[union-attr, call-arg]
-    parts = page.subfigures(5, 1, height_ratios=(1.75, 2.2, 3.0 if shown else 0.01, 3.0, 1.45))
+    parts: Any = page.subfigures(5, 1, height_ratios=(1.75, 2.2, 3.0 if shown else 0.01, 3.0, 1.45))
     _write_head(parts[0], result)
     left, right = parts[1].subfigures(1, 2)
     left.suptitle("Where: largest gap, 1 is noise and scatter", fontsize=9, weight="bold")
     right.suptitle("Which: evidence", fontsize=9, weight="bold")
-    draw.draw_maps(*left.subplots(1, 2), result)
+    before, after = left.subplots(1, 2)
+    draw.draw_maps(before, after, result)
     draw.draw_evidence(draw.bare(right.subplots()), result)
     if shown:
         parts[2].suptitle("Measured and simulated rotation", fontsize=9, weight="bold")

@@ -38,6 +38,7 @@ from daq_app.config import ConfigError, parse_rig
 from daq_app.monitor.actions import ActionBar
 from daq_app.monitor.background import Background
 from daq_app.monitor.campaign_page import CampaignPage
+from daq_app.monitor.gap_page import GapPage
 from daq_app.monitor.header import Header
 from daq_app.monitor.health_bar import HealthBar
 from daq_app.monitor.link import Link
@@ -95,12 +96,15 @@ class MainWindow(QMainWindow):
         self.campaign = CampaignPage(self.background)
         self.replay = ReplayPage(self.background)
         self.result = ResultPage(self._analyses)
+        self._diagnoses = Background(self)
+        self.gap = GapPage(self._diagnoses)
         live_pages: dict[str, QWidget] = {"Prepare": self.prepare, "Live": self.live}
         self.pages: dict[str, QWidget] = {
             **(live_pages if link is not None else {}),
             "Campaign": self.campaign,
             "Result": self.result,
             "Replay": self.replay,
+            "Gap": self.gap,
         }
         self._build()
         self.orders = Orders(
@@ -180,6 +184,9 @@ class MainWindow(QMainWindow):
         self.campaign.told.connect(self.notices.tell)
         self.campaign.run_chosen.connect(lambda name: self.open_run(Path(name)))
         self.replay.told.connect(self.notices.tell)
+        if self.link is None:
+            self.replay.opened.connect(lambda name: self.gap.set_folder(Path(name).parent))
+        self.gap.told.connect(self.notices.tell)
         self.result.told.connect(self.notices.tell)
         self.result.replay.connect(lambda name: self.open_run(Path(name)))
         for key, button in self.prepare.keys.items() if self.link is not None else ():
@@ -208,7 +215,7 @@ class MainWindow(QMainWindow):
         assert isinstance(app, QApplication)
         self.colours = THEMES[self.settings.theme]
         apply_theme(app, self, self.colours, self.settings.type_size)
-        for page in (self.prepare, self.live, self.campaign, self.result, self.replay):
+        for page in (self.prepare, self.live, self.campaign, self.result, self.replay, self.gap):
             page.restyle(self.colours)
         self.notices.restyle(self.colours)
 
@@ -242,6 +249,8 @@ class MainWindow(QMainWindow):
         self.prepare.wall.set_address(str(about.get("connection", "")) if about.get("simulated") else "")
         folder = str(about.get("folder", ""))
         self._runs_folder = Path(folder) if folder else None
+        if self._runs_folder is not None and self._runs_folder != self.gap.folder:
+            self.gap.set_folder(self._runs_folder)
         self.prepare.planned_rate_hz = float(about.get("planned_rate_hz", 0.0) or 0.0)
         if "tare" in about:
             self.prepare.set_zero(Zero(dict(about["tare"]), dict(about.get("tare_record", {}))))
@@ -290,6 +299,7 @@ class MainWindow(QMainWindow):
         before, self._state_before = self._state_before, message.state
         if before is message.state:
             return
+        self.gap.set_recording(message.state in RECORDING | {State.SAVING})
         if message.state is State.ARMED:
             self._released = False
         if message.state in (State.RELEASED, State.ROCKING):
@@ -312,6 +322,7 @@ class MainWindow(QMainWindow):
         if self._released:
             self.show_page(self.result)
             self.result.open(run)
+            self.gap.after_run(run)
 
     def _on_slow(self) -> None:
         self.header.refresh(self.colours)
@@ -374,8 +385,10 @@ class MainWindow(QMainWindow):
             if self._started_here and idle:
                 self.link.request("shutdown")  # refused if a test was armed this very moment
             self.link.close()
+        self.gap.close_down()
         self.background.finish()
         self._analyses.finish(0)
+        self._diagnoses.finish(2000)
         super().closeEvent(event)
 
 

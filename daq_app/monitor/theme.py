@@ -188,6 +188,12 @@ def _stylesheet(c: Colours, base: float) -> str:
     QTreeWidget::indicator {{ width: 13px; height: 13px; border: 1px solid {c.muted}; border-radius: 3px; }}
     QTreeWidget::indicator:checked {{ background: {c.accent}; border-color: {c.accent}; }}
     QTreeWidget::indicator:indeterminate {{ background: {c.line}; }}
+    QListWidget::indicator, QCheckBox::indicator {{ width: 13px; height: 13px; border: 1px solid {c.muted};
+        border-radius: 3px; }}
+    QListWidget::indicator:checked, QCheckBox::indicator:checked {{ background: {c.accent};
+        border-color: {c.accent}; }}
+    QProgressBar {{ background: {c.raised}; border: none; border-radius: 4px; }}
+    QProgressBar::chunk {{ background: {c.accent}; border-radius: 4px; }}
     QSplitter::handle {{ background: {c.ground}; }}
     QSplitter::handle:hover {{ background: {c.line}; }}
     QScrollBar:vertical {{ background: transparent; width: 10px; }}

@@ -1,0 +1,137 @@
+"""The gap page: a diagnosis in a process of its own, watched, stopped, shown."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import psutil
+import pytest
+
+from daq_app.monitor import gap_runner
+from daq_app.monitor.background import Background
+from daq_app.monitor.gap_page import GapPage
+from daq_app.monitor.gap_runner import GapRunner
+from daq_app.monitor.gap_views import closure_bars, evidence_bars, map_cells
+
+MADE = Path(__file__).parents[1] / "gap" / "made_diagnosis.py"
+
+
+def made():
+    spec = importlib.util.spec_from_file_location("made_diagnosis_for_the_window", MADE)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.diagnosis({"viscous.zeta": 0.006}, ("FR1-L1-1", "FR1-L3-1"))
+
+
+@pytest.fixture
+def child(monkeypatch, tmp_path):
+    """Replaces the diagnosis by a script that is given OUT and the runs; returns what was started."""
+    started = []
+
+    def use(script):
+        path = tmp_path / "child.py"
+        path.write_text(textwrap.dedent(script), encoding="utf-8")
+
+        def start(module, arguments):
+            assert module == "daq_app.gap.job"
+            process = subprocess.Popen(
+                [sys.executable, str(path), *arguments],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+            started.append(process)
+            return process
+
+        monkeypatch.setattr(gap_runner, "start_guarded", start)
+        return started
+
+    return use
+
+
+@pytest.fixture
+def page(qtbot):
+    page = GapPage(Background())
+    qtbot.addWidget(page)
+    page.resize(1240, 640)
+    yield page
+    page.close_down()
+
+
+def test_the_page_lists_the_runs_diagnoses_them_and_shows_the_answer(qtbot, page, child, run_file, tmp_path):
+    saved = tmp_path / "made.json"
+    made().save(saved)
+    child(f"""
+        import json, shutil, sys
+        print("a library prints this")
+        print(json.dumps({{"done": 3, "total": 7, "text": "single effects"}}), flush=True)
+        shutil.copy({str(saved)!r}, sys.argv[1])
+        print(json.dumps({{"result": sys.argv[1]}}), flush=True)
+    """)
+    page.set_folder(run_file.parent)
+    qtbot.waitUntil(lambda: page.runs.count() == 1, timeout=60_000)
+    assert page.chosen == [run_file] and "FR1-L1-1" in page.runs.item(0).text()
+    heard = []
+    page.runner.progress.connect(lambda *words: heard.append(words))
+    with qtbot.waitSignal(page.shown, timeout=60_000):
+        page.buttons["start"].click()
+        assert page.buttons["stop"].isEnabled() and not page.buttons["start"].isEnabled()
+    assert heard == [(3, 7, "single effects")]
+    assert page._title.text() == "An effect explains the gap"
+    assert "viscous" in page._sentence.text()
+    assert "9.10 → 1.05" in page._more.text() and "Limit: One level only" in page._more.text()
+    assert [bar.name for bar in page.evidence.bars] == ["viscous", "coulomb", "nothing missing"]
+    assert not page.grab().toImage().isNull()
+    assert page.buttons["start"].isEnabled() and not page.buttons["stop"].isEnabled()
+    run_file.with_suffix(".gap.json").unlink()
+
+
+def test_a_diagnosis_can_be_stopped_and_its_process_is_gone(qtbot, page, child, tmp_path):
+    started = child(
+        'import time; print(\'{"done": 0, "total": 1, "text": "long"}\', flush=True); time.sleep(600)'
+    )
+    with qtbot.waitSignal(page.runner.progress, timeout=60_000):
+        page.runner.start([tmp_path / "FR1-L1-1.h5"])
+    with qtbot.waitSignal(page.runner.failed, timeout=60_000) as failed:
+        page.runner.stop()
+    assert failed.args == ["The diagnosis was stopped."]
+    assert started[0].poll() is not None and not psutil.pid_exists(started[0].pid)
+    assert not page.runner.busy
+
+
+def test_a_test_that_is_armed_ends_the_diagnosis_and_keeps_the_next_one_off(qtbot, page, child, tmp_path):
+    child('import time; print(\'{"done": 0, "total": 1, "text": "long"}\', flush=True); time.sleep(600)')
+    told = []
+    page.told.connect(lambda severity, text: told.append(text))
+    with qtbot.waitSignal(page.runner.progress, timeout=60_000):
+        page.runner.start([tmp_path / "FR1-L1-1.h5"])
+    with qtbot.waitSignal(page.runner.failed, timeout=60_000):
+        page.set_recording(True)
+    assert "a test is being recorded" in told[0]
+    page.start()
+    assert "waits for its end" in told[-1]
+    assert not page.runner.busy
+
+
+def test_a_refusal_of_the_real_job_is_told_in_words(qtbot, tmp_path):
+    runner = GapRunner(Background())
+    missing = tmp_path / "FR1-L1-1.h5"
+    with qtbot.waitSignal(runner.failed, timeout=120_000) as failed:
+        runner.start([missing])
+    assert "FR1-L1-1.h5" in failed.args[0]
+    assert not missing.with_suffix(".gap.json").exists()
+    assert not runner.busy
+
+
+def test_the_views_read_the_documented_result():
+    result = made().to_dict()
+    assert map_cells(result)[("lvdt", "swing")] == (9.0, 1.0)
+    bars = evidence_bars(result)
+    assert [round(bar.lengths[0][0], 3) for bar in bars] == [1.0, 0.305, 0.0]
+    assert bars[0].lengths[0][1:] == ("accent", "p 0.98")
+    assert [bar.name for bar in closure_bars(result)] == ["L1", "L4"]
+    assert closure_bars({**result, "gap": None}) == []
