@@ -15,6 +15,8 @@ from sim_hardware.marked_line import PERIOD_SAMPLES, MarkedLine
 
 _WINDOW: Final = 40_000
 _PIECE: Final = 400
+_MOST_LEAPS: Final = 3
+"""In a tenth of a second."""
 _STEPS: Final = 1.5
 """A reading may differ from its mark by so many steps of a 16-bit converter."""
 _EXPLAINED_WITHIN: Final = 8_000
@@ -62,23 +64,19 @@ class _Walk:
 
     def piece(self, first: int, readings: Floats) -> None:
         """Judge a piece without a gap."""
-        wrong = self._wrong(first, readings)
-        if not wrong.any():
-            return
-        at = int(np.argmax(wrong))
-        lag = self._find_lag(first + at, readings[:, at])
-        if lag is None:
-            self._report.unexplained += 1
-            self.piece_after(first + at + 1, readings[:, at + 1 :])
-            return
-        if self._lag is not None:
-            self._report.leaps.append(Leap(first + at, lag - self._lag))
-        self._lag = lag
-        self.piece_after(first + at + 1, readings[:, at + 1 :])
-
-    def piece_after(self, first: int, readings: Floats) -> None:
-        if readings.shape[1]:
-            self.piece(first, readings)
+        for _ in range(_MOST_LEAPS):
+            wrong = self._wrong(first, readings)
+            if not wrong.any():
+                return
+            at = int(np.argmax(wrong))
+            lag = self._find_lag(first + at, readings[:, at])
+            if lag is None:
+                break
+            if self._lag is not None:
+                self._report.leaps.append(Leap(first + at, lag - self._lag))
+            self._lag = lag
+            first, readings = first + at, readings[:, at:]
+        self._report.unexplained += int(np.count_nonzero(self._wrong(first, readings)))
 
     def _wrong(self, first: int, readings: Floats) -> NDArray[np.bool_]:
         if self._lag is None:

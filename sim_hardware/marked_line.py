@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from daq_app.config.rig import Rig
 
 PERIOD_SAMPLES: Final = 40_000
-"""Of the triangle; within it two instants never look alike on all channels."""
+"""After these everything repeats; within them two instants never look alike on all channels."""
 _LAG_SAMPLES: Final = 1_700
 _REACH: Final = 0.9
 _NOISE_V: Final = 1.5e-3
@@ -50,7 +50,7 @@ class MarkedLine:
     def _of_row(self, row: int, tick: Floats) -> Floats:
         channel = self._channels[row]
         if channel.family != "lvdt":
-            mixed = ((tick + 911.0 * row).astype(np.int64) * _KNUTH) >> 13 & 0xFF
+            mixed = ((tick % PERIOD_SAMPLES + 911.0 * row).astype(np.int64) * _KNUTH) >> 13 & 0xFF
             zero = channel.offset if channel.measurement == "voltage" else 0.0
             return zero + _NOISE_V * (mixed / 127.5 - 1.0)
         low, high = channel.input_range_v

@@ -82,7 +82,9 @@ class FaultBoard:
     @staticmethod
     def _settle(entry: Entry) -> None:
         if entry.start_s is not None:
-            entry.end_s = entry.start_s + entry.fault.for_s
+            # A frozen server is frozen in real seconds, whatever the bench's clock does: its gate ends it.
+            frozen = entry.fault.kind == "server_frozen"
+            entry.end_s = math.inf if frozen else entry.start_s + entry.fault.for_s
 
     def listing(self) -> list[dict[str, object]]:
         """All faults, for the control service."""
