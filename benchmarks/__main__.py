@@ -48,6 +48,9 @@ def _known(path: Path) -> dict[str, Any]:
 
 def main() -> int:
     """Run what was asked for; 0 when every benchmark ran, whatever it measured."""
+    # As `daq-app` has it; NumPy is not loaded before a benchmark is.
+    for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     names = _available()
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"any of {', '.join(names)}; all if none")

@@ -26,6 +26,7 @@ from typing import Any, Final
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from scipy import stats
 
 from daq_app.acquisition.tare import take_tare
 from daq_app.campaign.collect import options_for, summarise
@@ -37,7 +38,7 @@ from daq_app.campaign.summary import MethodResult, TestSummary
 from daq_app.campaign.tables import METHODS, RestitutionRow, table_4_1
 from daq_app.campaign.workers import process_pool
 from daq_app.config import Scaling, load_rig
-from daq_app.rocking import AnalysisOptions, TestRecord, analyse_record
+from daq_app.rocking import AnalysisOptions, TestAnalysis, TestRecord, analyse_record
 
 PLAN: Final = Path(__file__).parents[1] / "configs" / "campaigns" / "costa.toml"
 TEST_SCATTER: Final = 0.005
@@ -49,8 +50,11 @@ _TARE_S: Final = 1.0
 _THINNED: Final = np.empty(0)
 
 
-def analysed(test: PlannedSimulation) -> TestSummary:
-    """One test simulated and analysed as its run file would be."""
+Interval = tuple[float, float]
+
+
+def analysed(test: PlannedSimulation) -> tuple[TestSummary, dict[str, Interval]]:
+    """One test simulated and analysed as its run file would be, and the test's own 95 % intervals."""
     rig, plan, readings = readings_of(test)
     armed = round(_TARE_S * plan.rate_hz)
     tare = take_tare(rig, readings.values[:, :armed], 0)
@@ -68,7 +72,16 @@ def analysed(test: PlannedSimulation) -> TestSummary:
         raise RuntimeError(f"{test.test}, seed {test.seed}: {[note.text for note in analysis.notes]}")
     recorded = RecordedTest(name, TestVerdict.GOOD, 0, Path(f"{test.test}.h5"))
     empty = dict.fromkeys(("time_s", "rotation_rad", "velocity_rad_s"), _THINNED)
-    return replace(summarise(recorded, rig, analysis), **empty)
+    return replace(summarise(recorded, rig, analysis), **empty), _intervals(analysis)
+
+
+def _intervals(analysis: TestAnalysis) -> dict[str, Interval]:
+    """As `daq-app analyse` prints them, less the method's bias."""
+    found = {"CRT": analysis.estimates["crt"].interval95(), "EAV": analysis.estimates["eav"].interval95()}
+    if analysis.fit is not None:
+        found["fit"] = analysis.fit.interval95()
+    bias = {name: analysis.bias[name.lower()].mean for name in found}
+    return {name: (i[0] - bias[name], i[1] - bias[name]) for name, i in found.items() if i is not None}
 
 
 def campaign_of(seed: int, pool: Executor) -> dict[str, Any]:
@@ -82,7 +95,7 @@ def campaign_of(seed: int, pool: Executor) -> dict[str, Any]:
         seed,
     )
     tests = tests_of(campaign, truth)
-    summaries = list(pool.map(analysed, tests))
+    answers = list(pool.map(analysed, tests))
     return {
         "seed": seed,
         "true_r": {name: own.r for name, own in truth.specimens.items()},
@@ -93,8 +106,9 @@ def campaign_of(seed: int, pool: Executor) -> dict[str, Any]:
                 "r_max": summary.r_max,
                 "phi0": summary.phi0,
                 "methods": {name: asdict(replace(m, points=())) for name, m in summary.methods.items()},
+                "intervals": intervals,
             }
-            for test, summary in zip(tests, summaries, strict=True)
+            for test, (summary, intervals) in zip(tests, answers, strict=True)
         ],
     }
 
@@ -133,6 +147,14 @@ def _summary(entry: dict[str, Any]) -> TestSummary:
     )
 
 
+def from_true_values(result: dict[str, Any], specimen: str) -> bool:
+    """Whether Student's interval of the tests' true r holds the specimen's: what perfect tests would give."""
+    entries = [e for e in result["tests"] if TestName.parse(e["test"]).specimen == specimen]
+    values = np.array([entry["true_r"] for entry in entries])
+    reach = stats.t.ppf(0.975, values.size - 1) * values.std(ddof=1) / math.sqrt(values.size)
+    return bool(abs(values.mean() - result["true_r"][specimen]) <= reach)
+
+
 def summary_table(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """By specimen and estimator: seeds covered, mean error, mean half width, worst miss."""
     found: dict[tuple[str, str], list[tuple[float, float, float]]] = {}
@@ -153,6 +175,7 @@ def summary_table(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
                 "true_r": float(true[0]),
                 "seeds": len(values),
                 "covered": int(np.count_nonzero(np.abs(errors) <= reaches)),
+                "covered_by_perfect_tests": sum(from_true_values(result, specimen) for result in results),
                 "mean_error": float(errors.mean()),
                 "mean_half_width": float(reaches.mean()),
                 "worst_error_over_half_width": float(np.max(np.abs(errors) / reaches)),
@@ -163,24 +186,26 @@ def summary_table(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def single_tests(results: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     """By estimator and level: bias, error and standard error of single tests against their own true r."""
-    found: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    found: dict[tuple[str, str], list[tuple[float, float, float]]] = {}
     for result in results:
         for entry in result["tests"]:
             level = TestName.parse(entry["test"]).level
             for method, value in entry["methods"].items():
                 error = value["r"] - value["bias"] - entry["true_r"]
                 sigma = math.hypot(value["standard_error"], value["bias_standard_error"])
-                found.setdefault((method, level), []).append((error, sigma))
+                low, high = entry["intervals"][method]
+                found.setdefault((method, level), []).append((error, sigma, low <= entry["true_r"] <= high))
     table = []
     for (method, level), pairs in sorted(
         found.items(), key=lambda item: (METHODS.index(item[0][0]), item[0][1])
     ):
-        errors, sigmas = np.array(pairs).T
+        errors, sigmas, covered = np.array(pairs).T
         table.append(
             {
                 "method": method,
                 "level": level,
                 "tests": errors.size,
+                "covered_share": float(covered.mean()),
                 "mean_error": float(errors.mean()),
                 "rms_error": float(np.sqrt(np.mean(errors**2))),
                 "rms_of_error_over_standard_error": float(np.sqrt(np.mean((errors / sigmas) ** 2))),

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 from daq_app.campaign import figures, tables
 from daq_app.campaign.collect import Failure
+from daq_app.campaign.statistics import GroupMean
 from daq_app.campaign.status import CampaignStatus
 from daq_app.campaign.summary import TestSummary
 
@@ -101,6 +102,7 @@ def write_report(
     folder.mkdir(parents=True, exist_ok=True)
     places = tables.table_3_2(status)
     restitution = tables.table_4_1(tests)
+    restitution += tables.mean_of_specimens(restitution)
     repetitions = tables.repetition_effect(tests)
     pictures = campaign_figures(tests)
     written = tables.write_csv(folder, places, tests, restitution, repetitions)
@@ -138,11 +140,18 @@ def _environment() -> Environment:
         loader=PackageLoader("daq_app.campaign"), autoescape=select_autoescape(), trim_blocks=True
     )
     environment.filters["number"] = _number
+    environment.filters["interval"] = _interval
     return environment
 
 
 def _number(value: float, digits: int) -> str:
     return "–" if math.isnan(value) else f"{value:.{digits}f}"
+
+
+def _interval(group: GroupMean) -> str:
+    if math.isnan(group.low95):
+        return "–"
+    return f"{_number(group.low95, 4)} … {_number(group.high95, 4)}"
 
 
 def _replace(path: Path, content: bytes) -> Path:
@@ -169,7 +178,7 @@ def _pdf(
                 row.method,
                 str(row.mean.tests),
                 _number(row.mean.mean, 4),
-                f"{_number(row.mean.low95, 4)} … {_number(row.mean.high95, 4)}",
+                _interval(row.mean),
                 _number(row.ratio, 3),
                 _number(row.corrected.mean, 4),
                 _number(row.r_max, 3),

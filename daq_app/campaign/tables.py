@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from scipy.special import stdtrit
+
 from daq_app.campaign.statistics import GroupMean, random_effects_mean
 from daq_app.campaign.status import CampaignStatus
 from daq_app.campaign.summary import TestSummary
@@ -67,6 +69,13 @@ class RepetitionRow:
         scatter = 0.0 if math.isnan(self.first.scatter) else self.first.scatter
         own = math.hypot(self.repeated.standard_error, scatter if self.repeated.tests == 1 else 0.0)
         return math.hypot(self.first.standard_error, own)
+
+    @property
+    def change_interval95(self) -> tuple[float, float]:
+        """Student's t with as many degrees of freedom as the scatter is known with."""
+        freedom = max(self.first.tests + self.repeated.tests - 2, 1)
+        reach = float(stdtrit(freedom, 0.975)) * self.change_standard_error
+        return self.change - reach, self.change + reach
 
 
 def table_3_2(status: CampaignStatus) -> list[PlaceRow]:
@@ -127,6 +136,27 @@ def table_4_1(tests: Sequence[TestSummary]) -> list[RestitutionRow]:
     return rows
 
 
+def mean_of_specimens(rows: Sequence[RestitutionRow]) -> list[RestitutionRow]:
+    """The last row of Table 4.1: the plain mean of the specimens, by estimator; none with one specimen.
+
+    It has no interval: specimens are not drawn from one population, and two tell no scatter.
+    """
+    means = []
+    for method in METHODS:
+        own = [row for row in rows if row.method == method]
+        if len(own) > 1:
+            plain, corrected = (
+                GroupMean(sum(values) / len(own), math.nan, math.nan, math.nan, math.nan, tests)
+                for values, tests in (
+                    ([row.mean.mean for row in own], sum(row.mean.tests for row in own)),
+                    ([row.corrected.mean for row in own], sum(row.corrected.tests for row in own)),
+                )
+            )
+            r_max = sum(row.r_max for row in own) / len(own)
+            means.append(RestitutionRow("mean", method, plain, corrected, r_max))
+    return means
+
+
 def repetition_effect(tests: Sequence[TestSummary]) -> list[RepetitionRow]:
     """Levels of which a repetition at the end exists, against their first tests."""
     rows = []
@@ -172,9 +202,13 @@ def write_csv(
     mean_rows: list[tuple[object, ...]] = [
         (r.specimen, r.method, *_group(r.mean), *_group(r.corrected), r.r_max, r.ratio) for r in restitution
     ]
-    change_header = ("specimen", "level", "method", "r_first", "r_repeated", "change", "standard_error")
+    change_header = ("specimen", "level", "method", *_group_header("r_first"), *_group_header("r_repeated"))
+    change_header += ("change", "change_standard_error", "change_low95", "change_high95")
     change_rows: list[tuple[object, ...]] = [
-        (r.specimen, r.level, r.method, r.first.mean, r.repeated.mean, r.change, r.change_standard_error)
+        (
+            *(r.specimen, r.level, r.method, *_group(r.first), *_group(r.repeated)),
+            *(r.change, r.change_standard_error, *r.change_interval95),
+        )
         for r in repetitions
     ]
     return [
@@ -234,11 +268,12 @@ def _point_table(tests: Sequence[TestSummary]) -> tuple[tuple[str, ...], list[tu
 
 
 def _write(path: Path, header: Sequence[str], rows: Sequence[Sequence[object]]) -> Path:
-    with path.open("w", newline="", encoding="utf-8") as file:
+    part = path.with_name(path.name + ".tmp")
+    with part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(header)
         writer.writerows([["" if _missing(cell) else cell for cell in row] for row in rows])
-    return path
+    return part.replace(path)
 
 
 def _missing(cell: object) -> bool:

@@ -6,6 +6,7 @@ The modules load NumPy, SciPy, HDF5 and more: seconds, that nobody should wait f
 from __future__ import annotations
 
 import importlib
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -117,4 +118,8 @@ def _root(context: typer.Context) -> None:
 
 def main() -> None:
     """Entry point of the console script."""
+    # The matrices here are small: threads of the linear algebra spin more than they help, and take
+    # processor time from the acquisition. Read by NumPy when it is loaded, by this process and its children.
+    for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     build_app()()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -40,7 +41,7 @@ def report(
     # Imported here: `--help` should not load SciPy.
     from daq_app.campaign import collect as gathering
     from daq_app.campaign.report import write_report
-    from daq_app.campaign.tables import table_4_1
+    from daq_app.campaign.tables import mean_of_specimens, table_4_1
     from daq_app.rocking.analysis import AnalysisOptions
 
     with reported():
@@ -63,9 +64,15 @@ def report(
         made = time.strftime("%Y-%m-%d %H:%M", time.localtime())
         footer = f"Made {made} from {len(recorded)} recorded tests in {folder.name}."
         write_report(target, campaign.name, status, tests, footer, failures)
-        _print(table_4_1(tests), tests, target, as_json)
+        rows = table_4_1(tests)
+        _print(rows + mean_of_specimens(rows), tests, target, as_json)
     if any(not failure.flagged_bad for failure in failures):
         raise typer.Exit(EXIT_FAILED)
+
+
+def _known(value: float) -> float | None:
+    """JSON has no NaN."""
+    return None if math.isnan(value) else value
 
 
 def _print(rows: list[RestitutionRow], tests: list[TestSummary], target: Path, as_json: bool) -> None:
@@ -76,12 +83,12 @@ def _print(rows: list[RestitutionRow], tests: list[TestSummary], target: Path, a
                 "method": row.method,
                 "tests": row.mean.tests,
                 "r": row.mean.mean,
-                "low95": row.mean.low95,
-                "high95": row.mean.high95,
-                "scatter": row.mean.scatter,
+                "low95": _known(row.mean.low95),
+                "high95": _known(row.mean.high95),
+                "scatter": _known(row.mean.scatter),
                 "r_corrected": row.corrected.mean,
-                "r_corrected_low95": row.corrected.low95,
-                "r_corrected_high95": row.corrected.high95,
+                "r_corrected_low95": _known(row.corrected.low95),
+                "r_corrected_high95": _known(row.corrected.high95),
                 "r_max": row.r_max,
                 "ratio": row.ratio,
             }
@@ -91,13 +98,16 @@ def _print(rows: list[RestitutionRow], tests: list[TestSummary], target: Path, a
         return
     console = Console()
     table = Table(title="Table 4.1: coefficient of restitution", title_justify="left")
-    for column in ("specimen", "estimator", "tests", "mean", "95 % interval", "r/r_max", "bias-corrected"):
+    columns = ("specimen", "estimator", "tests", "mean", "95 % interval", "r/r_max", "bias-corrected", "95 %")
+    for column in columns:
         table.add_column(column, justify="left" if column in ("specimen", "estimator") else "right")
     for row in rows:
-        interval = f"{row.mean.low95:.4f} … {row.mean.high95:.4f}"
-        corrected = f"{row.corrected.mean:.4f}"
-        cells = (str(row.mean.tests), f"{row.mean.mean:.4f}", interval, f"{row.ratio:.3f}", corrected)
-        table.add_row(row.specimen, row.method, *cells)
+        intervals = [
+            "–" if math.isnan(group.low95) else f"{group.low95:.4f} … {group.high95:.4f}"
+            for group in (row.mean, row.corrected)
+        ]
+        cells = (str(row.mean.tests), f"{row.mean.mean:.4f}", intervals[0], f"{row.ratio:.3f}")
+        table.add_row(row.specimen, row.method, *cells, f"{row.corrected.mean:.4f}", intervals[1])
     console.print(table)
     left_out = [test.test for test in tests if not test.good]
     if left_out:
