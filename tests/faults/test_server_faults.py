@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,27 @@ from daq_app.runfile import open_run
 from sim_hardware.control import SimControl
 
 pytestmark = pytest.mark.heavy
+
+
+@dataclass
+class Drifting:
+    """A device whose clock is 50 ppm fast, watched since the first test of this module."""
+
+    lab: Acquisition
+    since_s: float
+
+
+@pytest.fixture(scope="module", autouse=True)
+def drifting(rig_file: Path, rig: Rig, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Drifting]:
+    """The slowest of all faults to see: it runs beside the others, at real time."""
+    out = tmp_path_factory.mktemp("drifting") / "runs"
+    with SimulatedServer(rig_file, ["--wall", "marked"]) as own:
+        with SimControl(own.connection) as control:
+            control.command("fault", kind="clock_drift", target="cDAQ1", ppm=50.0)
+        lab = Acquisition(rig_file, rig, out, own.connection)
+        lab.state(State.PREVIEWING)
+        yield Drifting(lab, time.monotonic())
+        lab.kill()
 
 
 def test_samples_overwritten(shared: Acquisition, bench: SimControl, rig: Rig, row: Row) -> None:
@@ -213,6 +236,20 @@ def test_the_second_recorder_keeps_the_same_samples_by_itself(
         n = min(kept.size, rest.size)
         assert np.array_equal(kept[:n], rest[:n])
     assert lab.end() == 0
+
+
+def test_a_clock_that_is_50_ppm_off(drifting: Drifting, rig: Rig, row: Row) -> None:
+    """Too little for any test to suffer from; seen after a minute or so, and said in every run after."""
+    lab = drifting.lab
+    lab._struck_s = drifting.since_s
+    lab._mark = 0
+    told = lab.told("runs fast by at least")
+    lab.arm()
+    facts = look_at(lab.stop().run_path, rig)
+    assert facts.lost == 0
+    said = next(text for text in facts.reasons if "runs fast by at least" in text)
+    assert 20 <= float(said.partition("at least ")[2].partition(" ppm")[0]) <= 50, said
+    row("sample clock 50 ppm fast", told, facts)
 
 
 # -- before anything is armed ------------------------------------------------------------------------
