@@ -17,6 +17,9 @@ from sim_hardware.dynamics.effects import MOTION_EFFECTS
 from sim_hardware.dynamics.spec import find_effect
 from sim_hardware.sensors.effects import SENSOR_EFFECTS
 
+FORMS_ONLY = {("compliance", "fall")}
+"""Parameters of a form that the simulator has only one of."""
+
 
 def read_result(path: Path) -> dict[str, Any]:
     """The JSON of a diagnosis. Raises `CannotDiagnose` if the file is none."""
@@ -34,6 +37,8 @@ def effects_found(result: dict[str, Any]) -> dict[str, dict[str, float]]:
     effects: dict[str, dict[str, float]] = {}
     for estimate in result["effect_parameters"]:
         name, _, parameter = str(estimate["name"]).rpartition(".")
+        if (name, parameter) in FORMS_ONLY:
+            continue
         effects.setdefault(name, {})[parameter] = _possible(name, parameter, float(estimate["value"]))
     return effects
 

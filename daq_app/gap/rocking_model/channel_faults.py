@@ -38,6 +38,8 @@ SUSPECT = 4.0
 STRUCTURE = 0.5
 """Excess of the logarithm of what remains over noise from which a channel is suspect for it alone."""
 STRUCTURE_SD = 0.2
+RINGING: tuple[Family, ...] = ("accelerometer",)
+"""Families whose channels differ in how they ring: what remains of one says nothing."""
 SCREENED = 3
 """Runs that are looked at before all are."""
 
@@ -109,6 +111,8 @@ def _sizes(data: Sequence[_Family], family: Family, without: tuple[str, ...]) ->
             tolerance = np.array(TOLERANCE[family]) * beside[name].spread
             sd = np.hypot(tolerance, np.sqrt(np.diag(found.covariance)))
             size = float(np.abs(found.values / sd).max())
+            if family in RINGING:
+                usual = found.remains
             rows.setdefault(name, []).append(max(size, SUSPECT * (found.remains - usual) / STRUCTURE))
     return {name: float(np.median(values)) for name, values in rows.items()}
 
@@ -125,11 +129,12 @@ def channel_block(run: GapRun, grid: Grid, family: Family, name: str) -> Block |
     covariance = np.zeros((k + 1, k + 1))
     covariance[:k, :k] = found.covariance
     covariance[k, k] = STRUCTURE_SD**2
+    remains = 0.0 if family in RINGING else max(found.remains - usual, 0.0)
     return Block(
         name,
         (*SHAPES, "what remains"),
         (*_UNITS[family], "1"),
-        np.append(found.values, max(found.remains - usual, 0.0)),
+        np.append(found.values, remains),
         covariance,
         found.projection,
         beside.pick,

@@ -161,7 +161,7 @@ def floor(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatAr
     """The sinusoid of the floor while the wall does not move."""
     found = {
         "amplitude": values.get("ambient.amplitude", 0.0),
-        "frequency": values.get("ambient.frequency", run.vibration.frequency_hz if run.vibration else 0.0),
+        "frequency": values.get("ambient.fitted", run.vibration.frequency_hz if run.vibration else 0.0),
     }
     return np.array([found[name] for name in block.names])
 
@@ -171,4 +171,7 @@ def with_measured_inputs(run: RockingRun, values: Mapping[str, float]) -> Mappin
     if "ambient.amplitude" not in values or run.vibration is None:
         return values
     seen = run.vibration
-    return {**values, "ambient.frequency": seen.frequency_hz, "ambient.phase": seen.phase}
+    given = {**values, "ambient.frequency": seen.frequency_hz, "ambient.phase": seen.phase}
+    if "ambient.frequency" in values:
+        given["ambient.fitted"] = values["ambient.frequency"]
+    return given

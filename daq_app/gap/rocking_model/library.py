@@ -92,12 +92,20 @@ def _parameter(spec: EffectSpec, parameter: SpecParameter) -> Parameter:
     return positive(parameter.name, parameter.high, parameter.unit, parameter.text, per_run=per_run)
 
 
+_FORMS = {
+    "compliance": (
+        Parameter("fall", 0.5, 0.4, "1", 0.0, 1.0, meaning="share that falls with the overturning moment"),
+    )
+}
+"""Parameters of the form of an effect, beyond those of the simulator, which has one form only."""
+
+
 def _motion_effect(spec: EffectSpec, known: set[str]) -> Effect:
     names = _FREE.get(spec.name, tuple(p.name for p in spec.parameters if p.name != "v_mean"))
     return Effect(
         spec.name,
         spec.family,
-        tuple(_parameter(spec, p) for p in spec.parameters if p.name in names),
+        tuple(_parameter(spec, p) for p in spec.parameters if p.name in names) + _FORMS.get(spec.name, ()),
         spec.equation,
         spec.reference,
         spec.summary,

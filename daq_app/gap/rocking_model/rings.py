@@ -20,7 +20,8 @@ from daq_app.gap.rocking_model.sensor_blocks import GRID_HZ, Block, Grid, coarse
 
 BEND_HZ = np.geomspace(7.0, 42.0, 36)
 TURN_HZ = np.geomspace(1.5, 14.0, 40)
-DAMPING = (0.008, 0.02, 0.045, 0.09)
+DAMPING = (0.01, 0.04)
+FINE_DAMPING = (0.007, 0.012, 0.02, 0.032, 0.05, 0.08)
 DISPLACEMENT_MASK_S = 0.012
 ACCELERATION_MASK_S = 0.035
 _DEGREE = 4
@@ -172,31 +173,48 @@ def _clean(values: FloatArray, bases: list[tuple[NDArray[np.intp], FloatArray]])
 
 def scan(grids: Sequence[Grid], signals: Sequence[list[Signal]], *, slow: bool) -> Ring | None:
     """The oscillator that all runs and signals agree on best; None where there is nothing to scan."""
-    frequencies = TURN_HZ if slow else BEND_HZ
-    score = np.zeros((frequencies.size, len(DAMPING)))
+    coarse_hz = TURN_HZ if slow else BEND_HZ
+    score = _score(grids, signals, coarse_hz, DAMPING, slow=slow)
+    if not np.any(score > 0.0):
+        return None
+    i, _ = np.unravel_index(int(np.argmax(score)), score.shape)
+    # A lightly damped ring is sharper than the first scan's steps.
+    step = float(coarse_hz[1] / coarse_hz[0])
+    fine_hz = coarse_hz[i] * np.geomspace(1.0 / step, step, 25)
+    score = _score(grids, signals, fine_hz, FINE_DAMPING, slow=slow)
+    k, j = np.unravel_index(int(np.argmax(score)), score.shape)
+    inner = min(max(int(k), 1), fine_hz.size - 2)
+    bend = score[inner - 1, j] - 2.0 * score[inner, j] + score[inner + 1, j]
+    spacing = float(np.log(fine_hz[1] / fine_hz[0]))
+    shift = 0.5 * (score[inner - 1, j] - score[inner + 1, j]) / bend if bend < -1e-9 else 0.0
+    frequency = float(fine_hz[inner] * np.exp(spacing * np.clip(shift, -1.0, 1.0)))
+    sd = frequency * spacing / np.sqrt(max(-bend, 0.05))
+    return Ring(frequency, FINE_DAMPING[int(j)], float(score[k, j]), float(min(sd, 0.3 * frequency)))
+
+
+def _score(
+    grids: Sequence[Grid],
+    signals: Sequence[list[Signal]],
+    frequencies: FloatArray,
+    damping: Sequence[float],
+    *,
+    slow: bool,
+) -> FloatArray:
+    """Gain in log likelihood over all runs and signals, (frequencies, damping)."""
+    score = np.zeros((frequencies.size, len(damping)))
     for grid, listed in zip(grids, signals, strict=True):
         waves = None
         for signal in listed:
             if signal.pick.sum() < 100:
                 continue
             if waves is None:
-                waves = np.column_stack([ring_columns(grid, f, z) for f in frequencies for z in DAMPING])
-            bases = _cleaner(grid, signal.pick, slow)
-            both = _clean(np.column_stack([signal.values, waves]), bases)
-            if len(both) < 60:
-                continue
-            score += _gains(both[:, 0], both[:, 1:]).reshape(score.shape)
-    if not np.any(score > 0.0):
-        return None
-    i, j = np.unravel_index(int(np.argmax(score)), score.shape)
-    # Curvature of the log likelihood over ln f, by a parabola through the neighbours.
-    inner = min(max(int(i), 1), frequencies.size - 2)
-    bend = score[inner - 1, j] - 2.0 * score[inner, j] + score[inner + 1, j]
-    step = float(np.log(frequencies[1] / frequencies[0]))
-    shift = 0.5 * (score[inner - 1, j] - score[inner + 1, j]) / bend if bend < -1e-9 else 0.0
-    frequency = float(frequencies[inner] * np.exp(step * np.clip(shift, -1.0, 1.0)))
-    sd = frequency * step / np.sqrt(max(-bend, 0.05))
-    return Ring(frequency, DAMPING[int(j)], float(score[i, j]), float(min(sd, 0.3 * frequency)))
+                waves = np.column_stack(
+                    [ring_columns(grid, float(f), z) for f in frequencies for z in damping]
+                )
+            both = _clean(np.column_stack([signal.values, waves]), _cleaner(grid, signal.pick, slow))
+            if len(both) >= 60:
+                score += _gains(both[:, 0], both[:, 1:]).reshape(score.shape)
+    return score
 
 
 def _gains(values: FloatArray, waves: FloatArray) -> FloatArray:
