@@ -21,6 +21,8 @@ from daq_app.runfile.source import rig_of
 Floats = NDArray[np.float64]
 
 _WINDOW: Final = 4000
+_LONGEST_S: Final = 600.0
+_BEFORE_RELEASE_S: Final = 120.0
 _OPTIONS: Final = AnalysisOptions(fit=False, bias_runs=0)
 """What takes long (simulated bias, fit of the whole motion) waits for `daq-app analyse`."""
 _SIGNALS: Final = {
@@ -40,8 +42,9 @@ def derive(contents: JournalContents) -> tuple[DerivedData | None, str]:
     rig = rig_of(contents.header)
     if rig is None or rig.channel_ids != contents.header.channel_ids:
         return None, "The run's rig file is not understood, so nothing was derived"
+    start, stop = _analysed(contents)
     try:
-        analysis = analyse_record(_record(contents, rig), _OPTIONS)
+        analysis = analyse_record(_record(contents, rig, start, stop), _OPTIONS)
         online = _online(contents, rig)
     except Exception as error:
         return None, f"The analysis failed ({type(error).__name__}: {error}); the readings are complete"
@@ -49,30 +52,54 @@ def derive(contents: JournalContents) -> tuple[DerivedData | None, str]:
     quality = _quality(contents, analysis)
     if quality is not None:
         results["quality"] = quality
-    return DerivedData(contents.first_sample, _signals(analysis.series), results=results), ""
+    said = ""
+    if stop - start < contents.n_samples:
+        rate_hz = contents.header.rate_hz
+        said = f"Analysed from {start / rate_hz:.0f} s to {stop / rate_hz:.0f} s of this long recording"
+    return DerivedData(contents.first_sample + start, _signals(analysis.series), results=results), said
 
 
-def _record(contents: JournalContents, rig: Rig) -> TestRecord:
+def _analysed(contents: JournalContents) -> tuple[int, int]:
+    """First sample and end (from the run's first sample on) of what is analysed: all of a usual run.
+
+    A wall may stand armed for half an hour; its readings are kept whole, but the analysis would need
+    gigabytes of memory for them. So a long run is analysed from two minutes before its release on, or, where
+    nothing was released, at its end.
+    """
+    longest = round(_LONGEST_S * contents.header.rate_hz)
+    if contents.n_samples <= longest:
+        return 0, contents.n_samples
+    released = [event.sample for event in contents.events if event.kind in ("released", "rocking")]
+    if not released:
+        return contents.n_samples - longest, contents.n_samples
+    before = round(_BEFORE_RELEASE_S * contents.header.rate_hz)
+    start = min(max(0, released[-1] - contents.first_sample - before), contents.n_samples - longest)
+    return start, start + longest
+
+
+def _record(contents: JournalContents, rig: Rig, start: int, stop: int) -> TestRecord:
     header = contents.header
     row = {channel_id: index for index, channel_id in enumerate(header.channel_ids)}
 
     def load(wanted: tuple[str, ...]) -> Floats:
-        """Some channels of the whole run; the journal is walked through once for each call."""
+        """Some channels of what is analysed; the journal is walked through once for each call."""
         rows = [row[channel_id] for channel_id in wanted]
         scaling = Scaling.of([rig.channel(channel_id) for channel_id in wanted], header.tare)
-        si = np.empty((len(rows), contents.n_samples))
+        si = np.empty((len(rows), stop - start))
         for first, window in contents.windows(_WINDOW):
-            start = first - contents.first_sample
-            si[:, start : start + window.shape[1]] = scaling.to_si(window[rows])
+            at = first - contents.first_sample - start
+            low, high = max(at, 0), min(at + window.shape[1], stop - start)
+            if low < high:
+                si[:, low:high] = scaling.to_si(window[rows, low - at : high - at])
         return si
 
     return TestRecord(
         rig=rig,
         rate_hz=header.rate_hz,
-        n_samples=contents.n_samples,
+        n_samples=stop - start,
         channel_ids=header.channel_ids,
         load=load,
-        first_sample=contents.first_sample,
+        first_sample=contents.first_sample + start,
         time_offsets_s={channel_id: header.time_offset_s(channel_id) for channel_id in header.channel_ids},
         tared=bool(header.tare),
         label=header.test or header.run_id,

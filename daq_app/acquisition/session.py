@@ -90,6 +90,13 @@ class Session:
         # Listed now: what this session will record is none of them.
         folders = [self._settings.folder, self._settings.spare_folder]
         left = [path for folder in folders if folder and folder.is_dir() for path in find_journals(folder)]
+        if left:
+            names = ", ".join(path.stem for path in left[:3]) + (" …" if len(left) > 3 else "")
+            text = (
+                f"An earlier session was cut off: {len(left)} recording(s) ({names}) are being made into "
+                "runs now. You may go on; what is in them is told when they are there"
+            )
+            self._say(EventMessage(kind="recovering", sample=0, text=text, severity="warning"))
         for journal in left:
             job = {"job": "recover", "journal": str(journal)}
             self._finaliser.submit(job, self._tell_recovery)

@@ -57,7 +57,7 @@ class Saboteur:
             )
         except OSError:
             return False
-        return str(path).startswith(folder)
+        return str(path).startswith(folder + os.sep)
 
     def install(self) -> None:
         """Stand between Python and the system."""
