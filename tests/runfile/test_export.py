@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import errno
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -120,6 +121,14 @@ def test_read_back_bit_for_bit(tmp_path: Path, run: Path, format_: str, units: s
         wanted = source.header.reading_units if units == "raw" else ("m", "m", "m/s2", "rad")
         assert tuple(channel_units.values()) == wanted
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+def test_csv_is_as_exact_without_arrow(tmp_path: Path, run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fast = read_csv(export_run(run, tmp_path / "fast.csv", "csv", units="raw"))[1]
+    monkeypatch.setitem(sys.modules, "pyarrow.csv", None)
+    slow = read_csv(export_run(run, tmp_path / "slow.csv", "csv", units="raw"))[1]
+    for name, values in slow.items():
+        np.testing.assert_array_equal(values, fast[name])
 
 
 @pytest.mark.parametrize("format_", FORMATS)

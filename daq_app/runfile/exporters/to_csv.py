@@ -3,29 +3,57 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq_app.runfile.exporters.selection import Selection
 
 _ROWS: Final = 2048
 """Rows that are Python objects at a time: they take ten times the memory of the array."""
 
+Formatter = Callable[[NDArray[np.float64]], Iterator[bytes]]
+
 
 def write(path: Path, selection: Selection) -> None:
     """Columns ``time_s`` and one per channel; ``nan`` in gaps. Every number is its shortest exact text."""
-    with path.open("w", encoding="utf-8", newline="\n") as file:
+    lines_of = _formatter()
+    with path.open("wb") as file:
         for key, value in selection.metadata().items():
-            file.write(f"# {key}: {json.dumps(value, ensure_ascii=False)}\n")
+            file.write(f"# {key}: {json.dumps(value, ensure_ascii=False)}\n".encode())
         for channel_id, unit in zip(selection.ids, selection.channel_units, strict=True):
             known = json.dumps(selection.channel_metadata(channel_id), ensure_ascii=False)
-            file.write(f"# channel {channel_id} [{unit}]: {known}\n")
-        file.write(",".join(("time_s", *selection.ids)) + "\n")
+            file.write(f"# channel {channel_id} [{unit}]: {known}\n".encode())
+        file.write((",".join(("time_s", *selection.ids)) + "\n").encode())
         for times, values in selection.pieces():
-            # repr of a Python float is the shortest text that reads back to the same bits.
-            table = np.vstack([times, values]).T
-            for start in range(0, len(table), _ROWS):
-                rows = table[start : start + _ROWS].tolist()
-                file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+            file.writelines(lines_of(np.vstack([times, values])))
+
+
+def _formatter() -> Formatter:
+    """Arrow's, which is five times as fast, where it is installed; else Python's own. Both are exact."""
+    try:
+        import pyarrow.csv  # noqa: F401  # part of the optional extra `formats`
+    except ImportError:
+        return _by_python
+    return _by_arrow
+
+
+def _by_python(columns: NDArray[np.float64]) -> Iterator[bytes]:
+    """(columns, m) to lines; repr of a Python float is the shortest text that reads back to the same bits."""
+    table = columns.T
+    for start in range(0, len(table), _ROWS):
+        rows = table[start : start + _ROWS].tolist()
+        yield "".join(",".join(map(repr, row)) + "\n" for row in rows).encode()
+
+
+def _by_arrow(columns: NDArray[np.float64]) -> Iterator[bytes]:
+    import pyarrow as pa
+    import pyarrow.csv as pa_csv
+
+    sink = pa.BufferOutputStream()
+    table = pa.table(list(columns), names=[str(index) for index in range(len(columns))])
+    pa_csv.write_csv(table, sink, pa_csv.WriteOptions(include_header=False))
+    yield sink.getvalue().to_pybytes()
