@@ -33,6 +33,7 @@ from daq_app.campaign.collect import options_for, summarise
 from daq_app.campaign.names import TestName
 from daq_app.campaign.plan import load_campaign
 from daq_app.campaign.simulate import CampaignTruth, PlannedSimulation, SpecimenTruth, readings_of, tests_of
+from daq_app.campaign.statistics import random_effects_mean
 from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.campaign.summary import MethodResult, TestSummary
 from daq_app.campaign.tables import METHODS, RestitutionRow, table_4_1
@@ -71,8 +72,9 @@ def analysed(test: PlannedSimulation) -> tuple[TestSummary, dict[str, Interval]]
     if not analysis.found:
         raise RuntimeError(f"{test.test}, seed {test.seed}: {[note.text for note in analysis.notes]}")
     recorded = RecordedTest(name, TestVerdict.GOOD, 0, Path(f"{test.test}.h5"))
-    empty = dict.fromkeys(("time_s", "rotation_rad", "velocity_rad_s"), _THINNED)
-    return replace(summarise(recorded, rig, analysis), **empty), _intervals(analysis)
+    summary = summarise(recorded, rig, analysis)
+    thin = replace(summary, time_s=_THINNED, rotation_rad=_THINNED, velocity_rad_s=_THINNED)
+    return thin, _intervals(analysis)
 
 
 def _intervals(analysis: TestAnalysis) -> dict[str, Interval]:
@@ -184,6 +186,45 @@ def summary_table(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     return table
 
 
+def resampled(results: Sequence[dict[str, Any]], campaigns: int) -> list[dict[str, Any]]:
+    """Coverage over many campaigns made of the simulated tests' errors: what 20 seeds are too few to show.
+
+    Each new campaign draws its tests' true r afresh; error and standard error of each test are those of a
+    simulated test of the same specimen and level. The mean and its interval are the report's own.
+    """
+    pools: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
+    for result in results:
+        for entry in result["tests"]:
+            name = TestName.parse(entry["test"])
+            for method, value in entry["methods"].items():
+                error = value["r"] - value["bias"] - entry["true_r"]
+                sigma = math.hypot(value["standard_error"], value["bias_standard_error"])
+                pools.setdefault((name.specimen, method, name.level), []).append((error, sigma))
+    rng = np.random.default_rng(0)
+    table = []
+    for specimen, true_r in results[0]["true_r"].items():
+        names = [TestName.parse(entry["test"]) for entry in results[0]["tests"]]
+        levels = [name.level for name in names if name.specimen == specimen]
+        for method in METHODS:
+            covered = 0
+            for _ in range(campaigns):
+                drawn = true_r * (1.0 + TEST_SCATTER * rng.standard_normal(len(levels)))
+                picks = [pools[specimen, method, level] for level in levels]
+                errors = np.array([pool[rng.integers(len(pool))] for pool in picks])
+                group = random_effects_mean((drawn + errors[:, 0]).tolist(), errors[:, 1].tolist())
+                covered += group.low95 <= true_r <= group.high95
+            table.append(
+                {
+                    "specimen": specimen,
+                    "method": method,
+                    "campaigns": campaigns,
+                    "covered_share": covered / campaigns,
+                    "standard_error": math.sqrt(0.95 * 0.05 / campaigns),
+                }
+            )
+    return table
+
+
 def single_tests(results: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     """By estimator and level: bias, error and standard error of single tests against their own true r."""
     found: dict[tuple[str, str], list[tuple[float, float, float]]] = {}
@@ -242,6 +283,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.coverage", description=__doc__)
     parser.add_argument("--seeds", type=int, default=20, help="how many campaigns")
     parser.add_argument("--first-seed", type=int, default=1)
+    parser.add_argument("--resampled", type=int, default=2000, help="campaigns of resampled tests; 0: none")
     parser.add_argument("--workers", type=int, default=None, help="processes; all cores if left out")
     parser.add_argument("--store", type=Path, default=Path("coverage.jsonl"), help="results of single tests")
     parser.add_argument("--json", type=Path, default=Path("coverage.json"), help="where to write the tables")
@@ -265,6 +307,9 @@ def main() -> int:
         console, f"True r within the report's own 95 % interval, seeds {wanted[0]} to {wanted[-1]}", coverage
     )
     _print(console, "Single tests against their own r", singles)
+    many = resampled(results, options.resampled) if options.resampled else []
+    if many:
+        _print(console, "Campaigns of resampled tests", many)
     document = {
         "machine": {"platform": platform.platform(), "python": platform.python_version()},
         "measured": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
@@ -274,6 +319,7 @@ def main() -> int:
         "seeds": list(wanted),
         "coverage": coverage,
         "single_tests": singles,
+        "resampled": many,
     }
     options.json.write_text(json.dumps(document, indent=1), encoding="utf-8")
     console.print(f"written to {options.json}")
