@@ -155,6 +155,8 @@ def latency(bench: Bench) -> list[Figure]:
         return session.current_state in (bench.states.SAVING, bench.states.SAVED)
 
     bench.until(watch)
+    if not delays:
+        raise RuntimeError(f"no r came to the screen; the window says {window.header.words}")
     milliseconds = 1e3 * np.asarray(delays)
     note = "clock set by the earliest block: includes the 100 ms read period, not the few ms of its way"
     return [
@@ -197,8 +199,8 @@ def figures() -> list[Figure]:
         bench = Bench(Path(folder))
         try:
             found = [figure for size in SIZES for figure in frames(bench, size)]
-            found += memory(bench)
             found += latency(bench)
+            found += memory(bench)
         finally:
             bench.close()
     return found

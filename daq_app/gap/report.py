@@ -22,7 +22,7 @@ from daq_app.gap.rocking_model.run_features import extract
 from daq_app.gap.traces import Trace, traces
 
 _A4_IN: Final = (8.27, 11.69)
-_LISTED: Final = 7
+_LISTED: Final = 6
 """Parameters in the PDF; the HTML has all."""
 
 
@@ -122,7 +122,7 @@ def _pdf(result: Diagnosis, shown: Sequence[Trace], maps: Sequence[ProbeMap]) ->
     """Everything on one A4 page."""
     page = Figure(figsize=_A4_IN, layout="constrained")
     page.get_layout_engine().set(rect=(0.03, 0.015, 0.94, 0.97))  # type: ignore[union-attr, call-arg]
-    parts: Any = page.subfigures(5, 1, height_ratios=(1.75, 2.2, 3.0 if shown else 0.01, 3.0, 1.45))
+    parts: Any = page.subfigures(5, 1, height_ratios=(1.6, 2.2, 3.0 if shown else 0.01, 3.0, 1.65))
     _write_head(parts[0], result)
     left, right = parts[1].subfigures(1, 2)
     left.suptitle("Where: largest gap, 1 is noise and scatter", fontsize=9, weight="bold")
@@ -133,7 +133,7 @@ def _pdf(result: Diagnosis, shown: Sequence[Trace], maps: Sequence[ProbeMap]) ->
     if shown:
         parts[2].suptitle("Measured and simulated rotation", fontsize=9, weight="bold")
         _draw_traces(parts[2], result, shown)
-    left, right = parts[3].subfigures(1, 2, width_ratios=(1.0, 1.7))
+    left, right = parts[3].subfigures(1, 2, width_ratios=(1.0, 2.1))
     if result.gap is not None:
         left.suptitle("How far: held-out gap", fontsize=9, weight="bold")
         draw.draw_closure(draw.bare(left.subplots()), result)

@@ -16,7 +16,7 @@ from daq_app.gap.traces import Trace
 BEFORE, AFTER, MEASURED = "#8fa6bf", "#c8442e", "#1c232b"
 _PHASES: Final = ("held", "release", "swing", "peak", "impact", "tail", "run", "rest")
 _KNOT: Final = re.compile(r"^(.*?) at ([\d.]+) (.+)$")
-_MOST_SENSOR_ROWS: Final = 12
+_MOST_SENSOR_ROWS: Final = 7
 
 Shape = Mapping[str, tuple[float, float, float]]
 
@@ -115,6 +115,9 @@ def draw_trace(upper: Axes, lower: Axes, trace: Trace, name: str) -> None:
         lower.plot(
             time, 1e3 * (trace.measured_rad - simulated), color=colour, lw=0.9, label=f"{rms:.2f} mrad rms"
         )
+    left = np.abs(trace.measured_rad - trace.baseline_rad)[trace.time_s >= 0.0]
+    reach = 1.2e3 * float(np.nanmax(left, initial=1e-5))
+    lower.set_ylim(-reach, reach)
     lower.axhline(0.0, color="k", lw=0.5)
     lower.set_ylabel("measured − simulated", fontsize=7)
     lower.set_xlabel("time since release (s)", fontsize=7)
@@ -169,7 +172,8 @@ class ProbeMap:
         axes.axhline(0.0, color="k", lw=0.5)
         axes.set_xlabel(self.axis, fontsize=6.5)
         axes.set_ylabel(self.unit, fontsize=6.5)
-        axes.legend(fontsize=5.5, frameon=False)
+        if len(self.curves) > 1:
+            axes.legend(fontsize=5.5, frameon=False)
 
     def _draw_bars(self, axes: Axes) -> None:
         rows = sorted(self.bars, key=lambda bar: abs(bar[1]) / max(bar[3] - bar[2], 1e-12))
@@ -182,10 +186,10 @@ class ProbeMap:
         axes.set_xlabel(self.unit, fontsize=6.5)
 
 
-_MAPS: Final[dict[str, tuple[str, str]]] = {
-    "free_restitution": ("loss–velocity: change of r", "change of r"),
-    "free_restoring": ("moment–rotation: shift of half-cycle times, up and down alike", "s"),
-    "free_dissipation": ("loss within swings: falls later, rises earlier", "s"),
+_MAPS: Final[dict[str, tuple[str, str, float]]] = {
+    "free_restitution": ("loss–velocity", "change of r", 1.0),
+    "free_restoring": ("moment–rotation: time gained", "ms", 1e3),
+    "free_dissipation": ("loss in swings: fall later by", "ms", 1e3),
 }
 
 
@@ -203,8 +207,9 @@ def probe_maps(
         if not shape:
             continue
         if name in _MAPS:
-            title, unit = _MAPS[name]
-            maps.append(ProbeMap(title, shape, meanings, unit))
+            title, unit, factor = _MAPS[name]
+            scaled = {key: (factor * a, factor * b, factor * c) for key, (a, b, c) in shape.items()}
+            maps.append(ProbeMap(title, scaled, meanings, unit))
         elif any(_KNOT.match(meanings.get(key, "")) for key in shape):
             maps.append(ProbeMap(name, shape, meanings, (units or {}).get(name, "")))
         else:

@@ -30,7 +30,7 @@ from sim_hardware.dynamics.effects import MOTION_EFFECTS
 from sim_hardware.dynamics.motion import motion_vector, simulate_vector
 
 TRACE_HZ: Final = 200.0
-_BEFORE_S, _AFTER_S = 0.4, 0.3
+_BEFORE_S = 0.1
 _MASS_KG = 5000.0  # free in a motion that is described by α, p and R
 _MOTION: Final = frozenset(spec.name for spec in MOTION_EFFECTS)
 _TIME_SD_S: Final = 3e-4
@@ -43,7 +43,7 @@ Effects = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """One run at `TRACE_HZ`; times from the release, rotations in rad, all of shape (n,)."""
+    """One run at `TRACE_HZ` to the last peak that is followed; from the release, rad, all of shape (n,)."""
 
     run: str
     level: str
@@ -56,9 +56,10 @@ class Trace:
 
     @property
     def rms_rad(self) -> tuple[float, float]:
-        """Rms of measured minus baseline, and of measured minus augmented."""
+        """Rms of measured minus baseline, and of measured minus augmented, from the release on."""
+        moving = self.time_s >= 0.0
         left = (self.measured_rad - self.baseline_rad, self.measured_rad - self.augmented_rad)
-        return tuple(float(np.sqrt(np.nanmean(part**2))) for part in left)  # type: ignore[return-value]
+        return tuple(float(np.sqrt(np.nanmean(part[moving] ** 2))) for part in left)  # type: ignore[return-value]
 
 
 def traces(result: Diagnosis, runs: Sequence[GapRun], most: int = 2) -> list[Trace]:
@@ -150,7 +151,7 @@ def _trace(
         baseline = augmented  # the motion is the same, a family shows it differently
     else:
         baseline = follow(run.survey, {}, bend=False)  # "other parameters": than those of the rig file
-    time = np.arange(-_BEFORE_S, swings.rest_s - swings.release_s + _AFTER_S, 1.0 / TRACE_HZ)
+    time = np.arange(-_BEFORE_S, float(swings.peak_s[-1]), 1.0 / TRACE_HZ)
     samples = np.arange(theta.size) / run.rate_hz - (start_s + swings.release_s)
     heights = np.array([run.sensors[i].position_m[2] for i in run.indices("wire")] or [1.0])
     see = partial(
@@ -194,20 +195,24 @@ def _follow(
     impacts_before: float,
 ) -> _Followed:
     """The simulation set to one run by least squares of its impact times; `bend` lets α and p move."""
-    spread = np.array([0.01, survey.alpha_tolerance, survey.p_tolerance, 0.03])
-    free = np.array([True, bend, bend, "initial_velocity" in effects])
+    # Nobody holds five tonnes still: rotation and speed at the release are known to the sway's size.
+    sway = (swings.hold_sd + 2e-5, swings.hold_rate_sd + 2e-5 + 0.03 * ("initial_velocity" in effects))
+    spread = np.array([0.01, *sway, survey.alpha_tolerance, survey.p_tolerance])
+    free = np.array([True, True, True, bend, bend])
+    timed = np.isfinite(swings.fall_s[0])
+    first_fall = swings.fall_s[0][timed], np.sign(swings.peak_rad[0]) * swings.levels[0][timed]
 
     def simulate(u: FloatArray) -> _Followed:
-        full = np.zeros(4)
+        full = np.zeros(5)
         full[free] = u
-        delay, alpha, p, omega = full * spread
-        terms = {**effects, "initial_velocity": {"omega": omega}} if free[3] else effects
+        delay, theta0, omega, alpha, p = full * spread
+        terms = {**effects, "initial_velocity": {"omega": omega}}
         slender = survey.alpha_rad * (1.0 + alpha)
         # α may bend, the base stays as wide as it was surveyed.
         r0 = survey.half_base_m / math.sin(slender)
         vector = motion_vector(
             Body(slender, survey.p_rad_s * (1.0 + p), r0, _MASS_KG),
-            Release(float(swings.peak_rad[0])),
+            Release(float(swings.peak_rad[0]) + theta0),
             Restitution(min(r, 1.0)),
             terms,
             duration_s=float(swings.peak_s[-1]) + 3.0,
@@ -220,7 +225,9 @@ def _follow(
         found = followed.motion.impact_time_s[followed.motion.impact_kind == 0][: impacts_s.size]
         late = np.full(impacts_s.size, 0.1)  # an impact that the simulation never comes to
         late[: found.size] = found + followed.delay_s - impacts_s[: found.size]
-        return np.concatenate([late / _TIME_SD_S, u])
+        theta, speed, _ = followed.motion.evaluate(first_fall[0] - followed.delay_s)
+        fall = (theta - first_fall[1]) / np.maximum(np.abs(speed), 0.02)
+        return np.concatenate([late / _TIME_SD_S, fall / _TIME_SD_S, u])
 
     return simulate(least_squares(misfit, np.zeros(int(free.sum())), diff_step=1e-3, max_nfev=20).x)
 
@@ -254,6 +261,7 @@ def _meet_the_peaks(vector: FloatArray, swings: Swings) -> Motion:
         return np.asarray(1.0 - (1.0 - phi) ** 2)
 
     wanted = np.log(energy(swings.peak_rad))
+    wanted[0] = math.log(energy(np.array([vector[par.THETA0]]))[0])
     factors = np.zeros(wanted.size - 1)  # ln of each impact's r over the mean r
     vector[par.SCATTER] = 1.0
     motion = simulate_vector(vector, np.expm1(factors))
