@@ -118,7 +118,9 @@ class _Study:
         known = start.known() if start else {}
         sigmas = start.sigmas if start else {}
         again = start is not None and start.effects == effects
-        return FitTask(effects_of(effects, self.library), known, sigmas, polish, not again)
+        # A pair keeps the columns of the effect that it starts from while it looks for the other.
+        columns = {} if start is None else {k: c for k, c in start.columns.items() if "." in k[0]}
+        return FitTask(effects_of(effects, self.library), known, sigmas, polish, not again, columns)
 
     def _fit(
         self,

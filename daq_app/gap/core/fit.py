@@ -88,7 +88,7 @@ def fit(
     problem = Problem(model, runs, effects)
     base = problem.start(known or {})
     start_sigma = np.array([math.log((sigmas or {}).get(s.name, s.median)) for s in model.scatters])
-    starts = _starts(problem, base) if multistart and effects else [base]
+    starts = _starts(problem, base, known or {}) if multistart and effects else [base]
     linear = _linear(problem, frozen)
     searches = [Search(problem, u, start_sigma.copy(), frozen or linear) for u in starts]
     # A start may lie where the model diverges; it is dropped as long as another one does not.
@@ -135,10 +135,13 @@ def _lead(searches: list[Search], problem: Problem) -> tuple[list[Search], int]:
     return searches, sum(1 for search in searches if search.objective - best < 0.5)
 
 
-def _starts(problem: Problem, base: FloatArray) -> list[FloatArray]:
-    """Starting vectors over the effects' parameters, at most `_MAX_STARTS` besides zero."""
-    own = [k for k, q in enumerate(problem.unknowns) if q.effect and q.run is None]
-    per_run = [k for k, q in enumerate(problem.unknowns) if q.effect and q.run is not None]
+def _starts(
+    problem: Problem, base: FloatArray, known: Mapping[tuple[str, int | None], float]
+) -> list[FloatArray]:
+    """Starting vectors over the effects' unknown parameters, at most `_MAX_STARTS` besides zero."""
+    new = [k for k, q in enumerate(problem.unknowns) if q.effect and (q.key, q.run) not in known]
+    own = [k for k in new if problem.unknowns[k].run is None]
+    per_run = [k for k in new if problem.unknowns[k].run is not None]
     choices = [problem.unknowns[k].parameter.start_coordinates() for k in own]
     combinations = list(itertools.islice(itertools.product(*choices), 0, 64)) if own else [()]
     if len(combinations) > _MAX_STARTS:

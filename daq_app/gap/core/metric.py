@@ -2,7 +2,9 @@
 
 C = diag(sd² + Σ σ_s² d_s²) + L_f L_fᵀ. Where the rows that L_f couples have one scatter each, of a size
 that does not depend on the parameters, the generalised eigenvectors of (diag sd² + L_f L_fᵀ, diag d²) make
-C diagonal for every σ at once. Other covariances go through Woodbury's identity (`likelihood.Covariance`).
+C diagonal for every σ at once. A coupled row without scatter is given one of a ten-thousandth of its error,
+which changes nothing that could be seen and keeps the problem regular. Other covariances go through
+Woodbury's identity (`likelihood.Covariance`).
 """
 
 from __future__ import annotations
@@ -16,6 +18,8 @@ from numpy.typing import NDArray
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.likelihood import Covariance
 from daq_app.gap.core.model import Prediction
+
+_NEGLIGIBLE = 1e-4
 
 
 class Metric(Protocol):
@@ -42,9 +46,12 @@ class DiagonalMetric:
     def __init__(self, sd: FloatArray, prediction: Prediction, own: str, rows: NDArray[np.intp]) -> None:
         self._variance = sd**2
         self._own, self._rows = own, rows
-        self._scale = prediction.loadings[own][rows] if own else np.zeros(0)
+        self._given = prediction.loadings[own][rows] if own else np.zeros(0)
+        self._scale = self._given
         if rows.size:
             assert prediction.fixed_loadings is not None
+            error = np.sqrt(self._variance[rows] + np.sum(prediction.fixed_loadings[rows] ** 2, axis=1))
+            self._scale = np.where(self._given == 0.0, _NEGLIGIBLE * error, self._given)
             coupled = prediction.fixed_loadings[rows] / self._scale[:, None]
             whole = np.diag(self._variance[rows] / self._scale**2) + coupled @ coupled.T
             self._eigen, vectors = np.linalg.eigh(whole)
@@ -53,7 +60,7 @@ class DiagonalMetric:
         self._log_scale = 2.0 * float(np.log(np.abs(self._scale)).sum())
 
     def suits(self, prediction: Prediction) -> bool:
-        return not self._own or np.array_equal(prediction.loadings[self._own][self._rows], self._scale)
+        return not self._own or np.array_equal(prediction.loadings[self._own][self._rows], self._given)
 
     def prepare(self, matrix: FloatArray) -> FloatArray:
         turned = matrix.copy()
@@ -102,6 +109,6 @@ def metric_of(sd: FloatArray, prediction: Prediction) -> Metric:
     if not rows.size:
         return DiagonalMetric(sd, prediction, "", rows)
     acting = [name for name, loading in prediction.loadings.items() if loading[rows].any()]
-    if len(acting) == 1 and prediction.loadings[acting[0]][rows].all():
+    if len(acting) == 1:
         return DiagonalMetric(sd, prediction, acting[0], rows)
     return GeneralMetric(sd)

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from daq_app.gap.core.effects import Effect
@@ -33,9 +33,12 @@ class FitTask:
     sigmas: dict[str, float]
     polish: bool = True
     multistart: bool = True
+    columns: Columns = field(default_factory=dict)
+    """Columns of the Jacobian beyond those without any effect."""
 
     def run(self, model: Model, runs: Sequence[Run], frozen: Columns | None = None) -> Fit:
-        return fit(model, runs, self.effects, self.known, self.sigmas, self.multistart, frozen, self.polish)
+        known = {**(frozen or {}), **self.columns}
+        return fit(model, runs, self.effects, self.known, self.sigmas, self.multistart, known, self.polish)
 
 
 @dataclass(frozen=True, slots=True)

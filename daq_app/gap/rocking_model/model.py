@@ -131,9 +131,7 @@ class RockingModel:
         last = count + run.peaks.size
         predicted[count:last] = peaks
         loading_r[count:last] = 1.0 / slopes
-        predicted[last:], loading_s[last:] = self._remembered(
-            run, "blocks", values, response.block_coefficients
-        )
+        predicted[last:], loading_s[last:] = response.block_coefficients(run, values)
         loadings = {SCATTER_R: loading_r, SCATTER_TIME: loading_t, SCATTER_SENSOR: loading_s}
         return Prediction(predicted, loadings, run.block_loadings)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import extra_response as extra
+from daq_app.gap.rocking_model.memo import Memo
 from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.sensor_blocks import (
     Block,
@@ -134,14 +135,20 @@ def block_coefficients(run: RockingRun, values: Mapping[str, float]) -> tuple[Fl
             np.array([repeatability(block, i) for i in range(len(block.names))]) for block in run.blocks
         ]
     units: list[FloatArray] = run.cache["units"]
-    predicted = []
-    for block, unit in zip(run.blocks, units, strict=True):
-        coefficients = _PREDICT[block.rule](run, block, values)
-        if f"free_{block.family}.c0" in values:
-            free = [values.get(f"free_{block.family}.c{i}", 0.0) for i in range(unit.size)]
-            coefficients = coefficients + 3.0 * unit * np.array(free)
-        predicted.append(coefficients)
+    memos: list[Memo] = run.cache.setdefault("memos", [Memo() for _ in run.blocks])
+    predicted = [
+        memo.of(values, partial(_coefficients, run, block, unit))
+        for block, unit, memo in zip(run.blocks, units, memos, strict=True)
+    ]
     return np.concatenate(predicted), np.concatenate(units)
+
+
+def _coefficients(run: RockingRun, block: Block, unit: FloatArray, values: Mapping[str, float]) -> FloatArray:
+    coefficients = _PREDICT[block.rule](run, block, values)
+    if f"free_{block.family}.c0" in values:
+        free = [values.get(f"free_{block.family}.c{i}", 0.0) for i in range(unit.size)]
+        coefficients = coefficients + 3.0 * unit * np.array(free)
+    return coefficients
 
 
 def repeatability(block: Block, i: int) -> float:

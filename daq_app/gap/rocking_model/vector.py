@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,7 @@ _STILL = ("flexible_wall.", "yaw.", "twist.", "sliding.")
 _SWINGS_ONLY = frozenset(("p", "r", "zero", "theta0", "omega0", "viscous.zeta", "coulomb.mu"))
 
 
+@cache
 def acts_on(part: str, key: str, reference: str) -> bool:
     """Whether a value moves the ``swings`` or the ``blocks`` of a prediction; yes unless known otherwise."""
     if part == "blocks":
