@@ -54,6 +54,21 @@ def test_unknown_form_of_a_known_family_is_called_so() -> None:
     assert shape[3] - shape[1] > 0.02, "more r above an amplitude of a half than below"
 
 
+def test_a_small_rest_does_not_unmake_an_effect_that_explains_a_large_gap() -> None:
+    """A second, small cause is a stated limit beside a large first one; a larger one is not."""
+    singles = LIBRARY.without("free")
+    small = diagnose(
+        DecayModel(), make_runs(3, scatter=0.002, slope_k=0.1, shift_s=0.004), singles, Options(pairs=False)
+    )
+    assert small.decision.verdict == "effect"
+    assert not small.goodness.passed
+    assert any("small structure remains" in limit for limit in small.limits)
+    larger = diagnose(
+        DecayModel(), make_runs(3, scatter=0.002, slope_k=0.1, shift_s=0.008), singles, Options(pairs=False)
+    )
+    assert larger.decision.verdict == "none_of_these"
+
+
 def test_pair_is_found_where_a_single_effect_leaves_structure() -> None:
     result = diagnose(
         DecayModel(), make_runs(4, slope_k=0.05, shift_s=0.05), LIBRARY, Options(always_pairs=True)

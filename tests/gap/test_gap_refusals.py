@@ -16,7 +16,7 @@ from daq_app.config import load_rig
 from daq_app.gap.apply import apply_result, read_result
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.study import prepare
+from daq_app.gap.rocking_model.study import diagnose_runs, prepare
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +67,27 @@ def test_no_run_is_refused() -> None:
         prepare([])
 
 
+def test_the_rig_file_of_another_wall_is_doubted_and_no_effect_blamed() -> None:
+    """A survey that is off by 20 % is no gap of the physics: the answer names the numbers to check."""
+    runs = [
+        replace(run, survey=replace(run.survey, alpha_rad=1.2 * run.survey.alpha_rad))
+        for run in simulate({}, levels=(0.15, -0.25))
+    ]
+    result = diagnose_runs(runs, only=("viscous",))
+    assert result.decision.verdict == "cannot_tell"
+    assert "do not fit the specimen of the rig file" in result.decision.sentence
+    assert "alpha" in result.decision.sentence
+    assert "rig file" in result.next_measurement
+
+
+def test_one_run_says_what_one_run_cannot(wall: GapRun) -> None:
+    result = diagnose_runs([wall], only=("viscous", "lag@wire"))
+    assert result.gap is None
+    for words in ("One run only", "One level only", "to one side"):
+        assert any(words in limit for limit in result.limits), words
+    assert result.decision.verdict not in ("effect", "pair")
+
+
 def _result(effects: dict[str, float], decision: str = "effect") -> dict[str, object]:
     nuisance = {"alpha": 0.21, "p": 2.19, "r": 0.9, "half_base": 0.3255}
     return {
@@ -88,6 +109,15 @@ def test_apply_writes_a_rig_file_that_has_the_effect_and_the_parameters(tmp_path
     assert rig.specimen.alpha0_rad == 0.21
     assert rig.specimen.base_width_m / 2 == pytest.approx(0.3255)
     assert rig.channel_ids == load_rig(RIG).channel_ids
+
+
+def test_apply_takes_only_what_the_simulator_has(tmp_path: Path) -> None:
+    found = {"compliance.phi": 1e-3, "compliance.fall": 0.2, "polarity@LV-A06.on": 0.97}
+    out = tmp_path / "rig.toml"
+    apply_result(_result(found), RIG, out)
+    assert load_rig(out).simulation.effects == {"compliance": {"phi": 1e-3}, "polarity@LV-A06": {"on": 1.0}}
+    with pytest.raises(CannotDiagnose, match="cannot switch on"):
+        apply_result(_result({"unheard_of.k": 1.0}), RIG, out)
 
 
 def test_apply_refuses_where_nothing_was_named(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ class Thresholds:
     goodness_p: float = 1e-3
     goodness_tolerated: float = 0.35
     temperature: float = 1.0
-    remainder: float = 0.10
+    remainder: float = 0.15
     """Structure that a named hypothesis may leave in any group, as a share of the gap that it explains …"""
     closed: float = 0.95
     """… if it closes this share of the gap's excess over the floor …"""

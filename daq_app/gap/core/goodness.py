@@ -1,9 +1,9 @@
 """The goodness-of-fit gate: is what a hypothesis leaves over noise and scatter, or structure?
 
 Every run's whitened residuals (innovations) are standard normal under the truth. Per channel and
-observable the gate asks for their size (χ²) and for structure that repeats over runs: a mean, a
-trend with amplitude, with time and with side. A scatter size beyond what repeatability allows is a
-failure too, because a free scatter would otherwise swallow any misfit.
+observable the gate asks for their size (χ²), for structure that repeats over runs (a mean, a trend
+with amplitude, with time and with side) and for what differs from run to run. A scatter size beyond
+what repeatability allows is a failure too: a free scatter would otherwise swallow any misfit.
 """
 
 from __future__ import annotations
@@ -32,6 +32,9 @@ class GroupTest:
     structure: float
     """Rms of the structured part, in noise units."""
     p_structure: float
+    between_runs: float = 0.0
+    """Rms of what the features of one run have in common and other runs do not, in noise units."""
+    p_runs: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,14 +67,17 @@ def check(
     """
     groups = _gather(fit, runs)
     fraction = min(run.features.independent_fraction for run in runs)
-    tests = [_test(key, z, basis, fraction) for key, (z, basis) in groups.items() if z.size >= 3]
+    tests = [
+        _test(key, z, basis, places, fraction) for key, (z, basis, places) in groups.items() if z.size >= 3
+    ]
     excessive = tuple(s.name for s in scatters if fit.sigmas[s.name] > s.high)
-    count = 2 * max(len(tests), 1)
+    count = 3 * max(len(tests), 1)
     p_min, worst, worst_size, passed = 1.0, "", 0.0, not excessive
     for test in tests:
         for p, size, words in (
             (test.p_size, abs(math.sqrt(test.mean_square) - 1.0), "is larger than noise and scatter"),
             (test.p_structure, test.structure, "follows amplitude, time or side"),
+            (test.p_runs, test.between_runs, "differs from run to run"),
         ):
             corrected = min(p * count, 1.0)
             if corrected < p_min or not worst:
@@ -84,12 +90,15 @@ def check(
     return Goodness(passed, p_min, worst, worst_size, tuple(tests), excessive)
 
 
-def _gather(fit: Fit, runs: Sequence[Run]) -> dict[tuple[str, str], tuple[FloatArray, FloatArray]]:
-    """(channel, observable) → innovations and their explanatory basis [1, amplitude, time, side]."""
-    rows: dict[tuple[str, str], list[tuple[float, float, float]]] = {}
-    for run, innovations in zip(runs, fit.whitened, strict=True):
+def _gather(
+    fit: Fit, runs: Sequence[Run]
+) -> dict[tuple[str, str], tuple[FloatArray, FloatArray, FloatArray]]:
+    """(channel, observable) → innovations, their basis [1, amplitude, time, side], and their runs."""
+    rows: dict[tuple[str, str], list[tuple[float, float, float, int]]] = {}
+    for place, (run, innovations) in enumerate(zip(runs, fit.whitened, strict=True)):
         for label, z in zip(run.features.labels, innovations, strict=True):
-            rows.setdefault((label.channel, label.observable), []).append((z, label.amplitude, label.order))
+            entry = (z, label.amplitude, label.order, place)
+            rows.setdefault((label.channel, label.observable), []).append(entry)
     groups = {}
     for key, values in rows.items():
         array = np.asarray(values, dtype=float)
@@ -102,12 +111,15 @@ def _gather(fit: Fit, runs: Sequence[Run]) -> dict[tuple[str, str], tuple[FloatA
             if np.linalg.matrix_rank(trial, tol=1e-9 * max(np.abs(column).max(), 1e-30)) == trial.shape[1]:
                 kept.append(column)
         basis, _ = np.linalg.qr(np.column_stack(kept))
-        groups[key] = (array[:, 0], basis)
+        groups[key] = (array[:, 0], basis, array[:, 3])
     return groups
 
 
-def _test(key: tuple[str, str], z: FloatArray, basis: FloatArray, fraction: float) -> GroupTest:
+def _test(
+    key: tuple[str, str], z: FloatArray, basis: FloatArray, places: FloatArray, fraction: float
+) -> GroupTest:
     n = z.size
+    between, p_runs = _between_runs(z - basis @ (basis.T @ z), places, fraction)
     effective = max(n * fraction, 1.0)
     total = float(z @ z)
     structured = float(np.sum((basis.T @ z) ** 2))
@@ -120,4 +132,18 @@ def _test(key: tuple[str, str], z: FloatArray, basis: FloatArray, fraction: floa
         p_size=float(chi2.sf(total / n * effective, effective)),
         structure=math.sqrt(max(structured - k / fraction, 0.0) / n),
         p_structure=float(chi2.sf(structured * fraction, k)),
+        between_runs=between,
+        p_runs=p_runs,
     )
+
+
+def _between_runs(z: FloatArray, places: FloatArray, fraction: float) -> tuple[float, float]:
+    """(size, p) of the means of runs with at least three features; a crack or a warm-up shows there."""
+    sums = [(float(z[places == k].sum()), int(np.sum(places == k))) for k in np.unique(places)]
+    kept = [(total, n) for total, n in sums if n >= 3]
+    if len(kept) < 3:
+        return 0.0, 1.0
+    square = sum(total**2 / n for total, n in kept)
+    count = sum(n for _, n in kept)
+    size = math.sqrt(max(square - (len(kept) - 1) / fraction, 0.0) / count)
+    return size, float(chi2.sf(square * fraction, len(kept) - 1))

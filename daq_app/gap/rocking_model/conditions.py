@@ -53,6 +53,8 @@ class Condition:
     step_si: float
     step_sd: float
     frozen_share: float
+    frozen_sd: float
+    """How well the share of so few moments stands for that of all tests."""
     spikes_per_s: float
 
 
@@ -60,17 +62,17 @@ def inspect_channel(run: GapRun, index: int) -> Condition:
     """Examine one channel of one run; NaN anywhere means that nothing is examined."""
     values = run.channels[index]
     if not np.all(np.isfinite(values)):
-        return Condition(0.0, 1.0, None, 0.0, 1.0, 0.0, 0.0)
+        return Condition(0.0, 1.0, None, 0.0, 1.0, 0.0, 1e-3, 0.0)
     rate, accelerometer = run.rate_hz, run.sensors[index].family == "accelerometer"
     noise = _white_noise(values, rate)
     hum, hum_sd, wave = _hum(values, rate)
     if accelerometer:
-        return Condition(hum, hum_sd, wave, 0.0, 1.0, 0.0, 0.0)
+        return Condition(hum, hum_sd, wave, 0.0, 1.0, 0.0, 1e-3, 0.0)
     clean = values if wave is None else values - wave
     step, step_sd = _stairs(values, run.sensors[index].noise_si)
-    frozen = _frozen(values, rate, step, run.sensors[index].range_si)
+    frozen, frozen_sd = _frozen(values, rate, step, run.sensors[index].range_si)
     spikes = _spikes(clean, noise, rate) if step == 0.0 and frozen == 0.0 else 0.0
-    return Condition(hum, hum_sd, wave, step, step_sd, frozen, spikes)
+    return Condition(hum, hum_sd, wave, step, step_sd, frozen, frozen_sd, spikes)
 
 
 def _white_noise(values: FloatArray, rate_hz: float) -> float:
@@ -128,8 +130,10 @@ def _stairs(values: FloatArray, noise_si: float) -> tuple[float, float]:
     return step, 0.02 * step
 
 
-def _frozen(values: FloatArray, rate_hz: float, step: float, limits: tuple[float, float]) -> float:
-    """Share of the record in which the reading stands still although it should not."""
+def _frozen(
+    values: FloatArray, rate_hz: float, step: float, limits: tuple[float, float]
+) -> tuple[float, float]:
+    """(share, its sd) of the record in which the reading stands still although it should not."""
     inside = (values > limits[0] + RANGE_MARGIN * np.abs(limits[0])) & (
         values < limits[1] * (1 - RANGE_MARGIN)
     )
@@ -142,7 +146,8 @@ def _frozen(values: FloatArray, rate_hz: float, step: float, limits: tuple[float
         after = np.minimum(stops + 1, values.size - 1)
         jumps = np.abs(values[after] - values[starts])
         long &= jumps > 2.5 * step
-    return float(np.sum((stops - starts)[long])) / values.size
+    lengths = (stops - starts)[long] / values.size
+    return float(lengths.sum()), float(np.sqrt(np.sum(lengths**2))) + 1e-3
 
 
 def _spikes(values: FloatArray, noise: float, rate_hz: float) -> float:
@@ -188,7 +193,7 @@ def marks_of(runs: Sequence[GapRun], conditions: Sequence[dict[str, Condition]])
         table = {
             "hum": [[(c.hum_si, c.hum_sd, c.hum_wave is not None) for c in row] for row in rows],
             "quantisation": [[(c.step_si, c.step_sd, c.step_si > 0) for c in row] for row in rows],
-            "dropout": [[(c.frozen_share, 1e-3, c.frozen_share > 1e-3) for c in row] for row in rows],
+            "dropout": [[(c.frozen_share, c.frozen_sd, c.frozen_share > 1e-3) for c in row] for row in rows],
             "spikes": [[(c.spikes_per_s, 0.05, c.spikes_per_s > 0.3) for c in row] for row in rows],
         }
         for name, cells in table.items():

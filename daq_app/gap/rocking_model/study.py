@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -100,8 +100,12 @@ def _without_gaps(run: GapRun) -> GapRun:
     return run
 
 
-def diagnose_runs(runs: Sequence[GapRun], options: Options | None = None) -> Diagnosis:
+def diagnose_runs(
+    runs: Sequence[GapRun], options: Options | None = None, only: Collection[str] = ()
+) -> Diagnosis:
     """Where, which and how far, for tests of one specimen on one rig.
+
+    With `only`, no effects but these are considered (and no probes): a quick answer to a narrow question.
 
     Raises `CannotDiagnose` with the reason in words, and `parallel.Interrupted` when stopped.
     """
@@ -116,6 +120,9 @@ def diagnose_runs(runs: Sequence[GapRun], options: Options | None = None) -> Dia
             "All releases are to one side: release effects cannot be told from a difference of sides."
         )
     model, library = model_and_library(prepared)
+    if only:
+        library = library.without(*(name for name in library if name not in only))
+        limits.append(f"Only {', '.join(sorted(only))} were considered.")
     result = diagnose(model, prepared, library, options, limits)
     return _doubt_the_survey(result)
 

@@ -1,0 +1,104 @@
+"""Faults that show without a fit are found in the runs, named by channel, and taken out of the families."""
+
+from __future__ import annotations
+
+import pytest
+from simulated_wall import simulate
+
+from daq_app.gap.rocking_model.inspection import found_channels, found_marks
+from daq_app.gap.rocking_model.run_features import RockingRun
+from daq_app.gap.rocking_model.study import model_and_library, prepare
+
+LEVELS = (0.25, -0.35)
+
+
+def _prepared(effects: dict[str, dict[str, float]]) -> list[RockingRun]:
+    return prepare(simulate(effects, LEVELS))[0]
+
+
+def _mark(run: RockingRun, name: str) -> float:
+    block = next(b for b in run.blocks if b.kind == "conditions")
+    return float(block.values[block.names.index(name)])
+
+
+def _value(run: RockingRun, family: str, name: str) -> float:
+    block = next(b for b in run.blocks if b.family == family)
+    return float(block.values[block.names.index(name)])
+
+
+def test_healthy_runs_carry_no_mark_and_no_suspect() -> None:
+    runs = _prepared({})
+    assert found_marks(runs) == {}
+    assert found_channels(runs) == {}
+    _, library = model_and_library(runs)
+    assert "ambient" not in library, "no vibration of the floor is seen, so none can explain anything"
+
+
+def test_electronics_are_named_by_channel_with_their_size() -> None:
+    """Four faults on four channels at once; none of them moves the rotation that the fit starts from."""
+    runs = _prepared(
+        {
+            "polarity@LV-B06": {"on": 1.0},
+            "hum@WP-2": {"amplitude": 5e-4},
+            "dropout@LV-A02": {"share": 0.06, "duration": 0.05},
+            "quantisation@LV-A09": {"step": 1e-3},
+        }
+    )
+    assert set(found_marks(runs)) == {
+        "polarity@LV-B06",
+        "hum@WP-2",
+        "dropout@LV-A02",
+        "quantisation@LV-A09",
+    }
+    for run in runs:
+        assert _mark(run, "hum@WP-2") == pytest.approx(5e-4, rel=0.1)
+        assert _mark(run, "dropout@LV-A02") == pytest.approx(0.06, abs=0.06)
+        assert _mark(run, "quantisation@LV-A09") == pytest.approx(1e-3, rel=0.05)
+    healthy = _prepared({})
+    for run, clean in zip(runs, healthy, strict=True):
+        assert run.swings.peak_rad[1] == pytest.approx(clean.swings.peak_rad[1], rel=1e-3)
+
+
+def test_exchanged_plugs_are_put_back() -> None:
+    runs = _prepared({"swap@cDAQ1Mod3/ai0": {"places": 0.0}})
+    assert found_marks(runs) == {}
+    plain = simulate({}, LEVELS)
+    place = {sensor.id: i for i, sensor in enumerate(plain[0].sensors)}
+    for run in plain:
+        run.channels[[place["WP-1"], place["WP-4"]]] = run.channels[[place["WP-4"], place["WP-1"]]]
+    crossed, limits = prepare(plain)
+    assert set(found_marks(crossed)) == {"swap@wire"}
+    assert abs(_value(crossed[0], "wire", "gain")) < 5e-3
+    assert any("swap@wire" in limit for limit in limits)
+
+
+def test_a_family_that_stops_short_of_its_range_is_found_and_the_motion_read_elsewhere() -> None:
+    runs = _prepared({"saturation@lvdt": {"limit": 0.04}})
+    assert set(found_marks(runs)) == {"saturation@lvdt"}
+    by_amplitude = sorted(runs, key=lambda run: abs(run.swings.peak_rad[0]))
+    assert 1.0 / _mark(by_amplitude[-1], "saturation@lvdt") == pytest.approx(0.04, rel=0.02)
+    assert by_amplitude[-1].reference == "wire"
+
+
+def test_one_channel_with_another_gain_is_examined_on_its_own() -> None:
+    runs = _prepared({"gain@WP-2": {"error": 0.05}})
+    assert found_channels(runs) == {"WP-2": "wire"}
+    assert _value(runs[0], "WP-2", "gain") == pytest.approx(0.05, abs=0.012)
+    model, library = model_and_library(runs)
+    assert "gain@WP-2" in library
+    assert any(parameter.name == "cal_WP-2" for parameter in model.nuisance)
+
+
+def test_ring_down_and_floor_are_seen_at_their_frequency() -> None:
+    runs = _prepared(
+        {
+            "flexible_wall": {"gain": 0.004, "frequency": 16.0, "zeta": 0.025},
+            "ambient": {"amplitude": 0.08, "frequency": 2.3},
+        }
+    )
+    for run in runs:
+        assert _value(run, "bending", "frequency") == pytest.approx(16.0, rel=0.02)
+        assert _value(run, "bending", "sine in accelerometers") == pytest.approx(-0.004, rel=0.25)
+        assert _value(run, "floor", "amplitude") == pytest.approx(0.08, rel=0.15)
+        assert _value(run, "floor", "frequency") == pytest.approx(2.3, abs=0.05)
+    assert "ambient" in model_and_library(runs)[1]
