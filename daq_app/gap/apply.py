@@ -45,6 +45,11 @@ def effects_found(result: dict[str, Any]) -> dict[str, dict[str, float]]:
 
 def _possible(effect: str, parameter: str, value: float) -> float:
     """A value as the simulator takes it: within what has a meaning, whole where it counts something."""
+    if effect == "polarity" or effect.partition("@")[0] == "swap":
+        raise CannotDiagnose(
+            f"{effect} is wiring of single channels; the simulator has no effect that means the same.",
+            "Put the plugs right; the limits of the report say which.",
+        )
     try:
         spec = find_effect(effect, (*MOTION_EFFECTS, *SENSOR_EFFECTS)).parameter(parameter)
     except ValueError as problem:

@@ -137,6 +137,8 @@ def _frozen(
     inside = (values > limits[0] + RANGE_MARGIN * np.abs(limits[0])) & (
         values < limits[1] * (1 - RANGE_MARGIN)
     )
+    # Standing exactly at its largest or smallest reading a channel clips; it is not frozen.
+    inside &= (values != values.max()) & (values != values.min())
     same = (np.diff(values) == 0.0) & inside[1:]
     edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
     starts, stops = edges[::2], edges[1::2]

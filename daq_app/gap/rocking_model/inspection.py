@@ -80,9 +80,10 @@ def _wiring_marks(wiring: Wiring, families: dict[str, Family]) -> list[Mark]:
     turned, crossed = wiring.reversed_ids, wiring.exchanged
     first = f"polarity@{turned[0]}" if len(turned) == 1 else "polarity"
     second = f"swap@{families[crossed[0][0]]}" if crossed else "swap"
+    pairs = ", ".join(f"{a} and {b}" for a, b in crossed) or "channels"
     return [
-        Mark(first, "reversed channels", "1", float(len(turned)), _COUNT_SD),
-        Mark(second, "exchanged pairs of channels", "1", float(len(crossed)), _COUNT_SD),
+        Mark(first, f"{', '.join(turned) or 'channels'} reversed", "1", float(len(turned)), _COUNT_SD),
+        Mark(second, f"{pairs} exchanged", "1", float(len(crossed)), _COUNT_SD),
     ]
 
 
