@@ -10,8 +10,10 @@ readable and none lacks more than one block.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import multiprocessing
+import os
 import random
 import sys
 import tempfile
@@ -66,6 +68,12 @@ def _context() -> ForkServerContext | SpawnContext:
     return context
 
 
+def run_quietly(arguments: list[str]) -> None:
+    """The process, without the line that says where it listens."""
+    with Path(os.devnull).open("w") as nowhere, contextlib.redirect_stdout(nowhere):
+        run_and_exit(arguments)
+
+
 class Life:
     """One acquisition process and what it has told."""
 
@@ -81,7 +89,7 @@ class Life:
             "--speed",
             str(speed),
         ]
-        self.process = _context().Process(target=run_and_exit, args=(arguments,))
+        self.process = _context().Process(target=run_quietly, args=(arguments,))
         self.process.start()
         deadline = time.monotonic() + _LIMIT_S
         session = None
@@ -174,10 +182,11 @@ def run(kills: int, seed: int, speed: float, console: Console) -> list[Killed]:
     with tempfile.TemporaryDirectory(prefix="kills-") as name:
         folder = Path(name)
         with SimulatedServer(RIG, ["--speed", str(speed), "--wall", "marked"]) as server:
-            for number in range(kills):
-                done.append(one_round(number, rng, folder, server.connection, speed))
-                if number % 25 == 24:
-                    console.print(f"{number + 1} kills", highlight=False)
+            with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C: judge what there is
+                for number in range(kills):
+                    done.append(one_round(number, rng, folder, server.connection, speed))
+                    if number % 25 == 24:
+                        console.print(f"{number + 1} kills", highlight=False)
             last = Life(folder, server.connection, speed)
             deadline = time.monotonic() + _LIMIT_S
             while list(folder.glob("*.journal")) and time.monotonic() < deadline:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -14,11 +15,13 @@ from daq_app.runfile import Run, open_run
 from sim_hardware.marked_line import PERIOD_SAMPLES, MarkedLine
 
 _WINDOW: Final = 40_000
-_PIECE: Final = 400
+_PIECE: Final = 4_000
 _MOST_LEAPS: Final = 3
-"""In a tenth of a second."""
+"""In a second."""
 _STEPS: Final = 1.5
 """A reading may differ from its mark by so many steps of a 16-bit converter."""
+_KNOWN_TO: Final = re.compile(r"known to ([\d.]+) ms")
+_SLACK: Final = 4
 _EXPLAINED_WITHIN: Final = 8_000
 """Samples between a leap of the marks and the gap or the event that says why."""
 
@@ -54,8 +57,9 @@ class _Walk:
     """Goes through the run in order, with the lag of the marks found so far."""
 
     def __init__(self, rig: Rig, report: MarkedReport, lag: int | None) -> None:
-        self._marks = MarkedLine(rig)
-        self._rows = range(len(rig.channels))
+        marks = MarkedLine(rig)
+        ticks = np.arange(PERIOD_SAMPLES)
+        self._marks = np.stack([marks.reading(row, ticks) for row in range(len(rig.channels))])
         self._sharp = [row for row, channel in enumerate(rig.channels) if channel.family == "lvdt"]
         low, high = np.array([channel.input_range_v for channel in rig.channels]).T
         self._allowed = (_STEPS * (high - low) / 2**16)[:, None]
@@ -82,18 +86,20 @@ class _Walk:
         if self._lag is None:
             return np.ones(readings.shape[1], dtype=np.bool_)
         samples = first + self._lag + np.arange(readings.shape[1])
-        # Tasks that were started again sample between two marks: some channels see the next one already.
-        near = [np.stack([self._marks.reading(row, samples + step) for row in self._rows]) for step in (0, 1)]
-        off = np.minimum(np.abs(readings - near[0]), np.abs(readings - near[1]))
-        wrong: NDArray[np.bool_] = (off > self._allowed).any(axis=0)
-        return wrong
+        wrong = np.abs(readings - self._marks[:, samples % PERIOD_SAMPLES]) > self._allowed
+        at = np.flatnonzero(wrong.any(axis=0))
+        if at.size:
+            # Tasks that were started again sample between two marks: some channels see the next one already.
+            next_marks = self._marks[:, (samples[at] + 1) % PERIOD_SAMPLES]
+            wrong[:, at] &= np.abs(readings[:, at] - next_marks) > self._allowed
+        return np.asarray(wrong.any(axis=0), dtype=np.bool_)
 
     def _find_lag(self, sample: int, values: Floats) -> int | None:
         lags = np.arange(-PERIOD_SAMPLES // 2, PERIOD_SAMPLES // 2)
         worst = np.zeros(lags.size)
         for row in self._sharp:
-            near = [np.abs(self._marks.reading(row, sample + lags + step) - values[row]) for step in (0, 1)]
-            worst = np.maximum(worst, np.minimum(*near) / self._allowed[row])
+            off = np.abs(self._marks[row, (sample + lags) % PERIOD_SAMPLES] - values[row])
+            worst = np.maximum(worst, np.minimum(off, np.roll(off, -1)) / self._allowed[row])
         good = lags[worst <= 1.0]
         if not good.size:
             return None
@@ -103,8 +109,11 @@ class _Walk:
         return previous + int(distance[np.argmin(np.abs(distance))])
 
 
-def check_marked(path: Path, rig: Rig, lag: int | None = 0) -> MarkedReport:
-    """Walk through a run. `lag` is where its marks stand at its first sample; None: found from there."""
+def check_marked(path: Path, rig: Rig, lag: int | None = 0, speed: float = 1.0) -> MarkedReport:
+    """Walk through a run. `lag` is where its marks stand at its first sample; None: found from there.
+
+    `speed` is how much faster than real time the device ran.
+    """
     report = MarkedReport()
     with open_run(path) as run:
         report.n_samples = run.n_samples
@@ -114,7 +123,7 @@ def check_marked(path: Path, rig: Rig, lag: int | None = 0) -> MarkedReport:
             readings = run.readings(start=start, stop=min(start + _WINDOW, run.n_samples))
             _walk_window(walk, run.first_sample + start, readings, report, run)
         for leap in report.leaps:
-            leap.explained = _is_explained(leap, run)
+            leap.explained = _is_explained(leap, run, speed)
     return report
 
 
@@ -131,13 +140,15 @@ def _walk_window(walk: _Walk, first: int, readings: Floats, report: MarkedReport
             walk.piece(first + start, readings[:, start : min(start + _PIECE, high)])
 
 
-def _is_explained(leap: Leap, run: Run) -> bool:
-    near = [gap for gap in run.gaps if 0 <= leap.sample - gap.end < _PIECE and "started again" in gap.reason]
-    told = [
-        event
-        for event in run.events
-        if event.kind == "clock"
+def _is_explained(leap: Leap, run: Run, speed: float) -> bool:
+    for gap in run.gaps:
+        known = _KNOWN_TO.search(gap.reason)
+        if known is not None and 0 <= leap.sample - gap.end < _WINDOW // 100:
+            # The gap says how well its length is known; the marks say how long it was.
+            return abs(leap.by) <= _SLACK + speed * run.rate_hz * 1e-3 * float(known[1])
+    return any(
+        event.kind == "clock"
         and event.data.get("clock") == "stood_still"
         and abs(event.sample - leap.sample) < _EXPLAINED_WITHIN
-    ]
-    return bool(near or told)
+        for event in run.events
+    )

@@ -228,7 +228,7 @@ class Soak:
     def _report(self, path: Path, recorded_s: float) -> dict[str, Any]:
         self._console.print(f"recorded {recorded_s / 60:.1f} min; checking every sample of {path.name} …")
         verified = verify(path)
-        marks = check_marked(path, self._rig)
+        marks = check_marked(path, self._rig, speed=self._speed)
         with open_run(path) as run:
             gaps = list(run.gaps)
             asleep = [event.sample for event in run.events if event.data.get("alarm") == "asleep"]

@@ -6,51 +6,82 @@ been, had the old tasks gone on, and how well that is known.
 
 from __future__ import annotations
 
+from typing import Final
+
 from drivers.protocol import ClockReading
 
-_TRUSTED_SPAN_S = 2.0
-_PLAUSIBLE = 0.01
+_SPAN_S: Final = 1.0
+"""Least time between two readings that tell a rate."""
+_ADOPT_S: Final = 2.0
+"""A new line counts after so long: samples that only come late are back on the old one by then."""
+_OFF_S: Final = 0.03
+_PLAUSIBLE: Final = 0.01
 """Share by which a clock may be off its nominal rate before what was seen counts for more (an external
 clock; a simulated device that runs faster than real time)."""
+_OSCILLATOR: Final = 1e-4
+"""Share by which an oscillator that keeps its nominal rate may be off."""
 
 
 class ClockLine:
-    """Feed it the readings; it keeps the first, the last and the sharpest of the last ones."""
+    """Feed it the readings; it keeps a straight line of samples against time.
+
+    The line survives what is no clock: late replies, samples held up on the way, a count that leaps because
+    one of the two clocks stood still. Only a new line that lasts replaces it.
+    """
 
     def __init__(self, rate_hz: float) -> None:
         self._nominal_hz = rate_hz
+        self._rate_hz: float | None = None
+        self._rate_error = _OSCILLATOR
         self._first: ClockReading | None = None
         self._last: ClockReading | None = None
+        self._other: ClockReading | None = None
+        """Where another line may have begun."""
 
     def add(self, reading: ClockReading) -> None:
         """Readings come in order of time."""
-        if self._first is None:
-            self._first = reading
-        # A late reply is no sharp reading; an old sharp one is better for a while.
-        if self._last is None or _width(reading) <= 2.0 * _width(self._last) + 0.01 * _age(
-            self._last, reading
-        ):
+        if self._first is None or self._last is None:
+            self._first = self._last = reading
+        elif self._rate_hz is None or self._is_on(self._last, reading):
+            self._other = None
             self._last = reading
+            self._look_at_rate()
+        elif self._other is None or not self._is_on(self._other, reading):
+            self._other = reading
+        elif _age(self._other, reading) >= _ADOPT_S:
+            self._first, self._last, self._other = self._other, reading, None
 
     @property
     def rate_hz(self) -> float:
         """Samples per second of our clock: the nominal rate, unless the device is seen to differ clearly."""
-        if self._first is None or self._last is None:
-            return self._nominal_hz
-        span = _age(self._first, self._last)
-        if span < _TRUSTED_SPAN_S:
-            return self._nominal_hz
-        seen = (self._last.samples - self._first.samples) / span
-        return seen if abs(seen / self._nominal_hz - 1.0) > _PLAUSIBLE else self._nominal_hz
+        return self._rate_hz or self._nominal_hz
 
     def sample_at(self, before_s: float, after_s: float) -> tuple[int, float] | None:
         """The sample of an instant between the two, and the uncertainty in seconds; None without readings."""
         last = self._last
         if last is None:
             return None
-        middle = 0.5 * (before_s + after_s) - 0.5 * (last.before_s + last.after_s)
-        uncertain_s = 0.5 * (after_s - before_s) + 0.5 * _width(last)
-        return round(last.samples + middle * self.rate_hz), uncertain_s
+        passed_s = 0.5 * (before_s + after_s) - 0.5 * (last.before_s + last.after_s)
+        uncertain_s = 0.5 * (after_s - before_s) + 0.5 * _width(last) + self._rate_error * passed_s
+        return round(last.samples + passed_s * self.rate_hz), uncertain_s
+
+    def _look_at_rate(self) -> None:
+        assert self._first is not None and self._last is not None
+        span_s = _age(self._first, self._last)
+        if span_s < _SPAN_S:
+            return
+        seen = (self._last.samples - self._first.samples) / span_s
+        if abs(seen / self._nominal_hz - 1.0) <= _PLAUSIBLE:
+            self._rate_hz, self._rate_error = self._nominal_hz, _OSCILLATOR
+        elif self._rate_hz is None or abs(seen / self._rate_hz - 1.0) < _PLAUSIBLE:
+            self._rate_hz = seen
+            self._rate_error = 0.5 * (_width(self._first) + _width(self._last)) / span_s
+
+    def _is_on(self, earlier: ClockReading, reading: ClockReading) -> bool:
+        """Whether a reading can lie on the line through an earlier one."""
+        taken_s = (reading.samples - earlier.samples) / self.rate_hz
+        least, most = reading.before_s - earlier.after_s, reading.after_s - earlier.before_s
+        return least - _OFF_S <= taken_s <= most + _OFF_S
 
 
 def _width(reading: ClockReading) -> float:

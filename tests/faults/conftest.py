@@ -13,14 +13,12 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from fault_bench import Acquisition, RunFacts, Told, free_the_hardware
+from fault_bench import SPEED, Acquisition, RunFacts, Told, free_the_hardware
 
 from daq_app.acquisition.simulated import SimulatedServer
 from daq_app.config import Rig, load_rig
 from sim_hardware.control import SimControl
 
-SPEED = 2
-"""A buffer of 20 s lasts 10 s then, also for a machine that is busy."""
 _KEY = "fault row"
 
 

@@ -25,6 +25,8 @@ from daq_app.acquisition.messages import EventMessage, HealthMessage, Message, S
 from daq_app.config import Rig
 from daq_app.runfile import open_run, verify
 
+SPEED = 2
+"""Of the simulated devices: a buffer of 20 s lasts 10 s then, also for a machine that is busy."""
 RATE_HZ = 4000
 LIMIT_S = 120.0
 
@@ -276,7 +278,7 @@ def look_at(path: Path | str, rig: Rig | None, lag: int | None = None) -> RunFac
         quality = quality or {"verdict": "none", "reasons": []}
         first, end = run.first_sample, run.first_sample + run.n_samples
     if rig is not None:
-        marks = check_marked(path, rig, lag)
+        marks = check_marked(path, rig, lag, SPEED)
         assert marks.unexplained == 0, marks
         assert all(leap.explained for leap in marks.leaps), marks.leaps
     assert missing == report.lost_samples, "samples lost and the table of gaps are the same count"

@@ -10,8 +10,8 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import SPEED, Row, Start
-from fault_bench import Acquisition, free_the_hardware, look_at
+from conftest import Row, Start
+from fault_bench import SPEED, Acquisition, free_the_hardware, look_at
 
 from daq_app.acquisition import AcquisitionDied, AcquisitionProcess
 from daq_app.acquisition.messages import State

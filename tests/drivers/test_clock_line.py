@@ -1,0 +1,60 @@
+"""Which sample a clock would have reached: through jitter, late samples, standstills and leaps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drivers import ClockReading
+from drivers.clock_line import ClockLine
+
+RATE_HZ = 4000.0
+
+
+def fed(
+    until_s: float,
+    *,
+    speed: float = 1.0,
+    skip_at: float = 1e9,
+    held: tuple[float, float] = (1e9, 1e9),
+    seed: int = 1,
+) -> tuple[ClockLine, float]:
+    """A line after readings at 10 Hz; the device leaps 20 s ahead, its samples are held up at times."""
+    rng = np.random.default_rng(seed)
+    line = ClockLine(RATE_HZ)
+    offset = 0.0
+    for at in np.arange(0.1, until_s, 0.1):
+        late = 0.5e-3 * (1 + rng.exponential()) + (0.2 if rng.random() < 0.02 else 0.0)
+        asked = at + late * rng.random()
+        offset = 20.0 if asked > skip_at else 0.0
+        counted = held[0] if held[0] <= asked < held[1] else asked
+        line.add(ClockReading(at, at + late, int(RATE_HZ * speed * (counted + offset))))
+    return line, offset
+
+
+@pytest.mark.parametrize("speed", [1.0, 2.0, 5.0])
+@pytest.mark.parametrize("skip_at", [1e9, 30.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_sample_after_an_outage_is_known_as_well_as_it_says(
+    speed: float, skip_at: float, seed: int
+) -> None:
+    line, offset = fed(60.0, speed=speed, skip_at=skip_at, seed=seed)
+    for away_s in (0.1, 2.0, 20.0):
+        at = 60.0 + away_s
+        answer = line.sample_at(at, at + 2e-3)
+        assert answer is not None
+        sample, uncertain_s = answer
+        assert uncertain_s < 0.25
+        assert abs(sample - RATE_HZ * speed * (at + 1e-3 + offset)) <= RATE_HZ * speed * uncertain_s + 2
+
+
+def test_samples_that_were_held_up_before_the_end_do_not_shorten_the_gap() -> None:
+    """A chassis that falls off the network first delivers nothing, then its tasks are gone."""
+    line, _ = fed(60.0, held=(59.0, 70.0))
+    answer = line.sample_at(62.0, 62.001)
+    assert answer is not None
+    assert answer[0] == pytest.approx(62.0 * RATE_HZ, abs=RATE_HZ * answer[1] + 4)
+
+
+def test_without_readings_nothing_is_claimed() -> None:
+    assert ClockLine(RATE_HZ).sample_at(1.0, 1.1) is None
