@@ -163,7 +163,9 @@ def restitution_by_level(tests: Sequence[TestSummary]) -> Figure:
         for axis in axes
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
     }
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, frameon=False)
+    figure.legend(
+        handles.values(), handles.keys(), loc="outside upper center", ncols=2 * len(axes), frameon=False
+    )
     axes[0].set_ylabel("coefficient of restitution r")
     return figure
 

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib as mpl
 from jinja2 import Environment, PackageLoader, select_autoescape
-from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
 from daq_app.campaign import figures, tables
 from daq_app.campaign.collect import Failure
-from daq_app.campaign.statistics import GroupMean
+from daq_app.campaign.report_pdf import interval, number, report_pdf
 from daq_app.campaign.status import CampaignStatus
 from daq_app.campaign.summary import TestSummary
-
-_PDF_ROWS = 34
-"""Rows of a table on one page."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +125,18 @@ def write_report(
     )
     written += [
         _replace(folder / "report.html", html.encode()),
-        _pdf(folder / "report.pdf", title, pictures, restitution, tests),
+        _replace(
+            folder / "report.pdf",
+            report_pdf(
+                title,
+                [(picture.figure, picture.caption) for picture in pictures],
+                places,
+                restitution,
+                repetitions,
+                tests,
+                failures,
+            ),
+        ),
     ]
     return written
 
@@ -139,19 +145,9 @@ def _environment() -> Environment:
     environment = Environment(
         loader=PackageLoader("daq_app.campaign"), autoescape=select_autoescape(), trim_blocks=True
     )
-    environment.filters["number"] = _number
-    environment.filters["interval"] = _interval
+    environment.filters["number"] = number
+    environment.filters["interval"] = interval
     return environment
-
-
-def _number(value: float, digits: int) -> str:
-    return "–" if math.isnan(value) else f"{value:.{digits}f}"
-
-
-def _interval(group: GroupMean) -> str:
-    if math.isnan(group.low95):
-        return "–"
-    return f"{_number(group.low95, 4)} … {_number(group.high95, 4)}"
 
 
 def _replace(path: Path, content: bytes) -> Path:
@@ -160,63 +156,3 @@ def _replace(path: Path, content: bytes) -> Path:
     part.write_bytes(content)
     part.replace(path)
     return path
-
-
-def _pdf(
-    path: Path,
-    title: str,
-    pictures: Sequence[CaptionedFigure],
-    restitution: Sequence[tables.RestitutionRow],
-    tests: Sequence[TestSummary],
-) -> Path:
-    buffer = io.BytesIO()
-    with PdfPages(buffer, metadata={"Title": title}) as pages:
-        header = ["Specimen", "Estimator", "Tests", "Mean", "95 % interval", "r/r_max", "Corrected", "r_max"]
-        rows = [
-            [
-                row.specimen,
-                row.method,
-                str(row.mean.tests),
-                _number(row.mean.mean, 4),
-                _interval(row.mean),
-                _number(row.ratio, 3),
-                _number(row.corrected.mean, 4),
-                _number(row.r_max, 3),
-            ]
-            for row in restitution
-        ]
-        pages.savefig(_table_page(title, "Table 4.1: coefficient of restitution", header, rows))
-        for picture in pictures:
-            pages.savefig(picture.figure)
-        header, rows = _test_rows(tests)
-        for start in range(0, len(rows), _PDF_ROWS):
-            pages.savefig(_table_page(title, "All tests", header, rows[start : start + _PDF_ROWS]))
-    return _replace(path, buffer.getvalue())
-
-
-def _test_rows(tests: Sequence[TestSummary]) -> tuple[list[str], list[list[str]]]:
-    methods = [m for m in tables.METHODS if any(m in t.methods for t in tests)]
-    header = ["Test", "θ0/α", "Impacts", *(f"r {m}" for m in methods), "In the mean"]
-    rows = []
-    for test in tests:
-        values = [_number(test.methods[m].r, 4) if m in test.methods else "–" for m in methods]
-        inside = "yes" if test.good else "no: " + "; ".join(test.reasons)[:60]
-        rows.append([test.test, _number(test.phi0, 4), str(len(test.impacts_s)), *values, inside])
-    return header, rows
-
-
-def _table_page(title: str, heading: str, header: list[str], rows: list[list[str]]) -> Figure:
-    height = max(4.0, 1.2 + 0.27 * (len(rows) + 2))
-    figure = Figure(figsize=(11.0, height))
-    figure.text(0.05, 1.0 - 0.35 / height, title, fontsize=14, fontweight="bold", va="center")
-    figure.text(0.05, 1.0 - 0.70 / height, heading, fontsize=11, va="center")
-    axis = figure.add_axes((0.05, 0.02, 0.9, 1.0 - 1.0 / height))
-    axis.axis("off")
-    table = axis.table(
-        cellText=rows, colLabels=header, loc="upper left", cellLoc="center", edges="horizontal"
-    )
-    table.auto_set_font_size(False)
-    table.set_fontsize(9)
-    table.auto_set_column_width(list(range(len(header))))
-    table.scale(1.0, 1.25)
-    return figure

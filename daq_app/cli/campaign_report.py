@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -97,13 +98,14 @@ def _print(rows: list[RestitutionRow], tests: list[TestSummary], target: Path, a
         typer.echo(json.dumps({"report": str(target / "report.html"), "table_4_1": document}, indent=1))
         return
     console = Console()
-    table = Table(title="Table 4.1: coefficient of restitution", title_justify="left")
-    columns = ("specimen", "estimator", "tests", "mean", "95 % interval", "r/r_max", "bias-corrected", "95 %")
-    for column in columns:
-        table.add_column(column, justify="left" if column in ("specimen", "estimator") else "right")
+    if not console.is_terminal:
+        console = Console(width=120)  # a file or pipe has no width of its own
+    table = Table(title="Table 4.1: coefficient of restitution", title_justify="left", box=SIMPLE_HEAD)
+    for column in ("wall", "by", "tests", "mean", "95 %", "r/r_max", "corrected", "95 %"):
+        table.add_column(column, justify="left" if column in ("wall", "by") else "right", no_wrap=True)
     for row in rows:
         intervals = [
-            "–" if math.isnan(group.low95) else f"{group.low95:.4f} … {group.high95:.4f}"
+            "" if math.isnan(group.low95) else f"{group.low95:.4f}–{group.high95:.4f}"
             for group in (row.mean, row.corrected)
         ]
         cells = (str(row.mean.tests), f"{row.mean.mean:.4f}", intervals[0], f"{row.ratio:.3f}")

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from daq_app.campaign.collect import Failure
 from daq_app.campaign.names import TestName
 from daq_app.campaign.plan import load_campaign
 from daq_app.campaign.report import write_report
 from daq_app.campaign.status import CampaignStatus, RecordedTest, TestVerdict
 from daq_app.campaign.summary import MethodResult, TestSummary
-from daq_app.campaign.tables import repetition_effect, table_4_1
+from daq_app.campaign.tables import mean_of_specimens, repetition_effect, table_4_1
 from daq_app.rocking import amplitude_after, period_after, time_of_impact
 
 
@@ -87,6 +88,17 @@ def test_the_repetition_is_compared_with_the_first_tests(tests: list[TestSummary
     assert row.change == pytest.approx(-0.010, abs=1e-6)
     # One repetition says little while the first tests scatter by 0.003.
     assert row.change_standard_error > 0.003
+    low, high = row.change_interval95
+    assert (low + high) / 2 == pytest.approx(row.change)
+    assert high - low == pytest.approx(2 * 2.776 * row.change_standard_error, rel=1e-3)  # t, 4 degrees
+
+
+def test_the_last_row_is_the_mean_of_the_specimens(tests: list[TestSummary]) -> None:
+    rows = table_4_1(tests)
+    means = {row.method: row for row in mean_of_specimens(rows)}
+    assert means["CRT"].mean.mean == pytest.approx((0.895 + 0.93) / 2, abs=2e-3)
+    assert means["CRT"].mean.tests == 9 and np.isnan(means["CRT"].mean.low95)
+    assert mean_of_specimens([row for row in rows if row.specimen == "FR1"]) == []
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +106,8 @@ def report(
     tests: list[TestSummary], status: CampaignStatus, tmp_path_factory: pytest.TempPathFactory
 ) -> Path:
     folder = tmp_path_factory.mktemp("campaign") / "report"
-    written = write_report(folder, "Campaign", status, tests)
+    failure = Failure("FR1-L4-1", Path("FR1-L4-1_x.h5"), "a release but no impact")
+    written = write_report(folder, "Campaign", status, tests, failures=[failure])
     assert set(written) == set(folder.iterdir())
     return folder
 
@@ -105,7 +118,10 @@ def test_report_is_complete_and_names_what_it_leaves_out(report: Path) -> None:
     assert all(path.stat().st_size > 200 for path in report.iterdir())
     html = (report / "report.html").read_text(encoding="utf-8")
     assert "FR2-L2-1: 400 samples lost while rocking" in html
+    assert "FR1-L4-1 (FR1-L4-1_x.h5): a release but no impact" in html
     assert html.count("<svg") == 6
+    # Tables 4.1 and 3.2 (36 rows: two pages), repetitions, all tests, not analysed, and the figures.
+    assert (report / "report.pdf").read_bytes().count(b"/Type /Page ") == 6 + 6
     with (report / "table_3_2.csv").open(encoding="utf-8") as file:
         places = list(csv.DictReader(file))
     assert len(places) == 36
