@@ -1,4 +1,4 @@
-"""``python -m docs.make_screenshots``: the pictures of the operator's manual, from a simulated FR1-L3 test.
+"""``python -m docs.make_screenshots``: the pictures of the operator's manual, from simulated FR1 tests.
 
 Everything is real but the wall: the acquisition process, the NI-DAQmx client, the simulated device
 server, the window. Pictures go to docs/images, each at 1366×768 (dark) and 1920×1080 (light).
@@ -17,6 +17,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from daq_app.acquisition.launcher import AcquisitionProcess
 from daq_app.acquisition.messages import State
+from daq_app.cli.run_simulate import simulate_run
 from daq_app.monitor.app import application, open_window
 from daq_app.monitor.main_window import MainWindow
 from daq_app.monitor.settings import WindowSettings
@@ -141,10 +142,18 @@ def main() -> None:
     """Take all pictures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=REPOSITORY / "docs" / "images")
-    folder: Path = parser.parse_args().out
+    parser.add_argument(
+        "--part", choices=("all", "day", "gap"), default="all", help="what to take pictures of"
+    )
+    options = parser.parse_args()
+    folder: Path = options.out
     folder.mkdir(parents=True, exist_ok=True)
     rig = REPOSITORY / "configs" / "fr1.toml"
     with tempfile.TemporaryDirectory() as temporary:
+        if options.part != "day":
+            take_gap(rig, Path(temporary), folder)
+        if options.part == "gap":
+            return
         runs = Path(temporary) / "runs"
         runs.mkdir()
         acquisition = AcquisitionProcess(["--rig", str(rig), "--out", str(runs)])
@@ -152,6 +161,36 @@ def main() -> None:
             take_all(acquisition, rig, Path(temporary), folder)
         finally:
             acquisition.kill()
+
+
+def take_gap(rig: Path, temporary: Path, folder: Path) -> None:
+    """Four tests of a wall with viscous damping, diagnosed by the page itself."""
+    application()
+    runs = temporary / "gap"
+    runs.mkdir()
+    levels = {"L1": 0.15, "L2": 0.25, "L3": 0.35, "L4": 0.40}
+    for number, (level, ratio) in enumerate(levels.items()):
+        simulate_run(
+            rig,
+            runs / f"FR1-{level}-1.h5",
+            level=level,
+            theta0_over_alpha=ratio,
+            r=0.9,
+            seed=number,
+            test=None,
+            effects=("viscous:zeta=0.006", "restitution_scatter:sigma=0.004"),
+        )
+    window = MainWindow(None, WindowSettings(temporary / "gap.ini"))
+    window.show()
+    studio = Studio(window, folder)
+    page = window.gap
+    window.show_page(page)
+    page.set_folder(runs)
+    studio.until(lambda: page.runs.count() == len(levels))
+    page.start()
+    studio.until(lambda: page.result is not None and not page.runner.busy, limit_s=1800.0)
+    studio.shoot("gap")
+    window.close()
 
 
 def take_all(acquisition: AcquisitionProcess, rig: Path, temporary: Path, folder: Path) -> None:
