@@ -18,7 +18,10 @@ from sim_hardware.dynamics import shooting
 
 SCATTER_R = "scatter of r"
 SCATTER_TIME = "scatter of times"
+SCATTER_RELEASE = "scatter of releases"
 SCATTER_SENSOR = "scatter of sensors"
+PUSH_RAD_S = 3e-4
+"""Speed that a clean release may leave; nobody lets go of five tonnes without touching them."""
 _REMEMBERED = 6
 
 
@@ -34,6 +37,7 @@ class RockingModel:
     scatters = (
         Scatter(SCATTER_R, 0.004, 0.7, 0.02, "1", "relative scatter of r from impact to impact"),
         Scatter(SCATTER_TIME, 3e-5, 1.0, 1e-3, "s", "what half-cycle times scatter by beyond sensor noise"),
+        Scatter(SCATTER_RELEASE, 3e-5, 1.0, 4e-3, "s", "what the times of the first fall scatter by besides"),
         Scatter(
             SCATTER_SENSOR, 0.7, 0.15, 1.6, "1", "repeatability of sensor coefficients, in their own units"
         ),
@@ -115,7 +119,11 @@ class RockingModel:
             Parameter("zero", 0.0, 5e-5, "rad", meaning="rotation at which the wall stands upright"),
             Parameter("theta0", 0.0, swings.hold_sd + 2e-6, "rad", meaning="sway of the held rotation"),
             Parameter(
-                "omega0", 0.0, swings.hold_rate_sd + 2e-5, "rad/s", meaning="speed of the sway at release"
+                "omega0",
+                0.0,
+                swings.hold_rate_sd + PUSH_RAD_S,
+                "rad/s",
+                meaning="speed of the sway at release",
             ),
         )
 
@@ -128,11 +136,18 @@ class RockingModel:
         count = len(run.places)
         predicted[:count], peaks, slopes = self._remembered(run, "swings", values, self._swings)
         loading_t[:count] = 1.0
+        loading_0 = np.zeros(n)
+        loading_0[:count] = (run.places[:, 0] == 0) & (run.places[:, 2] == 0)
         last = count + run.peaks.size
         predicted[count:last] = peaks
         loading_r[count:last] = 1.0 / slopes
         predicted[last:], loading_s[last:] = response.block_coefficients(run, values)
-        loadings = {SCATTER_R: loading_r, SCATTER_TIME: loading_t, SCATTER_SENSOR: loading_s}
+        loadings = {
+            SCATTER_R: loading_r,
+            SCATTER_TIME: loading_t,
+            SCATTER_RELEASE: loading_0,
+            SCATTER_SENSOR: loading_s,
+        }
         return Prediction(predicted, loadings, run.block_loadings)
 
     @staticmethod

@@ -38,11 +38,13 @@ def saturated(runs: Sequence[GapRun]) -> tuple[list[GapRun], list[list[Mark]]]:
         for k in clipped:
             limits[ids[k]] = float(np.median(table[table[:, k, 0] > 0.0, k, 0]))
         key = ids[clipped[0]] if len(clipped) == 1 else family
-        # Where several clip, the one that travels furthest stands for them.
-        place = max(clipped, key=lambda k: limits[ids[k]]) if clipped else -1
+        # Where several clip, those that travel furthest stand for them; zeros differ, so their middle does.
+        furthest = max((limits[ids[k]] for k in clipped), default=0.0)
+        chosen = [k for k in clipped if limits[ids[k]] > 0.9 * furthest]
         for run_marks, row in zip(marks, table, strict=True):
-            reach = row[place, 1] if clipped else float(np.median(row[:, 1])) if len(ids) else 0.0
-            limit = row[place, 0] if clipped else 0.0
+            seen = [row[k, 0] for k in chosen if row[k, 0] > 0.0]
+            reach = float(np.median(row[chosen or slice(None), 1])) if len(ids) else 0.0
+            limit = float(np.median(seen)) if seen else 0.0
             value, sd = (1.0 / limit, 0.01 / limit) if limit else (0.0, 0.6 / max(reach, 1e-6))
             run_marks.append(Mark(f"saturation@{key}", "inverse of the limit", "1/m", value, sd))
     return [_narrowed(run, limits) for run in runs], marks
