@@ -172,6 +172,9 @@ def page(found: list[dict[str, Any]]) -> str:
     if unnamed:
         lines += ["", "## First, but not given as the verdict", ""]
         lines += [f"- **{f['case']}** ({f['decision']}): {f['sentence']}" for f in unnamed]
+    waiting = [name for name in CASES if name not in {f["case"] for f in found}]
+    if waiting:
+        lines += ["", f"**Not run yet** ({len(waiting)}): {', '.join(waiting)}."]
     seconds = sorted(f["cpu_s"] for f in found)
     lines += [
         "",
