@@ -234,8 +234,10 @@ def single_tests(results: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
             for method, value in entry["methods"].items():
                 error = value["r"] - value["bias"] - entry["true_r"]
                 sigma = math.hypot(value["standard_error"], value["bias_standard_error"])
-                low, high = entry["intervals"][method]
-                found.setdefault((method, level), []).append((error, sigma, low <= entry["true_r"] <= high))
+                # Stores of earlier versions have no intervals of single tests: NaN.
+                low, high = entry.get("intervals", {}).get(method, (math.nan, math.nan))
+                inside = math.nan if math.isnan(low) else float(low <= entry["true_r"] <= high)
+                found.setdefault((method, level), []).append((error, sigma, inside))
     table = []
     for (method, level), pairs in sorted(
         found.items(), key=lambda item: (METHODS.index(item[0][0]), item[0][1])
