@@ -68,6 +68,10 @@ class Studio:
         """Wait for a state of the acquisition."""
         self.until(lambda: self.window.session.current_state is wanted)
 
+    def is_live(self) -> bool:
+        """Whether nothing on screen is stale that should be live."""
+        return not self.window.session.data_missing
+
     def shoot(self, name: str) -> None:
         """Save the window as it is, in both looks."""
         for theme, width, height in LOOKS:
@@ -75,6 +79,9 @@ class Studio:
                 self.window.toggle_theme()
             self.window.resize(width, height)
             self.live_for(0.5)
+            self.until(self.is_live)  # a slow machine must not make the picture
+            self.window._on_slow()
+            self.app.processEvents()  # lays out what has just changed
             path = self.folder / f"{name}-{theme}-{width}x{height}.png"
             self.window.grab().save(str(path))
             print(path.name, flush=True)
@@ -127,6 +134,8 @@ def check_with_faults(studio: Studio) -> None:
     studio.wall.command("clear_faults")
     studio.live_for(4.0)
     check(studio)
+    while window.notices.current is not None:
+        window.notices.dismiss()
 
 
 def check(studio: Studio) -> None:

@@ -183,7 +183,8 @@ class BarRows(QWidget):
             )
             texts = [text for bar in self.bars for _, _, text in bar.lengths]
             right = max(metrics.horizontalAdvance(text) for text in texts) + 12.0
-            height = min(34.0, self.height() / len(self.bars))
+            most = max(len(bar.lengths) for bar in self.bars)
+            height = min(16.0 + 26.0 * most, self.height() / len(self.bars))
             for row, bar in enumerate(self.bars):
                 self._paint_row(painter, bar, QRectF(0, row * height, self.width(), height), left, right)
         painter.end()
