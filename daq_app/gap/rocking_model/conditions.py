@@ -21,6 +21,8 @@ FEWEST_STEPS = 0.004
 """Share of samples at which a reading in stairs goes on by a step."""
 SMALLEST_STEP = 5e-4
 """Smallest step that matters, as a share of the span of the reading."""
+USUAL_HUM = 0.45
+"""Amplitude of hum, over the rms of a sample's noise, up to which it is no fault."""
 FROZEN_S = 0.008
 """Equal readings in a row for longer than this are no chance."""
 SPIKE_SIZE = 9.0
@@ -93,7 +95,7 @@ def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray |
     sd = noise * np.sqrt(2.0 / count)
     amplitude = float(np.hypot(*np.linalg.lstsq(design, rest, rcond=None)[0][:2]))
     if amplitude < 6.0 * sd:
-        return amplitude, float(sd), None
+        return 0.0, float(sd), None
     # Over the whole record the frequency is sharp enough for the phase to hold.
     high = values - sosfiltfilt(butter(2, 25.0, fs=rate_hz, output="sos"), values)
     frequencies = np.linspace(MAINS_HZ - 0.6, MAINS_HZ + 0.6, 25)
@@ -101,7 +103,9 @@ def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray |
     best = float(frequencies[int(np.argmax(power))])
     whole = _wave_columns(t, best)[:, :2]
     wave = whole @ np.linalg.lstsq(whole, high, rcond=None)[0]
-    return amplitude, float(sd), np.asarray(wave, dtype=float)
+    # A little hum is on every long cable. It is taken out, but it is nothing to be explained.
+    shown = amplitude if amplitude > USUAL_HUM * noise else 0.0
+    return shown, float(sd), np.asarray(wave, dtype=float)
 
 
 def _wave_columns(t: FloatArray, frequency: float) -> FloatArray:
@@ -193,7 +197,7 @@ def marks_of(runs: Sequence[GapRun], conditions: Sequence[dict[str, Condition]])
         if not ids:
             continue
         table = {
-            "hum": [[(c.hum_si, c.hum_sd, c.hum_wave is not None) for c in row] for row in rows],
+            "hum": [[(c.hum_si, c.hum_sd, c.hum_si > 0.0) for c in row] for row in rows],
             "quantisation": [[(c.step_si, c.step_sd, c.step_si > 0) for c in row] for row in rows],
             "dropout": [[(c.frozen_share, c.frozen_sd, c.frozen_share > 1e-3) for c in row] for row in rows],
             "spikes": [[(c.spikes_per_s, 0.05, c.spikes_per_s > 0.3) for c in row] for row in rows],
