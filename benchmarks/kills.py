@@ -188,7 +188,7 @@ def run(kills: int, seed: int, speed: float, console: Console) -> list[Killed]:
                     if number % 25 == 24:
                         console.print(f"{number + 1} kills", highlight=False)
             last = Life(folder, server.connection, speed)
-            deadline = time.monotonic() + _LIMIT_S
+            deadline = time.monotonic() + _LIMIT_S + 20.0 * kills
             while list(folder.glob("*.journal")) and time.monotonic() < deadline:
                 time.sleep(0.1)
             last.client.request("shutdown", timeout_s=60.0, force=1.0)

@@ -200,7 +200,7 @@ def fuzz(minutes: float, seed: int) -> tuple[int, list[str]]:
         if process.process.poll() is not None:
             return attack.count, [*found, f"the process died: {process.said}"]
         client.request("stop", timeout_s=60.0)
-        saved = wait_for(client, lambda m: isinstance(m, StateMessage) and m.state is State.SAVED, 600.0)
+        saved = wait_for(client, lambda m: isinstance(m, StateMessage) and m.state is State.SAVED, 1800.0)
         assert isinstance(saved, StateMessage)
         found += judge(Path(saved.run_path))
         client.request("shutdown", timeout_s=60.0, force=1.0)
