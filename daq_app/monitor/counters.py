@@ -104,7 +104,7 @@ class Counters(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(6)
         self.tiles: dict[str, Tile] = {}
-        wide = {"rotation": 13, "margin": 11, "eav": 10, "crt": 10}
+        wide = {"rotation": 12, "margin": 11, "eav": 11, "crt": 11}
         for name, caption in CAPTIONS.items():
             self.tiles[name] = Tile(caption)
             layout.addWidget(self.tiles[name], wide.get(name, 8))

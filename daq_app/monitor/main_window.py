@@ -15,10 +15,12 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QApplication,
+    QBoxLayout,
     QFrame,
     QHBoxLayout,
     QMainWindow,
     QPushButton,
+    QSizePolicy,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
@@ -56,6 +58,8 @@ from daq_app.monitor.theme import THEMES, Colours, apply_theme
 
 FRAME_MS: Final = 25
 SLOW_MS: Final = 160
+ONE_ROW_UP_TO: Final = 10.5
+"""Type size in points up to which orders and health figures stand in one row."""
 _QUIET_EVENTS: Final = frozenset({"impact", "marker", "tare", "saved", *State})
 """Events that the pages show anyway, unless they are more than information."""
 
@@ -143,7 +147,8 @@ class MainWindow(QMainWindow):
         self.rail = NavigationRail(list(self.pages))
         footer = QFrame()
         footer.setObjectName("bar")
-        footer_layout = QHBoxLayout(footer)
+        footer.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
+        self._footer = footer_layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, footer)
         footer_layout.setContentsMargins(10, 5, 12, 5)
         footer_layout.addWidget(self.actions_bar)
         footer_layout.addStretch(1)
@@ -215,6 +220,10 @@ class MainWindow(QMainWindow):
         assert isinstance(app, QApplication)
         self.colours = THEMES[self.settings.theme]
         apply_theme(app, self, self.colours, self.settings.type_size)
+        # Large type: orders and figures below each other, or the window would be wider than the screen.
+        stacked = self.settings.type_size > ONE_ROW_UP_TO
+        directions = QBoxLayout.Direction
+        self._footer.setDirection(directions.TopToBottom if stacked else directions.LeftToRight)
         for page in (self.prepare, self.live, self.campaign, self.result, self.replay, self.gap):
             page.restyle(self.colours)
         self.notices.restyle(self.colours)

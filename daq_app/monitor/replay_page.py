@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QListWidget,
     QListWidgetItem,
     QPushButton,
+    QSizePolicy,
     QSplitter,
     QTreeWidget,
     QTreeWidgetItem,
@@ -64,10 +65,14 @@ class ReplayPage(QWidget):
             "open": QPushButton("Open …  Ctrl+O"),
             "whole": QPushButton("Whole run  Home"),
             "motion": QPushButton("Motion  End"),
-            "png": QPushButton("PNG  Ctrl+P"),
-            "svg": QPushButton("SVG  Ctrl+G"),
-            "csv": QPushButton("CSV of the view  Ctrl+E"),
+            "png": QPushButton("PNG"),
+            "svg": QPushButton("SVG"),
+            "csv": QPushButton("CSV of the view"),
         }
+        for name, key in (("png", "Ctrl+P"), ("svg", "Ctrl+G"), ("csv", "Ctrl+E")):
+            self.buttons[name].setToolTip(f"Save what is on screen  ({key})")
+        # A long name of a run must not make the window wider than the screen.
+        self._facts.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._build()
         self.plots.cursor_moved.connect(self._on_cursor)
         self.buttons["open"].clicked.connect(self.choose_file)
@@ -164,6 +169,7 @@ class ReplayPage(QWidget):
         gaps = f" · {missing} samples missing in {len(run.gaps)} gaps" if run.gaps else " · no gap"
         size = f"{stop - start:.1f} s at {run.rate_hz:g} Hz · {len(header.channel_ids)} channels"
         self._facts.setText(f"{run.path.name} · {size}{gaps}")
+        self._facts.setToolTip(self._facts.text())
         self._fill_tree()
         self._fill_events()
         self.plots.show_run(run, self.chosen)

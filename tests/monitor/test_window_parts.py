@@ -501,3 +501,20 @@ def test_a_note_is_typed_in_a_line_not_in_a_box(qtbot, window, monkeypatch):
     qtbot.keyClick(window.note_entry.line, Qt.Key.Key_Return)
     assert asked == [("note", {"text": "stone fell at B"})]
     assert window.note_entry.isHidden() and window.note_entry.line.text() == ""
+
+
+@pytest.mark.parametrize("points", [10.0, 13.0])
+def test_the_window_fits_the_smallest_screen_that_is_promised(window, points):
+    for part in (window.header, window.actions_bar.parentWidget()):
+        part.show()
+    for page in (window.prepare, window.live):
+        window.stack.addWidget(page)
+    window.settings.type_size = points
+    window.restyle()
+    window.show()  # only then the style sheet counts
+    window.replay._facts.setText(
+        "FR1-L3-2_20261121T160353-314Z.h5 · 25.3 s at 4000 Hz · 41 channels · no gap"
+    )
+    window.repaint()
+    hint = window.centralWidget().minimumSizeHint()
+    assert hint.width() <= 1366 and hint.height() <= 768
