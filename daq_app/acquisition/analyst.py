@@ -134,7 +134,7 @@ class Analyst(threading.Thread):
                     self.run_path = item.path
                     self._go(State.SAVED if item.ok else State.FAILED, item.text)
             case Noted(event=event):
-                if event.kind == "clock" and event.data.get("clock") in ("rate", "drift"):
+                if event.kind == "clock" and event.data.get("clock") in ("rate", "planned_rate", "drift"):
                     self._standing[str(event.data["clock"])] = event
             case End():
                 return
@@ -192,7 +192,7 @@ class Analyst(threading.Thread):
                 f"The hardware samples at {opened.rate_hz:g} Hz where {planned:g} Hz were planned. Times "
                 "use the rate that was read back. Check that the modules are the ones of the rig file"
             )
-            self._note("clock", text, "warning", data={"clock": "rate", "value": opened.rate_hz})
+            self._note("clock", text, "warning", data={"clock": "planned_rate", "value": opened.rate_hz})
         self._new_live()
         self._go(State.PREVIEWING, f"Sampling at {opened.rate_hz:g} Hz")
 

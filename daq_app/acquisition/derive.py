@@ -135,7 +135,7 @@ def _signals(series: Series | None) -> dict[str, DerivedSignal]:
     }
 
 
-_SPOILS_TIME: Final = ("stood_still",)
+_SPOILS_TIME: Final = ("stood_still", "rate")
 """News of the sample clock after which times within the run are wrong."""
 
 

@@ -88,7 +88,7 @@ class Running:
 
     def __init__(self, rig: Path, out: Path, *options: str) -> None:
         self.out = out
-        arguments = ["--rig", str(rig), "--out", str(out), *options]
+        arguments = ["--rig", str(rig), "--out", str(out), "--speed", str(SPEED), *options]
         self.process = _context().Process(target=run_and_exit, args=(arguments,))
         self.process.start()
         deadline = time.monotonic() + 60
