@@ -1,7 +1,12 @@
-"""The independently simulated recordings as runs of the diagnosis."""
+"""The independently simulated recordings as runs of the diagnosis.
+
+``python tests/gap/foreign_cases.py case_001 …`` prints what is said about them (all effects), and with
+``--only EFFECT,EFFECT`` what is said when only these are considered.
+"""
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 from pathlib import Path
@@ -51,3 +56,30 @@ def _sensor(channel: dict[str, Any]) -> Sensor:
         (channel["range"][0] * factor, channel["range"][1] * factor),
         time_constant_s=channel.get("time_constant_s", 0.0),
     )
+
+
+def main() -> None:
+    """Print a line per case: verdict, the first three hypotheses, the effect's parameters, the gap."""
+    from daq_app.gap.rocking_model.study import diagnose_runs
+
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("cases", nargs="+")
+    parser.add_argument("--only", default="")
+    given = parser.parse_args()
+    for case in given.cases:
+        result = diagnose_runs(load_case(case), only=tuple(filter(None, given.only.split(","))))
+        first = ", ".join(
+            f"{' + '.join(r.effects) or 'nothing'} {r.probability:.3f}" for r in result.which[:3]
+        )
+        values = ", ".join(
+            f"{e.name} {e.value:.5g} ({e.low:.5g} … {e.high:.5g})" for e in result.effect_parameters
+        )
+        gap = f"{result.gap.before:.2f} → {result.gap.after:.2f}" if result.gap else ""
+        print(
+            f"{case}: {result.decision.verdict}; {first}; {values}; {gap}; {result.goodness.worst}",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()

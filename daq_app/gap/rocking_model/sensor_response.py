@@ -24,7 +24,7 @@ REPEATABILITY: dict[tuple[str, str], float] = {
     ("wire", "gain"): 3e-4,
     ("wire", "lag"): 1e-4,
     ("wire", "even harmonic"): 1e-2,
-    ("wire", "step with moment"): 2e-5,
+    ("wire", "step with moment"): 5e-5,
     ("wire", "drift"): 6e-6,
     ("tiltmeter", "gain"): 2e-3,
     ("tiltmeter", "lag"): 2e-3,
