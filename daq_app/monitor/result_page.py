@@ -95,7 +95,7 @@ class ResultPage(QWidget):
         self.table.setFixedHeight(_HEADER_PX)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         self.buttons = {
-            "page": QPushButton("Open the page  Ctrl+O"),
+            "page": QPushButton("Page  Ctrl+O"),
             "replay": QPushButton("Replay  Ctrl+P"),
             "good": QPushButton("Good  Ctrl+G"),
             "bad": QPushButton("Repeat it  Ctrl+R"),

@@ -503,7 +503,7 @@ def test_a_note_is_typed_in_a_line_not_in_a_box(qtbot, window, monkeypatch):
     assert window.note_entry.isHidden() and window.note_entry.line.text() == ""
 
 
-@pytest.mark.parametrize("points", [10.0, 13.0])
+@pytest.mark.parametrize("points", [10.0, 13.0, 15.0])
 def test_the_window_fits_the_smallest_screen_that_is_promised(window, points):
     for part in (window.header, window.actions_bar.parentWidget()):
         part.show()
