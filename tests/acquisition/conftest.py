@@ -246,7 +246,9 @@ def live(
         stage = driver or StageDriver(wall_test)
         where = folder or tmp_path / "runs"
         where.mkdir(exist_ok=True)
-        settings.setdefault("patience", Patience(read_timeout_s=0.05, retry_pause_s=0.01))
+        # The stage runs out of samples while a run is being saved: on a busy machine for longer than 30 s.
+        patience = Patience(read_timeout_s=0.05, retry_pause_s=0.01, silence_limit_s=600.0)
+        settings.setdefault("patience", patience)
         session: Session | None = None
         desk = Desk("tcp://127.0.0.1:0", lambda command: _handle(session, desk, command), TOKEN)
         session = Session(
