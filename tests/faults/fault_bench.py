@@ -131,10 +131,17 @@ class Acquisition:
         with AcquisitionClient(
             self.session.address, topics=("state", "health", "event"), timeout_s=LIMIT_S
         ) as ear:
+            caught_up = False
             while not self._ending.is_set():
                 received = ear.receive(0.1)
-                if received is not None:
-                    self.heard.add(received.message)
+                if received is None:
+                    continue
+                self.heard.add(received.message)
+                if not caught_up:  # what was said before the subscription arrived, as any viewer asks for it
+                    caught_up = True
+                    events = ear.request("hello", timeout_s=LIMIT_S).data["events"]
+                    for event in events if isinstance(events, list) else ():
+                        self.heard.add(EventMessage.model_validate(event))
 
     # -- a run ------------------------------------------------------------------------------------
 
