@@ -19,7 +19,7 @@ from daq_app.config import Rig
 from daq_app.runfile import open_run
 from sim_hardware.control import SimControl
 
-pytestmark = pytest.mark.heavy
+pytestmark = [pytest.mark.heavy, pytest.mark.faults]
 
 
 @dataclass
