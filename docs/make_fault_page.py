@@ -47,7 +47,8 @@ def main() -> int:
     """The exit code of the tests."""
     with tempfile.TemporaryDirectory() as name:
         rows = Path(name) / "rows.json"
-        command = [sys.executable, "-m", "pytest", str(DOCS.parent / "tests" / "faults"), "-q", "-m", "faults"]
+        folder = str(DOCS.parent / "tests" / "faults")
+        command = [sys.executable, "-m", "pytest", folder, "-q", "-m", "faults"]
         code = subprocess.run(
             command, cwd=DOCS.parent, env={**os.environ, "FAULT_TABLE": str(rows)}, check=False
         ).returncode

@@ -12,8 +12,8 @@ from drivers.protocol import ClockReading
 
 _SPAN_S: Final = 1.0
 """Least time between two readings that tell a rate."""
-_ADOPT_S: Final = 2.0
-"""A new line counts after so long: samples that only come late are back on the old one by then."""
+_ADOPT_S: Final = 0.3
+"""A new line counts once it has run straight for so long: a count that is only held up does not grow."""
 _OFF_S: Final = 0.03
 _PLAUSIBLE: Final = 0.01
 """Share by which a clock may be off its nominal rate before what was seen counts for more (an external
