@@ -111,7 +111,7 @@ def test_a_stalled_device(shared: Acquisition, bench: SimControl, rig: Rig, row:
     shared.strike()
     bench.command("fault", kind="stalled", target="cDAQ1", for_s=1.6 * SPEED)
     told = shared.told("No samples for a second", "No new samples arrived in time")
-    shared.told("stood still for")
+    shared.told("The sample clock stood still")
     shared.record(2000)
     facts = look_at(shared.stop().run_path, rig)
     assert facts.lost == 0
