@@ -108,6 +108,7 @@ def test_a_server_that_freezes(shared: Acquisition, bench: SimControl, rig: Rig,
 def test_a_stalled_device(shared: Acquisition, bench: SimControl, rig: Rig, row: Row) -> None:
     """No sample is lost, for none was taken; but the times after it are wrong, and the verdict says so."""
     shared.arm()
+    shared.record(10_000)  # the clock is known after a second
     shared.strike()
     bench.command("fault", kind="stalled", target="cDAQ1", for_s=1.6 * SPEED)
     told = shared.told("No samples for a second", "No new samples arrived in time")
