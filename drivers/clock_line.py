@@ -11,7 +11,9 @@ from typing import Final
 from drivers.protocol import ClockReading
 
 _SPAN_S: Final = 1.0
-"""Least time between two readings that tell a rate."""
+"""Least time between two readings that tell that a clock keeps its nominal rate."""
+_OTHER_RATE_SPAN_S: Final = 3.0
+"""And that it has another one: not said after the first late reply."""
 _ADOPT_S: Final = 0.3
 """A new line counts once it has run straight for so long: a count that is only held up does not grow."""
 _OFF_S: Final = 0.03
@@ -35,6 +37,8 @@ class ClockLine:
         self._rate_error = _OSCILLATOR
         self._first: ClockReading | None = None
         self._last: ClockReading | None = None
+        self._middle: ClockReading | None = None
+        """Until the rate is known: where the first half of the readings so far ends."""
         self._other: ClockReading | None = None
         """Where another line may have begun."""
 
@@ -70,12 +74,29 @@ class ClockLine:
         span_s = _age(self._first, self._last)
         if span_s < _SPAN_S:
             return
-        seen = (self._last.samples - self._first.samples) / span_s
+        seen = _slope(self._first, self._last)
         if abs(seen / self._nominal_hz - 1.0) <= _PLAUSIBLE:
             self._rate_hz, self._rate_error = self._nominal_hz, _OSCILLATOR
-        elif self._rate_hz is None or abs(seen / self._rate_hz - 1.0) < _PLAUSIBLE:
-            self._rate_hz = seen
-            self._rate_error = 0.5 * (_width(self._first) + _width(self._last)) / span_s
+        elif self._rate_hz is None:
+            self._look_for_another_rate(self._first, self._last, span_s)
+        elif abs(seen / self._rate_hz - 1.0) < _PLAUSIBLE:
+            self._take_rate(seen, self._first, self._last)
+
+    def _look_for_another_rate(self, first: ClockReading, last: ClockReading, span_s: float) -> None:
+        """Only a rate that both halves of the readings show: one leap of a clock shows none."""
+        if self._middle is None:
+            if span_s >= 0.5 * _OTHER_RATE_SPAN_S:
+                self._middle = last
+        elif span_s >= _OTHER_RATE_SPAN_S:
+            early, late = _slope(first, self._middle), _slope(self._middle, last)
+            if abs(late / early - 1.0) <= _PLAUSIBLE:
+                self._take_rate(_slope(first, last), first, last)
+            else:
+                self._first, self._middle = self._middle, None
+
+    def _take_rate(self, rate_hz: float, first: ClockReading, last: ClockReading) -> None:
+        self._rate_hz = rate_hz
+        self._rate_error = 0.5 * (_width(first) + _width(last)) / _age(first, last)
 
     def _is_on(self, earlier: ClockReading, reading: ClockReading) -> bool:
         """Whether a reading can lie on the line through an earlier one."""
@@ -86,6 +107,10 @@ class ClockLine:
 
 def _width(reading: ClockReading) -> float:
     return reading.after_s - reading.before_s
+
+
+def _slope(earlier: ClockReading, later: ClockReading) -> float:
+    return (later.samples - earlier.samples) / _age(earlier, later)
 
 
 def _age(earlier: ClockReading, later: ClockReading) -> float:

@@ -40,7 +40,8 @@ class NidaqmxDriver:
 
     `backup_folder` switches on the NI driver's own TDMS logging (`start_backup`); `ledger` lets the
     next session clear the tasks that this one leaves on a device server if it is killed; `object_to`
-    may refuse devices before a wrong module gives a puzzling error.
+    may refuse devices before a wrong module gives a puzzling error. `clock_speed` is how much faster than
+    real time a simulated device runs: the length of a gap is told by this computer's clock.
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class NidaqmxDriver:
         backup_folder: PurePath | None = None,
         ledger: TaskLedger | None = None,
         object_to: Inspection | None = None,
+        clock_speed: float = 1.0,
     ) -> None:
         self._connection = Connection(connection)
         self._ledger = ledger if self._connection.is_remote else None
@@ -63,6 +65,7 @@ class NidaqmxDriver:
         self._backlog = 0
         self._overloaded: tuple[str, ...] = ()
         self._clock: ClockReading | None = None
+        self._clock_speed = clock_speed
         self._line = ClockLine(1.0)
         self._last_housekeeping = 0.0
         self._buffer_samples = 0
@@ -130,7 +133,7 @@ class NidaqmxDriver:
         """Start the clock: slaves armed first, the master last."""
         self._start_tasks()
         self._next_sample = self._origin = 0
-        self._line = ClockLine(self._rate_hz)
+        self._line = ClockLine(self._rate_hz * self._clock_speed)
 
     def _start_tasks(self) -> None:
         by_role = sorted(self._streams, key=lambda stream: stream.planned.role == "master")

@@ -32,6 +32,7 @@ def driver_maker(
             backup_folder=options.backup,
             ledger=options.out / ".open-tasks.json",
             object_to=lambda devices: check_modules(rig, devices),
+            clock_speed=_finite(options.speed),
         )
 
     if connection == "simulated":
@@ -76,3 +77,8 @@ def _replay(path: Path, options: argparse.Namespace, stack: ExitStack) -> Callab
         raise DriverError(error.message, advice=error.advice or "Choose a run file to replay") from error
     speed = float("inf") if options.speed == "max" else float(options.speed)
     return lambda: ReplayDriver(run, speed)
+
+
+def _finite(speed: str) -> float:
+    """A simulated device that runs as fast as it can has no rate; the driver learns what it sees."""
+    return 1.0 if speed == "max" else float(speed)

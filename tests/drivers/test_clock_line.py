@@ -56,5 +56,14 @@ def test_samples_that_were_held_up_before_the_end_do_not_shorten_the_gap() -> No
     assert answer[0] == pytest.approx(62.0 * RATE_HZ, abs=RATE_HZ * answer[1] + 4)
 
 
+@pytest.mark.parametrize("speed", [1.0, 2.0])
+def test_a_leap_in_the_first_second_is_taken_for_no_rate(speed: float) -> None:
+    line, offset = fed(12.0, speed=speed, skip_at=0.7)
+    answer = line.sample_at(20.0, 20.002)
+    assert answer is not None
+    expected = RATE_HZ * speed * (20.001 + offset)
+    assert answer[0] == pytest.approx(expected, abs=RATE_HZ * speed * answer[1] + 4)
+
+
 def test_without_readings_nothing_is_claimed() -> None:
     assert ClockLine(RATE_HZ).sample_at(1.0, 1.1) is None

@@ -15,7 +15,7 @@ from sim_hardware.control import SimControl
 
 WALL = "commanded"
 
-pytestmark = [pytest.mark.heavy, pytest.mark.faults]
+pytestmark = pytest.mark.heavy
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from daq_app.config import Rig
 from daq_app.runfile import open_run
 from sim_hardware.control import SimControl
 
-pytestmark = [pytest.mark.heavy, pytest.mark.faults]
+pytestmark = pytest.mark.heavy
 
 linux_only = pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="needs Linux's /proc")
 posix_only = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such thing")
