@@ -100,10 +100,11 @@ def write_report(
     restitution += tables.mean_of_specimens(restitution)
     repetitions = tables.repetition_effect(tests)
     pictures = campaign_figures(tests)
+    drawn = {picture.name: picture.svg for picture in pictures}
     written = tables.write_csv(folder, places, tests, restitution, repetitions)
     for picture in pictures:
         path = folder / f"{picture.name}.svg"
-        path.write_text('<?xml version="1.0" encoding="utf-8"?>\n' + picture.svg, encoding="utf-8")
+        path.write_text('<?xml version="1.0" encoding="utf-8"?>\n' + drawn[picture.name], encoding="utf-8")
         written.append(path)
     good = sum(test.good for test in tests)
     html = (
@@ -117,6 +118,7 @@ def write_report(
             restitution=restitution,
             repetitions=repetitions,
             figures=pictures,
+            drawn=drawn,
             methods=[m for m in tables.METHODS if any(m in t.methods for t in tests)],
             left_out=[test for test in tests if not test.good],
             failures=failures,
