@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
@@ -25,6 +24,7 @@ from daq_app.campaign.status import CampaignStatus, Place, PlaceState, Proposal
 from daq_app.campaign.verdicts import give_verdict
 from daq_app.config import ConfigError
 from daq_app.monitor.background import Background
+from daq_app.monitor.banner import keyed_button
 from daq_app.monitor.campaign_table import CampaignModel, StateDelegate, release_text
 from daq_app.monitor.labels import Tile, role_label
 from daq_app.monitor.theme import Colours, font
@@ -79,18 +79,14 @@ class CampaignPage(QWidget):
         self._chosen.setWordWrap(True)
         self._reason = QLineEdit()
         self._reason.setPlaceholderText("Why (needed to reject)")
-        self.accept_button = QPushButton("Good  Ctrl+G")
-        self.reject_button = QPushButton("Repeat it  Ctrl+R")
+        self.accept_button = keyed_button(self, "Good", "Ctrl+G", lambda: self._judge("good"))
+        self.reject_button = keyed_button(self, "Repeat it", "Ctrl+R", lambda: self._judge("bad"))
         self.open_button = QPushButton("Open its run")
         self._build()
         self.take_button.clicked.connect(self.take_next)
-        self.accept_button.clicked.connect(lambda: self._judge("good"))
-        self.reject_button.clicked.connect(lambda: self._judge("bad"))
         self.open_button.clicked.connect(self._open_chosen)
         self.table.selectionModel().selectionChanged.connect(lambda *_: self._show_chosen())
         self.table.activated.connect(lambda _index: self._open_chosen())
-        QShortcut(QKeySequence("Ctrl+G"), self).activated.connect(self.accept_button.click)
-        QShortcut(QKeySequence("Ctrl+R"), self).activated.connect(self.reject_button.click)
 
     def _build(self) -> None:
         top = QHBoxLayout()

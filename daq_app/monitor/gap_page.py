@@ -6,18 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import Qt, QUrl, Signal
-from PySide6.QtGui import QDesktopServices, QKeySequence, QShortcut
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QFrame,
     QGridLayout,
     QHBoxLayout,
-    QLabel,
     QListWidget,
     QListWidgetItem,
     QProgressBar,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
@@ -27,11 +24,11 @@ from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.config import ConfigError
 from daq_app.gap.files import newest_result
 from daq_app.monitor.background import Background
+from daq_app.monitor.banner import Banner, keyed_button, open_outside
 from daq_app.monitor.gap_runner import GapRunner
 from daq_app.monitor.gap_views import BarRows, GapMapView, closure_bars, evidence_bars, map_cells
 from daq_app.monitor.labels import number, role_label, set_role
-from daq_app.monitor.shapes import Sign
-from daq_app.monitor.theme import DARK, Colours, font
+from daq_app.monitor.theme import DARK, Colours
 from daq_app.runfile import RunFileError
 
 _PATH = Qt.ItemDataRole.UserRole
@@ -62,13 +59,11 @@ class GapPage(QWidget):
         self.result: dict[str, Any] | None = None
         self._result_file: Path | None = None
         self.runner = GapRunner(background, self)
-        self._sign = Sign(30)
-        self._title = QLabel("No diagnosis yet")
-        self._title.setFont(font(19, bold=True))
-        self._sentence = role_label("Choose runs of one specimen, several levels if there are.", "muted")
-        self._more = role_label("", "muted")
-        for label in (self._sentence, self._more):
-            label.setWordWrap(True)
+        self.banner = Banner(
+            "No diagnosis yet", "Choose runs of one specimen, several levels if there are.", "", points=19
+        )
+        self._sign, self._title = self.banner.sign, self.banner.title
+        self._sentence, self._more = self.banner.sentences
         self.runs = QListWidget()
         self.runs.itemChanged.connect(lambda _item: self._show_buttons())
         self.after_test = QCheckBox("Diagnose after every test")
@@ -77,40 +72,22 @@ class GapPage(QWidget):
         self.progress.setFixedHeight(8)
         self._progress_text = role_label("", "muted")
         self.buttons = {
-            "start": QPushButton("Diagnose  Ctrl+B"),
-            "stop": QPushButton("Stop  Ctrl+K"),
-            "page": QPushButton("Open the page  Ctrl+O"),
+            "start": keyed_button(self, "Diagnose", "Ctrl+B", self.start),
+            "stop": keyed_button(self, "Stop", "Ctrl+K", self.runner.stop),
+            "page": keyed_button(self, "Open the page", "Ctrl+O", self._open_page),
         }
         self.buttons["start"].setProperty("role", "primary")
         self.map = GapMapView()
         self.evidence = BarRows()
         self.closure = BarRows()
         self._build()
-        for name, key, act in (
-            ("start", "Ctrl+B", self.start),
-            ("stop", "Ctrl+K", self.runner.stop),
-            ("page", "Ctrl+O", self._open_page),
-        ):
-            self.buttons[name].clicked.connect(act)
-            QShortcut(QKeySequence(key), self).activated.connect(self.buttons[name].click)
         self.runner.progress.connect(self._on_progress)
         self.runner.finished.connect(lambda path: self._on_finished(Path(path)))
         self.runner.failed.connect(self._on_failed)
         self._show_buttons()
 
     def _build(self) -> None:
-        banner = QFrame()
-        banner.setObjectName("card")
-        row = QHBoxLayout(banner)
-        row.setContentsMargins(14, 10, 14, 10)
-        row.setSpacing(12)
-        words = QVBoxLayout()
-        words.setSpacing(2)
-        for label in (self._title, self._sentence, self._more):
-            words.addWidget(label)
-        row.addWidget(self._sign, 0, Qt.AlignmentFlag.AlignTop)
-        row.addLayout(words, 1)
-        row.addWidget(self.buttons["page"], 0, Qt.AlignmentFlag.AlignTop)
+        self.banner.add_buttons(self.buttons["page"])
         left = QVBoxLayout()
         left.setSpacing(6)
         left.addWidget(role_label("Runs", "heading"))
@@ -146,7 +123,7 @@ class GapPage(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(10, 8, 10, 8)
         layout.setSpacing(8)
-        layout.addWidget(banner)
+        layout.addWidget(self.banner)
         layout.addLayout(below, 1)
 
     @staticmethod
@@ -316,7 +293,7 @@ class GapPage(QWidget):
 
     def _open_page(self) -> None:
         if self._result_file is not None:
-            QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._result_file.with_suffix(".html"))))
+            open_outside(self._result_file.with_suffix(".html"))
 
 
 def _read(path: Path) -> dict[str, Any]:

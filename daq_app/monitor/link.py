@@ -18,7 +18,7 @@ from PySide6.QtCore import QObject, Signal
 
 from daq_app.acquisition.client import AcquisitionClient, AcquisitionUnreachable
 from daq_app.acquisition.curve import ViewerKeys
-from daq_app.acquisition.messages import Reply
+from daq_app.acquisition.messages import EstimateMessage, Reply
 from daq_app.monitor.session import Published
 
 _POLL_S: Final = 0.1
@@ -32,6 +32,8 @@ class Link(QObject):
 
     replied = Signal(str, object)
     """(command name, `Reply`): also for a command that could not be sent, with ``ok=False``."""
+    urgent = Signal()
+    """Something has come that the operator waits for: r after an impact."""
 
     def __init__(
         self,
@@ -93,6 +95,8 @@ class Link(QObject):
                 continue
             if received is not None:
                 self._inbox.append(Published(received.message, time.monotonic(), received.readings))
+                if isinstance(received.message, EstimateMessage):
+                    self.urgent.emit()
 
     def _command(self) -> None:
         while (task := self._commands.get()) is not None:

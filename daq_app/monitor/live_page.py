@@ -111,17 +111,23 @@ class LivePage(QWidget):
             self._caption.setText(text)
         set_role(self._caption, "warning" if doubtful else "muted")
 
-    def _draw_estimate(self) -> None:
-        """Draw r as soon as it comes, not with the slow parts: it is what the operator waits for."""
+    def show_estimate(self) -> None:
+        """Draw and paint r now, between two frames: it is what the operator waits for."""
+        if self._draw_estimate():
+            self.restitution.plot.viewport().repaint()
+
+    def _draw_estimate(self) -> bool:
+        """Hand r to its plots; false where it has not changed."""
         revision = self._session.revision
         seen = (revision.get(EstimateMessage, 0), revision.get(StateMessage, 0))
         if seen == self._seen:
-            return
+            return False
         self._seen = seen
         self.restitution.draw()
         self.estimate_drawn_s = time.monotonic()
         self.periods.draw()
         self.counters.refresh()
+        return True
 
     def _on_theory(self, on: bool) -> None:
         self.motion.set_theory(on)

@@ -13,18 +13,7 @@ from typing import Any, Final
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
-from PySide6.QtWidgets import (
-    QApplication,
-    QBoxLayout,
-    QFrame,
-    QHBoxLayout,
-    QMainWindow,
-    QPushButton,
-    QSizePolicy,
-    QStackedWidget,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QApplication, QMainWindow, QPushButton, QWidget
 
 from daq_app.acquisition.messages import (
     BlockMessage,
@@ -37,17 +26,11 @@ from daq_app.acquisition.messages import (
 )
 from daq_app.campaign.plan import Campaign
 from daq_app.config import ConfigError, parse_rig
-from daq_app.monitor.actions import ActionBar
 from daq_app.monitor.background import Background
 from daq_app.monitor.campaign_page import CampaignPage
 from daq_app.monitor.gap_page import GapPage
-from daq_app.monitor.header import Header
-from daq_app.monitor.health_bar import HealthBar
 from daq_app.monitor.link import Link
 from daq_app.monitor.live_page import LivePage
-from daq_app.monitor.navigation import NavigationRail
-from daq_app.monitor.note_entry import NoteEntry
-from daq_app.monitor.notices import NoticeLine
 from daq_app.monitor.orders import Orders
 from daq_app.monitor.prepare_page import PreparePage, Zero
 from daq_app.monitor.replay_page import ReplayPage
@@ -55,11 +38,10 @@ from daq_app.monitor.result_page import ResultPage
 from daq_app.monitor.session import RECORDING, Session
 from daq_app.monitor.settings import TYPE_SIZES, WindowSettings
 from daq_app.monitor.theme import THEMES, Colours, apply_theme
+from daq_app.monitor.window_frame import WindowFrame
 
 FRAME_MS: Final = 25
 SLOW_MS: Final = 160
-ONE_ROW_UP_TO: Final = 10.5
-"""Type size in points up to which orders and health figures stand in one row."""
 _QUIET_EVENTS: Final = frozenset({"impact", "marker", "tare", "saved", *State})
 """Events that the pages show anyway, unless they are more than information."""
 
@@ -90,11 +72,6 @@ class MainWindow(QMainWindow):
         self._released = False
         """Whether the wall was let go since the last arming: an aborted arming has no result."""
 
-        self.header = Header(self.session)
-        self.notices = NoticeLine()
-        self.note_entry = NoteEntry()
-        self.actions_bar = ActionBar()
-        self.health = HealthBar(self.session)
         self.live = LivePage(self.session, settings.alarm_levels)
         self.prepare = PreparePage(self.session, self.background)
         self.campaign = CampaignPage(self.background)
@@ -110,7 +87,21 @@ class MainWindow(QMainWindow):
             "Replay": self.replay,
             "Gap": self.gap,
         }
-        self._build()
+        self.frame = WindowFrame(self.session, self.pages, live=link is not None)
+        self.header, self.notices, self.note_entry = (
+            self.frame.header,
+            self.frame.notices,
+            self.frame.note_entry,
+        )
+        self.actions_bar, self.health = self.frame.actions_bar, self.frame.health
+        self.stack, self.rail = self.frame.stack, self.frame.rail
+        self.setCentralWidget(self.frame)
+        self.splitters = {
+            "live_upper": self.live.upper,
+            "live_whole": self.live.whole,
+            "replay": self.replay.splitter,
+        }
+        self.show_page(self.prepare if link is not None else self.replay)
         self.orders = Orders(
             link,
             self.session,
@@ -125,6 +116,7 @@ class MainWindow(QMainWindow):
         settings.restore_layout(self, self.splitters)
         if link is not None:
             link.replied.connect(self._on_reply)
+            link.urgent.connect(self._on_urgent)
             self._adopt(link.about)
             if not link.may_command:
                 self.notices.tell(
@@ -137,45 +129,6 @@ class MainWindow(QMainWindow):
         self._slow_timer = QTimer(self)
         self._slow_timer.timeout.connect(self._on_slow)
         self._slow_timer.start(SLOW_MS)
-
-    # -- building --------------------------------------------------------------------------------
-
-    def _build(self) -> None:
-        self.stack = QStackedWidget()
-        for page in self.pages.values():
-            self.stack.addWidget(page)
-        self.rail = NavigationRail(list(self.pages))
-        footer = QFrame()
-        footer.setObjectName("bar")
-        footer.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
-        self._footer = footer_layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, footer)
-        footer_layout.setContentsMargins(10, 5, 12, 5)
-        footer_layout.addWidget(self.actions_bar)
-        footer_layout.addStretch(1)
-        footer_layout.addWidget(self.health)
-        middle = QHBoxLayout()
-        middle.setSpacing(0)
-        middle.addWidget(self.rail)
-        middle.addWidget(self.stack, 1)
-        central = QWidget()
-        layout = QVBoxLayout(central)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(0)
-        layout.addWidget(self.header)
-        layout.addWidget(self.notices)
-        layout.addWidget(self.note_entry)
-        layout.addLayout(middle, 1)
-        layout.addWidget(footer)
-        self.setCentralWidget(central)
-        self.splitters = {
-            "live_upper": self.live.upper,
-            "live_whole": self.live.whole,
-            "replay": self.replay.splitter,
-        }
-        if self.link is None:
-            for part in (self.header, footer):
-                part.hide()  # nothing is live here, so nothing may look as if it were
-        self.show_page(self.prepare if self.link is not None else self.replay)
 
     def _connect(self) -> None:
         self.actions_bar.ordered.connect(self._on_order)
@@ -207,10 +160,7 @@ class MainWindow(QMainWindow):
 
     def show_page(self, page: QWidget) -> None:
         """Bring a page to the front; one that this window does not have stays away."""
-        if page not in self.pages.values():
-            return
-        self.stack.setCurrentWidget(page)
-        self.rail.mark(list(self.pages.values()).index(page))
+        self.frame.show_page(page)
 
     # -- look ------------------------------------------------------------------------------------
 
@@ -220,10 +170,7 @@ class MainWindow(QMainWindow):
         assert isinstance(app, QApplication)
         self.colours = THEMES[self.settings.theme]
         apply_theme(app, self, self.colours, self.settings.type_size)
-        # Large type: orders and figures below each other, or the window would be wider than the screen.
-        stacked = self.settings.type_size > ONE_ROW_UP_TO
-        directions = QBoxLayout.Direction
-        self._footer.setDirection(directions.TopToBottom if stacked else directions.LeftToRight)
+        self.frame.set_type_size(self.settings.type_size)
         for page in (self.prepare, self.live, self.campaign, self.result, self.replay, self.gap):
             page.restyle(self.colours)
         self.notices.restyle(self.colours)
@@ -282,10 +229,7 @@ class MainWindow(QMainWindow):
         if math.isfinite(self._last_frame_s):
             self.longest_stall_s = max(self.longest_stall_s, now - self._last_frame_s)
         self._last_frame_s = now
-        if self.link is not None:
-            for published in self.link.take():
-                self.session.feed(published)
-                self._after(published.message)
+        self._take_in()
         live = tuple(self.session.fresh(kind) for kind in (BlockMessage, MotionMessage, HealthMessage))
         if live != self._was_live:
             # What has just gone stale must not stand as live until the next slow tick.
@@ -293,6 +237,18 @@ class MainWindow(QMainWindow):
             self._on_slow()
         if self.stack.currentWidget() is self.live:
             self.live.draw_frame()
+
+    def _take_in(self) -> None:
+        if self.link is not None:
+            for published in self.link.take():
+                self.session.feed(published)
+                self._after(published.message)
+
+    def _on_urgent(self) -> None:
+        """r has come: it is on screen before the next frame is drawn."""
+        self._take_in()
+        if self.stack.currentWidget() is self.live:
+            self.live.show_estimate()
 
     def _after(self, message: object) -> None:
         match message:

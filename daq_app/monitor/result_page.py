@@ -5,13 +5,10 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl, Signal
-from PySide6.QtGui import QDesktopServices, QKeySequence, QShortcut
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
-    QFrame,
     QHBoxLayout,
     QHeaderView,
-    QLabel,
     QPushButton,
     QTableWidget,
     QTableWidgetItem,
@@ -24,9 +21,9 @@ from daq_app.campaign.result import NoResult, Result, load_result
 from daq_app.campaign.result_report import METHODS, period_deviation, repetition_rows, verdict_sentence
 from daq_app.config.wording import plus_minus
 from daq_app.monitor.background import Background
-from daq_app.monitor.labels import DASH, Tile, number, role_label, set_role
+from daq_app.monitor.banner import Banner, keyed_button, open_outside
+from daq_app.monitor.labels import DASH, Tile, number, set_role
 from daq_app.monitor.result_plots import ResultPlots
-from daq_app.monitor.shapes import Sign
 from daq_app.monitor.theme import DARK, Colours, font
 
 _LIMIT_S = 300.0
@@ -70,11 +67,12 @@ class ResultPage(QWidget):
         self._colours = DARK
         self.run: Path | None = None
         self.result: Result | None = None
-        self._sign = Sign(30)
-        self._title = QLabel("No test yet")
-        self._title.setFont(font(22, bold=True))
-        self._verdict = role_label("The result appears here after a test.", "muted")
-        self._verdict.setWordWrap(True)
+        self.banner = Banner("No test yet", "The result appears here after a test.", points=22)
+        self._sign, self._title, (self._verdict,) = (
+            self.banner.sign,
+            self.banner.title,
+            self.banner.sentences,
+        )
         self.tiles = {
             "theta0": Tile("θ0/α", 19),
             "impacts": Tile("Impacts", 19),
@@ -95,37 +93,19 @@ class ResultPage(QWidget):
         self.table.setFixedHeight(_HEADER_PX)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         self.buttons = {
-            "page": QPushButton("Page  Ctrl+O"),
-            "replay": QPushButton("Replay  Ctrl+P"),
-            "good": QPushButton("Good  Ctrl+G"),
-            "bad": QPushButton("Repeat it  Ctrl+R"),
+            "page": keyed_button(self, "Page", "Ctrl+O", self._open_page),
+            "replay": keyed_button(self, "Replay", "Ctrl+P", lambda: self.replay.emit(str(self.run))),
+            "good": keyed_button(self, "Good", "Ctrl+G", lambda: self.judge.emit(str(self.run), "good")),
+            "bad": keyed_button(self, "Repeat it", "Ctrl+R", lambda: self.judge.emit(str(self.run), "bad")),
             "next": QPushButton("Next test  F6"),
         }
         self.buttons["next"].setProperty("role", "primary")
         self._build()
-        self.buttons["page"].clicked.connect(self._open_page)
-        self.buttons["replay"].clicked.connect(lambda: self.run and self.replay.emit(str(self.run)))
-        self.buttons["good"].clicked.connect(lambda: self.run and self.judge.emit(str(self.run), "good"))
-        self.buttons["bad"].clicked.connect(lambda: self.run and self.judge.emit(str(self.run), "bad"))
         self.buttons["next"].clicked.connect(self.next_wanted.emit)
-        for name, key in (("page", "Ctrl+O"), ("replay", "Ctrl+P"), ("good", "Ctrl+G"), ("bad", "Ctrl+R")):
-            QShortcut(QKeySequence(key), self).activated.connect(self.buttons[name].click)
         self._show_buttons()
 
     def _build(self) -> None:
-        banner = QFrame()
-        banner.setObjectName("card")
-        row = QHBoxLayout(banner)
-        row.setContentsMargins(14, 8, 14, 8)
-        row.setSpacing(12)
-        words = QVBoxLayout()
-        words.setSpacing(0)
-        words.addWidget(self._title)
-        words.addWidget(self._verdict)
-        row.addWidget(self._sign)
-        row.addLayout(words, 1)
-        for button in self.buttons.values():
-            row.addWidget(button)
+        self.banner.add_buttons(*self.buttons.values())
         tiles = QHBoxLayout()
         tiles.setSpacing(6)
         for tile in self.tiles.values():
@@ -133,7 +113,7 @@ class ResultPage(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(10, 8, 10, 8)
         layout.setSpacing(6)
-        layout.addWidget(banner)
+        layout.addWidget(self.banner)
         layout.addLayout(tiles)
         layout.addWidget(self.plots, 1)
         layout.addWidget(self.table)
@@ -223,4 +203,4 @@ class ResultPage(QWidget):
 
     def _open_page(self) -> None:
         if self.run is not None:
-            QDesktopServices.openUrl(QUrl.fromLocalFile(str(self.run.with_suffix(".result.html"))))
+            open_outside(self.run.with_suffix(".result.html"))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -21,6 +23,10 @@ except ImportError as error:
     QT_TROUBLE = f"Qt needs the system packages {packages} ({error})"
 
 
+QT_FREE = frozenset({"session", "minmax_ring", "motion_trace"})
+"""Modules of the window that work without Qt."""
+
+
 class _SkippedModule(pytest.Module):
     def collect(self) -> Any:
         pytest.skip(QT_TROUBLE, allow_module_level=True)
@@ -28,7 +34,10 @@ class _SkippedModule(pytest.Module):
 
 def pytest_pycollect_makemodule(module_path: Path, parent: Any) -> pytest.Module | None:
     """A module that uses Qt is collected as one skip where Qt cannot start."""
-    if QT_TROUBLE and "qtbot" in module_path.read_text(encoding="utf-8"):
+    if not QT_TROUBLE:
+        return None
+    text = module_path.read_text(encoding="utf-8")
+    if "qtbot" in text or not set(re.findall(r"daq_app\.monitor\.(\w+)", text)) <= QT_FREE:
         return _SkippedModule.from_parent(parent, path=module_path)
     return None
 
@@ -60,6 +69,51 @@ def settings(tmp_path: Path) -> Any:
     from daq_app.monitor.settings import WindowSettings
 
     return WindowSettings(tmp_path / "window.ini")
+
+
+class Clock:
+    """A clock that a test moves by hand."""
+
+    now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def play() -> Callable[..., None]:
+    """Feeds a session what the stand-in publishes up to a time, each message at its instant."""
+    from daq_app.monitor.session import Published
+
+    def feed(session: Any, clock: Clock, stand_in: Any, until_s: float) -> None:
+        start = clock.now
+        for instant in stand_in.instants(until_s):
+            clock.now = start + instant.time_s
+            for message, readings in instant.messages:
+                session.feed(Published(message, clock.now, readings))
+
+    return feed
+
+
+@pytest.fixture
+def window(qtbot: Any, settings: Any, rig: Any, clock: Clock) -> Any:
+    """A window without a link, whose session a test feeds by hand."""
+    from daq_app.monitor.main_window import MainWindow
+
+    window: Any = MainWindow(None, settings)
+    qtbot.addWidget(window)
+    window._frame_timer.stop()
+    window._slow_timer.stop()
+    window.session.clock = window.clock = clock
+    window.session.set_rig(rig, 4000.0)
+    window.prepare.set_rig(rig)
+    window.header.show()
+    return window
 
 
 @pytest.fixture(scope="session")

@@ -21,18 +21,6 @@ from daq_app.monitor.labels import DASH, number, size_text
 from daq_app.monitor.session import Published, Session
 
 
-class Clock:
-    now = 100.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
-@pytest.fixture
-def clock():
-    return Clock()
-
-
 @pytest.fixture
 def session(clock, rig):
     session = Session(clock)
@@ -40,15 +28,7 @@ def session(clock, rig):
     return session
 
 
-def play(session, clock, stand_in, until_s):
-    start = clock.now
-    for instant in stand_in.instants(until_s):
-        clock.now = start + instant.time_s
-        for message, readings in instant.messages:
-            session.feed(Published(message, clock.now, readings))
-
-
-def test_a_value_is_live_for_half_a_second_and_then_a_dash(session, clock, stand_in):
+def test_a_value_is_live_for_half_a_second_and_then_a_dash(session, clock, stand_in, play):
     play(session, clock, stand_in, 3.0)
     assert tile_texts(session, AlarmLevels())["rotation"].value.endswith("mrad")
     clock.now += 0.49
@@ -63,7 +43,7 @@ def test_a_value_is_live_for_half_a_second_and_then_a_dash(session, clock, stand
     assert session.current_state is None
 
 
-def test_the_figures_of_a_test_agree_with_the_motion(session, clock, stand_in, rig):
+def test_the_figures_of_a_test_agree_with_the_motion(session, clock, stand_in, play, rig):
     play(session, clock, stand_in, stand_in.release_s + 4.0)
     texts = tile_texts(session, AlarmLevels())
     impacts = int(np.sum(stand_in.motion.impacts_s <= stand_in.release_s + 4.0))
@@ -77,7 +57,7 @@ def test_the_figures_of_a_test_agree_with_the_motion(session, clock, stand_in, r
     assert session.overturning_margin == pytest.approx(1 - abs(theta) / rig.specimen.alpha0_rad)
 
 
-def test_arming_forgets_the_estimate_of_the_last_test(session, clock, stand_in):
+def test_arming_forgets_the_estimate_of_the_last_test(session, clock, stand_in, play):
     play(session, clock, stand_in, stand_in.release_s + 2.0)
     session.feed(Published(StateMessage(state=State.SAVED), clock.now))
     assert session.estimate is not None
@@ -125,7 +105,7 @@ def test_health_that_repeats_itself_goes_stale(session, clock):
     assert not session.recording_on_disk
 
 
-def test_restarted_tasks_start_the_plots_anew(session, clock, stand_in):
+def test_restarted_tasks_start_the_plots_anew(session, clock, stand_in, play):
     play(session, clock, stand_in, 6.0)
     assert session.recent(1.0) is not None
     first = BlockMessage(first_sample=0, n_samples=400, n_channels=41, rate_hz=4000.0)

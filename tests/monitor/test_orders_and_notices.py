@@ -1,0 +1,150 @@
+"""What may be ordered when, and what the window says to whoever ordered it."""
+
+from __future__ import annotations
+
+import pytest
+
+from daq_app.acquisition.messages import EventMessage, State
+from daq_app.campaign.check_model import ChannelCheck, Finding, SensorCheck, Verdict
+from daq_app.monitor.actions import ActionBar
+from daq_app.monitor.background import Background
+from daq_app.monitor.notices import NoticeLine
+from daq_app.monitor.state_look import LOOKS, look_of
+
+
+def test_every_state_has_its_own_word_and_shape_so_that_colour_is_not_needed():
+    words = [look.word for look in LOOKS.values()]
+    assert set(LOOKS) == set(State)
+    assert len(set(words)) == len(words)
+    assert len({(look.shape, look.tone) for look in LOOKS.values()}) == len(LOOKS)
+    assert look_of(None).word == "No link"
+
+
+@pytest.mark.parametrize(
+    ("state", "sampling", "enabled"),
+    [
+        (State.IDLE, False, {"preview", "next"}),
+        (State.PREVIEWING, True, {"arm", "next", "marker", "note"}),
+        (State.PREVIEWING, False, {"next"}),
+        (State.ARMED, True, {"stop", "abort", "marker", "note"}),
+        (State.HOLDING, True, {"stop", "abort", "marker", "note"}),
+        (State.ROCKING, True, {"stop", "marker", "note"}),
+        (State.AT_REST, True, {"stop", "marker", "note"}),
+        (State.SAVING, True, set()),
+        (State.SAVED, True, {"arm", "next"}),
+        (State.FAILED, False, {"preview", "next"}),
+        (None, False, set()),
+    ],
+)
+def test_only_orders_that_make_sense_can_be_given(qtbot, state, sampling, enabled):
+    bar = ActionBar()
+    qtbot.addWidget(bar)
+    bar.refresh(state, sampling=sampling, may_command=True)
+    assert {name for name, button in bar.buttons.items() if button.isEnabled()} == enabled
+    bar.refresh(state, sampling=sampling, may_command=False)
+    assert not any(button.isEnabled() for button in bar.buttons.values())
+
+
+def test_an_abort_must_be_ordered_twice_within_seconds(qtbot, clock):
+    bar = ActionBar(clock)
+    qtbot.addWidget(bar)
+    bar.refresh(State.ARMED, sampling=True, may_command=True)
+    orders = []
+    bar.ordered.connect(orders.append)
+    button = bar.buttons["abort"]
+    button.click()
+    assert orders == [] and button.text() == "F8 again: abort"
+    clock.now += 3.0
+    bar.refresh(State.ARMED, sampling=True, may_command=True)
+    assert button.text() == "Abort  F8"
+    button.click()
+    button.click()
+    assert orders == ["abort"]
+
+
+def test_orders_have_keys(qtbot):
+    from PySide6.QtCore import Qt
+
+    bar = ActionBar()
+    qtbot.addWidget(bar)
+    with qtbot.waitActive(bar):
+        bar.show()
+        bar.activateWindow()
+    bar.refresh(State.PREVIEWING, sampling=True, may_command=True)
+    with qtbot.waitSignal(bar.ordered) as ordered:
+        qtbot.keyClick(bar, Qt.Key.Key_F5)
+    assert ordered.args == ["arm"]
+
+
+def test_arming_without_a_name_is_refused_with_what_to_do(window):
+    window.orders.arm()
+    assert window.notices.current == ("warning", "Give the test a name before arming.")
+
+
+def test_a_no_go_must_be_overruled_on_purpose(window, monkeypatch):
+    bad = Finding("stuck", Verdict.NO_GO, "Stuck.")
+    window.prepare.check = SensorCheck((ChannelCheck("WP-3", "wire", (bad,), 0.0, 0.0, 1.0, 0.0),))
+    window.prepare.card.propose("FR1-L3-1")
+    asked = []
+    monkeypatch.setattr(
+        window.orders, "request", lambda name, arguments=None: asked.append((name, arguments))
+    )
+    window.orders.arm()
+    assert asked == []
+    assert "no-go" in window.notices.current[1]
+    window.orders.arm()
+    assert asked[0][1]["test"] == "FR1-L3-1"
+    assert "Sensor check: no-go" in asked[0][1]["notes"]
+
+
+def test_a_note_is_typed_in_a_line_not_in_a_box(qtbot, window, monkeypatch):
+    from PySide6.QtCore import Qt
+
+    asked = []
+    monkeypatch.setattr(window.orders, "request", lambda name, more=None: asked.append((name, more)))
+    window.actions_bar.refresh(State.ROCKING, sampling=True, may_command=True)
+    window.actions_bar.buttons["note"].click()
+    assert not window.note_entry.isHidden()
+    qtbot.keyClicks(window.note_entry.line, "stone fell at B")
+    qtbot.keyClick(window.note_entry.line, Qt.Key.Key_Escape)
+    assert window.note_entry.isHidden() and asked == []
+    window.actions_bar.buttons["note"].click()
+    qtbot.keyClick(window.note_entry.line, Qt.Key.Key_Return)
+    assert asked == [("note", {"text": "stone fell at B"})]
+    assert window.note_entry.isHidden() and window.note_entry.line.text() == ""
+
+
+def test_errors_stay_in_front_until_they_are_read(qtbot):
+    line = NoticeLine()
+    qtbot.addWidget(line)
+    line.tell("info", "zero taken")
+    line.tell("error", "the disk is full")
+    line.tell("error", "the disk is full")
+    line.tell("info", "marker written")
+    assert line.current == ("error", "the disk is full")
+    line.dismiss()
+    assert line.current == ("info", "marker written")
+    line.dismiss()
+    assert line.current is None
+    assert line.isHidden()
+
+
+def test_events_that_matter_are_told_and_routine_ones_are_not(window):
+    window._after(EventMessage(kind="impact", sample=1, text="impact 3"))
+    window._after(EventMessage(kind="rocking", sample=1, text="rocking"))
+    assert window.notices.current is None
+    window._after(EventMessage(kind="gap", sample=1, text="400 samples lost", severity="error"))
+    assert window.notices.current == ("error", "400 samples lost")
+
+
+def test_a_background_failure_is_handed_back_not_swallowed(qtbot):
+    background = Background()
+    failures = []
+
+    def fail():
+        raise ValueError("no")
+
+    background.run(fail, lambda _: None, failures.append)
+    qtbot.waitUntil(lambda: bool(failures), timeout=60_000)
+    assert isinstance(failures[0], ValueError)
+    assert not background.busy
