@@ -31,6 +31,8 @@ _CHANNEL_OPTIONS = [
     # Two connections of one process must not share a socket: a fresh one is how we get rid of a dead one.
     ("grpc.use_local_subchannel_pool", 1),
 ]
+_TLS_SERVICE = "ni-grpc-device"
+"""What NI's TLS settings call the device server."""
 _ADDRESS = re.compile(r"^grpc(?P<tls>s?)://(?P<host>\[[0-9A-Fa-f:.]+\]|[^:/\s]+):(?P<port>\d{1,5})/?$")
 _SHORT_CALL_S = 10.0
 
@@ -104,6 +106,30 @@ class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc]  # grpc
         return continuation(limited, request)
 
 
+def _tls_channel(target: Target) -> Any:
+    """Encrypted by this machine's NI settings. Raises `DriverError` where they are missing or switched off."""
+    from nitlsconfig import NitlsconfigError
+    from nitlsconfig.cli import ClientConfig, ClientServerMode
+    from nitlsconfig.grpc_channel import create_grpc_device_channel
+
+    host = target.host.strip("[]")
+    try:
+        # NI's function makes a plain channel without a word where the settings say so.
+        off = ClientConfig(_TLS_SERVICE, host).server_mode is ClientServerMode.Disabled
+        channel = None if off else create_grpc_device_channel(host, target.port, options=_CHANNEL_OPTIONS)
+    except NitlsconfigError as error:
+        raise DriverError(
+            f"TLS to {host}:{target.port} is not set up on this machine ({error})",
+            advice="Set it up with nitlsconfig, as NI's gRPC Device Server describes",
+        ) from error
+    if channel is None:
+        raise DriverError(
+            f"TLS to {host}:{target.port} is switched off in this machine's NI settings",
+            advice="Switch it on with nitlsconfig (client, ni-grpc-device, server_mode)",
+        )
+    return channel
+
+
 class Connection:
     """One way to one NI-DAQmx driver. Not thread-safe: it belongs to the reader's thread."""
 
@@ -124,18 +150,7 @@ class Connection:
     def _connect(self) -> None:
         address = f"{self.target.host}:{self.target.port}"
         if self.target.tls:
-            from nitlsconfig import NitlsconfigError
-            from nitlsconfig.grpc_channel import create_grpc_device_channel
-
-            try:
-                self._raw = create_grpc_device_channel(
-                    self.target.host.strip("[]"), self.target.port, options=_CHANNEL_OPTIONS
-                )
-            except NitlsconfigError as error:
-                raise DriverError(
-                    f"TLS to {address} is not set up on this machine ({error})",
-                    advice="Set it up with nitlsconfig, as NI's gRPC Device Server describes",
-                ) from error
+            self._raw = _tls_channel(self.target)
         else:
             self._raw = grpc.insecure_channel(address, options=_CHANNEL_OPTIONS)
         self._channel = grpc.intercept_channel(self._raw, self._deadline)

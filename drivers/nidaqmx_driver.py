@@ -147,10 +147,10 @@ class NidaqmxDriver:
         self._backlog = 0
         self._last_housekeeping = time.monotonic()
 
-    def read(self, timeout_s: float) -> Block:
+    def read(self, timeout_s: float, n_samples: int | None = None) -> Block:
         """See the protocol. Blocks up to `timeout_s` for every task together."""
         plan = self._opened_plan()
-        wanted = self._read_size(plan)
+        wanted = self._read_size(plan, n_samples)
         deadline = time.monotonic() + timeout_s
         try:
             for stream in self._streams:
@@ -168,9 +168,12 @@ class NidaqmxDriver:
         assert block is not None
         return block
 
-    def _read_size(self, plan: TaskPlan) -> int:
-        periods = min(_CATCH_UP_READS, max(1, self._backlog // plan.read_samples))
-        return periods * plan.read_samples
+    def _read_size(self, plan: TaskPlan, asked: int | None) -> int:
+        """What was asked for, or whole read periods where samples have piled up."""
+        waiting = self._backlog // plan.read_samples
+        if waiting == 0 and asked is not None:
+            return asked
+        return min(_CATCH_UP_READS, max(1, waiting)) * plan.read_samples
 
     def _block(self, n_samples: int) -> Block | None:
         """The next `n_samples` of all tasks as one rectangle; None for no samples."""

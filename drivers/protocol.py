@@ -126,12 +126,13 @@ class Driver(Protocol):
         """Start the clock: slaves armed first, the master last."""
         ...
 
-    def read(self, timeout_s: float) -> Block:
-        """Wait for the next `plan.read_samples` samples of every channel and return them.
+    def read(self, timeout_s: float, n_samples: int | None = None) -> Block:
+        """Wait for the next `n_samples` (`plan.read_samples` if None) of every channel and return them.
 
-        Returns more where more are waiting. `first_sample` follows the last block, except after
-        `recover`, where it may lie beyond samples that are lost. Raises `DriverError` (with `partial`
-        where samples had been read); `retryable` after a time-out.
+        Returns more where more are waiting; less than `plan.read_samples` may be asked for at any time.
+        `first_sample` follows the last block, except after `recover`, where it may lie beyond samples that
+        are lost. Raises `DriverError` (with `partial` where samples had been read); `retryable` after a
+        time-out.
         """
         ...
 

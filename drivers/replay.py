@@ -87,20 +87,21 @@ class ReplayDriver:
         self._started_s = self._clock()
         self._next = 0
 
-    def read(self, timeout_s: float) -> Block:
+    def read(self, timeout_s: float, n_samples: int | None = None) -> Block:
         """See the protocol: waits until the samples are due."""
         plan = self._opened()
         if self._started_s is None:
             raise DriverError("The replay has not been started", advice="Start it first")
         if self._next >= self._recording.n_samples:
             raise DriverError("The recording has ended", advice="Start the replay again, or stop")
-        stop = min(self._next + plan.read_samples, self._recording.n_samples)
+        wanted = plan.read_samples if n_samples is None else n_samples
+        stop = min(self._next + wanted, self._recording.n_samples)
         self._wait_for(stop, timeout_s)
         readings = self._recording.readings(plan.channel_ids, self._next, stop)
         present = np.asarray(~np.isnan(readings).any(axis=0), dtype=np.bool_)
         if not present.any():
             self._next = stop
-            return self.read(timeout_s)
+            return self.read(timeout_s, n_samples)
         # One block is one unbroken piece: up to the first gap, after any gap at its beginning.
         first = int(np.argmax(present))
         broken = np.flatnonzero(~present[first:])

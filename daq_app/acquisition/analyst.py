@@ -41,6 +41,7 @@ from drivers import Block, Opened
 _REPEAT_STATE_S: Final = 1.0
 _TARE_S: Final = 1.0
 _SAME_RATE: Final = 1e-6
+_MOVING: Final = frozenset({State.RELEASED, State.ROCKING})
 
 
 class Analyst(threading.Thread):
@@ -51,10 +52,12 @@ class Analyst(threading.Thread):
         rig: Rig,
         publisher: Publisher,
         post: Callable[[Item], None],
+        hurry: Callable[[bool], None],
         *,
         release_within_s: float,
         planned_rate_hz: float = 0.0,
     ) -> None:
+        """`hurry(True)` asks for samples in small pieces, from the release to the rest; it must not block."""
         super().__init__(name="analyst", daemon=True)
         self.inbox: queue.SimpleQueue[Item | None] = queue.SimpleQueue()
         self.state = State.IDLE
@@ -66,6 +69,7 @@ class Analyst(threading.Thread):
         self._rig = rig
         self._publisher = publisher
         self._post = post
+        self._hurry = hurry
         self._release_within_s = release_within_s
         self._planned_rate_hz = planned_rate_hz
         self._opened: Opened | None = None
@@ -151,7 +155,7 @@ class Analyst(threading.Thread):
                 self._note("overload", text, "warning")
         if self._channels is not None:
             # Impacts ring and leap by themselves: then only what cannot be motion is looked at.
-            moving = self.state in (State.RELEASED, State.ROCKING)
+            moving = self.state in _MOVING
             for doubt in self._channels.check(block, moving=moving):
                 data: dict[str, float | str] = {"channel": doubt.channel_id, "doubt": doubt.name}
                 self._note("channel", doubt.text, "warning", doubt.sample, data)
@@ -329,6 +333,7 @@ class Analyst(threading.Thread):
 
     def _go(self, state: State, text: str, since: int | None = None) -> None:
         self.state, self.state_text = state, text
+        self._hurry(state in _MOVING)
         self._since = self._sample if since is None else since
         self._last_state_s = 0.0
         self._repeat_state()

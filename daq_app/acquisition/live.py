@@ -35,10 +35,17 @@ class LiveView:
         self._excluded: tuple[str, ...] = ()
 
     def show(self, block: Block, overloaded: tuple[str, ...], *, quietly: bool) -> tuple[PhaseEvent, ...]:
-        """Analyse and publish a block; answers what happened in it. `quietly`: leave out the raw block."""
-        self.trouble = ""
+        """Analyse and publish a block; answers what happened in it. `quietly`: leave out the raw block.
+
+        What follows from the block goes out before the block itself: somebody waits for r.
+        """
+        events = self._analyse(block)
         if not quietly:
             self._publish_block(block, overloaded)
+        return events
+
+    def _analyse(self, block: Block) -> tuple[PhaseEvent, ...]:
+        self.trouble = ""
         if self._analyser is None:
             return ()
         try:
@@ -51,7 +58,7 @@ class LiveView:
                 "rest are not detected any more: stop by hand, and analyse the run afterwards"
             )
             return ()
-        self._publish_motion(result)
+        self._publish(result)
         if result.excluded_wires != self._excluded:
             self._excluded = result.excluded_wires
             if self._excluded:
@@ -69,7 +76,10 @@ class LiveView:
         si = np.ascontiguousarray(self._scaling.to_si(block.readings), dtype="<f4")
         self._publisher.send("block", heading, si.tobytes())
 
-    def _publish_motion(self, result: LiveResult) -> None:
+    def _publish(self, result: LiveResult) -> None:
+        if result.estimate is not None:
+            self.estimate = result.estimate
+            self._publisher.send("estimate", EstimateMessage.model_validate(result.estimate.as_message()))
         start = -result.first_sample % self._step
         rotation = result.rotation_rad[start :: self._step]
         if rotation.size:
@@ -82,6 +92,3 @@ class LiveView:
                 tilt_rad=result.tilt_rad,
             )
             self._publisher.send("motion", motion)
-        if result.estimate is not None:
-            self.estimate = result.estimate
-            self._publisher.send("estimate", EstimateMessage.model_validate(result.estimate.as_message()))

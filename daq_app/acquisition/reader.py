@@ -23,6 +23,8 @@ from drivers import Block, Driver, DriverError
 
 _OVERDUE_S: Final = 0.4
 """Several read periods: from then on a read that has found nothing is told."""
+_QUICK_READ_S: Final = 0.025
+"""Read period while the wall moves: r must not wait for the end of a long block."""
 _STUCK_RECOVERIES: Final = 20
 """So many recoveries in a row without one sample between them will not help any more."""
 
@@ -62,6 +64,11 @@ class Reader(threading.Thread):
         self._patience = patience or Patience()
         self._stop_asked = threading.Event()
         self._requests: queue.SimpleQueue[tuple[Callable[[Driver], Any], Future[Any]]] = queue.SimpleQueue()
+        self._quick_samples = plan.read_samples
+        if math.isfinite(speed):
+            quick = max(1, round(_QUICK_READ_S * plan.rate_hz * speed))
+            self._quick_samples = min(plan.read_samples, quick)
+        self._at_once: int | None = None
         self._next_sample = 0
         self._recoveries = 0
         self._loss_reason = "samples never arrived"
@@ -85,6 +92,10 @@ class Reader(threading.Thread):
         done: Future[Any] = Future()
         self._requests.put((call, done))
         return done
+
+    def hurry(self, quickly: bool) -> None:
+        """From the next read on: short reads for the motion, or those of the plan."""
+        self._at_once = self._quick_samples if quickly else None
 
     def request_stop(self) -> None:
         """End after the read that is under way."""
@@ -121,7 +132,7 @@ class Reader(threading.Thread):
         while not self._stop_asked.is_set():
             self._serve_requests(driver)
             try:
-                block = driver.read(self._patience.read_timeout_s)
+                block = driver.read(self._patience.read_timeout_s, self._at_once)
             except DriverError as error:
                 self._after(error, driver)
             else:

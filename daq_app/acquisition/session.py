@@ -69,6 +69,7 @@ class Session:
             settings.rig,
             publisher,
             self.recorder.inbox.put,
+            self._hurry,
             release_within_s=settings.release_within_s,
             planned_rate_hz=settings.plan.rate_hz,
         )
@@ -163,6 +164,11 @@ class Session:
                 self.opened = None
                 self.error = error
         self.analyst.inbox.put(item)
+
+    def _hurry(self, quickly: bool) -> None:
+        """On the analyst's thread."""
+        if self._reader is not None:
+            self._reader.hurry(quickly)
 
     def _announce(self, event: EventMessage) -> None:
         self.recent_events.append(event)

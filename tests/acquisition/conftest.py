@@ -1,7 +1,8 @@
-"""A whole test of a wall as readings, a driver that hands it out on demand, and sessions on it."""
+"""A whole test of a wall as readings, a driver that hands it out on demand, sessions on it; and processes."""
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,15 +14,22 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+sys.path.insert(0, str(Path(__file__).parent))
+
+from process_bench import SPEED, Running, quick_rig
+
+from benchmarks.processes import free_the_hardware
 from daq_app.acquisition.client import AcquisitionClient
 from daq_app.acquisition.desk import Desk
 from daq_app.acquisition.finaliser import Finaliser
 from daq_app.acquisition.messages import EventMessage, Message, Reply, State, StateMessage
 from daq_app.acquisition.reader import Patience
 from daq_app.acquisition.session import Session, SessionSettings
+from daq_app.acquisition.simulated import SimulatedServer
 from daq_app.config import Rig, Scaling, TaskPlan, load_rig, plan_tasks
 from daq_app.rocking import RotationGeometry, free_rocking
 from drivers import Block, DriverError, Opened
+from sim_hardware.control import SimControl
 
 RATE_HZ = 4000.0
 UPRIGHT_S, PULL_S, HOLD_S = 4.0, 1.0, 6.0
@@ -101,6 +109,8 @@ class StageDriver:
         self.refuse_to_open: DriverError | None = None
         self.refuse_backup: DriverError | None = None
         self.backups: list[str] = []
+        self.sizes: dict[int, int] = {}
+        """How many samples each read brought, by its first."""
 
     def let(self, until: int) -> None:
         """Allow reading up to that sample."""
@@ -126,19 +136,20 @@ class StageDriver:
     def start(self) -> None:
         self._next = 0
 
-    def read(self, timeout_s: float) -> Block:
+    def read(self, timeout_s: float, n_samples: int | None = None) -> Block:
         assert self.plan is not None
         if self._cues and self._next >= self._cues[0][0]:
             _, error, lose = self._cues.pop(0)
             self._next += lose
             raise error
-        stop = self._next + self.plan.read_samples
+        stop = self._next + (n_samples or self.plan.read_samples)
         with self._changed:
             if not self._changed.wait_for(lambda: self._allowed >= stop, timeout_s):
                 raise DriverError("No samples", advice="Wait", retryable=True)
         readings = self._wall.readings[:, self._next : stop]
         block = Block(self._next, np.ascontiguousarray(readings), time.time_ns(), 0)
         self._next += block.n_samples
+        self.sizes[block.first_sample] = block.n_samples
         if block.n_samples == 0:
             raise DriverError("The stage is empty", advice="End the test")
         return block
@@ -281,3 +292,48 @@ def _handle(session: Session | None, desk: Desk, command: Any) -> Any:
         return Reply(ok=True, data={"publisher": desk.addresses.publisher})
     assert session is not None
     return session.handle(command)
+
+
+# -- processes -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def rig_file(configs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """FR1 with a wall that comes to rest soon."""
+    return quick_rig(configs, tmp_path_factory.mktemp("rig"))
+
+
+@pytest.fixture(scope="module")
+def server(rig_file: Path) -> Iterator[SimulatedServer]:
+    """One simulated chassis with a wall that does what it is told."""
+    options = ["--speed", str(SPEED), "--wall", "commanded", "--theta0-over-alpha", "0.35"]
+    with SimulatedServer(rig_file, options) as started:
+        assert started.connection
+        yield started
+
+
+@pytest.fixture
+def wall(server: SimulatedServer) -> Iterator[SimControl]:
+    """The simulated wall, upright and whole."""
+    with SimControl(server.connection) as control:
+        control.command("clear_faults")
+        free_the_hardware(server.connection)
+        control.command("reset")
+        yield control
+        control.command("clear_faults")
+
+
+@pytest.fixture
+def start(
+    rig_file: Path, tmp_path: Path, server: SimulatedServer, wall: SimControl
+) -> Iterator[Callable[..., Running]]:
+    made: list[Running] = []
+
+    def make(*options: str) -> Running:
+        made.append(Running(rig_file, tmp_path / "runs", "--connection", server.connection, *options))
+        return made[-1]
+
+    yield make
+    for one in made:
+        if one.process.exitcode is None:
+            one.kill()

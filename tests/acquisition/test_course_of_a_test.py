@@ -62,6 +62,26 @@ def test_a_release_is_recorded_whole_and_by_itself(live: Lives, wall_test: Any) 
     assert estimates[-1].crt_mean == pytest.approx(0.7, abs=0.01)
 
 
+def test_samples_come_in_small_pieces_only_while_the_wall_moves(live: Lives, wall_test: Any) -> None:
+    """An r waits at most for the end of the block that its impact lies in."""
+    lab = live()
+    lab.zero_and_arm()
+
+    def sizes_up_to(sample: int, since: int) -> set[int]:
+        """Of the reads in between, without the one that was waited for when it became otherwise."""
+        lab.driver.let(sample)
+        lab.wait_for(lambda message: isinstance(message, HealthMessage) and message.sample > sample - 400)
+        return {size for first, size in lab.driver.sizes.items() if since + 400 <= first < sample - 400}
+
+    moving, resting = wall_test.release_sample + 3200, wall_test.rest_sample + 6400
+    assert sizes_up_to(moving, 0) == {400}
+    lab.wait_for_state(State.RELEASED)
+    assert sizes_up_to(moving + 4000, moving) == {100}
+    lab.driver.let(resting)
+    lab.wait_for_state(State.SAVING)
+    assert sizes_up_to(wall_test.n_samples, resting) == {400}
+
+
 def test_health_tells_what_is_on_disk(live: Lives, wall_test: Any) -> None:
     lab = live()
     lab.zero_and_arm()

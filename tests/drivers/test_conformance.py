@@ -117,6 +117,22 @@ def test_blocks_follow_each_other_without_a_hole(subject: Subject) -> None:
         expected += block.n_samples
 
 
+def test_short_reads_lose_nothing_and_bring_no_more_than_asked_for(subject: Subject) -> None:
+    subject.driver.open(subject.plan)
+    subject.driver.start()
+    short = subject.plan.read_samples // 4
+    expected, sizes = subject.driver.read(5.0).n_samples, []
+    while sizes.count(short) < 3:
+        block = subject.driver.read(5.0, short)
+        samples = expected + np.arange(block.n_samples)
+        assert block.first_sample == expected
+        assert np.abs(block.readings[0] - subject.expect(0, samples)).max() <= subject.tolerance(0)
+        expected += block.n_samples
+        sizes.append(block.n_samples)
+        assert len(sizes) < 100, sizes  # more at once only where samples have piled up
+    assert subject.driver.read(5.0).n_samples >= subject.plan.read_samples
+
+
 def test_every_row_holds_its_own_channel_at_its_own_time(subject: Subject) -> None:
     subject.driver.open(subject.plan)
     subject.driver.start()
