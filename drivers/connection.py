@@ -107,7 +107,7 @@ class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc]  # grpc
 
 
 def _tls_channel(target: Target) -> Any:
-    """Encrypted by this machine's NI settings. Raises `DriverError` where they are missing or switched off."""
+    """Encrypted by this machine's NI settings. Raises `DriverError` where they lack or are switched off."""
     from nitlsconfig import NitlsconfigError
     from nitlsconfig.cli import ClientConfig, ClientServerMode
     from nitlsconfig.grpc_channel import create_grpc_device_channel

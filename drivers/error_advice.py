@@ -141,7 +141,8 @@ _UNKNOWN = Advice(
 BY_GRPC_STATUS: Final[dict[str, Advice]] = {
     "UNAVAILABLE": Advice(
         "The device server cannot be reached",
-        "Check that it runs, its address and port (hardware.connection), the network and the firewall",
+        "Check that it runs, its address and port (hardware.connection), the network, the firewall and, "
+        "with grpcs://, the certificates on both sides",
         recoverable=True,
     ),
     "DEADLINE_EXCEEDED": Advice(

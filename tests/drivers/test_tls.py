@@ -1,0 +1,149 @@
+"""The NI driver through TLS: what `grpcs://` promises, and what it refuses.
+
+NI's tool for certificates is not on a machine without NI software: a script that answers as it does takes
+its place, and a relay that speaks TLS stands before the simulated device server.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import socket
+import ssl
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers import DriverError, open_driver
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the stand-in for NI's tool is a script")
+KEYS = Path(__file__).parent / "tls"
+"""Made for these tests; they protect nothing."""
+
+
+class TlsRelay:
+    """Takes TLS connections on a port of its own and passes on what they say."""
+
+    def __init__(self, port: int) -> None:
+        self._behind = port
+        self._context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        self._context.load_cert_chain(KEYS / "server.pem", KEYS / "server-key.pem")
+        self._context.set_alpn_protocols(["h2"])
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listening.getsockname()[1]
+        self.handshakes = 0
+        self._open: list[socket.socket] = [self._listening]
+        self._thread = threading.Thread(target=self._accept, daemon=True)
+        self._thread.start()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                plain, _ = self._listening.accept()
+            except OSError:
+                return
+            try:
+                front = self._context.wrap_socket(plain, server_side=True)
+            except OSError:
+                plain.close()
+                continue
+            self.handshakes += 1
+            back = socket.create_connection(("127.0.0.1", self._behind))
+            self._open += [front, back]
+            for source, target in ((front, back), (back, front)):
+                threading.Thread(target=self._pass_on, args=(source, target), daemon=True).start()
+
+    @staticmethod
+    def _pass_on(source: socket.socket, target: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while data := source.recv(65536):
+                target.sendall(data)
+        with contextlib.suppress(OSError):
+            target.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        for each in self._open:
+            with contextlib.suppress(OSError):
+                each.shutdown(socket.SHUT_RDWR)
+            each.close()
+        self._thread.join()
+
+
+@pytest.fixture
+def lab(laboratory: Callable[..., Any]) -> Any:
+    return laboratory()
+
+
+@pytest.fixture
+def relay(lab: Any) -> Iterator[TlsRelay]:
+    made = TlsRelay(lab.server.port)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def configured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """What NI's tool says of this machine's TLS settings."""
+
+    def write(trusted: str = "server.pem", server_mode: str = "TrustedCertificates") -> None:
+        answer = {
+            "client": [
+                {
+                    "service_name": "ni-grpc-device",
+                    "certificate_mode": "Disabled",
+                    "server_mode": server_mode,
+                    "trusted_certificates_location": f"File://{trusted}",
+                    "trusted_certificates_contents": (KEYS / trusted).read_text(encoding="ascii"),
+                }
+            ]
+        }
+        (tmp_path / "answer.json").write_text(json.dumps(answer), encoding="utf-8")
+        tool = tmp_path / "nitlsconfig"
+        tool.write_text(f'#!/bin/sh\ncat "{tmp_path / "answer.json"}"\n', encoding="utf-8")
+        tool.chmod(0o755)
+        monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+
+    return write
+
+
+def test_samples_come_through_tls(lab: Any, relay: TlsRelay, configured: Callable[..., None]) -> None:
+    configured()
+    driver = open_driver(f"grpcs://localhost:{relay.port}")
+    try:
+        opened = driver.open(lab.plan)
+        driver.start()
+        block = driver.read(5.0)
+    finally:
+        driver.close()
+    assert opened.rate_hz == 4000.0 and block.readings.shape[0] == 41
+    assert relay.handshakes >= 1, "nothing went past the encryption"
+
+
+def test_a_server_that_is_not_trusted_is_not_talked_to(
+    lab: Any, relay: TlsRelay, configured: Callable[..., None]
+) -> None:
+    configured(trusted="stranger.pem")
+    driver = open_driver(f"grpcs://localhost:{relay.port}")
+    with pytest.raises(DriverError) as told:
+        driver.open(lab.plan)
+    driver.close()
+    assert relay.handshakes == 0
+    assert "ertificate" in f"{told.value} {told.value.advice}"
+
+
+def test_tls_that_is_switched_off_on_this_machine_is_no_tls(configured: Callable[..., None]) -> None:
+    """NI's channel would be plain then, though the address says otherwise."""
+    configured(server_mode="Disabled")
+    with pytest.raises(DriverError, match="switched off"):
+        open_driver("grpcs://localhost:31763")
+
+
+def test_a_machine_without_nis_tool_is_told_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(DriverError, match="not set up on this machine"):
+        open_driver("grpcs://localhost:31763")
