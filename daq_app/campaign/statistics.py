@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, stats
+from scipy import optimize, special
 
 Floats = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def random_effects_mean(values: Sequence[float], standard_errors: Sequence[float
     mean = float(weights @ y / weights.sum())
     spread = float(weights @ (y - mean) ** 2 / (y.size - 1))
     error = math.sqrt(max(spread, 1.0) / float(weights.sum()))
-    reach = float(stats.t.ppf(0.975, y.size - 1)) * error
+    reach = float(special.stdtrit(y.size - 1, 0.975)) * error
     return GroupMean(mean, error, mean - reach, mean + reach, scatter, int(y.size))
 
 

@@ -130,13 +130,30 @@ class PhaseDetector:
         if self._tilts is None:
             self._tilts = RollingArray(2 * self._window, max(joined.shape[0] - 1, 1))
         self._events = []
-        for index in range(count):
-            self._raw.append(whole[0, index])
-            self._frames.append(means[:1, index])
+        index = 0
+        while index < count:
+            # A stretch in which nothing can happen goes in as one piece, with the frame behind it.
+            stop = min(index + self._uneventful(means[0, index:]) + 1, count)
+            self._raw.append(whole[0, index:stop].reshape(-1))
+            self._frames.append(means[:1, index:stop])
             if joined.shape[0] > 1:
-                self._tilts.append(means[1:, index : index + 1])
+                self._tilts.append(means[1:, index:stop])
             self._step()
+            index = stop
         return self._events
+
+    def _uneventful(self, frames: Floats) -> int:
+        """How many of the next frames `_step` would pass by: before the next tick, and none of them tells."""
+        ahead = frames[: -(self._frames.end + 1) % _TICK]
+        if not ahead.size or self.phase is Phase.AT_REST or (self.phase is Phase.WAITING and not self.side):
+            return ahead.size
+        beyond = max(self.settings.crossing_rad, 6.0 * self._noise)
+        still = self._crossing_side * ahead > -beyond
+        if self.phase is Phase.HOLDING:
+            still &= self.side * ahead > 0.8 * abs(self._hold_rad)
+            if still[0]:
+                self._fast_frames = 0
+        return int(ahead.size if still.all() else np.argmin(still))
 
     # -- one frame -------------------------------------------------------------------------------
 
