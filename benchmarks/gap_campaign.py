@@ -34,11 +34,19 @@ def quick_rig(path: Path = RIG) -> Rig:
 def simulate(
     effects: Effects, seed: int, path: Path = RIG, levels: tuple[float, ...] = LEVELS, *, survey: Path = RIG
 ) -> list[GapRun]:
-    """One run per level: scatter of r, noise, calibration errors of 0.2 %, impacts counted through.
+    """One run per level of the rig file `path`, as seen by a diagnosis that believes the file `survey`."""
+    return campaign(quick_rig(path), quick_rig(survey), effects, seed, levels)
 
-    `path` is the rig file that is simulated, `survey` the one that the diagnosis believes.
-    """
-    rig, believed = quick_rig(path), quick_rig(survey)
+
+def campaign(
+    rig: Rig,
+    believed: Rig,
+    effects: Effects,
+    seed: int,
+    levels: tuple[float, ...] = LEVELS,
+    post_rest_s: float = 1.2,
+) -> list[GapRun]:
+    """One run per level: scatter of r, noise, calibration errors of 0.2 %, impacts counted through."""
     plan = plan_tasks(rig)
     offsets = np.zeros(len(rig.channels))
     for task in plan.tasks:
@@ -55,7 +63,7 @@ def simulate(
             seed=seed * 100 + number,
             effects=effects,
             impacts_before=impacts,
-            post_rest_s=1.2,
+            post_rest_s=post_rest_s,
         )
         runs.append(
             GapRun(

@@ -3,11 +3,11 @@
     python -m benchmarks.gap_effects [EFFECT …] [--out FOLDER] [--page docs/gap-effects.md] [--cores N]
 
 One JSON per effect in FOLDER; those that exist are not done again, so that an interrupted study goes on.
+The whole results are kept too (`build/gap_effects/results`); the study of the loop goes on from them.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import resource
 import sys
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.gap_campaign import Effects, simulate
+from benchmarks.gap_study import Found, run_study
 from daq_app.gap.core import Options
 from daq_app.gap.rocking_model.study import diagnose_runs
 
@@ -74,6 +75,7 @@ CASES: dict[str, Effects] = {
     "swap@wire": {"swap@wire": {"places": 1.0}},
 }
 """Name of a case → what is switched on. Strengths lie within the simulator's ranges."""
+FOLDER = Path("build/gap_effects")
 SAME = (
     {"alpha_asymmetry", "base_tilt", "eccentric_mass"},
     {"dwell", "bounce"},
@@ -82,45 +84,53 @@ SAME = (
 """Effects that no sensor of the rig tells apart."""
 
 
-def study(name: str, seed: int, cores: int) -> dict[str, Any]:
+def diagnosed(name: str, seed: int, cores: int) -> dict[str, Any]:
+    """The result of one case as `daq-app gap diagnose` writes it; from the file where there is one."""
+    kept = FOLDER / "results" / f"{name}-{seed}.json"
+    if not kept.exists():
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        diagnose_runs(simulate(CASES[name], seed), Options(workers=cores)).save(kept)
+    found: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
+    return found
+
+
+def study(name: str, seed: int, cores: int) -> Found:
     """Diagnose one case; everything that the table needs."""
     effects = CASES[name]
     before = _cpu()
-    result = diagnose_runs(simulate(effects, seed), Options(workers=cores))
+    result = diagnosed(name, seed, cores)
     truth = next(iter(effects), "")
-    first = result.which[0]
-    right = truth == (first.effects[0] if len(first.effects) == 1 else "") or (
-        not truth and not first.effects
-    )
+    first = result["which"][0]
+    right = first["effects"] == ([truth] if truth else [])
     parameter, value = next(iter(effects[truth].items())) if truth else ("", 0.0)
-    estimate = next((e for e in result.effect_parameters if e.name == f"{truth}.{parameter}"), None)
-    limit = next(
-        (d.limit for d in result.detection if d.effect == truth and d.parameter == parameter), float("nan")
-    )
+    estimate = next((e for e in result["effect_parameters"] if e["name"] == f"{truth}.{parameter}"), None)
+    same = [d for d in result["detection"] if d["effect"] == truth and d["parameter"] == parameter]
+    limit = same[0]["limit"] if same else None
+    gap = result["gap"]
     return {
         "case": name,
         "truth": {k: dict(v) for k, v in effects.items()},
-        "first": list(first.effects),
-        "probability": first.probability,
-        "set95": [list(r.effects) for r in result.set95],
-        "decision": result.decision.verdict,
-        "sentence": result.decision.sentence,
+        "first": first["effects"],
+        "probability": first["probability"],
+        "set95": [r["effects"] for r in result["set95"]],
+        "decision": result["decision"],
+        "sentence": result["decision_detail"]["sentence"],
         "named_first": right,
-        "equivalent": right or _same(truth, first.effects),
-        "family": first.family,
-        "estimate": [estimate.value, estimate.low, estimate.high] if estimate else None,
-        "covered": bool(estimate and estimate.low <= value <= estimate.high),
-        "strength_sd": 4.0 * abs(value) / limit if limit == limit and limit > 0 else None,
-        "gap": [result.gap.before, result.gap.after, result.gap.closure] if result.gap else None,
-        "worst": result.goodness.worst,
-        "passed": result.goodness.passed,
-        "top": [[list(r.effects), r.log_evidence - first.log_evidence] for r in result.which[:5]],
-        "limits": list(result.limits),
+        "equivalent": right or _same(truth, first["effects"]),
+        "family": first["family"],
+        "estimate": [estimate["value"], estimate["low"], estimate["high"]] if estimate else None,
+        "covered": bool(estimate and estimate["low"] <= value <= estimate["high"]),
+        "strength_sd": 4.0 * abs(value) / limit if limit else None,
+        "gap": [gap["before"], gap["after"], gap["closure"]] if gap else None,
+        "worst": result["goodness"]["worst"],
+        "passed": result["goodness"]["passed"],
+        "top": [[r["effects"], r["log_evidence"] - first["log_evidence"]] for r in result["which"][:5]],
+        "limits": result["limits"],
         "cpu_s": _cpu() - before,
     }
 
 
-def _same(truth: str, found: tuple[str, ...]) -> bool:
+def _same(truth: str, found: list[str]) -> bool:
     if len(found) != 1 or not truth:
         return False
     a, b = truth.partition("@"), found[0].partition("@")
@@ -132,7 +142,7 @@ def _cpu() -> float:
     return sum(u.ru_utime + u.ru_stime for u in usage)
 
 
-def page(found: list[dict[str, Any]]) -> str:
+def page(found: list[Found]) -> str:
     """The table as Markdown, with every miss and what was said instead."""
     right = [f for f in found if f["named_first"]]
     equal = [f for f in found if f["equivalent"]]
@@ -183,38 +193,22 @@ def page(found: list[dict[str, Any]]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _say(found: Found) -> str:
+    estimate = "" if found["covered"] or not found["estimate"] else f" outside {found['estimate']}"
+    return f"{found['first']} p={found['probability']:.3f} {found['decision']} {found['gap']}{estimate}"
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run what is missing, then write the page."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    return run_study(
+        __doc__ or "",
+        list(CASES),
+        lambda name, given: study(name, given.seed, given.cores),
+        _say,
+        page,
+        FOLDER,
+        arguments,
     )
-    parser.add_argument("effects", nargs="*", help="cases to do; all if none is named")
-    parser.add_argument("--out", type=Path, default=Path("build/gap_effects"))
-    parser.add_argument("--page", type=Path)
-    parser.add_argument("--cores", type=int, default=1)
-    parser.add_argument("--seed", type=int, default=11)
-    given = parser.parse_args(arguments)
-    unknown = [name for name in given.effects if name not in CASES]
-    if unknown:
-        parser.error(f"unknown cases {', '.join(unknown)}; there are {', '.join(CASES)}")
-    given.out.mkdir(parents=True, exist_ok=True)
-    for name in given.effects or CASES:
-        target = given.out / f"{name}.json"
-        if target.exists():
-            continue
-        found = study(name, given.seed, given.cores)
-        target.write_text(json.dumps(found, indent=1), encoding="utf-8")
-        print(
-            f"{name}: {found['first']} p={found['probability']:.3f} {found['decision']} {found['gap']}",
-            flush=True,
-        )
-    done = [given.out / f"{name}.json" for name in CASES if (given.out / f"{name}.json").exists()]
-    text = page([json.loads(path.read_text(encoding="utf-8")) for path in done])
-    if given.page:
-        given.page.write_text(text, encoding="utf-8")
-    else:
-        print(text)
-    return 0
 
 
 if __name__ == "__main__":

@@ -10,23 +10,22 @@ r and the effects are the file's, only releases and sensor calibrations are free
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from benchmarks.gap_campaign import RIG, quick_rig, simulate
-from benchmarks.gap_effects import CASES
+from benchmarks.gap_effects import CASES, diagnosed
+from benchmarks.gap_study import Found, run_study
 from daq_app.gap.apply import apply_result
-from daq_app.gap.core import Options, Parameter, Prediction, Run, fit
+from daq_app.gap.core import CannotDiagnose, Parameter, Prediction, Run, fit
 from daq_app.gap.rocking_model.inspection import calibrations
 from daq_app.gap.rocking_model.model import RockingModel
 from daq_app.gap.rocking_model.run_features import RockingRun
-from daq_app.gap.rocking_model.study import diagnose_runs, prepare
+from daq_app.gap.rocking_model.study import prepare
 
 LOOPS = (
     "pivot_shift",
@@ -46,7 +45,7 @@ LOOPS = (
     "hum@LV-A03",
     "initial_velocity",
 )
-NEW_SEED, FIRST_SEED = 77, 11
+NEW_SEED = 77
 WITHIN = 1.2
 
 
@@ -85,18 +84,14 @@ def gap_of(rig: Path, runs: list[RockingRun]) -> tuple[float, float]:
     return float(np.sqrt(np.mean(np.concatenate(found.whitened) ** 2))), found.sigmas["scatter of r"]
 
 
-def loop(name: str, cores: int) -> dict[str, Any]:
+def loop(name: str, seed: int, cores: int) -> Found:
     """One effect through the loop."""
     effects = CASES[name]
-    result = diagnose_runs(simulate(effects, FIRST_SEED), Options(workers=cores))
-    said: dict[str, Any] = {
-        "effect": name,
-        "decision": result.decision.verdict,
-        "named": list(result.which[0].effects),
-    }
+    result = diagnosed(name, seed, cores)
+    said: Found = {"effect": name, "decision": result["decision"], "named": result["which"][0]["effects"]}
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "applied.toml"
-        applied = apply_result(result.to_dict(), RIG, out)
+        applied = apply_result(result, RIG, out)
         fresh, _ = prepare(simulate(effects, NEW_SEED))
         before, scatter_before = gap_of(RIG, fresh)
         after, scatter_after = gap_of(out, fresh)
@@ -107,7 +102,7 @@ def loop(name: str, cores: int) -> dict[str, Any]:
     return said | {"scatter_before": scatter_before, "scatter_after": scatter_after}
 
 
-def page(found: list[dict[str, Any]]) -> str:
+def page(found: list[Found]) -> str:
     """The table as Markdown."""
     good = [f for f in found if "after" in f and f["after"] <= WITHIN]
     lines = [
@@ -138,35 +133,24 @@ def page(found: list[dict[str, Any]]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _loop_or_refusal(name: str, given: argparse.Namespace) -> Found:
+    try:
+        return loop(name, given.seed, given.cores)
+    except CannotDiagnose as refusal:
+        return {"effect": name, "refusal": str(refusal)}
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run what is missing, then write the page."""
-    from daq_app.gap.core import CannotDiagnose
-
-    raw = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
-    parser.add_argument("effects", nargs="*", help="effects to do; all of the list if none is named")
-    parser.add_argument("--out", type=Path, default=Path("build/gap_loops"))
-    parser.add_argument("--page", type=Path)
-    parser.add_argument("--cores", type=int, default=1)
-    given = parser.parse_args(arguments)
-    given.out.mkdir(parents=True, exist_ok=True)
-    for name in given.effects or LOOPS:
-        target = given.out / f"{name}.json"
-        if target.exists():
-            continue
-        try:
-            found = loop(name, given.cores)
-        except CannotDiagnose as refusal:
-            found = {"effect": name, "refusal": str(refusal)}
-        target.write_text(json.dumps(found, indent=1), encoding="utf-8")
-        print(f"{name}: {found.get('before')} → {found.get('after')} {found.get('refusal', '')}", flush=True)
-    paths = [given.out / f"{name}.json" for name in LOOPS if (given.out / f"{name}.json").exists()]
-    text = page([json.loads(path.read_text(encoding="utf-8")) for path in paths])
-    if given.page:
-        given.page.write_text(text, encoding="utf-8")
-    else:
-        print(text)
-    return 0
+    return run_study(
+        __doc__ or "",
+        LOOPS,
+        _loop_or_refusal,
+        lambda found: f"{found.get('before')} → {found.get('after')} {found.get('refusal', '')}",
+        page,
+        Path("build/gap_loops"),
+        arguments,
+    )
 
 
 if __name__ == "__main__":

@@ -5,16 +5,12 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-
-from daq_app.config import load_rig, plan_tasks
+from benchmarks.gap_campaign import LEVELS, campaign
+from daq_app.config import load_rig
 from daq_app.config.rig import Rig
-from daq_app.config.scaling import Scaling
-from daq_app.gap.rocking_model.records import GapRun, Sensor, Survey
-from sim_hardware.direct import synthesise_test
+from daq_app.gap.rocking_model.records import GapRun
 
 RIG = Path(__file__).parents[2] / "configs" / "fr1.toml"
-LEVELS = (0.15, -0.25, 0.35, 0.40, -0.15, 0.25)
 
 
 @cache
@@ -29,37 +25,4 @@ def simulate(
     effects: dict[str, dict[str, float]], levels: tuple[float, ...] = LEVELS, seed: int = 1
 ) -> list[GapRun]:
     """One run per level with calibration errors of 0.2 % besides `effects`."""
-    rig = short_rig()
-    plan = plan_tasks(rig)
-    runs = []
-    impacts = 0
-    calibration = 0.002 * np.random.default_rng(seed).standard_normal(len(rig.channels))
-    for number, level in enumerate(levels):
-        test = synthesise_test(
-            rig,
-            plan,
-            level,
-            seed=seed * 100 + number,
-            effects=effects,
-            impacts_before=impacts,
-            post_rest_s=1.0,
-        )
-        si = Scaling.of(rig.channels).to_si(test.readings) * (1.0 + calibration[:, None])
-        offsets = np.zeros(len(rig.channels))
-        for task in plan.tasks:
-            for planned in task.channels:
-                offsets[planned.rig_index] = planned.time_offset_s
-        runs.append(
-            GapRun(
-                f"{number}",
-                f"L{abs(level):.2f}",
-                test.rate_hz,
-                tuple(Sensor.from_channel(c) for c in rig.channels),
-                si,
-                Survey.from_specimen(rig.specimen),
-                offsets,
-                float(impacts),
-            )
-        )
-        impacts += len(test.truth["impact_time_s"])  # type: ignore[arg-type]
-    return runs
+    return campaign(short_rig(), short_rig(), effects, seed, levels, post_rest_s=1.0)

@@ -43,10 +43,13 @@ def load_diagnoser(name: str) -> Diagnoser:
 
 
 def product(case: Path) -> Result:
-    """``daq-app gap diagnose`` on all runs of the case with its rig file, pairs included."""
+    """``daq-app gap diagnose`` on all runs of the case with its rig file, as a user would call it.
+
+    One process: the cases fill the cores.
+    """
     out = case / "result.json"
     command = [sys.executable, "-m", "daq_app.cli", "gap", "diagnose", *map(str, run_files(case))]
-    command += ["--rig", str(case / RIG_FILE), "--json", str(out), "--pairs"]
+    command += ["--rig", str(case / RIG_FILE), "--json", str(out), "--cores", "1"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if not out.exists():
         raise DiagnoserError(f"gap diagnose ended with {done.returncode}: {done.stderr.strip()[-2000:]}")

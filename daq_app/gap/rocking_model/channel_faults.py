@@ -15,9 +15,10 @@ from scipy.signal import butter, sosfiltfilt
 
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.motion_grid import GRID_HZ, SMOOTH_HZ, Grid, coarse
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rotation import wall_rotation, zeroed
-from daq_app.gap.rocking_model.sensor_blocks import GRID_HZ, SMOOTH_HZ, Block, Grid, coarse
+from daq_app.gap.rocking_model.sensor_blocks import Block
 
 SHAPES = ("gain", "lag", "curvature", "drift")
 _UNITS: dict[Family, tuple[str, str, str, str]] = {

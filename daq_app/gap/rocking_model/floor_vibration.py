@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rotation import zeroed
-from daq_app.gap.rocking_model.sensor_blocks import GRID_HZ, Grid, coarse
 
 FREQUENCIES_HZ = np.arange(0.4, 6.0, 0.02)
 SMALLEST_GAIN = 6.0

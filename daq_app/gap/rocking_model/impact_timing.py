@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rotation import zeroed
-from daq_app.gap.rocking_model.sensor_blocks import GRID_HZ, Grid, coarse
 
 MOST = 14
 """Impacts used: the first ones are the loudest."""

@@ -17,7 +17,14 @@ from daq_app.gap.rocking_model.channel_faults import channel_block, suspects
 from daq_app.gap.rocking_model.conditions import Mark, conditions_of, marks_of, without_hum
 from daq_app.gap.rocking_model.floor_vibration import find_vibration
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.rings import Signal, bend_signals, ring_block, scan, turn_signals
+from daq_app.gap.rocking_model.rings import (
+    Signal,
+    bend_signals,
+    ring_block,
+    scan,
+    turn_signals,
+    with_repeatability,
+)
 from daq_app.gap.rocking_model.run_features import Examined, RockingRun, examine, scalar_block
 from daq_app.gap.rocking_model.saturation import saturated
 from daq_app.gap.rocking_model.sensor_blocks import Block
@@ -186,10 +193,15 @@ def _add_rings(
     ring = scan(grids, signals, slow=slow)
     if ring is None:
         return
+    found: list[Block] = []
+    rows: list[list[Block]] = []
     for row, entry, listed in zip(more, examined, signals, strict=True):
         block = ring_block(name, entry.features.grid, listed, ring, slow=slow)
         if block is not None:
-            row.append(block)
+            found.append(block)
+            rows.append(row)
+    for row, block in zip(rows, with_repeatability(found), strict=True):
+        row.append(block)
 
 
 def found_channels(runs: Sequence[RockingRun]) -> dict[str, str]:

@@ -77,6 +77,8 @@ _MARK_REACH = {
 }
 SMALLEST = {("residual_cable", "slack"): 4e-3}
 """Lower end of a range that the simulator lets begin at zero."""
+_WIDER = {("yaw", "kick"): 0.4, ("twist", "kick"): 0.4, ("flexible_wall", "gain"): 0.02}
+"""Reach of strengths that have no usual size: how hard an impact kicks depends on its very form."""
 _DRIFT_REACH = {"lvdt": 1e-3, "wire": 2e-3, "tiltmeter": 1e-3, "accelerometer": 1e-2}
 
 
@@ -87,9 +89,10 @@ def _parameter(spec: EffectSpec, parameter: SpecParameter) -> Parameter:
         low = max(parameter.low, SMALLEST.get((spec.name, parameter.name), 1e-6))
         found = between(parameter.name, low, parameter.high, parameter.unit, parameter.text)
         return replace(found, per_run=per_run)
+    reach = _WIDER.get((spec.name, parameter.name), parameter.high)
     if parameter.low < 0:
-        return signed(parameter.name, parameter.high, parameter.unit, parameter.text, per_run=per_run)
-    return positive(parameter.name, parameter.high, parameter.unit, parameter.text, per_run=per_run)
+        return signed(parameter.name, reach, parameter.unit, parameter.text, per_run=per_run)
+    return positive(parameter.name, reach, parameter.unit, parameter.text, per_run=per_run)
 
 
 _FORMS = {

@@ -12,6 +12,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import sensor_response as response
 from daq_app.gap.rocking_model.extra_response import with_measured_inputs
 from daq_app.gap.rocking_model.records import Survey
+from daq_app.gap.rocking_model.repeatability import biases
 from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.vector import acts_on, kernel_vector, restitution_of
 from sim_hardware.dynamics import shooting
@@ -39,7 +40,7 @@ class RockingModel:
         Scatter(SCATTER_TIME, 3e-5, 1.0, 1e-3, "s", "what half-cycle times scatter by beyond sensor noise"),
         Scatter(SCATTER_RELEASE, 3e-5, 1.0, 4e-3, "s", "what the times of the first fall scatter by besides"),
         Scatter(
-            SCATTER_SENSOR, 0.7, 0.15, 1.6, "1", "repeatability of sensor coefficients, in their own units"
+            SCATTER_SENSOR, 0.7, 0.35, 2.0, "1", "repeatability of sensor coefficients, in their own units"
         ),
     )
 
@@ -110,6 +111,7 @@ class RockingModel:
                 Parameter(f"cal_{name}", 0.0, own, "1", meaning=f"calibration of {name}", linear=True)
                 for name, own in self.channels.items()
             ),
+            *biases(),
         )
 
     def local_nuisance(self, run: Run) -> tuple[Parameter, ...]:

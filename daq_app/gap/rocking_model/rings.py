@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rotation import Rotation, wall_rotation, zeroed
-from daq_app.gap.rocking_model.sensor_blocks import GRID_HZ, Block, Grid, coarse
+from daq_app.gap.rocking_model.sensor_blocks import Block
 
 BEND_HZ = np.geomspace(7.0, 42.0, 36)
 TURN_HZ = np.geomspace(1.5, 14.0, 40)
@@ -25,6 +26,9 @@ FINE_DAMPING = (0.007, 0.012, 0.02, 0.032, 0.05, 0.08)
 DISPLACEMENT_MASK_S = 0.012
 ACCELERATION_MASK_S = 0.035
 _DEGREE = 4
+REPEATABILITY = 0.07
+"""Relative repeatability of a ring-down in one run: kicks differ from impact to impact. It is no free
+scatter, which would grow until an effect that nobody named hides in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,13 +119,10 @@ def _between(grid: Grid, mask_s: float) -> NDArray[np.bool_]:
 
 
 def ring_columns(grid: Grid, frequency_hz: float, zeta: float) -> FloatArray:
-    """Sine and cosine of the ring-down per unit jump of θ̇, shape (m, 2).
-
-    The jump at an impact is taken from the reference motion on both sides of it.
-    """
+    """Sine and cosine of the ring-down per unit jump of θ̇, shape (m, 2)."""
     natural = 2.0 * np.pi * frequency_hz
     rate = -zeta * natural + 1j * natural * np.sqrt(1.0 - zeta**2)
-    jumps = jumps_of(grid)
+    jumps = grid.jumps
     wave = np.zeros(grid.time_s.size, dtype=complex)
     state = 0.0 + 0.0j
     edges = np.append(np.searchsorted(grid.time_s, grid.impact_s), grid.time_s.size)
@@ -132,18 +133,6 @@ def ring_columns(grid: Grid, frequency_hz: float, zeta: float) -> FloatArray:
         part = slice(edges[k], edges[k + 1])
         wave[part] = state * np.exp(rate * (grid.time_s[part] - start))
     return np.column_stack([wave.imag, wave.real])
-
-
-def jumps_of(grid: Grid) -> FloatArray:
-    """Jump of θ̇ at each impact, from the motion a few samples to either side."""
-    at = np.searchsorted(grid.time_s, grid.impact_s)
-    before = np.clip(at - 3, 0, grid.omega.size - 1)
-    after = np.clip(at + 2, 0, grid.omega.size - 1)
-    # θ̇ changes along θ̈ on the way: carried to the impact from both sides.
-    lead, trail = grid.impact_s - grid.time_s[before], grid.impact_s - grid.time_s[after]
-    ends = grid.omega[after] + grid.alpha[after] * trail, grid.omega[before] + grid.alpha[before] * lead
-    jumps: FloatArray = ends[0] - ends[1]
-    return jumps
 
 
 def _cleaner(grid: Grid, pick: NDArray[np.bool_], slow: bool) -> list[tuple[NDArray[np.intp], FloatArray]]:
@@ -183,13 +172,24 @@ def scan(grids: Sequence[Grid], signals: Sequence[list[Signal]], *, slow: bool) 
     fine_hz = coarse_hz[i] * np.geomspace(1.0 / step, step, 25)
     score = _score(grids, signals, fine_hz, FINE_DAMPING, slow=slow)
     k, j = np.unravel_index(int(np.argmax(score)), score.shape)
-    inner = min(max(int(k), 1), fine_hz.size - 2)
-    bend = score[inner - 1, j] - 2.0 * score[inner, j] + score[inner + 1, j]
     spacing = float(np.log(fine_hz[1] / fine_hz[0]))
-    shift = 0.5 * (score[inner - 1, j] - score[inner + 1, j]) / bend if bend < -1e-9 else 0.0
-    frequency = float(fine_hz[inner] * np.exp(spacing * np.clip(shift, -1.0, 1.0)))
-    sd = frequency * spacing / np.sqrt(max(-bend, 0.05))
-    return Ring(frequency, FINE_DAMPING[int(j)], float(score[k, j]), float(min(sd, 0.3 * frequency)))
+    along, bend = _vertex(score[:, j], int(k))
+    frequency = float(fine_hz[0] * np.exp(spacing * along))
+    sd = frequency * spacing / np.sqrt(max(bend, 0.05))
+    # A damping between the steps would leave the ring too small: its size follows the damping.
+    across, _ = _vertex(score[k], int(j))
+    zeta = float(np.exp(np.interp(across, np.arange(len(FINE_DAMPING)), np.log(FINE_DAMPING))))
+    return Ring(frequency, zeta, float(score[k, j]), float(min(sd, 0.3 * frequency)))
+
+
+def _vertex(values: FloatArray, k: int) -> tuple[float, float]:
+    """(place, −second difference) of the top of a sampled curve near its sample `k`."""
+    inner = min(max(k, 1), values.size - 2)
+    bend = float(values[inner - 1] - 2.0 * values[inner] + values[inner + 1])
+    if bend > -1e-9:
+        return float(k), 0.0
+    shift = 0.5 * float(values[inner - 1] - values[inner + 1]) / bend
+    return inner + float(np.clip(shift, -1.0, 1.0)), -bend
 
 
 def _score(
@@ -302,3 +302,27 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
         ring=(ring.frequency_hz, ring.zeta, GRID_HZ),
         levers=tuple(levers),
     )
+
+
+def with_repeatability(blocks: Sequence[Block]) -> list[Block]:
+    """The blocks of all runs with what the ring-down itself repeats by, a share of its usual size.
+
+    Of its own size in each run it would make the small ones the sure ones.
+    """
+    parts = {
+        name: np.array([b.values[b.names.index(name)] for b in blocks if name in b.names])
+        for name in dict.fromkeys(n for b in blocks for n in b.names if " in " in n)
+    }
+    usual = {
+        name.partition(" in ")[2]: float(np.median(np.hypot(values, parts["cosine" + name[4:]])))
+        for name, values in parts.items()
+        if name.startswith("sine")
+    }
+    return [
+        replace(
+            block,
+            covariance=block.covariance
+            + np.diag([(REPEATABILITY * usual.get(n.partition(" in ")[2], 0.0)) ** 2 for n in block.names]),
+        )
+        for block in blocks
+    ]

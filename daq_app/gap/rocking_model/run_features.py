@@ -14,9 +14,10 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import swings as sw
 from daq_app.gap.rocking_model.floor_vibration import Vibration, quiet
 from daq_app.gap.rocking_model.impact_timing import acceleration_delay
+from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse, make_grid
 from daq_app.gap.rocking_model.records import GapRun, Survey
 from daq_app.gap.rocking_model.rotation import Rotation, joint_rotation, sample_noise, wall_rotation
-from daq_app.gap.rocking_model.sensor_blocks import GRID_HZ, Block, Grid, blocks_of, coarse, make_grid
+from daq_app.gap.rocking_model.sensor_blocks import Block, blocks_of
 
 _SMALLEST_LOADING = 1e-3
 
@@ -105,7 +106,7 @@ def examine(run: GapRun, reference: str = "") -> Examined:
     run, joint = _from_hold(run)
     reference, theta, noise, notes = _reference(run, joint, reference)
     swings = sw.find_swings(theta, noise, run.rate_hz, run.name)
-    grid = make_grid(theta, joint.valid, swings, run.rate_hz)
+    grid = make_grid(theta, joint.valid, swings, run.rate_hz, run.survey)
     blocks = tuple(blocks_of(run, joint, grid, swings, reference, quiet(run, grid)).values())
     late = acceleration_delay(run, grid)
     if late is not None:
@@ -149,17 +150,17 @@ def _from_hold(run: GapRun) -> tuple[GapRun, Rotation]:
     step = max(round(run.rate_hz / GRID_HZ), 1)
     theta = np.abs(coarse(joint.theta, run.rate_hz))
     largest = float(theta.max())
-    held = np.flatnonzero(theta > 0.98 * largest)
     below = np.flatnonzero(theta < 0.5 * largest)
     # The release ends the first stay near the largest rotation; a later peak never comes that high.
-    after = below[below > held[0]]
-    release = held[held < after[0]][-1] if after.size else held[-1]
+    after = below[below > np.flatnonzero(theta > 0.98 * largest)[0]]
+    fall = int(after[0]) if after.size else theta.size
+    # A wall that is pulled quickly overshoots and sways about the rotation at which it is then held.
+    near = np.flatnonzero(theta[:fall] > 0.85 * largest)
+    plateau = float(np.median(theta[near]))
+    release = int(near[theta[near] > 0.98 * plateau][-1])
     # The pull must not be taken for the hold: at most as long as the wall has been held still.
-    still = (
-        release - int(np.flatnonzero(theta[:release] < 0.97 * largest)[-1])
-        if np.any(theta[:release] < 0.97 * largest)
-        else release
-    )
+    pulled = np.flatnonzero(theta[:release] < 0.93 * plateau)
+    still = release - int(pulled[-1]) if pulled.size else release
     wanted = min(BEFORE_RELEASE_S * run.rate_hz, max(still * step - 0.1 * run.rate_hz, run.rate_hz))
     start = int(release * step - wanted)
     if start < 0.5 * run.rate_hz:

@@ -10,9 +10,9 @@ import numpy as np
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.conditions import Mark
+from daq_app.gap.rocking_model.motion_grid import GRID_HZ, coarse
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rotation import reaches_its_range, wire_reading, zeroed
-from daq_app.gap.rocking_model.sensor_blocks import GRID_HZ, coarse
 
 _OTHER: dict[Family, Family] = {"lvdt": "wire", "wire": "lvdt"}
 _BELOW = (0.3, 0.85)

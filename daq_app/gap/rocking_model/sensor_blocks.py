@@ -7,7 +7,6 @@ same coefficients by passing its own difference through the same regression.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -16,37 +15,10 @@ from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.motion_grid import GRID_HZ, SMOOTH_HZ, Grid, coarse
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rotation import Rotation, wall_rotation, wire_reading, zeroed
 from daq_app.gap.rocking_model.swings import Swings
-
-GRID_HZ = 200.0
-"""Regressions run on averages over 5 ms."""
-SMOOTH_HZ = 30.0
-POLYNOMIAL_DEGREE = 8
-SMALLEST_GRID_RAD = 8e-4
-MASK_S = 0.05
-"""Accelerations near an impact are left out."""
-
-
-@dataclass(frozen=True, slots=True)
-class Grid:
-    """Reference motion on the coarse grid, shape (m,): s from release, rad, rad/s, rad/s²."""
-
-    time_s: FloatArray
-    theta: FloatArray
-    omega: FloatArray
-    alpha: FloatArray
-    near_impact: NDArray[np.bool_]
-    valid: NDArray[np.bool_]
-    impact_s: FloatArray
-    """Impacts as the reference rotation has them, s from release, up to where half-cycles can be told."""
-    raw: FloatArray
-    """The reference rotation as measured, averaged over the grid's intervals."""
-    rest_s: float
-    """When the wall comes to rest, s from release."""
-    speed: FloatArray
-    """θ̇ at every sample of the record, shape (n,): what jumps at impacts must not be averaged over them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,67 +65,6 @@ class Block:
         """What the regression makes of a difference given on the whole grid."""
         found: FloatArray = self.projection @ series[self.pick]
         return found
-
-
-def coarse(values: FloatArray, rate_hz: float) -> FloatArray:
-    """Averages over the grid's intervals; shape (n,) → (m,)."""
-    step = round(rate_hz / GRID_HZ)
-    m = values.size // step
-    found: FloatArray = values[: m * step].reshape(m, step).mean(axis=1)
-    return found
-
-
-def make_grid(theta: FloatArray, valid: NDArray[np.bool_], swings: Swings, rate_hz: float) -> Grid:
-    """Reference motion with its derivatives.
-
-    Between impacts the rotation is a polynomial fitted to all samples of the half-cycle: a filter
-    that keeps the impacts sharp leaves far too much noise in the second derivative, and noise in an
-    explanatory variable biases every coefficient.
-    """
-    n = theta.size
-    smooth = sosfiltfilt(butter(4, SMOOTH_HZ, fs=rate_hz, output="sos"), theta)
-    omega, alpha = np.zeros(n), np.zeros(n)
-    release = round(swings.release_s * rate_hz)
-    crossings = _impact_samples(theta, smooth, release)
-    ends = [release, *crossings]
-    guard = int(0.004 * rate_hz)
-    for start, stop in itertools.pairwise(ends):
-        inside = np.arange(start + (0 if start == release else guard), stop - guard)
-        if inside.size < 60:
-            continue
-        x = np.linspace(-1.0, 1.0, inside.size)
-        fitted = np.polynomial.chebyshev.Chebyshev.fit(x, theta[inside], POLYNOMIAL_DEGREE, domain=[-1, 1])
-        whole = np.arange(start, stop)
-        position = 2.0 * (whole - inside[0]) / (inside[-1] - inside[0]) - 1.0
-        scale = 2.0 * rate_hz / (inside[-1] - inside[0])
-        smooth[whole] = fitted(position)
-        omega[whole] = fitted.deriv(1)(position) * scale
-        alpha[whole] = fitted.deriv(2)(position) * scale**2
-    time_s = coarse(np.arange(n) / rate_hz, rate_hz) - swings.release_s
-    impact_s = np.array(crossings) / rate_hz - swings.release_s
-    distance = np.abs(time_s[:, None] - impact_s[None, :]).min(axis=1) if impact_s.size else time_s + 1e9
-    good = coarse(valid.astype(float), rate_hz) > 0.999
-    parts = [coarse(v, rate_hz) for v in (smooth, omega, alpha)]
-    raw = coarse(theta, rate_hz)
-    rest = swings.rest_s - swings.release_s
-    return Grid(time_s, parts[0], parts[1], parts[2], distance < MASK_S, good, impact_s, raw, rest, omega)
-
-
-def _impact_samples(theta: FloatArray, smooth: FloatArray, release: int) -> list[int]:
-    """Samples at which the rotation passes zero, until half-cycles become too short to see."""
-    found: list[int] = []
-    signs = np.sign(smooth)
-    for k in np.flatnonzero(np.diff(signs) != 0).tolist():
-        if k <= release:
-            continue
-        if found and (k - found[-1] < 100 or np.abs(smooth[found[-1] : k]).max() < SMALLEST_GRID_RAD):
-            break
-        # The smoothed record rounds the corner; the crossing itself is read from the raw one nearby.
-        window = slice(max(k - 60, 0), k + 60)
-        t = np.arange(-60, k + 60 - max(k - 60, 0) - 60)
-        slope, level = np.polyfit(t, theta[window], 1)
-        found.append(int(k + np.clip(-level / slope, -40, 40)) if slope else int(k))
-    return found
 
 
 def first_order(values: FloatArray, time_constant_s: float, rate_hz: float = GRID_HZ) -> FloatArray:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import extra_response as extra
 from daq_app.gap.rocking_model.memo import Memo
+from daq_app.gap.rocking_model.repeatability import bias_names, repeatability
 from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.sensor_blocks import (
     Block,
@@ -20,32 +21,16 @@ from daq_app.gap.rocking_model.sensor_blocks import (
     slip_shape,
 )
 
-REPEATABILITY: dict[tuple[str, str], float] = {
-    ("wire", "gain"): 3e-4,
-    ("wire", "lag"): 1e-4,
-    ("wire", "even harmonic"): 1e-2,
-    ("wire", "step with moment"): 5e-5,
-    ("wire", "drift"): 6e-6,
-    ("tiltmeter", "gain"): 2e-3,
-    ("tiltmeter", "lag"): 2e-3,
-    ("tiltmeter", "drift"): 1e-5,
-    ("accelerometer", "gain of gravity"): 1e-2,
-    ("accelerometer", "gain of inertia"): 3e-3,
-    ("impact timing", "delay"): 3e-4,
-    ("base", "slip per speed"): 2e-4,
-    ("base", "follows rotation"): 1e-3,
-    ("joint", "pivot"): 3e-4,
-    ("joint", "pivot left against right"): 3e-4,
-    ("joint", "pivot with rotation"): 1e-2,
-    ("joint", "contact length"): 1e-4,
-    ("joint", "drift"): 3e-6,
-    ("twist", "follows rotation"): 3e-4,
-}
-"""Unit in which coefficients scatter from run to run; the model's scatter multiplies it."""
-
-
-RING_SCATTER = 0.15
-"""Relative repeatability of a ring-down, of which the scatter takes about half."""
+_FAMILY_EFFECTS = (
+    ("gain", "error"),
+    ("lag", "tau"),
+    ("slow_response", "tau"),
+    ("filter_delay", "tau"),
+    ("drift", "rate"),
+    ("wire_cosine", "kappa"),
+    ("wire_inertia", "frequency"),
+)
+"""Effects on a whole family, and the parameter that says that they are there."""
 
 
 def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
@@ -145,66 +130,53 @@ def block_coefficients(run: RockingRun, values: Mapping[str, float]) -> tuple[Fl
 
 def _coefficients(run: RockingRun, block: Block, unit: FloatArray, values: Mapping[str, float]) -> FloatArray:
     coefficients = _PREDICT[block.rule](run, block, values)
+    for i, name in bias_names(block.family, block.names):
+        coefficients[i] += values.get(name, 0.0)
     if f"free_{block.family}.c0" in values:
         free = [values.get(f"free_{block.family}.c{i}", 0.0) for i in range(unit.size)]
         coefficients = coefficients + 3.0 * unit * np.array(free)
     return coefficients
 
 
-def repeatability(block: Block, i: int) -> float:
-    """Unit in which a coefficient scatters from run to run; 0 for what does not."""
-    match block.rule:
-        case "conditions" | "floor":
-            return 0.0
-        case "bending" | "turning":
-            # Kicks differ from impact to impact as r does; frequency and damping do not.
-            if block.names[i] in ("frequency", "damping"):
-                return 0.0
-            same = [k for k, name in enumerate(block.names) if name.split()[1:] == block.names[i].split()[1:]]
-            return RING_SCATTER * float(np.hypot(*block.values[same]))
-        case "channel":
-            return 0.1 * float(np.sqrt(block.covariance[i, i])) if i == len(block.names) - 1 else 0.0
-    return REPEATABILITY[(block.family, block.names[i])]
-
-
 def _family_difference(run: RockingRun, family: str, values: Mapping[str, float]) -> FloatArray | None:
     """What a family's sensor effects add to the rotation it shows, on the grid; None for nothing."""
-    grid = run.grid
-    total: FloatArray | None = None
+    shown = run.grid.theta
+    total = _added(run, family, values, shown)
+    if total is None or family != run.reference:
+        return total
+    # The grid's own rotation has the effect already: what is behind it is found by going back twice.
+    for _ in range(2):
+        total = _added(run, family, values, shown - total)
+        assert total is not None
+    return total
 
-    def add(series: FloatArray) -> None:
-        nonlocal total
-        total = series if total is None else total + series
 
-    for name, parameter in (
-        ("gain", "error"),
-        ("lag", "tau"),
-        ("slow_response", "tau"),
-        ("filter_delay", "tau"),
-        ("drift", "rate"),
-        ("wire_cosine", "kappa"),
-        ("wire_inertia", "frequency"),
-    ):
+def _added(run: RockingRun, family: str, values: Mapping[str, float], theta: FloatArray) -> FloatArray | None:
+    """What a family's sensor effects add to the rotation `theta`; None for nothing."""
+    time_s = run.grid.time_s
+    parts: list[FloatArray] = []
+    for name, parameter in _FAMILY_EFFECTS:
         value = values.get(f"{name}@{family}.{parameter}")
         if value is None:
             continue
-        if name == "gain":
-            add(value * grid.theta)
-        elif name == "lag":
-            add(np.interp(grid.time_s - value, grid.time_s, grid.theta) - grid.theta)
-        elif name == "slow_response":
-            add(first_order(grid.theta, value) - grid.theta)
-        elif name == "filter_delay":
-            add(extra.bessel(grid.theta, value) - grid.theta)
-        elif name == "wire_inertia":
-            zeta = values.get(f"wire_inertia@{family}.zeta", 0.2)
-            add(extra.resonator(grid.theta, 2.0 * np.pi * value, zeta) - grid.theta)
-        elif name == "drift":
-            scale = {"wire": run.wire_height_m, "lvdt": np.inf}.get(family, 1.0)
-            add(value / scale * (grid.time_s - (run.swings.rest_s - run.swings.release_s)))
-        else:
-            add(run.wire_height_m * value * grid.theta**2)
-    return total
+        match name:
+            case "gain":
+                parts.append(value * theta)
+            case "lag":
+                parts.append(np.interp(time_s - value, time_s, theta) - theta)
+            case "slow_response":
+                parts.append(first_order(theta, value) - theta)
+            case "filter_delay":
+                parts.append(extra.bessel(theta, value) - theta)
+            case "wire_inertia":
+                zeta = values.get(f"wire_inertia@{family}.zeta", 0.2)
+                parts.append(extra.resonator(theta, 2.0 * np.pi * value, zeta) - theta)
+            case "drift":
+                scale = {"wire": run.wire_height_m, "lvdt": np.inf}.get(family, 1.0)
+                parts.append(value / scale * (time_s - (run.swings.rest_s - run.swings.release_s)))
+            case "wire_cosine":
+                parts.append(run.wire_height_m * value * theta**2)
+    return np.sum(parts, axis=0) if parts else None
 
 
 def _difference_of(
@@ -288,8 +260,11 @@ def _accelerometer(run: RockingRun, block: Block, values: Mapping[str, float]) -
     name = run.reference
     reference = _own_gain(run, values) + values.get(f"gain@{name}.error", 0.0)
     clock = 1.0 + values.get("clock.error", 0.0)
-    found = {"gain of gravity": own - reference, "gain of inertia": (1.0 + own - reference) / clock**2 - 1.0}
-    return np.array([found.get(name, 0.0) for name in block.names])
+    ratio = (1.0 + own) / (1.0 + reference)
+    gains = {"gain of gravity": ratio - 1.0, "gain of inertia": ratio / clock**2 - 1.0}
+    found = np.array([gains.get(name, 0.0) for name in block.names])
+    # The base turns slowly: of its rotation the accelerometers show gravity alone, as in the simulator.
+    return found - 9.81 * _base_rotation(run, block, values) if "compliance.phi" in values else found
 
 
 def _impact_timing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:

@@ -30,7 +30,7 @@ PROBE_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45)
 _BLOCKS_ONLY = frozenset(
     ("cal_tiltmeter", "cal_accelerometer", "tilt_response", "onset", "base_follow", "twist_follow")
 ) | {"mount_height", "wire_even"}
-_STILL = ("flexible_wall.", "yaw.", "twist.", "sliding.")
+_STILL = ("bias_", "flexible_wall.", "yaw.", "twist.", "sliding.")
 """Effects that do not move the rotation of the joint."""
 _SWINGS_ONLY = frozenset(("p", "r", "zero", "theta0", "omega0", "viscous.zeta", "coulomb.mu"))
 
