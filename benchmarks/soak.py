@@ -9,8 +9,6 @@ process is flat, the file verifies. Prints a table, writes JSON; exit code 1 if 
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import random
 import signal
@@ -29,14 +27,13 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.marked_check import check_marked
+from benchmarks.marked_recording import RIG, command_line, console, marked_server, write_report
 from daq_app.acquisition import AcquisitionClient, AcquisitionProcess
 from daq_app.acquisition.messages import EventMessage, HealthMessage, State, StateMessage
-from daq_app.acquisition.simulated import SimulatedServer
 from daq_app.config import load_rig
 from daq_app.runfile import Gap, open_run, verify
 from sim_hardware.control import SimControl
 
-RIG: Final = Path(__file__).parents[1] / "configs" / "fr1.toml"
 _CHASSIS: Final = "cDAQ1"
 _SLACK: Final = 8_000
 """Samples: a fault is told to the device some time after the last health message."""
@@ -84,8 +81,7 @@ class Soak:
 
     def run(self) -> dict[str, Any]:
         """Record, break, watch, stop, check."""
-        options = ["--speed", str(self._speed), "--wall", "marked"]
-        with SimulatedServer(RIG, options) as server, SimControl(server.connection) as control:
+        with marked_server(self._speed) as server, SimControl(server.connection) as control:
             limit_s = str(60.0 * self._minutes * self._speed + 3600.0)
             process = AcquisitionProcess(
                 [
@@ -262,6 +258,7 @@ class Soak:
                 "most": float(sizes.max()),
             },
             "memory_mb_per_hour": slope,
+            "memory_series_s_mb": [(round(at, 1), round(size, 1)) for at, size in self._memory],
             "gap_table": [asdict(gap) for gap in gaps],
         }
 
@@ -309,20 +306,17 @@ def _summary(report: dict[str, Any]) -> list[str]:
 
 def main() -> int:
     """0 if every sample is explained, the file verified, and the memory flat."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.soak", description=__doc__)
+    parser = command_line("soak", __doc__, speed=1.0)
     parser.add_argument("--minutes", type=float, default=30.0)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--speed", type=float, default=1.0, help="of the simulated device")
-    parser.add_argument("--json", type=Path, default=Path("soak.json"))
     options = parser.parse_args()
-    console = Console(width=None if sys.stdout.isatty() else 140)
+    terminal = console()
     with tempfile.TemporaryDirectory(prefix="soak-") as name:
-        report = Soak(options.minutes, options.seed, options.speed, Path(name), console).run()
-    options.json.write_text(json.dumps(report, indent=1), encoding="utf-8")
-    console.print(_table(report))
+        report = Soak(options.minutes, options.seed, options.speed, Path(name), terminal).run()
+    write_report(options.json, report)
+    terminal.print(_table(report))
     for line in _summary(report):
-        console.print(line, soft_wrap=True)
-    console.print(f"written to {options.json}")
+        terminal.print(line, soft_wrap=True)
+    terminal.print(f"written to {options.json}")
     return 0 if report["explained"] and report["verified"] else 1
 
 
