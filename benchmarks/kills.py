@@ -9,34 +9,27 @@ readable and none lacks more than one block.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
-import json
-import multiprocessing
 import os
 import random
 import sys
 import tempfile
 import time
 from dataclasses import asdict, dataclass
-from multiprocessing.context import ForkServerContext, SpawnContext
 from pathlib import Path
 from typing import Any, Final
 
-import grpc
-import session_pb2
-import session_pb2_grpc
 from rich.console import Console
 
 from benchmarks.marked_check import check_marked
+from benchmarks.marked_recording import RIG, command_line, console, marked_server, write_report
+from benchmarks.processes import free_the_hardware, quick_context
 from daq_app.acquisition import AcquisitionClient, read_session_file
 from daq_app.acquisition.messages import HealthMessage
 from daq_app.acquisition.process import run_and_exit
-from daq_app.acquisition.simulated import SimulatedServer
 from daq_app.config import load_rig
 from daq_app.runfile import open_run, verify
 
-RIG: Final = Path(__file__).parents[1] / "configs" / "fr1.toml"
 MOMENTS: Final = ("arming", "rocking", "rocking", "finalising", "recovering")
 _LIMIT_S: Final = 240.0
 
@@ -60,14 +53,6 @@ class Killed:
         return max(0, -(-(self.read_sample - self.end_sample) // 400))
 
 
-def _context() -> ForkServerContext | SpawnContext:
-    if sys.platform == "win32":
-        return multiprocessing.get_context("spawn")
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["daq_app.acquisition.session", "drivers.nidaqmx_driver"])
-    return context
-
-
 def run_quietly(arguments: list[str]) -> None:
     """The process, without the line that says where it listens."""
     with Path(os.devnull).open("w") as nowhere, contextlib.redirect_stdout(nowhere):
@@ -89,7 +74,7 @@ class Life:
             "--speed",
             str(speed),
         ]
-        self.process = _context().Process(target=run_quietly, args=(arguments,))
+        self.process = quick_context().Process(target=run_quietly, args=(arguments,))
         self.process.start()
         deadline = time.monotonic() + _LIMIT_S
         session = None
@@ -146,14 +131,8 @@ def one_round(number: int, rng: random.Random, folder: Path, connection: str, sp
             time.sleep(rng.uniform(0.0, 1.0))
     finally:
         life.kill()
-    _free(connection)
+    free_the_hardware(connection)
     return Killed(moment, journal.stem, life.read, life.safe)
-
-
-def _free(connection: str) -> None:
-    """A killed session's tasks, cleared: the next round is not about them."""
-    with grpc.insecure_channel(connection.removeprefix("grpc://")) as channel:
-        session_pb2_grpc.SessionUtilitiesStub(channel).ResetServer(session_pb2.ResetServerRequest())
 
 
 def _judge(kill: Killed, folder: Path) -> None:
@@ -175,18 +154,18 @@ def _judge(kill: Killed, folder: Path) -> None:
     kill.problem = "" if kill.readable else f"{marks.unexplained} wrong samples, {gaps} gaps"
 
 
-def run(kills: int, seed: int, speed: float, console: Console) -> list[Killed]:
+def run(kills: int, seed: int, speed: float, terminal: Console) -> list[Killed]:
     """All rounds, the last recovery, the judgement."""
     rng = random.Random(seed)
     done: list[Killed] = []
     with tempfile.TemporaryDirectory(prefix="kills-") as name:
         folder = Path(name)
-        with SimulatedServer(RIG, ["--speed", str(speed), "--wall", "marked"]) as server:
+        with marked_server(speed) as server:
             with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C: judge what there is
                 for number in range(kills):
                     done.append(one_round(number, rng, folder, server.connection, speed))
                     if number % 25 == 24:
-                        console.print(f"{number + 1} kills", highlight=False)
+                        terminal.print(f"{number + 1} kills", highlight=False)
             last = Life(folder, server.connection, speed)
             deadline = time.monotonic() + _LIMIT_S + 20.0 * kills
             while list(folder.glob("*.journal")) and time.monotonic() < deadline:
@@ -216,17 +195,14 @@ def _summary(done: list[Killed]) -> dict[str, Any]:
 
 def main() -> int:
     """0 if every run is readable and none lacks more than one block."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.kills", description=__doc__)
+    parser = command_line("kills", __doc__, speed=2.0)
     parser.add_argument("--kills", type=int, default=300)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--speed", type=float, default=2.0, help="of the simulated device")
-    parser.add_argument("--json", type=Path, default=Path("kills.json"))
     options = parser.parse_args()
-    console = Console(width=None if sys.stdout.isatty() else 140)
+    terminal = console()
     began = time.monotonic()
-    found = _summary(run(options.kills, options.seed, options.speed, console))
-    options.json.write_text(json.dumps(found, indent=1), encoding="utf-8")
-    console.print(
+    found = _summary(run(options.kills, options.seed, options.speed, terminal))
+    write_report(options.json, found)
+    terminal.print(
         f"{found['readable']} of {found['kills']} readable and right in every sample; at most "
         f"{found['most_blocks_lost']} block lost in each; {found['acknowledged_samples_missing']} lack an "
         f"acknowledged sample ({', '.join(f'{n} while {m}' for m, n in found['by_moment'].items())}; "
