@@ -10,6 +10,7 @@ a minute for one file, or a file left in the folder of runs. Found files are kep
 from __future__ import annotations
 
 import argparse
+import contextlib
 import random
 import shutil
 import subprocess
@@ -156,7 +157,9 @@ def watch(kind: str, seed: int, minutes: float) -> tuple[int, list[str]]:
             process = psutil.Process(worker.pid)
             seen, since, why = "", time.monotonic(), ""
             while not why and time.monotonic() < until and worker.poll() is None:
-                time.sleep(0.2)
+                # Its end is awaited; that it hangs or swells, nobody tells: looked at in between.
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    worker.wait(0.2)
                 now = log.read_text(errors="replace")
                 if now != seen:
                     seen, since = now, time.monotonic()
