@@ -25,6 +25,12 @@ def figures() -> list[Figure]:
         assert (runs / "report" / "report.pdf").exists()
     cores = f"{os.cpu_count()} cores"
     return [
+        Figure(
+            "what all cores do at once",
+            _all_cores_over_one(),
+            "× one core",
+            note=f"the same arithmetic in one process and in {os.cpu_count()}; virtual cores may share one",
+        ),
         Figure("campaign simulate, 36 tests", simulated, "s", note=f"{count} runs, {size:.0f} MB, {cores}"),
         Figure(
             "campaign report of 36 runs",
@@ -34,6 +40,28 @@ def figures() -> list[Figure]:
             note=f"analysis with simulated bias, HTML, PDF, CSV, {cores}",
         ),
     ]
+
+
+_ARITHMETIC = """
+import time
+started = time.perf_counter()
+sum(i * i for i in range(20_000_000))
+print(time.perf_counter() - started)
+"""
+
+
+def _all_cores_over_one() -> float:
+    """How much more work all cores do than one: says what to expect of anything that runs on all."""
+
+    def slowest(processes: int) -> float:
+        running = [
+            subprocess.Popen([sys.executable, "-c", _ARITHMETIC], stdout=subprocess.PIPE, text=True)
+            for _ in range(processes)
+        ]
+        return max(float(process.communicate()[0]) for process in running)
+
+    count = os.cpu_count() or 1
+    return count * slowest(1) / slowest(count)
 
 
 def _seconds(command: str, runs: Path) -> float:
