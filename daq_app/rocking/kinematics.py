@@ -128,6 +128,8 @@ class WireWatch:
         usable = agree.copy()
         for frame in range(agree.shape[1]):
             now = agree[:, frame]
+            if not now.any():
+                continue  # a gap in the record says nothing of any wire
             self._run = np.where(now, 0, self._run + 1)
             self._wait = np.where(now, np.maximum(self._wait - 1, 0), self._hold_off)
             self.lost |= self._run >= self._for_good

@@ -161,7 +161,8 @@ class LiveAnalyser:
         for start in range(0, si.shape[1], _PIECE_FRAMES * self._frame):
             piece = si[:, start : start + _PIECE_FRAMES * self._frame]
             wires = self.geometry.rotation(piece[: self._n_wires], self._watch)
-            excluded |= wires.excluded.any(axis=1)
+            # In a gap no wire has a value: none disagrees with the others.
+            excluded |= (wires.excluded & ~wires.excluded.all(axis=0)).any(axis=1)
             self._log.append(np.vstack((wires.rotation_rad[None], piece[self._n_wires :])))
             bridged = _bridge(wires.rotation_rad, self._last_rotation)
             self._last_rotation = float(bridged[-1])

@@ -135,6 +135,7 @@ def test_a_gap_costs_the_half_cycle_but_not_the_test(made):
     start = round((test.motion.impacts_s[2] + 0.1) * test.rate_hz)
     results = [analyser.process(0, test.readings[:, :start])]
     results.append(analyser.process(start + 800, test.readings[:, start + 800 :]))
+    assert not any(result.excluded_wires for result in results), "no wire is to blame for a gap"
     estimate = last_estimate(results)
     assert estimate.eav.r == pytest.approx(0.895, abs=0.003)
     assert estimate.crt.r == pytest.approx(0.895, abs=0.003)
