@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
-import multiprocessing
-import sys
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from multiprocessing.context import ForkServerContext, SpawnContext
 from pathlib import Path
 from typing import Any
 
-import grpc
-import session_pb2
-import session_pb2_grpc
 from saboteur import run_sabotaged
 
 from benchmarks.marked_check import check_marked
+from benchmarks.processes import quick_context
 from daq_app.acquisition import AcquisitionClient, read_session_file
 from daq_app.acquisition.messages import EventMessage, HealthMessage, Message, State, StateMessage
 from daq_app.config import Rig
@@ -31,29 +24,9 @@ RATE_HZ = 4000
 LIMIT_S = 120.0
 
 
-def free_the_hardware(connection: str) -> None:
-    """Forget what killed sessions left on the server, as its operator would with a reset."""
-    with (
-        contextlib.suppress(grpc.RpcError),  # the server may be what was killed
-        grpc.insecure_channel(connection.removeprefix("grpc://")) as channel,
-    ):
-        session_pb2_grpc.SessionUtilitiesStub(channel).ResetServer(session_pb2.ResetServerRequest())
-
-
-def _context() -> ForkServerContext | SpawnContext:
-    """Processes that start quickly where the platform can fork from one that has loaded everything."""
-    if sys.platform == "win32":
-        return multiprocessing.get_context("spawn")
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(
-        ["daq_app.acquisition.process", "daq_app.acquisition.session", "drivers.nidaqmx_driver"]
-    )
-    return context
-
-
 def another_process(work: Callable[..., None], *arguments: object) -> Any:
     """Started; it can be killed."""
-    process = _context().Process(target=work, args=arguments, daemon=True)
+    process = quick_context().Process(target=work, args=arguments, daemon=True)
     process.start()
     return process
 
@@ -102,15 +75,15 @@ class Acquisition:
     def __init__(self, rig_file: Path, rig: Rig, out: Path, connection: str, *options: str) -> None:
         self.rig, self.out, self.connection = rig, out, connection
         self.spare = out.with_name(f"{out.name}-spare")
-        self._orders = out.with_name(f"{out.name}-orders.json")
-        self._orders.parent.mkdir(parents=True, exist_ok=True)
-        self._orders.write_text("{}")
+        out.parent.mkdir(parents=True, exist_ok=True)
+        heard, self._orders = quick_context().Pipe(duplex=False)
         arguments = [
             *("--rig", str(rig_file), "--out", str(out), "--spare", str(self.spare)),
             *("--connection", connection, *options),
         ]
-        self.process = _context().Process(target=run_sabotaged, args=(arguments, str(self._orders)))
+        self.process = quick_context().Process(target=run_sabotaged, args=(arguments, heard))
         self.process.start()
+        heard.close()
         session = None
         deadline = time.monotonic() + LIMIT_S
         while session is None or session.pid != self.process.pid:
@@ -164,10 +137,12 @@ class Acquisition:
         self.heard.wait(
             lambda m: isinstance(m, HealthMessage) and m.buffer_samples > 0, self._mark, "samples"
         )
-        deadline = time.monotonic() + LIMIT_S
-        while not (reply := self.client.request("arm", timeout_s=LIMIT_S, test=test)).ok:
-            assert "Nothing is being sampled" in reply.text and time.monotonic() < deadline, reply.text
-            time.sleep(0.02)
+        reply = self.client.request("arm", timeout_s=LIMIT_S, test=test)
+        if not reply.ok:  # the hardware is open, and the session is about to hear of it
+            assert "Nothing is being sampled" in reply.text, reply.text
+            self.state(State.PREVIEWING)
+            reply = self.client.request("arm", timeout_s=LIMIT_S, test=test)
+            assert reply.ok, reply.text
         self.mark()
         self.record(1000)
         return Path(str(reply.data["journal"]))
@@ -198,9 +173,7 @@ class Acquisition:
 
     def sabotage(self, **orders: Any) -> None:
         """Break the machine under the process; nothing mends it."""
-        written = self._orders.with_suffix(".tmp")
-        written.write_text(json.dumps(orders))
-        written.replace(self._orders)
+        self._orders.send(orders)
 
     def strike(self) -> None:
         """The fault happens now."""

@@ -1,25 +1,25 @@
 """An acquisition process with a saboteur in it: the machine under it fails when a test says so.
 
-The test writes a JSON object into a file; a thread here reads it and makes the system calls of this process
-behave accordingly. Everything above the system calls is the product as it ships.
+The test sends what is to be broken; a thread here hears it and makes the system calls of this process behave
+accordingly. Everything above the system calls is the product as it ships.
 """
 
 from __future__ import annotations
 
+import contextlib
 import errno
-import json
 import os
 import shutil
 import threading
 import time
 from collections import namedtuple
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 from daq_app.acquisition.process import run_and_exit
 
 Usage = namedtuple("Usage", "total used free")
-_LOOK_S = 0.005
 
 
 class Saboteur:
@@ -27,21 +27,15 @@ class Saboteur:
 
     NAMES = ("full", "read_only", "flush_s", "free_bytes", "clock_s", "memory_bytes", "no_memory")
 
-    def __init__(self, orders: Path) -> None:
+    def __init__(self, orders: Connection) -> None:
         self._orders = orders
         self._now: dict[str, Any] = {}
-        self._seen = b""
         threading.Thread(target=self._listen, daemon=True).start()
 
     def _listen(self) -> None:
-        while True:
-            try:
-                text = self._orders.read_bytes()
-                if text != self._seen:
-                    self._now, self._seen = json.loads(text), text
-            except (OSError, ValueError):
-                pass
-            time.sleep(_LOOK_S)
+        with contextlib.suppress(EOFError, OSError):  # the test has ended
+            while True:
+                self._now = self._orders.recv()
 
     def get(self, name: str) -> Any:
         return self._now.get(name)
@@ -130,9 +124,9 @@ class Saboteur:
         journal.pack_frame = sabotaged_pack
 
 
-def run_sabotaged(arguments: list[str], orders: str) -> None:
+def run_sabotaged(arguments: list[str], orders: Connection) -> None:
     """The whole process: `daq_app.acquisition`, with the saboteur installed first."""
-    Saboteur(Path(orders)).install()
+    Saboteur(orders).install()
     run_and_exit(arguments)
 
 

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 from conftest import Row, Start
-from fault_bench import SPEED, Acquisition, free_the_hardware, look_at
+from fault_bench import SPEED, Acquisition, look_at
 
+from benchmarks.processes import free_the_hardware
 from daq_app.acquisition import AcquisitionDied, AcquisitionProcess
 from daq_app.acquisition.messages import State
 from daq_app.config import Rig
