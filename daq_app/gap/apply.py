@@ -17,8 +17,8 @@ from sim_hardware.dynamics.effects import MOTION_EFFECTS
 from sim_hardware.dynamics.spec import find_effect
 from sim_hardware.sensors.effects import SENSOR_EFFECTS
 
-FORMS_ONLY = {("compliance", "fall")}
-"""Parameters of a form that the simulator has only one of."""
+FORMS_ONLY = {("compliance", "fall"), ("ambient", "shift")}
+"""Parameters that the simulator has not: of a form that it knows only one of, or read from a run itself."""
 
 
 def read_result(path: Path) -> dict[str, Any]:

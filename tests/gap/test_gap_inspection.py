@@ -87,7 +87,7 @@ def test_one_channel_with_another_gain_is_examined_on_its_own() -> None:
     assert _value(runs[0], "WP-2", "gain") == pytest.approx(0.05, abs=0.012)
     model, library = model_and_library(runs)
     assert "gain@WP-2" in library
-    assert any(parameter.name == "cal_WP-2" for parameter in model.nuisance)
+    assert any(parameter.name == "cal_WP-2_gain" for parameter in model.nuisance)
 
 
 def test_ring_down_and_floor_are_seen_at_their_frequency() -> None:

@@ -20,6 +20,8 @@ from daq_app.gap.core.search import TOLERANCE, Search
 _MAX_STARTS = 6
 _FOLLOWED = 3
 _POLISH_ROUNDS = 8
+_SAME = 0.5
+"""Log posterior within which two searches are at the same optimum."""
 _LOOSE = 0.05
 """Tolerance of the search in a hypothesis that has yet to show that it is worth more."""
 
@@ -128,11 +130,17 @@ def _lead(searches: list[Search], problem: Problem) -> tuple[list[Search], int]:
     if len(searches) > _FOLLOWED:
         held = np.array([bool(q.effect) for q in problem.unknowns])
         searches = sorted(searches, key=lambda search: search.promise(held))[:_FOLLOWED]
-    for search in searches:
-        search.run(4, 4, _LOOSE)
+    first, *others = searches
+    first.run(4, 4, _LOOSE)
+    for search in others:
+        # At the scatter of the first it is soon seen whether another start leads to the same place.
+        search.adopt(first.log_sigma)
+        search.walk(4, _LOOSE)
+        if abs(search.objective - first.objective) > _SAME:
+            search.run(4, 4, _LOOSE)
     searches = sorted(searches, key=lambda search: search.objective)
     best = searches[0].objective
-    return searches, sum(1 for search in searches if search.objective - best < 0.5)
+    return searches, sum(1 for search in searches if search.objective - best < _SAME)
 
 
 def _starts(

@@ -190,15 +190,25 @@ class Search:
             curvature[k] = (ahead - 2 * here + behind) / SCATTER_STEP**2
         return slope, curvature
 
+    def adopt(self, log_sigma: FloatArray) -> None:
+        """Go on with other scatter sizes."""
+        self.log_sigma = log_sigma.copy()
+        self.objective = self.value_at(self.u, self.predictions, self.log_sigma)
+
+    def walk(self, steps: int, tolerance: float = TOLERANCE) -> float:
+        """Steps at the scatter as it is, until one gains less than `tolerance`; returns the gain."""
+        gained = 0.0
+        for _ in range(steps):
+            gain = self.step()
+            gained += gain
+            if gain < tolerance:
+                break
+        return gained
+
     def run(self, rounds: int, steps: int, tolerance: float = TOLERANCE) -> bool:
         """Alternate steps and scatter updates; True when neither changes anything any more."""
         for _ in range(rounds):
-            gained = 0.0
-            for _ in range(steps):
-                gain = self.step()
-                gained += gain
-                if gain < tolerance:
-                    break
+            gained = self.walk(steps, tolerance)
             before = self.log_sigma.copy()
             self.update_scatter()
             if gained < tolerance and np.all(np.abs(self.log_sigma - before) < 0.01):

@@ -34,6 +34,8 @@ TOLERANCE: dict[Family, tuple[float, float, float, float]] = {
 """What healthy channels differ by: calibration, and how well the others predict them."""
 CALIBRATION = 3e-3
 """Relative tolerance of one channel's calibration."""
+_SOUND = 0.5
+"""Standard deviation of what a sound channel is off by, in those tolerances."""
 SUSPECT = 4.0
 """Tolerances by which a channel must be off to be looked at on its own."""
 STRUCTURE = 0.5
@@ -144,7 +146,7 @@ def channel_block(run: GapRun, grid: Grid, family: Family, name: str) -> Block |
         design=found.design,
         noise=found.noise * float(np.exp(max(usual, 0.0))),
         tags={name: family},
-        levers=(CALIBRATION * beside.spread,),
+        levers=(CALIBRATION * beside.spread, *(_SOUND * beside.spread * t for t in TOLERANCE[family][1:])),
     )
 
 

@@ -81,7 +81,8 @@ def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
         found[:-1] = block.projection @ seen
         left = seen - block.design @ (block.design.T @ seen)
         found[-1] = 0.5 * np.log1p(float(left @ left) / seen.size / block.noise**2)
-    found[0] += values.get(f"cal_{block.family}", 0.0)
+    for k, shape in enumerate(block.names[: len(block.levers)]):
+        found[k] += values.get(f"cal_{block.family}_{shape}", 0.0)
     return found
 
 
@@ -168,7 +169,8 @@ def with_measured_inputs(run: RockingRun, values: Mapping[str, float]) -> Mappin
     if "ambient.amplitude" not in values or run.vibration is None:
         return values
     seen = run.vibration
-    given = {**values, "ambient.frequency": seen.frequency_hz, "ambient.phase": seen.phase}
+    given = {**values, "ambient.frequency": seen.frequency_hz}
+    given["ambient.phase"] = seen.phase + values.get("ambient.shift", 0.0)
     if "ambient.frequency" in values:
         given["ambient.fitted"] = values["ambient.frequency"]
     return given

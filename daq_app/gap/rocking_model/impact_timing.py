@@ -13,6 +13,8 @@ MOST = 14
 """Impacts used: the first ones are the loudest."""
 WINDOW_S = 0.11
 REACH_S = 0.065
+MIDDLE_OF_IMPACT_S = 1.5e-3
+"""By how much the middle of an impact is later than the contact, at sensors that are not late at all."""
 MODEL_ERROR_S = 3e-4
 """How well the shape of an impact is known at all."""
 

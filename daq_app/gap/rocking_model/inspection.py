@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from daq_app.config.rig import Family
-from daq_app.gap.core import CannotDiagnose
+from daq_app.gap.core import CannotDiagnose, FeatureSet
 from daq_app.gap.rocking_model.channel_faults import channel_block, suspects
 from daq_app.gap.rocking_model.conditions import Mark, conditions_of, marks_of, without_hum
 from daq_app.gap.rocking_model.floor_vibration import find_vibration
+from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rings import (
     Signal,
@@ -34,6 +35,10 @@ LATE_S = 2.5e-3
 """Lag between LVDTs and wires from which it matters which of them the motion is read from."""
 _SPOILING = ("quantisation", "dropout", "saturation", "spikes")
 _COUNT_SD = 0.05
+_READ_FROM = {"lvdt": ("wire", "joint", "twist"), "wire": ("wire", "base")}
+"""Blocks that a family's readings enter."""
+_STAIRS = 25.0
+"""Factor on their errors where these readings go in steps."""
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer", "tiltmeter")
 
 
@@ -63,7 +68,13 @@ def inspect(runs: Sequence[GapRun]) -> Inspected:
         if mark.value > 0 and _spoils(mark, families)
     }
     clean = [run.excluding(single) for run in clean]
-    clean, limits = saturated(clean)
+    stairs = {
+        m.key.partition("@")[2]
+        for row in marks
+        for m in row
+        if m.key.startswith("quantisation") and m.value > 0
+    }
+    clean, limits = saturated(clean, stairs)
     marks = [[*row, *more] for row, more in zip(marks, limits, strict=True)]
     clipped = {
         mark.key.partition("@")[2]
@@ -110,7 +121,8 @@ def choose_reference(inspected: Inspected) -> str:
     delays = [_coefficient(f, "impact timing", "delay") for f in (first, second)]
     if delays[0] is None or delays[1] is None or second.reference != "wire":
         return ""
-    return "wire" if abs(delays[1]) < abs(delays[0]) else ""
+    late = [abs(delay - MIDDLE_OF_IMPACT_S) for delay in delays if delay is not None]
+    return "wire" if late[1] < late[0] else ""
 
 
 def _coefficient(run: RockingRun, family: str, name: str) -> float | None:
@@ -164,9 +176,27 @@ def completed(
             )
             row.append(scalar_block("floor", entries, grid))
         row.append(_mark_block(seen, entry))
-        features = replace(entry.features, vibration=vibration)
+        features = replace(_beside_stairs(entry.features, seen), vibration=vibration)
         runs.append(features.with_blocks(row))
     return runs
+
+
+def _beside_stairs(run: RockingRun, marks: Sequence[Mark]) -> RockingRun:
+    """The run with wider errors of all that was read from a family whose reading goes in steps.
+
+    Steps are no noise: the same ones come back in every half-cycle, so that a regression does not see
+    what they do to it.
+    """
+    families = {m.key.partition("@")[2] for m in marks if m.key.startswith("quantisation") and m.value > 0}
+    spoilt = {name for family in families for name in _READ_FROM.get(family, ())}
+    if not spoilt:
+        return run
+    kept = tuple(
+        replace(b, covariance=_STAIRS**2 * b.covariance) if b.family in spoilt else b for b in run.blocks
+    )
+    first = len(run.features) - sum(len(b.names) for b in run.blocks)
+    features = FeatureSet(run.features.values[:first], run.features.sd[:first], run.features.labels[:first])
+    return replace(run, features=features, blocks=()).with_blocks(kept)
 
 
 def _mark_block(marks: Sequence[Mark], entry: Examined) -> Block:
@@ -209,9 +239,14 @@ def found_channels(runs: Sequence[RockingRun]) -> dict[str, str]:
     return {b.family: b.tags[b.family] for run in runs for b in run.blocks if b.kind == "channel"}
 
 
-def calibrations(runs: Sequence[RockingRun]) -> dict[str, float]:
-    """Of those channels: relative error with which the others of their family predict them."""
-    return {b.family: b.levers[0] for run in runs for b in run.blocks if b.kind == "channel"}
+def calibrations(runs: Sequence[RockingRun]) -> dict[str, dict[str, float]]:
+    """Of those channels: what a sound one may be off by in each shape, as the others predict it."""
+    return {
+        b.family: dict(zip(b.names, b.levers, strict=False))
+        for run in runs
+        for b in run.blocks
+        if b.kind == "channel"
+    }
 
 
 def found_marks(runs: Sequence[RockingRun]) -> dict[str, str]:

@@ -98,7 +98,13 @@ def _parameter(spec: EffectSpec, parameter: SpecParameter) -> Parameter:
 _FORMS = {
     "compliance": (
         Parameter("fall", 0.5, 0.4, "1", 0.0, 1.0, meaning="share that falls with the overturning moment"),
-    )
+    ),
+    # Read from the run itself while the wall stands still, and carried on over its motion.
+    "ambient": (
+        Parameter(
+            "shift", 0.0, 0.1, "rad", meaning="phase less that read at rest", per_run=True, starts=(0.0,)
+        ),
+    ),
 }
 """Parameters of the form of an effect, beyond those of the simulator, which has one form only."""
 

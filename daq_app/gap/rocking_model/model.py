@@ -11,6 +11,7 @@ from daq_app.gap.core import Parameter, Prediction, Run, Scatter
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import sensor_response as response
 from daq_app.gap.rocking_model.extra_response import with_measured_inputs
+from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.records import Survey
 from daq_app.gap.rocking_model.repeatability import biases
 from daq_app.gap.rocking_model.run_features import RockingRun
@@ -44,8 +45,8 @@ class RockingModel:
         ),
     )
 
-    def __init__(self, survey: Survey, channels: Mapping[str, float] | None = None) -> None:
-        """`channels` are examined on their own: the relative tolerance of each one's calibration."""
+    def __init__(self, survey: Survey, channels: Mapping[str, Mapping[str, float]] | None = None) -> None:
+        """`channels` are examined on their own: what a sound one may be off by in gain, lag, … (sd)."""
         self.survey = survey
         self.channels = dict(channels or {})
 
@@ -92,7 +93,12 @@ class RockingModel:
                 "tilt_response", 0.0, 0.01, "s", meaning="error of the tiltmeters' time constant", linear=True
             ),
             Parameter(
-                "onset", 1.5e-3, 1e-3, "s", meaning="middle of the impact after the contact", linear=True
+                "onset",
+                MIDDLE_OF_IMPACT_S,
+                1e-3,
+                "s",
+                meaning="middle of the impact after the contact",
+                linear=True,
             ),
             Parameter(
                 "base_follow", 0.0, 8e-3, "m/rad", meaning="translation from wire calibrations", linear=True
@@ -108,8 +114,9 @@ class RockingModel:
             ),
             Parameter("wire_even", 0.0, 5e-3, "1/rad", meaning="even part from wire anchors", linear=True),
             *(
-                Parameter(f"cal_{name}", 0.0, own, "1", meaning=f"calibration of {name}", linear=True)
-                for name, own in self.channels.items()
+                Parameter(f"cal_{name}_{shape}", 0.0, own, meaning=f"{shape} of {name}", linear=True)
+                for name, sound in self.channels.items()
+                for shape, own in sound.items()
             ),
             *biases(),
         )

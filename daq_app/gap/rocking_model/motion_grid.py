@@ -42,6 +42,8 @@ class Grid:
     """θ̇ at every sample of the record, shape (n,): what jumps at impacts must not be averaged over them."""
     jumps: FloatArray
     """Jump of θ̇ at each impact, rad/s."""
+    approach: FloatArray
+    """θ̇ just before each impact, rad/s."""
 
 
 def coarse(values: FloatArray, rate_hz: float) -> FloatArray:
@@ -85,8 +87,8 @@ def make_grid(
     distance = np.abs(time_s[:, None] - impact_s[None, :]).min(axis=1) if impact_s.size else time_s + 1e9
     good = coarse(valid.astype(float), rate_hz) > 0.999
     rotation, rate, acceleration = (coarse(v, rate_hz) for v in (smooth, omega, alpha))
-    jumps = _jumps(np.abs(rotation), time_s, impact_s, survey)
-    jumps *= np.sign(np.interp(impact_s - 0.02, time_s, rotation))
+    before, after = _speeds(np.abs(rotation), time_s, impact_s, survey)
+    side = np.sign(np.interp(impact_s - 0.02, time_s, rotation))
     return Grid(
         time_s,
         rotation,
@@ -98,12 +100,15 @@ def make_grid(
         raw=coarse(theta, rate_hz),
         rest_s=swings.rest_s - swings.release_s,
         speed=omega,
-        jumps=jumps,
+        jumps=side * (before - after),
+        approach=-side * before,
     )
 
 
-def _jumps(size: FloatArray, time_s: FloatArray, impact_s: FloatArray, survey: Survey) -> FloatArray:
-    """Loss of speed at each impact, from the peaks before and after it: ½ω² = p² (cos(α − φ) − cos α).
+def _speeds(
+    size: FloatArray, time_s: FloatArray, impact_s: FloatArray, survey: Survey
+) -> tuple[FloatArray, FloatArray]:
+    """Speeds before and after each impact, from the peaks around it: ½ω² = p² (cos(α − φ) − cos α).
 
     A jump is the small difference of two speeds. Read off the motion beside the impact it would carry
     an error of its own size, and what follows from it would look weaker than it is.
@@ -115,8 +120,7 @@ def _jumps(size: FloatArray, time_s: FloatArray, impact_s: FloatArray, survey: S
     alpha = survey.alpha_rad
     energy = np.cos(alpha - np.minimum(peaks, alpha)) - np.cos(alpha)
     speeds = survey.p_rad_s * np.sqrt(2.0 * energy)
-    lost: FloatArray = speeds[:-1] - speeds[1:]
-    return lost
+    return speeds[:-1], speeds[1:]
 
 
 def _impact_samples(theta: FloatArray, smooth: FloatArray, release: int) -> list[int]:

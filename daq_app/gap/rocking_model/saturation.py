@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,22 +17,32 @@ from daq_app.gap.rocking_model.rotation import reaches_its_range, wire_reading, 
 _OTHER: dict[Family, Family] = {"lvdt": "wire", "wire": "lvdt"}
 _BELOW = (0.3, 0.85)
 """Part of a channel's travel over which it must be in proportion to the rotation."""
+LIMIT_SD = 0.01
+"""Relative error of a limit."""
 _GOES_ON = 1.025
 """How much further the rotation must go on than the channel."""
 
 
-def saturated(runs: Sequence[GapRun]) -> tuple[list[GapRun], list[list[Mark]]]:
-    """Runs with the ranges that the channels really have, and a mark per family: 1/limit, 0 for no limit."""
+def saturated(runs: Sequence[GapRun], stairs: Collection[str] = ()) -> tuple[list[GapRun], list[list[Mark]]]:
+    """Runs with the ranges that the channels really have, and a mark per family: 1/limit, 0 for no limit.
+
+    `stairs` are families and channels whose reading goes in steps: their tops are flat for that.
+    """
     rotations = {family: [_rotation(run, family) for run in runs] for family in _OTHER}
     marks: list[list[Mark]] = [[] for _ in runs]
     limits: dict[str, float] = {}
     for family, other in _OTHER.items():
         ids = [runs[0].sensors[i].id for i in runs[0].indices(family)]
         cells = [
-            [_limit(run, name, rotation) for name in ids]
+            [
+                (0.0, 0.0) if family in stairs or name in stairs else _limit(run, name, rotation)
+                for name in ids
+            ]
             for run, rotation in zip(runs, rotations[other], strict=True)
         ]
         table = np.array(cells).reshape(len(runs), len(ids), 2)
+        # A limit is one in all runs: what a channel has gone beyond in another run was none.
+        table[:, :, 0] *= table[:, :, 0] > 0.97 * table[:, :, 1].max(axis=0)
         clipped = [k for k in range(len(ids)) if np.any(table[:, k, 0] > 0.0)]
         # A faulty rotation makes all channels of the other family look wrong in the same way.
         for k in clipped:
@@ -45,7 +55,7 @@ def saturated(runs: Sequence[GapRun]) -> tuple[list[GapRun], list[list[Mark]]]:
             seen = [row[k, 0] for k in chosen if row[k, 0] > 0.0]
             reach = float(np.median(row[chosen or slice(None), 1])) if len(ids) else 0.0
             limit = float(np.median(seen)) if seen else 0.0
-            value, sd = (1.0 / limit, 0.01 / limit) if limit else (0.0, 0.6 / max(reach, 1e-6))
+            value, sd = (1.0 / limit, LIMIT_SD / limit) if limit else (0.0, 0.6 / max(reach, 1e-6))
             run_marks.append(Mark(f"saturation@{key}", "inverse of the limit", "1/m", value, sd))
     return [_narrowed(run, limits) for run in runs], marks
 
@@ -98,6 +108,9 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None) -> tuple[float, 
     if rotation is None or not np.all(np.isfinite(run.channels[i])):
         return 0.0, 0.0
     mine = np.abs(coarse(zeroed(run, i), run.rate_hz))
+    # A channel stops at a reading, wherever its zero has gone since.
+    reading = np.abs(coarse(run.aligned(i), run.rate_hz))
+    furthest = float(reading.max())
     half = run.survey.half_base_m
     if sensor.family == "wire" and sensor.anchor_m is not None:
         expected = np.abs(wire_reading(rotation, sensor.position_m, sensor.anchor_m, half))
@@ -105,14 +118,14 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None) -> tuple[float, 
         expected = half * np.abs(rotation) - sensor.position_m[0] * rotation
     largest = float(mine.max())
     if reaches_its_range(run.aligned(i), sensor.range_si):
-        return 0.0, largest
+        return 0.0, furthest
     # On the side of its largest reading only: the other side may have another gain.
     side = np.sign(rotation[int(np.argmax(mine))])
     same = np.sign(rotation) == side
     below = same & (mine > _BELOW[0] * largest) & (mine < _BELOW[1] * largest)
     top = same & (mine > 0.985 * largest)
     if below.sum() < 20 or top.sum() < round(0.05 * GRID_HZ):
-        return 0.0, largest
+        return 0.0, furthest
     gain = float(np.median(mine[below] / np.maximum(expected[below], 1e-9)))
     reach = gain * expected[top]
     noise = float(np.std(mine[-40:]))
@@ -121,4 +134,4 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None) -> tuple[float, 
     travel = float(np.quantile(reach, 0.99) - np.quantile(reach, 0.01))
     moved = float(np.quantile(mine[top], 0.95) - np.quantile(mine[top], 0.05))
     steady = travel > 0.02 * largest + 3.0 * noise and moved < 0.5 * travel + 2.0 * noise
-    return (float(np.median(mine[top])), largest) if goes_on and steady else (0.0, largest)
+    return (float(np.median(reading[top])), furthest) if goes_on and steady else (0.0, furthest)

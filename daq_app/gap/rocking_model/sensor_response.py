@@ -16,7 +16,6 @@ from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.sensor_blocks import (
     Block,
     first_order,
-    impacts_of,
     moment_shape,
     slip_shape,
 )
@@ -216,14 +215,9 @@ def _base_rotation(run: RockingRun, block: Block, values: Mapping[str, float]) -
         return first_order(shape, slow)
 
     moment = _unit(run, block, "moment", lambda: seen(moment_shape(theta, run.survey.alpha_rad)))
-    reaction = _unit(run, block, "reaction", lambda: seen(np.tanh(theta / 5e-4)))
+    reaction = _unit(run, block, "reaction", lambda: seen(np.tanh(theta / 1e-4)))
     found: FloatArray = values["compliance.phi"] * (fall * moment + (1.0 - fall) * reaction)
     return found
-
-
-def _slip(run: RockingRun) -> FloatArray:
-    impact_s, speeds = impacts_of(run.grid)
-    return slip_shape(run.grid.time_s, impact_s, speeds)
 
 
 def _wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
@@ -236,7 +230,7 @@ def _wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatAr
         found = found + _base_rotation(run, block, values)
     if "sliding.c" in values:
         found = found + values["sliding.c"] / run.wire_height_m * _unit(
-            run, block, "slip", partial(_slip, run)
+            run, block, "slip", partial(slip_shape, run.grid)
         )
     series = _difference_of(run, "wire", "lvdt", values)
     return found if series is None else found + block.coefficients(series)
@@ -308,7 +302,9 @@ def _joint(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatA
 
 def _base(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     found = values["base_follow"] * _unit(run, block, "theta", lambda: run.grid.theta)
-    total: FloatArray = found + values.get("sliding.c", 0.0) * _unit(run, block, "slip", partial(_slip, run))
+    total: FloatArray = found + values.get("sliding.c", 0.0) * _unit(
+        run, block, "slip", partial(slip_shape, run.grid)
+    )
     return total
 
 
