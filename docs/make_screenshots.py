@@ -10,7 +10,7 @@ import argparse
 import os
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -24,7 +24,8 @@ from daq_app.monitor.settings import WindowSettings
 from sim_hardware.control import SimControl
 
 REPOSITORY = Path(__file__).parents[1]
-LOOKS = (("dark", 1366, 768), ("light", 1920, 1080))
+Look = tuple[str, int, int]
+LOOKS: tuple[Look, ...] = (("dark", 1366, 768), ("light", 1920, 1080))
 FAULTS = (
     {"kind": "channel_hum", "family": "LV-A07", "amplitude_v": 0.25},
     {"kind": "channel_stuck", "family": "WP-3"},
@@ -72,12 +73,18 @@ class Studio:
         """Whether nothing on screen is stale that should be live."""
         return not self.window.session.data_missing
 
-    def shoot(self, name: str) -> None:
-        """Save the window as it is, in both looks."""
-        for theme, width, height in LOOKS:
-            if self.window.settings.theme != theme:
-                self.window.toggle_theme()
-            self.window.resize(width, height)
+    def dress(self, look: Look) -> None:
+        """Change theme and size."""
+        theme, width, height = look
+        if self.window.settings.theme != theme:
+            self.window.toggle_theme()
+        self.window.resize(width, height)
+
+    def shoot(self, name: str, looks: Sequence[Look] = LOOKS) -> None:
+        """Save the window as it is, in these looks."""
+        for look in looks:
+            theme, width, height = look
+            self.dress(look)
             self.live_for(0.5)
             self.until(self.is_live)  # a slow machine must not make the picture
             self.window._on_slow()
@@ -93,27 +100,26 @@ class Studio:
         button.click()
 
 
-def take_test(studio: Studio, name: str, *, picture: bool) -> None:
-    """Arm, pull, release, and wait for the result; with pictures of what happens if asked for."""
+def take_test(studio: Studio, name: str, look: Look) -> None:
+    """Arm, pull, release, wait for the result; pictures of pull and motion, which leave time for one look."""
     window = studio.window
     window.prepare.card.propose(name, 0.35)
     studio.order("arm")
     studio.state(State.ARMED)
     studio.live_for(1.0)
     studio.wall.command("pull", theta0_over_alpha=0.35)
-    if picture:
-        window.show_page(window.prepare)
-        studio.live_for(1.4)
-        studio.shoot("pull")
+    window.show_page(window.prepare)
+    studio.dress(look)
+    studio.live_for(1.4)
+    studio.shoot("pull", [look])
     studio.state(State.HOLDING)
     window.prepare.run_pull()
     window.show_page(window.live)
     studio.live_for(6.0)
     studio.wall.command("release")
-    if picture:
-        window.live.theory_button.setChecked(True)
-        studio.until(lambda: (e := window.session.estimate) is not None and len(e.impact_samples) >= 6)
-        studio.shoot("live")
+    window.live.theory_button.setChecked(True)
+    studio.until(lambda: (e := window.session.estimate) is not None and len(e.impact_samples) >= 6)
+    studio.shoot("live", [look])
     studio.state(State.SAVED)
     studio.until(lambda: window.result.result is not None)
 
@@ -216,8 +222,8 @@ def take_all(acquisition: AcquisitionProcess, rig: Path, temporary: Path, folder
     check_with_faults(studio)
     window.prepare.tare_button.click()
     studio.until(lambda: bool(window.prepare.zero.record))
-    take_test(studio, "FR1-L3-1", picture=False)
-    take_test(studio, "FR1-L3-2", picture=True)
+    take_test(studio, "FR1-L3-1", LOOKS[1])
+    take_test(studio, "FR1-L3-2", LOOKS[0])
     studio.shoot("result")
     window.show_page(window.campaign)
     studio.shoot("campaign")
