@@ -71,7 +71,8 @@ def _pm(value: ValueWithSigma | None, digits: int, scale: float) -> str:
 def _table(title: str, *columns: str) -> Table:
     table = Table(title=title, title_justify="left", header_style="bold", pad_edge=False)
     for index, name in enumerate(columns):
-        table.add_column(name, justify="left" if index == 0 else "right", no_wrap=index == 0)
+        whole = index == 0 or name == "plain mean"  # a mean and its error belong on one line
+        table.add_column(name, justify="left" if index == 0 else "right", no_wrap=whole)
     return table
 
 

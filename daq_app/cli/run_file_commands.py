@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,7 +18,15 @@ from rich.text import Text
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
 from daq_app.config import parse_rig
 from daq_app.config.toml_file import read_text
-from daq_app.runfile import DerivedData, JournalContents, Recovery, VerifyReport, recover, verify
+from daq_app.runfile import (
+    DerivedData,
+    JournalContents,
+    Recovery,
+    RunFileError,
+    VerifyReport,
+    recover,
+    verify,
+)
 from daq_app.runfile.exporters import ExportFormat, export_run
 from daq_app.runfile.importers import import_file, load_import_map
 
@@ -141,7 +151,12 @@ def _recovery_dict(result: Recovery) -> dict[str, Any]:
 def export_command(
     run: Annotated[Path, typer.Argument(help="A run file.", metavar="RUN")],
     format_: Annotated[ExportFormat, typer.Option("--format", help="What to write.")],
-    out: Annotated[Path, typer.Option("--out", help="File to write, or a folder to write into.")] = Path(),
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", help="Folder to write into (made if need be), or the file, named with its suffix."
+        ),
+    ] = Path(),
     raw: Annotated[
         bool, typer.Option("--raw/--si", help="Readings of the channels, or SI with offset and tare off.")
     ] = False,
@@ -155,11 +170,15 @@ def export_command(
 
     The file appears under its name only when it is complete; gaps are NaN.
     """
-    with reported(), Progress(console=Console(stderr=True), transient=True) as progress:
+    with (
+        reported(),
+        _file_or_folder(out) as place,
+        Progress(console=Console(stderr=True), transient=True) as progress,
+    ):
         task = progress.add_task(f"{run.name} → {format_}", total=1.0)
         path = export_run(
             run,
-            out,
+            place,
             format_,
             units="raw" if raw else "si",
             from_s=from_s,
@@ -177,7 +196,10 @@ def import_command(
         Path | None,
         typer.Option("--map", help="Which column is which channel (TOML); without it, names must agree."),
     ] = None,
-    out: Annotated[Path, typer.Option("--out", help="Folder of runs, or the run file to write.")] = Path(),
+    out: Annotated[
+        Path,
+        typer.Option("--out", help="Folder of runs (made if need be), or the run file, named with .h5."),
+    ] = Path(),
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Turn a recording of another program into a run.
@@ -188,8 +210,9 @@ def import_command(
     with reported():
         rig_text = read_text(rig)
         import_map = load_import_map(map_) if map_ else None
-        with Console(stderr=True).status(f"importing {file.name} …"):
-            report = import_file(file, parse_rig(rig_text, str(rig)), rig_text, out, import_map)
+        parsed = parse_rig(rig_text, str(rig))
+        with _file_or_folder(out) as place, Console(stderr=True).status(f"importing {file.name} …"):
+            report = import_file(file, parsed, rig_text, place, import_map)
     if as_json:
         document = {
             "run": str(report.run),
@@ -204,3 +227,23 @@ def import_command(
         print_paragraph("Doubtful", doubt, style="bold yellow")
     size = f"{len(report.channel_ids)} channels, {report.n_samples} samples at {report.rate_hz:g} Hz"
     typer.echo(f"{report.run}: {size}")
+
+
+@contextlib.contextmanager
+def _file_or_folder(out: Path) -> Iterator[Path]:
+    """A name without a suffix is a folder, and is made: no file would be found again without one."""
+    made = not out.suffix and not out.exists()
+    if made:
+        try:
+            out.mkdir(parents=True)
+        except OSError as error:
+            raise RunFileError(
+                f"the folder {out} cannot be made ({error.strerror or error})", advice="Choose another place."
+            ) from error
+    try:
+        yield out
+    except BaseException:
+        if made:
+            with contextlib.suppress(OSError):
+                out.rmdir()
+        raise

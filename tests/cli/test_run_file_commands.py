@@ -80,6 +80,11 @@ def test_export_writes_what_was_asked(app: typer.Typer, folder: Path) -> None:
     assert cli.invoke(app, ["export", run, *options]).exit_code == 2
     assert cli.invoke(app, ["export", run, *options, "--overwrite"]).exit_code == 0
     assert cli.invoke(app, ["export", run, "--format", "xls"]).exit_code == 2
+    new = folder / "exported" / "today"
+    assert cli.invoke(app, ["export", run, "--format", "npz", "--out", str(new)]).exit_code == 2
+    assert not new.exists(), "nothing is left of an export that is refused"
+    assert cli.invoke(app, ["export", run, "--format", "npz", "--raw", "--out", str(new)]).exit_code == 0
+    assert (new / "FR1-L1-1.npz").is_file(), "a name without a suffix is a folder"
 
 
 def test_import_reports_doubts_and_faults(app: typer.Typer, tmp_path: Path, configs: Path) -> None:
