@@ -75,12 +75,12 @@ def score(
             frozen=columns,
             polish=not columns,
         )
-        strain = _strain(model, trained) / len(runs)
+        strain = strain_of(model, trained) / len(runs)
         results += [_predict(model, runs[i], effects, trained, _of_run(whole, i), strain) for i in fold]
     return results
 
 
-def _strain(model: Model, trained: Fit) -> float:
+def strain_of(model: Model, trained: Fit) -> float:
     """Squared distance from the priors of those parameters that are the model's own, beyond chance."""
     own = {p.name for p in model.nuisance}
     square = math.fsum(
