@@ -11,11 +11,10 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from daq_app.campaign.plan import load_campaign
 from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.status import CampaignStatus, PlaceState
 from daq_app.campaign.verdicts import give_verdict
-from daq_app.cli.campaign_progress import DEFAULT_PLAN
+from daq_app.cli.campaign_progress import DEFAULT_PLAN, open_plan
 from daq_app.cli.campaign_report import report
 from daq_app.cli.campaign_simulate import simulate
 from daq_app.cli.errors import reported
@@ -50,7 +49,7 @@ def register(app: typer.Typer) -> None:
 def plan(file: Annotated[Path, typer.Argument(help="Campaign file (TOML).")] = DEFAULT_PLAN) -> None:
     """Show every test of a campaign in its order, with its level."""
     with reported():
-        campaign = load_campaign(file)
+        campaign = open_plan(file)
         table = Table(title=f"{campaign.name}: {len(campaign.tests)} tests", title_justify="left")
         for column in ("", "test", "θ0/α", "remark"):
             table.add_column(column, overflow="fold")
@@ -68,7 +67,7 @@ def status(
 ) -> None:
     """Say what of a campaign is done, what is missing, what must be repeated, and which test is next."""
     with reported():
-        campaign = load_campaign(plan_file)
+        campaign = open_plan(plan_file)
         if specimen and specimen not in campaign.specimens:
             wrong = f"`{specimen}` is no specimen of {plan_file}"
             right = f"Specimens: {', '.join(campaign.specimens)}"

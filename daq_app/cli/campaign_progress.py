@@ -10,6 +10,9 @@ from typing import Final
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from daq_app.campaign.plan import Campaign, load_campaign
+from daq_app.config import ConfigError, Problem
+
 DEFAULT_PLAN: Final = Path("configs/campaigns/costa.toml")
 
 
@@ -30,3 +33,12 @@ def progress_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
             bar.update(task, completed=done, total=total, description=name)
 
         yield advance
+
+
+def open_plan(path: Path) -> Campaign:
+    """The campaign of a file. Raises `ConfigError`; where nobody named a file, it says how to."""
+    if path == DEFAULT_PLAN and not path.exists():
+        wrong = "it is the campaign that is taken if none is named, and it is not here"
+        right = "Name the campaign file (--plan FILE.toml), or start in the folder that has `configs`"
+        raise ConfigError([Problem(str(path), "--plan", wrong, right)])
+    return load_campaign(path)

@@ -13,10 +13,9 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from daq_app.campaign.plan import load_campaign
 from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.status import CampaignStatus
-from daq_app.cli.campaign_progress import DEFAULT_PLAN, progress_bar
+from daq_app.cli.campaign_progress import DEFAULT_PLAN, open_plan, progress_bar
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
 
 if TYPE_CHECKING:
@@ -46,7 +45,7 @@ def report(
     from daq_app.rocking.analysis import AnalysisOptions
 
     with reported():
-        campaign = load_campaign(plan_file)
+        campaign = open_plan(plan_file)
         recorded = read_recorded(folder)
         status = CampaignStatus(campaign, recorded)
         with progress_bar("analysing") as advance:

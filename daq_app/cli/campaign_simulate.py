@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from daq_app.campaign.plan import Campaign, load_campaign
-from daq_app.cli.campaign_progress import DEFAULT_PLAN, progress_bar
+from daq_app.campaign.plan import Campaign
+from daq_app.cli.campaign_progress import DEFAULT_PLAN, open_plan, progress_bar
 from daq_app.cli.errors import reported
 from daq_app.config import ConfigError, Problem, load_rig
 
@@ -37,7 +37,7 @@ def simulate(
     from daq_app.campaign.simulate import CampaignTruth, SpecimenTruth, simulate_campaign
 
     with reported():
-        campaign = load_campaign(plan_file)
+        campaign = open_plan(plan_file)
         given = _given(r or [], campaign)
         specimens = {
             name: SpecimenTruth(given.get(name, _of_rig(campaign, name)), test_scatter, impact_scatter)

@@ -116,7 +116,8 @@ def simulate(
         int | None, typer.Option(help="Seed of noise and scatter.", show_default="rig file")
     ] = None,
     test: Annotated[
-        str | None, typer.Option(help="Name of the test.", show_default="SPECIMEN-LEVEL-1")
+        str | None,
+        typer.Option(help="Name of the test.", show_default="the file's name, else SPECIMEN-LEVEL-1"),
     ] = None,
     effect: Annotated[
         list[str] | None,

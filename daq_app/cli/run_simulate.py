@@ -7,6 +7,7 @@ from pathlib import Path
 
 from daq_app.acquisition.offline import Readings, record_offline
 from daq_app.acquisition.tare import NotSteady
+from daq_app.campaign.names import TestName
 from daq_app.config import ConfigError, Problem, load_rig, plan_tasks
 from daq_app.runfile import RunFileError
 from sim_hardware.direct import synthesise_test
@@ -45,10 +46,20 @@ def simulate_run(
             [Problem(str(rig_file), "simulation", str(error), "Correct the rig file or the option")]
         ) from error
     readings = Readings(simulated.readings, "simulated without real time", dict(simulated.truth))
-    name = test or f"{rig.specimen.name}-{level}-1"
+    name = test or _test_named_by(out, rig.specimen.name, level)
     try:
         return record_offline(rig, rig_file.read_text(encoding="utf-8"), plan, readings, out, name)
     except NotSteady as error:
         raise RunFileError(
             str(error), advice="Give the simulated wall a longer simulation.upright_s in the rig file."
         ) from error
+
+
+def _test_named_by(out: Path, specimen: str, level: str) -> str:
+    """The test that the file's name is the name of, if it is one of this level; else the first of it."""
+    try:
+        named = TestName.parse(out.stem)
+    except ValueError:
+        named = None
+    fits = named is not None and (named.specimen, named.level) == (specimen, level)
+    return out.stem if fits else f"{specimen}-{level}-1"

@@ -44,9 +44,14 @@ def test_the_level_is_in_the_name(test: str, level: str | None) -> None:
     assert level_of(test) == level
 
 
-@pytest.mark.parametrize(("level", "r"), [("L1", 0.82), ("L4", 0.95)])
-def test_a_simulated_run_gives_back_its_r(configs: Path, tmp_path: Path, level: str, r: float) -> None:
-    out = tmp_path / "run.h5"
+@pytest.mark.parametrize(
+    ("level", "r", "file", "test"),
+    [("L1", 0.82, "run.h5", "FR1-L1-1"), ("L4", 0.95, "FR1-L4-3.h5", "FR1-L4-3")],
+)
+def test_a_simulated_run_gives_back_its_r(
+    configs: Path, tmp_path: Path, level: str, r: float, file: str, test: str
+) -> None:
+    out = tmp_path / file
     arguments = ["simulate", str(configs / "fr1.toml"), "--level", level, "--r", str(r), "--out", str(out)]
     answer = runner.invoke(build_app(), [*arguments, "--json", "--seed", "5"])
     assert answer.exit_code == 0, answer.output
@@ -64,7 +69,7 @@ def test_a_simulated_run_gives_back_its_r(configs: Path, tmp_path: Path, level: 
     again = runner.invoke(build_app(), arguments)
     assert again.exit_code == 2, "a run is never overwritten"
     with open_run(out) as run:
-        assert run.header.test == f"FR1-{level}-1"
+        assert run.header.test == test
         assert [event.kind for event in run.events if event.kind in LEVELS] == []
 
 
