@@ -130,6 +130,7 @@ def score(
     folder: Annotated[Path, typer.Argument(help="Folder of the cases.", metavar="DIR")],
     labels: _LabelsOption = None,
     html: Annotated[Path | None, typer.Option(help="Write a page with pictures.")] = None,
+    page: Annotated[Path | None, typer.Option(help="The same as Markdown, pictures in images/.")] = None,
     json_out: Annotated[Path | None, typer.Option("--json", help="Write all numbers as JSON.")] = None,
 ) -> None:
     """Open the labels, check the seals, say how good the diagnosis is. Exit code 1: a target is missed."""
@@ -144,6 +145,10 @@ def score(
             from daq_app.gap.blind.report import write_report
 
             write_report(found, html)
+        if page:
+            from daq_app.gap.blind.report import write_markdown
+
+            write_markdown(found, page)
         if not found.passed:
             raise typer.Exit(EXIT_FAILED)
 

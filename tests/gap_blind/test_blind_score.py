@@ -17,7 +17,7 @@ from daq_app.gap.blind.judge import Judged, judge
 from daq_app.gap.blind.layout import SEAL_FILE
 from daq_app.gap.blind.mix import category_of
 from daq_app.gap.blind.names import COMPARABLE, accepted_names, base_name
-from daq_app.gap.blind.report import write_report
+from daq_app.gap.blind.report import write_markdown, write_report
 from daq_app.gap.blind.runner import Outcome, save_outcome
 from daq_app.gap.blind.score import Row, Score, score_folder, table
 from daq_app.gap.blind.seal import SealBroken, file_sha256, read_seal, seal_case
@@ -235,6 +235,10 @@ def test_a_folder_is_scored_and_shown(check: Path, tmp_path: Path) -> None:
     page = (tmp_path / "score.html").read_text(encoding="utf-8")
     assert page.count("data:image/png;base64,") == 3
     assert "Confusion matrix" in page and "20 cases" in page
+    write_markdown(found, tmp_path / "score.md")
+    text = (tmp_path / "score.md").read_text(encoding="utf-8")
+    assert "| pairs exact | 1 |" in text and "images/score-reliability.png" in text
+    assert (tmp_path / "images" / "score-confusion.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_result_for_other_data_and_a_changed_label_are_refused(check: Path, tmp_path: Path) -> None:

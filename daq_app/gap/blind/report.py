@@ -1,4 +1,4 @@
-"""The score of a blind check as one HTML page with its pictures inside."""
+"""The score of a blind check as a page: HTML with its pictures inside, or Markdown with them beside it."""
 
 from __future__ import annotations
 
@@ -45,8 +45,56 @@ bootstrap otherwise).</p>
 
 
 def write_report(score: Score, path: Path) -> None:
-    """Write the page."""
-    pictures = [
+    """Write the page as HTML with the pictures inside."""
+    template = Environment(autoescape=True).from_string(_PAGE)
+    text = template.render(
+        n=len(score.judged),
+        waiting=score.waiting,
+        rows=score.rows,
+        pictures=[(title, note, base64.b64encode(data).decode()) for title, note, data in _pictures(score)],
+        wrong=[j for j in score.judged if not j.answered_rightly],
+        number=number,
+        interval=interval,
+    )
+    path.write_text(text, encoding="utf-8")
+
+
+def write_markdown(score: Score, path: Path) -> None:
+    """Write the page as Markdown; its pictures lie beside it in ``images/``, named after it."""
+    met = {True: "met", False: "**missed**", None: ""}
+    lines = [
+        f"# Blind check: {len(score.judged)} cases with a result, {len(score.waiting)} still without",
+        "",
+        "Every label was opened after the diagnosis and agreed with its seal. Intervals are 95 %.",
+        "",
+        "| score | found | 95 % interval | cases | target | |",
+        "|---|---|---|---|---|---|",
+        *(
+            f"| {r.name} | {number(r.found.value)} | {interval(r.found)} | {r.found.n} | {r.target} | "
+            f"{met[r.met]} |"
+            for r in score.rows
+        ),
+    ]
+    images = path.parent / "images"
+    images.mkdir(parents=True, exist_ok=True)
+    for title, note, data in _pictures(score):
+        name = f"{path.stem}-{title.split()[0].lower()}.png"
+        (images / name).write_bytes(data)
+        lines += ["", f"## {title}", "", note, "", f"![{title}](images/{name})"]
+    lines += ["", "## Cases that were answered wrongly", ""]
+    lines += ["| case | hidden | strength, sd | decision | named first | p |", "|---|---|---|---|---|---|"]
+    lines += [
+        f"| {j.case} | {' + '.join(j.truth) or 'nothing'} | {number(j.strength)} | {j.decision} | "
+        f"{' + '.join(j.named)} | {number(j.claimed)} |"
+        for j in score.judged
+        if not j.answered_rightly
+    ]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _pictures(score: Score) -> list[tuple[str, str, bytes]]:
+    """(title, what it shows, PNG)."""
+    return [
         (
             "Confusion matrix",
             "Rows: what was hidden. Columns: what was answered; decisions that name nothing in brackets.",
@@ -63,17 +111,6 @@ def write_report(score: Score, path: Path) -> None:
             _picture(lambda axes: _draw_closure(axes, score), (9.0, 9.0)),
         ),
     ]
-    template = Environment(autoescape=True).from_string(_PAGE)
-    text = template.render(
-        n=len(score.judged),
-        waiting=score.waiting,
-        rows=score.rows,
-        pictures=pictures,
-        wrong=[j for j in score.judged if not j.answered_rightly],
-        number=number,
-        interval=interval,
-    )
-    path.write_text(text, encoding="utf-8")
 
 
 def number(value: float) -> str:
@@ -85,12 +122,12 @@ def interval(value: Value) -> str:
     return "–" if math.isnan(value.value) else f"{value.low:.3g} to {value.high:.3g}"
 
 
-def _picture(draw: Callable[[Axes], None], size: tuple[float, float]) -> str:
+def _picture(draw: Callable[[Axes], None], size: tuple[float, float]) -> bytes:
     figure = Figure(figsize=size, layout="constrained")
     draw(figure.add_subplot())
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=80)
-    return base64.b64encode(buffer.getvalue()).decode()
+    return buffer.getvalue()
 
 
 def _draw_confusion(axes: Axes, score: Score) -> None:
