@@ -88,6 +88,7 @@ def write_result(run: Path, test: TestSummary, earlier: Sequence[TestSummary] = 
             names=METHODS,
             deviation=period_deviation(test),
             plus_minus=plus_minus,
+            bias=_bias,
         )
     )
     return [
@@ -99,17 +100,40 @@ def write_result(run: Path, test: TestSummary, earlier: Sequence[TestSummary] = 
 def _pdf(test: TestSummary, figure: Figure, rows: Sequence[RepetitionRow]) -> bytes:
     buffer = io.BytesIO()
     with PdfPages(buffer, metadata={"Title": test.test}) as pages:
-        pages.savefig(figure)
+        pages.savefig(figure, bbox_inches="tight", pad_inches=0.4)
         pages.savefig(_table_page(test, rows))
     return buffer.getvalue()
 
 
+def _bias(value: float) -> str:
+    """With its sign; none where it rounds to nothing."""
+    return f"{value:+.4f}".replace("-", "−") if abs(value) >= 5e-5 else "0.0000"
+
+
 def _table_page(test: TestSummary, rows: Sequence[RepetitionRow]) -> Figure:
+    """r by each estimator, and the tests of the level, as on the HTML page."""
     page = Figure(figsize=(11.0, 7.2))
     page.text(0.05, 0.93, test.test, fontsize=15, fontweight="bold")
     page.text(0.05, 0.88, verdict_sentence(test), fontsize=11, wrap=True)
-    axis = page.add_axes((0.05, 0.05, 0.9, 0.78))
-    axis.axis("off")
+    methods = [(name, method) for name in METHODS if (method := test.methods.get(name)) is not None]
+    estimates = [
+        [
+            name,
+            f"{method.r:.4f}",
+            plus_minus(method.standard_error),
+            f"{method.r / test.r_max:.3f}",
+            _bias(method.bias),
+            f"{method.corrected:.4f}",
+        ]
+        for name, method in methods
+    ]
+    if estimates:
+        header = ["Estimator", "r", "standard error", "r/r_max", "bias of the method", "bias-corrected r"]
+        _table(page, (0.05, 0.62, 0.9, 0.22), header, estimates)
+    deviation = period_deviation(test)
+    if deviation is not None:
+        said = f"The measured periods deviate from theory (4.1) by {100 * deviation:+.1f} % on average."
+        page.text(0.05, 0.65, said.replace("-", "−"), fontsize=10)
     cells = [
         [
             row.test + ("  (this test)" if row.this else ""),
@@ -120,14 +144,23 @@ def _table_page(test: TestSummary, rows: Sequence[RepetitionRow]) -> Figure:
         ]
         for row in rows
     ]
+    page.text(0.05, 0.58, "Tests of this level", fontsize=12, fontweight="bold")
     header = ["Test", "θ0/α", "Impacts", *(f"r {name}" for name in METHODS), "Verdict"]
+    _table(page, (0.05, 0.05, 0.9, 0.5), header, cells)
+    return page
+
+
+def _table(
+    page: Figure, box: tuple[float, float, float, float], header: list[str], cells: list[list[str]]
+) -> None:
+    axis = page.add_axes(box)
+    axis.axis("off")
     table = axis.table(
         cellText=cells, colLabels=header, loc="upper left", edges="horizontal", cellLoc="center"
     )
     table.auto_set_font_size(False)
     table.set_fontsize(10)
     table.scale(1.0, 1.5)
-    return page
 
 
 def _replace(path: Path, content: bytes) -> Path:
