@@ -102,10 +102,17 @@ def _wall(rig: Rig, arguments: argparse.Namespace) -> SignalSource:
     return wall
 
 
-def _warm_up(bench: Bench) -> None:
-    """Load the wall's compiled kernels now: at speed 60 a second of it would be a minute of the bench."""
+def warm_up(bench: Bench, arguments: argparse.Namespace) -> None:
+    """Load the wall's compiled kernels now: a second of it would be a second in which nothing is sampled.
+
+    On a new machine they are compiled here. A commanded wall would meet those of the motion only at its
+    release, so a scripted one is let go in its place.
+    """
     terminals = tuple(name for device in bench.present() for name in device.physical_channels)
     bench.source.volts(terminals, np.linspace(0.0, 0.01, 11))
+    if arguments.wall == "commanded":
+        rehearsed = argparse.Namespace(**{**vars(arguments), "wall": "scripted"})
+        _wall(load_rig(arguments.config), rehearsed).volts(terminals, np.arange(0.0, 60.0, 0.5))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -116,7 +123,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (ConfigError, UnknownProduct, ValueError, OSError, RuntimeError) as error:
         print(f"daqmx_server: {error}", file=sys.stderr)
         return 2
-    _warm_up(server.bench)
+    warm_up(server.bench, arguments)
     ended = threading.Event()
     for name in ("SIGINT", "SIGTERM", "SIGBREAK"):
         if hasattr(signal, name):
