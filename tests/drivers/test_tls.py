@@ -18,21 +18,22 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import trustme
 
 from drivers import DriverError, open_driver
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the stand-in for NI's tool is a script")
-KEYS = Path(__file__).parent / "tls"
-"""Made for these tests; they protect nothing."""
 
 
 class TlsRelay:
     """Takes TLS connections on a port of its own and passes on what they say."""
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, authority: trustme.CA) -> None:
         self._behind = port
         self._context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        self._context.load_cert_chain(KEYS / "server.pem", KEYS / "server-key.pem")
+        authority.issue_cert("localhost").configure_cert(self._context)
+        authority.configure_trust(self._context)
+        self._context.verify_mode = ssl.CERT_REQUIRED  # both sides show who they are
         self._context.set_alpn_protocols(["h2"])
         self._listening = socket.create_server(("127.0.0.1", 0))
         self.port = self._listening.getsockname()[1]
@@ -79,26 +80,35 @@ def lab(laboratory: Callable[..., Any]) -> Any:
     return laboratory()
 
 
+@pytest.fixture(scope="module")
+def authority() -> trustme.CA:
+    """Who both sides trust."""
+    return trustme.CA()
+
+
 @pytest.fixture
-def relay(lab: Any) -> Iterator[TlsRelay]:
-    made = TlsRelay(lab.server.port)
+def relay(lab: Any, authority: trustme.CA) -> Iterator[TlsRelay]:
+    made = TlsRelay(lab.server.port, authority)
     yield made
     made.close()
 
 
 @pytest.fixture
-def configured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+def configured(authority: trustme.CA, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """What NI's tool says of this machine's TLS settings."""
 
-    def write(trusted: str = "server.pem", server_mode: str = "TrustedCertificates") -> None:
+    def write(trusted: trustme.CA = authority, server_mode: str = "TrustedCertificates") -> None:
+        own = authority.issue_cert("operator")
         answer = {
             "client": [
                 {
                     "service_name": "ni-grpc-device",
-                    "certificate_mode": "Disabled",
+                    "certificate_mode": "Managed",
+                    "certificate_chain_contents": own.cert_chain_pems[0].bytes().decode(),
+                    "certificate_key_contents": own.private_key_pem.bytes().decode(),
                     "server_mode": server_mode,
-                    "trusted_certificates_location": f"File://{trusted}",
-                    "trusted_certificates_contents": (KEYS / trusted).read_text(encoding="ascii"),
+                    "trusted_certificates_location": "File://trusted.pem",
+                    "trusted_certificates_contents": trusted.cert_pem.bytes().decode(),
                 }
             ]
         }
@@ -127,7 +137,7 @@ def test_samples_come_through_tls(lab: Any, relay: TlsRelay, configured: Callabl
 def test_a_server_that_is_not_trusted_is_not_talked_to(
     lab: Any, relay: TlsRelay, configured: Callable[..., None]
 ) -> None:
-    configured(trusted="stranger.pem")
+    configured(trusted=trustme.CA())
     driver = open_driver(f"grpcs://localhost:{relay.port}")
     with pytest.raises(DriverError) as told:
         driver.open(lab.plan)
