@@ -18,6 +18,19 @@ from daq_app.monitor.session import Published
 from daq_app.monitor.strip_panel import arrange
 
 
+def recorded(sample: int, *, safe: int) -> HealthMessage:
+    """A recording that has read up to one sample and has it on disk up to another."""
+    return HealthMessage(
+        sample=sample,
+        acknowledged_sample=safe,
+        recording=True,
+        backlog_samples=0,
+        buffer_samples=80_000,
+        gaps=0,
+        lost_samples=0,
+    )
+
+
 def test_the_live_page_draws_what_the_session_knows(window, stand_in, play):
     play(window.session, window.clock, stand_in, stand_in.release_s + 3.0)
     live = window.live
@@ -160,16 +173,7 @@ def test_a_value_that_goes_stale_leaves_the_screen_with_the_next_frame(window, s
 
 def test_recording_light_says_when_the_disk_is_behind(window):
     window.session.feed(Published(StateMessage(state=State.ARMED), window.clock.now))
-    health = HealthMessage(
-        sample=20_000,
-        acknowledged_sample=8_000,
-        recording=True,
-        backlog_samples=0,
-        buffer_samples=80_000,
-        gaps=0,
-        lost_samples=0,
-    )
-    window.session.feed(Published(health, window.clock.now))
+    window.session.feed(Published(recorded(20_000, safe=8_000), window.clock.now))
     window.header.refresh(window.colours)
     assert window.header.words["recording"] == "Disk is slow"
     assert window.header.words["recording_detail"] == "3.0 s wait for the disk"
@@ -208,16 +212,7 @@ def test_a_window_opened_in_mid_run_dates_the_recording_from_its_arming(window):
     window._adopt_past(past)
     assert window.notices.current == ("warning", "Left by an earlier session")
     window.session.feed(Published(StateMessage(state=State.ROCKING), window.clock.now))
-    health = HealthMessage(
-        sample=60_400,
-        acknowledged_sample=60_000,
-        recording=True,
-        backlog_samples=0,
-        buffer_samples=80_000,
-        gaps=0,
-        lost_samples=0,
-    )
-    window.session.feed(Published(health, window.clock.now))
+    window.session.feed(Published(recorded(60_400, safe=60_000), window.clock.now))
     window.header.refresh(window.colours)
     assert window.header.words["recording_detail"] == "5.0 s safe on disk"
     window.live.draw_slow()
