@@ -49,7 +49,7 @@ def acquisition(configs, tmp_path_factory):
     """One acquisition and one wall for all tests here: they take turns, as on a test day."""
     out = tmp_path_factory.mktemp("day") / "runs"
     out.mkdir()
-    process = AcquisitionProcess(["--rig", str(configs / "fr1.toml"), "--out", str(out), "--speed", "4"])
+    process = AcquisitionProcess(["--rig", str(configs / "fr1.toml"), "--out", str(out), "--speed", "2"])
     yield process
     process.kill()
 
