@@ -64,3 +64,19 @@ def test_foreign_lag_is_named_with_its_size() -> None:
     assert result.which[0].effects == ("lag@lvdt",)
     estimate = result.effect_parameters[0]
     assert estimate.low < 5.197e-3 < estimate.high
+
+
+@pytest.mark.heavy
+@pytest.mark.timeout(600)
+def test_foreign_soft_joint_is_named_with_its_size() -> None:
+    result = _diagnose("case_005")
+    assert result.which[0].effects == ("winkler",)
+    estimate = result.effect_parameters[0]
+    assert estimate.low < 0.1079e-3 < estimate.high, "from the label's stiffness, weight and base"
+
+
+@pytest.mark.heavy
+@pytest.mark.timeout(600)
+def test_two_foreign_causes_at_once_are_not_taken_for_one() -> None:
+    """A tilted base and contact springs; no single effect may be named as the cause."""
+    assert _diagnose("case_002").decision.verdict not in ("effect", "nothing_missing", "parameters")
