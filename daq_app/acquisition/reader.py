@@ -23,7 +23,7 @@ from drivers import Block, Driver, DriverError
 
 _OVERDUE_S: Final = 0.4
 """Several read periods: from then on a read that has found nothing is told."""
-_QUICK_READ_S: Final = 0.025
+_QUICK_READ_S: Final = 0.032
 """Read period while the wall moves: r must not wait for the end of a long block."""
 _STUCK_RECOVERIES: Final = 20
 """So many recoveries in a row without one sample between them will not help any more."""
