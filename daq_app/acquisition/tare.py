@@ -25,9 +25,8 @@ _LARGEST_SHARE: Final = 0.25
 _NOISE_FACTOR: Final = 6.0
 """Scatter above this many times the expected noise is motion, hum or a loose plug."""
 _DRIFT_FACTOR: Final = 4.0
-_UPRIGHT_SHARE: Final = 0.07
-"""Largest |tilt| / α at which the wall counts as upright: zeroing a pulled wall would hide θ0. Less than half
-of the lowest level of a plan (0.15), more than what tiltmeters are mounted off by."""
+_UPRIGHT_SHARE: Final = 0.05
+"""Largest |tilt| / α at which the wall counts as upright: zeroing a pulled wall would hide θ0."""
 
 
 class NotSteady(Exception):

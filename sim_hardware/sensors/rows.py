@@ -18,6 +18,8 @@ IEPE_CORNER_HZ: Final = 0.5
 RING_M_S2: Final = 110.0
 """Ringing of an accelerometer per rad/s of approach: several g for the first impacts of a test."""
 FLOATING_NOISE_V: Final = 2e-3
+_LEVELLED_RAD: Final = 8e-3
+"""A tiltmeter is levelled to within half a degree when it is mounted, however wide its range."""
 
 _AXIS: Final = {"x": la.AXIS_X, "y": la.AXIS_Y, "z": la.AXIS_Z}
 _RING_BY_AXIS: Final = {"x": 1.0, "y": 0.2, "z": 1.3}
@@ -60,6 +62,8 @@ def sensor_row(channel: Channel, height_m: float, offset_scatter: float, seed: i
     low, high = channel.range_si
     iepe = channel.measurement == "iepe"
     scatter = offset_scatter * (high - low) * own.standard_normal()
+    if channel.family == "tiltmeter":
+        scatter = min(max(scatter, -_LEVELLED_RAD), _LEVELLED_RAD)
     row[la.RW_OFFSET] = 0.0 if iepe else scatter  # an AC-coupled sensor shows no offset
     row[la.RW_LOW], row[la.RW_HIGH] = low, high
     if channel.family == "accelerometer":
