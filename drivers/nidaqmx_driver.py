@@ -239,8 +239,7 @@ class NidaqmxDriver:
             if self._connection.is_remote:
                 self._connection.reconnect()
             if self._tasks_run_on():
-                self._go_on_in_the_buffer(self._plan)
-                return ""
+                return self._go_on_in_the_buffer(self._plan)
         except Exception as error:
             raise translate(error, doing="taking up reading again") from error
         return self._start_again(self._plan)
@@ -259,15 +258,21 @@ class NidaqmxDriver:
             raise
         return bool(self._streams)
 
-    def _go_on_in_the_buffer(self, plan: TaskPlan) -> None:
+    def _go_on_in_the_buffer(self, plan: TaskPlan) -> str:
+        """Read on where reading stood, or at the oldest sample there is; says so where some are gone."""
         # The oldest samples are being overwritten while we ask for them: leave a margin.
         margin = max(2 * plan.read_samples, self._buffer_samples // 20)
         oldest = max(stream.total_acquired() for stream in self._streams) - self._buffer_samples + margin
         position = max(self._next_sample - self._origin, oldest)
         for stream in self._streams:
             stream.seek(position)
+        overwritten = self._origin + position > self._next_sample
         self._next_sample = self._origin + position
         self._last_housekeeping = time.monotonic()
+        if not overwritten:
+            return ""
+        kept_s = self._buffer_samples / self._rate_hz
+        return f"The device's buffer holds {kept_s:.0f} s: older samples had been overwritten"
 
     def _start_again(self, plan: TaskPlan) -> str:
         """New tasks in place of those that have ended; their samples take their place by the clock."""

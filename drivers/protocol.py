@@ -141,8 +141,9 @@ class Driver(Protocol):
 
         The next block begins at the oldest sample that was not read yet and still exists: a
         `first_sample` beyond the last block's end is the gap. Tasks that have ended are started again; the
-        gap is then as long as the clocks say, and the answer is a sentence on how well that is known
-        (empty where the sample clock ran on). Raises `DriverError`; `recoverable`: try again later.
+        gap is then as long as the clocks say, and the answer is a sentence on how well that is known. Where
+        the sample clock ran on, the answer says what had been overwritten by then; it is empty where nothing
+        was lost. Raises `DriverError`; `recoverable`: try again later.
         """
         ...
 

@@ -118,6 +118,20 @@ def test_overwritten_samples_are_a_gap_of_the_right_length(laboratory: Laborator
     driver.close()
 
 
+def test_samples_overwritten_while_the_way_was_cut_are_told_as_such(laboratory: Laboratories) -> None:
+    """The first error after a sleep is often a call that took too long; the loss has another cause."""
+    lab = laboratory()
+    driver = started(lab)
+    block = driver.read(1.0)
+    assert driver.recover() == ""
+    after = driver.read(1.0)
+    assert after.first_sample == block.first_sample + block.n_samples
+    lab.let_time_pass(lab.rig.acquisition.buffer_s + 3.0)
+    assert "20 s: older samples had been overwritten" in driver.recover()
+    assert lost([after, driver.read(1.0)]) >= after.first_sample + 3 * 4000
+    driver.close()
+
+
 def test_a_long_deafness_within_the_buffer_costs_nothing_and_is_caught_up_in_large_reads(
     laboratory: Laboratories,
 ) -> None:
