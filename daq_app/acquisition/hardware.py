@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from daq_app.acquisition.options import time_factor
 from daq_app.acquisition.preflight import check_modules
 from daq_app.acquisition.simulated import SimulatedServer
 from daq_app.config.rig import Rig
@@ -75,10 +77,10 @@ def _replay(path: Path, options: argparse.Namespace, stack: ExitStack) -> Callab
         run = stack.enter_context(open_run(path))
     except RunFileError as error:
         raise DriverError(error.message, advice=error.advice or "Choose a run file to replay") from error
-    speed = float("inf") if options.speed == "max" else float(options.speed)
-    return lambda: ReplayDriver(run, speed)
+    return lambda: ReplayDriver(run, time_factor(options.speed))
 
 
 def _finite(speed: str) -> float:
     """A simulated device that runs as fast as it can has no rate; the driver learns what it sees."""
-    return 1.0 if speed == "max" else float(speed)
+    factor = time_factor(speed)
+    return factor if math.isfinite(factor) else 1.0

@@ -19,6 +19,11 @@ def _speed(text: str) -> str:
     raise argparse.ArgumentTypeError("it is a factor above 0, or max")
 
 
+def time_factor(speed: str) -> float:
+    """How much faster than real time; infinite for `max`."""
+    return float("inf") if speed == "max" else float(speed)
+
+
 def _is_number(text: str) -> bool:
     try:
         float(text)

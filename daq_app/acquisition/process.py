@@ -19,7 +19,7 @@ from daq_app.acquisition.finaliser import Finaliser
 from daq_app.acquisition.hardware import driver_maker, planned_truth
 from daq_app.acquisition.items import RequestRefused
 from daq_app.acquisition.messages import Command, Reply
-from daq_app.acquisition.options import READY, parse
+from daq_app.acquisition.options import READY, parse, time_factor
 from daq_app.acquisition.session_file import SessionFile, remove_session_file, write_session_file
 from daq_app.config import ConfigError, Rig, TaskPlan, load_rig, plan_tasks
 from daq_app.runfile import FolderLock, RunFileError
@@ -61,7 +61,7 @@ class Process:
                 spare_folder=options.spare,
                 patience=Patience(reconnect_limit_s=options.reconnect_within),
                 truth=planned_truth(connection, rig, options),
-                speed=float("inf") if options.speed == "max" else float(options.speed),
+                speed=time_factor(options.speed),
             ),
             self._desk.publisher,
             finaliser,
