@@ -244,7 +244,7 @@ def lasting() -> Iterator[Counter]:
     counter.close()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(frames=st.lists(st.binary(max_size=300), min_size=1, max_size=12))
 def test_any_frames_at_all(lasting: Counter, frames: list[bytes]) -> None:
     counter = lasting

@@ -69,7 +69,7 @@ def _loads_or_is_refused(text: str) -> None:
         assert sum(len(task.channels) for task in plan.tasks) == plan.n_channels
 
 
-@settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
 def test_changed_values(data: st.DataObject) -> None:
     tables = copy.deepcopy(_tables(data.draw(st.sampled_from(_NAMES))))
@@ -84,7 +84,7 @@ def test_changed_values(data: st.DataObject) -> None:
     _loads_or_is_refused(tomli_w.dumps(tables))
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(st.sampled_from(_NAMES), st.integers(0, 12_000), st.integers(0, 40), st.text(max_size=6))
 def test_changed_text(name: str, start: int, length: int, insert: str) -> None:
     text = _text(name)

@@ -18,7 +18,7 @@ from daq_app.gap.core.likelihood import Covariance, log_density
 from daq_app.gap.core.parameters import between, positive
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(1, 30), st.integers(0, 8), st.integers(0, 4), st.integers(0, 2**32 - 1))
 def test_density_and_whitening_agree_with_dense_algebra(n: int, k: int, fixed: int, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -16,7 +16,7 @@ from daq_app.gap.blind.seal import SealBroken, open_label, seal_case
 from daq_app.runfile import open_run
 
 DIAGNOSERS = '''
-import os, sys, time
+import os, sys, threading
 from pathlib import Path
 
 def guess(case):
@@ -34,7 +34,7 @@ def breaks(case):
     raise ValueError("no idea")
 
 def hangs(case):
-    time.sleep(600)
+    threading.Event().wait()
 '''
 
 

@@ -17,6 +17,11 @@ from daq_app.monitor.gap_page import GapPage
 from daq_app.monitor.gap_runner import GapRunner
 from daq_app.monitor.gap_views import closure_bars, evidence_bars, map_cells
 
+LONG_WORK = """
+import threading
+print('{"done": 0, "total": 1, "text": "long"}', flush=True)
+threading.Event().wait()
+"""
 MADE = Path(__file__).parents[1] / "gap" / "made_diagnosis.py"
 
 
@@ -91,9 +96,7 @@ def test_the_page_lists_the_runs_diagnoses_them_and_shows_the_answer(qtbot, page
 
 
 def test_a_diagnosis_can_be_stopped_and_its_process_is_gone(qtbot, page, child, tmp_path):
-    started = child(
-        'import time; print(\'{"done": 0, "total": 1, "text": "long"}\', flush=True); time.sleep(600)'
-    )
+    started = child(LONG_WORK)
     with qtbot.waitSignal(page.runner.progress, timeout=60_000):
         page.runner.start([tmp_path / "FR1-L1-1.h5"])
     with qtbot.waitSignal(page.runner.failed, timeout=60_000) as failed:
@@ -104,7 +107,7 @@ def test_a_diagnosis_can_be_stopped_and_its_process_is_gone(qtbot, page, child, 
 
 
 def test_a_test_that_is_armed_ends_the_diagnosis_and_keeps_the_next_one_off(qtbot, page, child, tmp_path):
-    child('import time; print(\'{"done": 0, "total": 1, "text": "long"}\', flush=True); time.sleep(600)')
+    child(LONG_WORK)
     told = []
     page.told.connect(lambda severity, text: told.append(text))
     with qtbot.waitSignal(page.runner.progress, timeout=60_000):

@@ -16,7 +16,7 @@ from daq_app.monitor.motion_trace import MotionTrace
     cuts=st.lists(st.tuples(st.integers(0, 15), st.integers(1, 40)), min_size=1, max_size=12),
     start=st.integers(0, 30),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_each_column_holds_the_extremes_of_exactly_its_samples(n_columns, size, cuts, start):
     rng = np.random.default_rng(5)
     ring = MinMaxRing(3, n_columns, size)
@@ -59,7 +59,6 @@ def test_a_spike_of_one_sample_stays_visible_until_it_leaves_the_strip():
     first=st.integers(0, 300),
     width=st.integers(0, 60),
 )
-@settings(deadline=None)
 def test_the_trace_keeps_the_newest_points_and_any_window_of_them(capacity, blocks, first, width):
     trace = MotionTrace(capacity)
     count = 0
@@ -88,7 +87,6 @@ def test_a_restarted_clock_drops_the_old_points():
     sizes=st.lists(st.integers(1, 90), min_size=1, max_size=12),
     start=st.integers(0, 99),
 )
-@settings(deadline=None)
 def test_merged_columns_hold_the_same_extremes_on_a_grid_that_stands_still(merge, sizes, start):
     rng = np.random.default_rng(sum(sizes) + start)
     ring = MinMaxRing(2, 24, 5)

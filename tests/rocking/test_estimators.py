@@ -37,7 +37,7 @@ def follow(motion, time, rotation):
     return track
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(0.05, 0.6), st.floats(0.7, 0.98), st.floats(0.95, 1.05), st.sampled_from([1, -1]))
 def test_arcs_of_clean_motion_are_exact_for_any_p(phi, r, factor, side):
     """Without noise the fits give peaks and one-sided speeds, though their own p is wrong."""

@@ -83,7 +83,7 @@ def test_rotation_and_velocity_belong_to_the_same_samples(made):
     np.testing.assert_allclose(velocity[falling], omega[falling], atol=5e-3)
 
 
-@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=5, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_block_size_gives_the_same_answer(made, data):
     test = made(phi=0.15, r=0.82, side=1, seed=3)

@@ -37,7 +37,7 @@ def test_noise_is_as_stated():
     assert FILTER.velocity(noise).std() == pytest.approx(FILTER.noise_rad_s(1e-4), rel=0.03)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(st.integers(0, 700), min_size=1, max_size=8), st.integers(0, 2**32 - 1))
 def test_streaming_equals_offline(sizes, seed):
     signal = np.random.default_rng(seed).normal(size=sum(sizes) + 1)

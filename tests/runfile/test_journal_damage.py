@@ -121,7 +121,7 @@ def damages(draw: st.DrawFn) -> Damage:
 def test_no_damage_gives_a_wrong_sample(tmp_path: Path, sound: bytes, foreign: bytes) -> None:
     path = tmp_path / "damaged.journal"
 
-    @settings(max_examples=400, deadline=None, derandomize=True)
+    @settings(max_examples=400)
     @given(todo=st.lists(damages(), min_size=1, max_size=4))
     def prove(todo: list[Damage]) -> None:
         data = sound

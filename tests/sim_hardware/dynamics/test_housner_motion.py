@@ -166,7 +166,7 @@ def test_times_need_not_ascend() -> None:
     assert np.array_equal(motion.rotation(shuffled)[order], motion.rotation(times))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     level=st.floats(0.02, 0.97),
     r=st.floats(0.0, 1.0),

@@ -53,7 +53,7 @@ def test_deviates_are_normal_white_and_independent() -> None:
     assert abs(np.corrcoef(a, b)[0, 1]) < 0.02
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(cuts=st.lists(st.integers(1, 31_999), max_size=6), start=st.integers(0, 60_000))
 def test_pieces_make_the_same_volts_as_the_whole(
     wall: VirtualRig, terminals: tuple[str, ...], cuts: list[int], start: int

@@ -19,7 +19,7 @@ from sim_hardware.daqmx_server.sampling import Input, Sampler, SampleTimes
 from sim_hardware.daqmx_server.triggers import Condition, CrossingSearch
 from sim_hardware.faults.model import ClockChange, fault_from
 
-_steady = settings(deadline=None, derandomize=True, max_examples=60)
+_steady = settings(max_examples=60)
 
 _changes = st.lists(
     st.builds(
