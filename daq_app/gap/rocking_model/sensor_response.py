@@ -17,6 +17,7 @@ from daq_app.gap.rocking_model.sensor_blocks import (
     Block,
     first_order,
     moment_shape,
+    side_of,
     slip_shape,
 )
 
@@ -215,7 +216,7 @@ def _base_rotation(run: RockingRun, block: Block, values: Mapping[str, float]) -
         return first_order(shape, slow)
 
     moment = _unit(run, block, "moment", lambda: seen(moment_shape(theta, run.survey.alpha_rad)))
-    reaction = _unit(run, block, "reaction", lambda: seen(np.tanh(theta / 1e-4)))
+    reaction = _unit(run, block, "reaction", lambda: seen(side_of(theta)))
     found: FloatArray = values["compliance.phi"] * (fall * moment + (1.0 - fall) * reaction)
     return found
 

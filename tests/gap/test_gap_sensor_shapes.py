@@ -1,0 +1,36 @@
+"""Shapes that the regressions on the coarse grid use are means over its intervals, not values of means."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from daq_app.gap.rocking_model.motion_grid import GRID_HZ, coarse
+from daq_app.gap.rocking_model.sensor_blocks import UPRIGHT_RAD, moment_shape, side_of
+
+RATE_HZ = 4000.0
+ALPHA = 0.215
+
+
+def _rocking() -> np.ndarray:
+    """Rotation of ever shorter half-cycles that cross zero anywhere in the grid's intervals, (n,)."""
+    t = np.arange(0.0, 8.0, 1.0 / RATE_HZ)
+    return 0.06 * np.exp(-0.3 * t) * np.cos(2 * np.pi * (0.6 * t + 0.05 * t**2))
+
+
+def test_the_side_in_the_interval_of_an_impact_is_its_mean() -> None:
+    theta = _rocking()
+    true = coarse(np.tanh(theta / UPRIGHT_RAD), RATE_HZ)
+    of_means = np.tanh(coarse(theta, RATE_HZ) / UPRIGHT_RAD)
+    error = np.abs(side_of(coarse(theta, RATE_HZ)) - true)
+    assert error.max() < 0.03
+    assert np.abs(of_means - true).max() > 0.5, "else there would be nothing to be careful about"
+
+
+def test_a_base_that_gives_way_is_found_without_bias() -> None:
+    """Regression of the true step, averaged, on the shape: an error in the shape makes it too small."""
+    theta = _rocking()
+    sharp = np.tanh(theta / UPRIGHT_RAD) * np.sin(ALPHA - np.abs(theta)) / np.sin(ALPHA)
+    seen, mean = coarse(sharp, RATE_HZ), coarse(theta, RATE_HZ)
+    columns = np.column_stack([moment_shape(mean, ALPHA), mean, np.gradient(mean) * GRID_HZ])
+    step = np.linalg.lstsq(columns, seen, rcond=None)[0][0]
+    assert abs(step - 1.0) < 2e-3
