@@ -73,6 +73,45 @@ def test_exchanged_plugs_are_put_back() -> None:
     assert any("WP-1 and WP-4 exchanged" in limit for limit in limits)
 
 
+@pytest.mark.parametrize(
+    ("target", "places", "words"),
+    [
+        ("wire", 1.0, "WP-2 shows WP-1, WP-3 shows WP-2, WP-4 shows WP-3"),
+        ("wire", 2.0, "WP-3 shows WP-1, WP-4 shows WP-2, WP-5 shows WP-3"),
+        ("lvdt", 1.0, "LV-A01 and LV-B01 exchanged"),
+    ],
+)
+def test_plugs_that_are_all_moved_on_are_put_back(target: str, places: float, words: str) -> None:
+    """Two wires of one height show the same: which of these is which stays open, and needs no answer."""
+    key = f"swap@{target}"
+    crossed, limits = prepare(simulate({key: {"places": places}}, LEVELS))
+    assert set(found_marks(crossed)) == {key}
+    assert _mark(crossed[0], key) == places
+    assert abs(_value(crossed[0], "wire", "gain")) < 5e-3
+    assert any(words in limit for limit in limits)
+
+
+def test_a_channel_that_shows_no_sensor_of_its_kind_does_not_hide_exchanged_plugs() -> None:
+    runs = simulate({}, LEVELS)
+    place = {sensor.id: i for i, sensor in enumerate(runs[0].sensors)}
+    for run in runs:
+        run.channels[[place["WP-1"], place["WP-4"]]] = run.channels[[place["WP-4"], place["WP-1"]]]
+        run.channels[place["WP-3"]] *= 4.0
+    crossed, limits = prepare(runs)
+    assert "swap@wire" in found_marks(crossed)
+    assert any("WP-1 and WP-4 exchanged" in limit for limit in limits)
+
+
+def test_curvature_of_all_wires_is_no_fault_of_one() -> None:
+    """The error grows with the square of the travel, which differs from wire to wire."""
+    family = _prepared({"wire_cosine@wire": {"kappa": 0.2}})
+    assert found_channels(family) == {}
+    run = family[0]
+    seen = _value(run, "wire", "even harmonic")
+    assert seen == pytest.approx(0.2 * run.wire_bend_m, abs=0.01)
+    assert found_channels(_prepared({"wire_cosine@WP-4": {"kappa": 0.2}})) == {"WP-4": "wire"}
+
+
 def test_a_family_that_stops_short_of_its_range_is_found_and_the_motion_read_elsewhere() -> None:
     runs = _prepared({"saturation@lvdt": {"limit": 0.04}})
     assert set(found_marks(runs)) == {"saturation@lvdt"}

@@ -7,7 +7,7 @@ the whole family does cancels. What is left is regressed on a few shapes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,8 +97,11 @@ def suspects(runs: Sequence[GapRun], grids: Sequence[Grid]) -> dict[Family, str]
             # A bad channel spoils the prediction of the others: right is the one without which all agree.
             rest = _sizes(usable, family, (name,))
             own = rest.pop(name)
-            if own > SUSPECT and max(rest.values()) < max(SUSPECT, 0.4 * own):
-                found[family] = name
+            agree = max(SUSPECT, 0.4 * own)
+            if own > SUSPECT and max(rest.values()) < agree:
+                # Curvature is the one fault of a whole family that does not cancel between its channels.
+                if max(_sizes([_straightened(d) for d in usable], family, ()).values()) > agree:
+                    found[family] = name
                 break
     return found
 
@@ -118,6 +121,14 @@ def _sizes(data: Sequence[_Family], family: Family, without: tuple[str, ...]) ->
                 usual = found.remains
             rows.setdefault(name, []).append(max(size, SUSPECT * (found.remains - usual) / STRUCTURE))
     return {name: float(np.median(values)) for name, values in rows.items()}
+
+
+def _straightened(data: _Family) -> _Family:
+    """The family less the error κ u² that, with one κ for all channels, explains most of its disagreement."""
+    apart = np.eye(len(data.ids)) - data.design @ np.linalg.pinv(data.design)
+    seen, bent = (apart @ data.signals)[:, data.pick], (apart @ data.signals**2)[:, data.pick]
+    kappa = float(np.sum(bent * seen)) / max(float(np.sum(bent**2)), 1e-300)
+    return replace(data, signals=data.signals - kappa * data.signals**2)
 
 
 def channel_block(run: GapRun, grid: Grid, family: Family, name: str) -> Block | None:

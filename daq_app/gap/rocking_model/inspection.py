@@ -98,10 +98,15 @@ def _wiring_marks(wiring: Wiring, families: dict[str, Family]) -> list[Mark]:
     turned, crossed = wiring.reversed_ids, wiring.exchanged
     first = f"polarity@{turned[0]}" if len(turned) == 1 else "polarity"
     second = f"swap@{families[crossed[0][0]]}" if crossed else "swap"
-    pairs = ", ".join(f"{a} and {b}" for a, b in crossed) or "channels"
+    shown = dict(crossed)
+    words = [
+        f"{a} and {b} exchanged" if shown[b] == a else f"{a} shows {b}"
+        for a, b in crossed
+        if shown[b] != a or a < b
+    ]
     return [
         Mark(first, f"{', '.join(turned) or 'channels'} reversed", "1", float(len(turned)), _COUNT_SD),
-        Mark(second, f"{pairs} exchanged", "1", float(len(crossed)), _COUNT_SD),
+        Mark(second, ", ".join(words) or "channels exchanged", "1", float(wiring.places), _COUNT_SD),
     ]
 
 

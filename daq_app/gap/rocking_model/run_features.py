@@ -45,6 +45,10 @@ class RockingRun:
     impacts_before: float
     wire_height_m: float
     """Height at which a displacement of all wires looks like one rotation."""
+    wire_bend_m: float
+    """Height at which an error with the square of a wire's reading looks like one of the rotation."""
+    base_bend_m2: float
+    """What such an error of all wires makes of the base, over the square of the rotation."""
     block_loadings: FloatArray
     """(n, k): measurement covariance of the blocks as loadings."""
     notes: tuple[str, ...] = ()
@@ -134,7 +138,7 @@ def examine(run: GapRun, reference: str = "") -> Examined:
         grid,
         reference,
         run.impacts_before,
-        _wire_height(run),
+        *_wire_heights(run),
         np.zeros((len(values), 0)),
         notes,
     )
@@ -227,9 +231,17 @@ def _times(
     return values, sds, labels, np.array(places, dtype=np.intp)
 
 
-def _wire_height(run: GapRun) -> float:
-    heights = np.array([run.sensors[i].position_m[2] for i in run.indices("wire")])
-    return float(np.sum(heights**2) / np.sum(heights)) if heights.size else 1.0
+def _wire_heights(run: GapRun) -> tuple[float, float, float]:
+    """How a displacement u of every wire, and κ u² of every wire, act on their mean rotation and base.
+
+    The mean has the weights z²: Σ z² (u/z) / Σ z² for a displacement, Σ z² (κ z² θ²/z) / Σ z² for κ u².
+    The base is where the straight line through the displacements over z ends.
+    """
+    z = np.array([run.sensors[i].position_m[2] for i in run.indices("wire")])
+    if not z.size:
+        return 1.0, 1.0, 0.0
+    at_base = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
+    return float(np.sum(z**2) / np.sum(z)), float(np.sum(z**3) / np.sum(z**2)), float(at_base @ z**2)
 
 
 def _from_peak_error(swings: sw.Swings, survey: Survey, ka: int, a: int, kb: int, b: int) -> float:

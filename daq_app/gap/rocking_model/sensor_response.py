@@ -47,7 +47,7 @@ def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
     rest = run.swings.rest_s - run.swings.release_s
     drift = values.get("drift@wire.rate", 0.0) / run.wire_height_m if name == "wire" else 0.0
     offset = values["zero"] + drift * (run.swings.peak_s - rest)
-    bend = values.get(f"wire_cosine@{name}.kappa", 0.0) * run.wire_height_m
+    bend = values.get(f"wire_cosine@{name}.kappa", 0.0) * run.wire_bend_m
     slow = _second_order(values, name)
     acceleration = -(values["p"] ** 2) * np.sin(values["alpha"] - np.abs(peaks)) * side
     lost = np.where(np.arange(peaks.size) > 0, slow * acceleration, 0.0)
@@ -175,7 +175,7 @@ def _added(run: RockingRun, family: str, values: Mapping[str, float], theta: Flo
                 scale = {"wire": run.wire_height_m, "lvdt": np.inf}.get(family, 1.0)
                 parts.append(value / scale * (time_s - (run.swings.rest_s - run.swings.release_s)))
             case "wire_cosine":
-                parts.append(run.wire_height_m * value * theta**2)
+                parts.append(run.wire_bend_m * value * theta**2)
     return np.sum(parts, axis=0) if parts else None
 
 
@@ -306,6 +306,9 @@ def _base(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatAr
     total: FloatArray = found + values.get("sliding.c", 0.0) * _unit(
         run, block, "slip", partial(slip_shape, run.grid)
     )
+    if "wire_cosine@wire.kappa" in values:
+        bend = values["wire_cosine@wire.kappa"] * run.base_bend_m2
+        total = total + bend * _unit(run, block, "square", lambda: run.grid.theta**2)
     return total
 
 

@@ -6,10 +6,10 @@ many channels, so that a few wrong ones cannot spoil it.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray
@@ -23,9 +23,11 @@ LOW_PASS_HZ = 12.0
 REVERSED_BELOW = -0.4
 """Slope of a channel on what it should show, below which it is called reversed."""
 EXCHANGE_GAIN = 0.15
-"""Exchanging two channels must leave less than this share of their misfit …"""
+"""Putting plugs back must leave less than this share of the misfit of the channels …"""
 EXCHANGE_MISFIT = 0.03
-"""… which must be more than this share of their signal."""
+"""… which must be more than this share of a signal."""
+_MOVED = 1e-3
+"""Misfit that a channel must lose to be called moved: channels that show the same stay where they are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,15 +36,21 @@ class Wiring:
 
     reversed_ids: tuple[str, ...] = ()
     exchanged: tuple[tuple[str, str], ...] = ()
+    """(channel, channel whose sensor it shows)."""
+    places: int = 0
+    """Places by which the sensors are turned round among the terminals of their kind; 1 for any other
+    exchange, 0 for none."""
 
 
 def mend(runs: list[GapRun]) -> tuple[list[GapRun], Wiring]:
     """Runs with reversed channels turned round and exchanged ones put back, and what was done."""
-    found = _check(runs[0])
-    others = [_check(run) for run in runs[1:]]
+    found = [_check(run) for run in runs]
+    first = found[0]
+    same = all(w.exchanged == first.exchanged for w in found)
     kept = Wiring(
-        tuple(name for name in found.reversed_ids if all(name in w.reversed_ids for w in others)),
-        tuple(pair for pair in found.exchanged if all(pair in w.exchanged for w in others)),
+        tuple(name for name in first.reversed_ids if all(name in w.reversed_ids for w in found)),
+        first.exchanged if same else (),
+        min(w.places for w in found) if same else 0,
     )
     if kept == Wiring():
         return runs, kept
@@ -54,8 +62,8 @@ def _mended(run: GapRun, wiring: Wiring) -> GapRun:
     channels = run.channels.copy()
     for name in wiring.reversed_ids:
         channels[place[name]] *= -1.0
-    for first, second in wiring.exchanged:
-        channels[[place[first], place[second]]] = channels[[place[second], place[first]]]
+    for terminal, sensor in wiring.exchanged:
+        channels[place[sensor]] = run.channels[place[terminal]]
     return replace(run, channels=channels)
 
 
@@ -67,19 +75,20 @@ def _check(run: GapRun) -> Wiring:
     slope = np.array([_slope(run, name, y, e) for name, y, e in zip(ids, measured, expected, strict=True)])
     # A channel that should show next to nothing cannot be judged by its slope.
     lively = size > 0.05 * np.median(size)
-    exchanged = [
-        (first, second)
-        for group in _groups(run, ids)
-        for first, second in itertools.combinations(group, 2)
-        if _exchanged(measured, expected, ids.index(first), ids.index(second))
-    ]
+    exchanged: list[tuple[str, str]] = []
+    places = 0
+    for group in _groups(run, ids):
+        at = [ids.index(name) for name in group]
+        order, turn = _order(np.array([[_misfit(measured[i], expected[j]) for j in at] for i in at]))
+        exchanged += [(group[i], group[j]) for i, j in enumerate(order) if i != j]
+        places = max(places, turn)
     involved = {name for pair in exchanged for name in pair}
     turned = tuple(
         name
         for name, s, alive in zip(ids, slope, lively, strict=True)
         if alive and s < REVERSED_BELOW and name not in involved
     )
-    return Wiring(turned, tuple(exchanged))
+    return Wiring(turned, tuple(exchanged), places)
 
 
 def _slope(run: GapRun, name: str, measured: FloatArray, expected: FloatArray) -> float:
@@ -106,15 +115,33 @@ def _groups(run: GapRun, ids: list[str]) -> list[list[str]]:
     return list(kinds.values())
 
 
-def _exchanged(measured: FloatArray, expected: FloatArray, i: int, j: int) -> bool:
-    """Whether the two make sense only the other way round. Their own gains are left free to ± 15 %."""
-    straight = _misfit(measured[i], expected[i]) + _misfit(measured[j], expected[j])
-    crossed = _misfit(measured[i], expected[j]) + _misfit(measured[j], expected[i])
-    return straight > EXCHANGE_MISFIT and crossed < EXCHANGE_GAIN * straight
+def _order(misfit: FloatArray) -> tuple[list[int], int]:
+    """(which sensor each terminal shows, places turned round) from misfits of terminals (rows) as sensors.
+
+    The order with the smallest misfit of all, if it makes sense of what makes no sense as it is. A channel
+    that shows no sensor of its kind says nothing about where the others are plugged.
+    """
+    n = len(misfit)
+    order = list(range(n))
+    known = np.flatnonzero(misfit.min(axis=1) < EXCHANGE_MISFIT)
+    table = misfit[np.ix_(known, known)]
+    straight = float(np.trace(table))
+    if known.size < 2 or straight <= EXCHANGE_MISFIT:
+        return order, 0
+    _, best = linear_sum_assignment(table + _MOVED * (1.0 - np.eye(known.size)))
+    left = float(table[np.arange(known.size), best].sum())
+    if left >= EXCHANGE_GAIN * straight:
+        return order, 0
+    for i, j in zip(known, known[best], strict=True):
+        order[int(i)] = int(j)
+    turned = [float(np.trace(np.roll(misfit, k, axis=1))) for k in range(1, n)]
+    # Sensors that show the same may be exchanged or not: the turn that fits as well is the simpler story.
+    fits = [k for k, total in enumerate(turned, start=1) if known.size == n and total < left + _MOVED]
+    return order, fits[0] if fits else 1
 
 
 def _misfit(measured: FloatArray, expected: FloatArray) -> float:
-    """Share of a signal's power that what is expected, with a gain near 1, leaves unexplained."""
+    """Share of a signal's power that what is expected, with a gain within 15 % of 1, leaves unexplained."""
     gain = float(np.clip(measured @ expected / max(float(expected @ expected), 1e-30), 0.85, 1.15))
     left = measured - gain * expected
     return float(left @ left / max(float(measured @ measured), float(expected @ expected), 1e-30))
