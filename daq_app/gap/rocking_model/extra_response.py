@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
@@ -35,11 +36,18 @@ def resonator(values: FloatArray, natural: float, zeta: float) -> FloatArray:
 
     A bilinear transform would be off in delay by a fifth where the response is as quick as the grid.
     """
+    numerator, denominator = _discrete(float(natural), float(zeta))
+    found: FloatArray = lfilter(numerator, denominator, values - values[0]) + values[0]
+    return found
+
+
+@lru_cache(maxsize=64)
+def _discrete(natural: float, zeta: float) -> tuple[FloatArray, FloatArray]:
+    """Filter of the resonator; all runs and blocks of one prediction ask for the same one."""
     numerator, denominator, _ = cont2discrete(
         ([natural**2], [1.0, 2.0 * zeta * natural, natural**2]), 1.0 / GRID_HZ, method="foh"
     )
-    found: FloatArray = lfilter(numerator[0], denominator, values - values[0]) + values[0]
-    return found
+    return numerator[0], denominator
 
 
 def responded(values: FloatArray, effect: str, given: Mapping[str, float]) -> FloatArray:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from daq_app.gap.core.features import FloatArray
 
@@ -27,6 +28,11 @@ class Watched(Mapping[str, float]):
     def __getitem__(self, key: str) -> float:
         self.asked[key] = None
         return self._values[key]
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """As a dict's; the mapping's own would raise and catch an error for every effect that is absent."""
+        self.asked[key] = None
+        return self._values.get(key, default)
 
     def __contains__(self, key: object) -> bool:
         self.asked[str(key)] = None
