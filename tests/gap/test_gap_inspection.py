@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from simulated_wall import simulate
 
@@ -142,3 +143,20 @@ def test_ring_down_and_floor_are_seen_at_their_frequency() -> None:
         assert _value(run, "floor", "amplitude") == pytest.approx(0.08, rel=0.15)
         assert _value(run, "floor", "frequency") == pytest.approx(2.3, abs=0.05)
     assert "ambient" in model_and_library(runs)[1]
+
+
+def test_the_phase_of_the_floor_is_read_after_the_rest_where_the_hold_is_spoilt() -> None:
+    """A quick pull or footsteps leave nothing to read while the wall is held."""
+    runs = simulate({"ambient": {"amplitude": 0.08, "frequency": 2.3}}, LEVELS)
+    clean, _ = prepare(runs)
+    shaken = runs[0].channels[runs[0].indices("accelerometer")]
+    before = round((clean[0].swings.release_s - 0.05) * runs[0].rate_hz) + runs[0].channels.shape[1]
+    before -= round((clean[0].grid.time_s[-1] + clean[0].swings.release_s) * runs[0].rate_hz)
+    shaken[:, :before] += 0.8 * np.random.default_rng(5).standard_normal(shaken[:, :before].shape)
+    runs[0].channels[runs[0].indices("accelerometer")] = shaken
+    spoilt = prepare(runs)[0][0].vibration
+    whole = clean[0].vibration
+    assert spoilt is not None
+    assert whole is not None
+    assert abs(spoilt.phase - whole.phase) < 3.0 * spoilt.phase_sd + 0.05
+    assert 0.0 < spoilt.phase_sd < 0.2

@@ -178,7 +178,7 @@ def with_measured_inputs(run: RockingRun, values: Mapping[str, float]) -> Mappin
         return values
     seen = run.vibration
     given = {**values, "ambient.frequency": seen.frequency_hz}
-    given["ambient.phase"] = seen.phase + values.get("ambient.shift", 0.0)
+    given["ambient.phase"] = seen.phase + seen.phase_sd * values.get("ambient.shift", 0.0)
     if "ambient.frequency" in values:
         given["ambient.fitted"] = values["ambient.frequency"]
     return given

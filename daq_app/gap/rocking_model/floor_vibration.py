@@ -22,6 +22,8 @@ FREQUENCIES_HZ = np.arange(0.4, 6.0, 0.02)
 SMALLEST_GAIN = 6.0
 """Gain in log likelihood per run, on average, below which there is no vibration to speak of."""
 _REST_MARGIN_S = 0.3
+_SHORTEST, _ENOUGH = 60, 120
+"""Samples of the grid in a part that is used, and in both."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +35,7 @@ class Vibration:
     amplitude: float
     amplitude_sd: float
     phase: float
+    phase_sd: float
     found: bool
 
 
@@ -77,9 +80,11 @@ def _quiet(run: GapRun, grid: Grid) -> _Quiet | None:
     low_pass = butter(3, 8.0, fs=GRID_HZ, output="sos")
     calm = quiet(run, grid)
     held, resting = calm & (grid.time_s < -0.05), calm & (grid.time_s > grid.rest_s + _REST_MARGIN_S)
-    if held.sum() < 100 or resting.sum() < 60:
-        return None
+    # Too short a part says nothing, but the other may: a quick pull leaves a swaying wall.
+    held, resting = held & (held.sum() >= _SHORTEST), resting & (resting.sum() >= _SHORTEST)
     pick = held | resting
+    if pick.sum() < _ENOUGH:
+        return None
     # Only the held part sways: its own rotation says by how much.
     sway = np.zeros((2, grid.time_s.size))
     before = grid.time_s < 0.0
@@ -88,7 +93,7 @@ def _quiet(run: GapRun, grid: Grid) -> _Quiet | None:
     sway[0, before], sway[1, before] = -9.81 * theta, height * twice
     columns = np.column_stack([held, resting, sway[0], sway[1]])[pick].astype(float)
     columns[:, 2:] /= np.abs(columns[:, 2:]).max(axis=0) + 1e-30
-    basis, _ = np.linalg.qr(columns)
+    basis, _ = np.linalg.qr(columns[:, np.any(columns != 0.0, axis=0)])
     return _Quiet(grid.time_s[pick], measured[pick], basis, resting[pick])
 
 
@@ -136,6 +141,8 @@ def _share(data: _Quiet, frequency: float, frequency_sd: float, found: bool) -> 
     fraction = max(independent_fraction(values), 0.05) if not found else 0.3
     variance = left / values.size / fraction
     sd = float(np.sqrt(variance * 0.5 * np.trace(inverse)))
-    return Vibration(
-        frequency, frequency_sd, float(np.hypot(sine, cosine)), sd, float(np.arctan2(cosine, sine)), found
-    )
+    amplitude = float(np.hypot(sine, cosine))
+    # The phase is read where the wall stands and used where it moves, half a record away.
+    apart = 0.5 * float(np.ptp(data.time_s))
+    phase_sd = float(np.hypot(sd / max(amplitude, sd), 2.0 * np.pi * frequency_sd * apart))
+    return Vibration(frequency, frequency_sd, amplitude, sd, float(np.arctan2(cosine, sine)), phase_sd, found)

@@ -102,7 +102,7 @@ _FORMS = {
     # Read from the run itself while the wall stands still, and carried on over its motion.
     "ambient": (
         Parameter(
-            "shift", 0.0, 0.1, "rad", meaning="phase less that read at rest", per_run=True, starts=(0.0,)
+            "shift", 0.0, 1.0, "1", meaning="error of the phase read at rest", per_run=True, starts=(0.0,)
         ),
     ),
 }
