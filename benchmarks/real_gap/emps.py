@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from benchmarks.real_gap.emps_model import EmpsModel, library, load_runs, with_independence
+from benchmarks.real_gap.emps_model import EmpsModel, library, load_runs
+from benchmarks.real_gap.independence import with_independence
 from benchmarks.real_gap.report import arguments, print_rows, show
 from daq_app.gap.core import Diagnosis, Fit, Options, diagnose, fit
 from daq_app.gap.core.features import PlainRun

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -27,9 +27,8 @@ from daq_app.gap.core import (
     Prediction,
     Run,
     Scatter,
-    fit,
 )
-from daq_app.gap.core.features import FloatArray, PlainRun, independent_fraction
+from daq_app.gap.core.features import FloatArray, PlainRun
 from daq_app.gap.core.parameters import positive, signed
 
 RATE_HZ = 1000.0
@@ -254,13 +253,3 @@ def library(*, with_viscous: bool = True) -> Library:
     ]
     whole = Library(effects)
     return whole if with_viscous else whole.without("viscous")
-
-
-def with_independence(model: EmpsModel, runs: list[PlainRun], effects: tuple[Effect, ...]) -> list[PlainRun]:
-    """The runs with their share of independent samples, from the residual of a rich hypothesis."""
-    rich = fit(model, runs, effects)
-    fraction = min(independent_fraction(residual) for residual in rich.residuals)
-    return [replace(run, features=replace(run.features, independent_fraction=fraction)) for run in runs]
-
-
-__all__ = ["EmpsModel", "library", "load_motion", "load_runs", "with_independence"]

@@ -12,6 +12,7 @@ import numpy as np
 from rich.console import Console
 
 from benchmarks.real_gap import pendulum_model as pm
+from benchmarks.real_gap.independence import with_independence
 from benchmarks.real_gap.report import arguments, print_rows, show
 from daq_app.gap.core import Diagnosis, Fit, Options, diagnose, fit
 from daq_app.gap.core.features import FloatArray, PlainRun
@@ -48,8 +49,8 @@ def run(folder: Path) -> PendulumResult:
     """Everything that the command prints."""
     paths = sorted(folder.glob("free_swing_*.txt"))
     library = pm.library()
-    records = pm.with_independence(
-        pm.load_runs(paths), (library["hand"], library["quadratic"], library["coulomb"])
+    records = with_independence(
+        pm.PendulumModel(), pm.load_runs(paths), (library["hand"], library["quadratic"], library["coulomb"])
     )
     release = diagnose(pm.PendulumModel(), records, library, Options(pairs=False, hold_out="repetition"))
     best = fit(pm.PendulumModel(), records, tuple(library[e] for e in release.which[0].effects))

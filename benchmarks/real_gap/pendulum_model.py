@@ -26,9 +26,8 @@ from daq_app.gap.core import (
     Prediction,
     Run,
     Scatter,
-    fit,
 )
-from daq_app.gap.core.features import FloatArray, PlainRun, independent_fraction
+from daq_app.gap.core.features import FloatArray, PlainRun
 from daq_app.gap.core.parameters import positive, signed
 
 RATE_HZ = 1000.0
@@ -203,13 +202,6 @@ def library() -> Library:
             ),
         ]
     )
-
-
-def with_independence(runs: list[PlainRun], effects: tuple[Effect, ...]) -> list[PlainRun]:
-    """The runs with their share of independent samples, from the residual of a rich hypothesis."""
-    rich = fit(PendulumModel(), runs, effects)
-    fraction = min(independent_fraction(residual) for residual in rich.residuals)
-    return [replace(run, features=replace(run.features, independent_fraction=fraction)) for run in runs]
 
 
 @nb.njit(cache=True)

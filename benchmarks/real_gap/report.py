@@ -15,14 +15,16 @@ DATA = Path(__file__).parents[2].parent / "shared" / "data" / "real"
 """Where the public recordings lie: the folder ``shared`` beside the repository."""
 
 
-def arguments(description: str) -> argparse.Namespace:
-    """The options that both commands take."""
+def arguments(description: str, needed: str = "") -> argparse.Namespace:
+    """The options that all commands take; `needed`: a file that must be in the data folder."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--data", type=Path, default=DATA, help="folder with the public recordings")
     parser.add_argument("--pictures", type=Path, help="write pictures into this folder")
     options = parser.parse_args()
     if not options.data.is_dir():
         parser.error(f"there is no folder {options.data}; give it with --data")
+    if not (options.data / needed).exists():
+        parser.error(f"there is no {needed} in {options.data}; give the folder that holds it with --data")
     return options
 
 
