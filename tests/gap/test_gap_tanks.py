@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.real_gap.tanks_model import STEP_S, TanksModel, library, load_runs
 from scipy.integrate import solve_ivp
 
+from benchmarks.real_gap.tanks_model import STEP_S, TanksModel, library, load_runs
 from daq_app.gap.core import fit
 
 LIMIT_V, SHARE, DEPTH_V = 8.0, 0.6, 0.05
