@@ -23,9 +23,12 @@ Effects = Mapping[str, Mapping[str, float]]
 
 @cache
 def quick_rig(path: Path = RIG) -> Rig:
-    """A rig with a short wait before the release, and with scatter of r where the file has none."""
+    """A rig with a short wait before the release, and with scatter of r where the file has none.
+
+    The wait is long enough for the sway of the pull to die away: a release is judged against it.
+    """
     rig = load_rig(path)
-    quick: dict[str, float] = {"upright_s": 0.5, "pull_s": 0.5, "hold_s": 1.6}
+    quick: dict[str, float] = {"upright_s": 0.5, "pull_s": 0.5, "hold_s": 3.6}
     if not rig.simulation.restitution_scatter:
         quick["restitution_scatter"] = SCATTER_OF_R
     return rig.model_copy(update={"simulation": rig.simulation.model_copy(update=quick)})

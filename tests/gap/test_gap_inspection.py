@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from simulated_wall import simulate
 
+from benchmarks.gap_campaign import simulate as longer_held
 from daq_app.gap.rocking_model.inspection import found_channels, found_marks
 from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.study import model_and_library, prepare
@@ -160,3 +161,11 @@ def test_the_phase_of_the_floor_is_read_after_the_rest_where_the_hold_is_spoilt(
     assert whole is not None
     assert abs(spoilt.phase - whole.phase) < 3.0 * spoilt.phase_sd + 0.05
     assert 0.0 < spoilt.phase_sd < 0.2
+
+
+def test_gravity_is_read_from_a_held_wall_that_still_sways() -> None:
+    """What the winch left swings out during the hold; its mean acceleration is no error of a sensor."""
+    run = prepare(longer_held({}, 11, levels=(0.15, -0.25)))[0][1]
+    block = next(b for b in run.blocks if b.family == "accelerometer")
+    place = block.names.index("gain of gravity")
+    assert abs(block.values[place]) < 2.0 * np.sqrt(block.covariance[place, place])
