@@ -16,6 +16,7 @@ from daq_app.gap.rocking_model.floor_vibration import Vibration, quiet
 from daq_app.gap.rocking_model.impact_timing import acceleration_delay
 from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse, make_grid
 from daq_app.gap.rocking_model.records import GapRun, Survey
+from daq_app.gap.rocking_model.release_speed import release_speed
 from daq_app.gap.rocking_model.rotation import Rotation, joint_rotation, sample_noise, wall_rotation
 from daq_app.gap.rocking_model.sensor_blocks import Block, blocks_of
 
@@ -115,6 +116,10 @@ def examine(run: GapRun, reference: str = "") -> Examined:
     late = acceleration_delay(run, grid)
     if late is not None:
         blocks = (*blocks, scalar_block("impact timing", (("delay", "s", late[0], late[1]),), grid))
+    let_go = release_speed(theta, noise, swings, run.survey, run.rate_hz)
+    if let_go is not None:
+        entry = ("speed away from upright", "rad/s", let_go[0], let_go[1] ** 2)
+        blocks = (*blocks, scalar_block("release", (entry,), grid))
     values, sds, labels, places = _times(swings, reference, run.survey)
     peaks = np.arange(1, swings.peak_s.size)
     amplitude, order = swings.peak_rad, swings.peak_s / max(swings.peak_s[-1], 1e-9)

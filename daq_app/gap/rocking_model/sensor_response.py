@@ -301,6 +301,11 @@ def _joint(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatA
     return found
 
 
+def _release(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """Speed away from upright when the wall was let go."""
+    return np.array([values["omega0"] + values.get("initial_velocity.omega", 0.0)])
+
+
 def _base(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     found = values["base_follow"] * _unit(run, block, "theta", lambda: run.grid.theta)
     total: FloatArray = found + values.get("sliding.c", 0.0) * _unit(
@@ -338,5 +343,6 @@ _PREDICT = {
     "floor": extra.floor,
     "joint": _joint,
     "base": _base,
+    "release": _release,
     "twist": _twist,
 }

@@ -1,0 +1,42 @@
+"""The speed at the release is found with its sign, run by run, and a clean release claims none."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.gap_campaign import simulate
+from daq_app.gap.core import fit
+from daq_app.gap.rocking_model.library import rocking_library
+from daq_app.gap.rocking_model.model import RockingModel
+from daq_app.gap.rocking_model.run_features import RockingRun
+from daq_app.gap.rocking_model.study import prepare
+
+SPEED_RAD_S = 0.012
+
+
+def _features(run: RockingRun) -> tuple[float, float]:
+    block = next(b for b in run.blocks if b.family == "release")
+    return float(block.values[0]), float(block.covariance[0, 0]) ** 0.5
+
+
+def test_a_wall_thrown_up_and_one_pushed_down_are_told_apart() -> None:
+    """Both fall through the held rotation alike; a fit of the times alone would know |ω₀| only."""
+    up = simulate({"initial_velocity": {"omega": SPEED_RAD_S}}, 11, levels=(0.35,))
+    down = simulate({"initial_velocity": {"omega": -SPEED_RAD_S}}, 12, levels=(-0.35,))
+    runs, _ = prepare([*up, *down])
+    for run, true in zip(runs, (SPEED_RAD_S, -SPEED_RAD_S), strict=True):
+        found, sd = _features(run)
+        assert found == pytest.approx(true, abs=3 * sd)
+        assert sd < 0.3 * SPEED_RAD_S
+    result = fit(RockingModel(runs[0].survey), runs, (rocking_library()["initial_velocity"],))
+    for local, true in zip(result.local_values, (SPEED_RAD_S, -SPEED_RAD_S), strict=True):
+        value, low, high = local["initial_velocity.omega"]
+        assert low < true < high
+        assert value == pytest.approx(true, rel=0.15)
+
+
+def test_a_clean_or_a_slow_release_claims_no_speed() -> None:
+    for effects in ({}, {"slow_release": {"tau": 0.04}}):
+        found, sd = _features(prepare(simulate(effects, 11, levels=(0.35,)))[0][0])
+        assert abs(found) < 2.5 * sd
+        assert sd > 1e-3
