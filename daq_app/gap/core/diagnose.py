@@ -18,7 +18,7 @@ from daq_app.gap.core.goodness import Goodness, check
 from daq_app.gap.core.held_out import GapSize, HeldOutRun, gap_size
 from daq_app.gap.core.likelihood import Covariance
 from daq_app.gap.core.model import Model
-from daq_app.gap.core.parallel import FitTask, ScoreTask, Workers
+from daq_app.gap.core.parallel import FitTask, GlanceTask, ScoreTask, Workers
 from daq_app.gap.core.problem import Problem
 from daq_app.gap.core.result import CannotDiagnose, Detection, Diagnosis, Estimate
 from daq_app.gap.core.where import gap_map
@@ -27,6 +27,13 @@ Hypothesis = tuple[str, ...]
 POLISHED = 6
 POLISH_REACH = 40.0
 """The best six hypotheses within 40 in log evidence are fitted to the end with exact Jacobians."""
+REACH = 60.0
+REACH_SHARE = 0.5
+"""A hypothesis is fitted if a glance puts it within 60 of the best in log evidence, or if it gains half as
+much as the best; the others keep what the glance gave them, which leaves them without a chance."""
+LITTLE = 3.0
+"""A glance that has arrived and gained less than this over what it started from, and is no nearer to the
+best, is kept too: the scatter that it took over is its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +140,38 @@ class _Study:
         tasks = [self._task(h, s, polish=polish) for h, s in zip(hypotheses, starts, strict=True)]
         return self.workers.run(tasks, text)
 
+    def _screened(self, hypotheses: Sequence[Hypothesis], starts: Sequence[Fit], text: str) -> list[Fit]:
+        """Fits of hypotheses, of those without a chance a glance only."""
+        tasks = [
+            GlanceTask(t.effects, t.known, t.sigmas, t.columns)
+            for t in (self._task(h, s, polish=False) for h, s in zip(hypotheses, starts, strict=True))
+        ]
+        found: list[Fit] = self.workers.run(tasks, text)
+        null = self.fits[NULL].log_evidence
+        best = max(f.log_evidence for f in (*self.fits.values(), *found))
+        bar = best - max(REACH, REACH_SHARE * (best - null))
+        near = [
+            k
+            for k, f in enumerate(found)
+            if f.log_evidence >= bar and not self._done(f, starts[k].log_evidence, best)
+        ]
+        # A glance whose other starts promise no more is gone on with; else all starts are followed.
+        fitted = self._fit(
+            [hypotheses[k] for k in near],
+            [found[k] if found[k].settled else starts[k] for k in near],
+            text,
+            polish=False,
+        )
+        for k, result in zip(near, fitted, strict=True):
+            found[k] = result
+        return found
+
+    @staticmethod
+    def _done(seen: Fit, start: float, best: float) -> bool:
+        """Whether a fit could not change what a glance says of a hypothesis."""
+        gained = seen.log_evidence - start
+        return seen.settled and seen.converged and gained < LITTLE and seen.log_evidence < best - LITTLE
+
     def fit_all(self) -> None:
         """Null, singles and probes; then pairs where they are wanted."""
         self.fits[NULL] = self._fit([NULL], [None], "without any effect")[0]
@@ -140,7 +179,7 @@ class _Study:
         singles = [(effect.name,) for effect in self.library.named]
         probes = [(effect.name,) for effect in self.library.probes]
         both = singles + probes
-        found = self._fit(both, [self.fits[NULL]] * len(both), "single effects", polish=False)
+        found = self._screened(both, [self.fits[NULL]] * len(both), "single effects")
         for hypothesis, result in zip(both, found, strict=True):
             (self.fits if hypothesis in singles else self.probes)[hypothesis] = result
         self._polish(self.fits)
@@ -187,13 +226,12 @@ class _Study:
 
     def _fit_pairs(self) -> None:
         candidates = pair_candidates(self.fits, self.library, self.options.pair_width)
-        starts: list[Fit | None] = []
+        starts: list[Fit] = []
         for pair in candidates:
             known = [self.fits[(name,)] for name in pair]
             starts.append(max(known, key=lambda f: f.log_evidence))
-        for pair, result in zip(
-            candidates, self._fit(candidates, starts, "pairs of effects", polish=False), strict=True
-        ):
+        found = self._screened(candidates, starts, "pairs of effects")
+        for pair, result in zip(candidates, found, strict=True):
             self.fits[pair] = result
 
     def _ranked(self) -> list[Ranked]:

@@ -22,6 +22,7 @@ _FOLLOWED = 3
 _POLISH_ROUNDS = 8
 _SAME = 0.5
 """Log posterior within which two searches are at the same optimum."""
+_GLANCES = 4
 _LOOSE = 0.05
 """Tolerance of the search in a hypothesis that has yet to show that it is worth more."""
 
@@ -45,6 +46,8 @@ class Fit:
     starts: int = 1
     starts_agreeing: int = 1
     converged: bool = True
+    settled: bool = False
+    """Of a glance: no other start promises more than the place where it ended."""
     columns: Columns = field(default_factory=dict, repr=False)
     """Jacobian at the end, where it was worked out exactly."""
     values: dict[str, tuple[float, float, float]] = field(default_factory=dict)
@@ -101,14 +104,46 @@ def fit(
     return _finish(best, converged, len(followed), agreeing, exact=polish)
 
 
+def glance(
+    model: Model,
+    runs: Sequence[Run],
+    effects: Sequence[Effect],
+    known: Mapping[tuple[str, int | None], float],
+    sigmas: Mapping[str, float],
+    frozen: Columns,
+) -> Fit:
+    """What a hypothesis is worth to within a few per cent of what it gains, for a tenth of a fit's cost.
+
+    Every start is judged by one linear step of all unknowns; the one that promises most takes
+    `_GLANCES` steps at the scatter as it was, and if it does not keep its promise the one that is best as
+    it stands. `Fit.settled` says whether no other start promises more than where this ended.
+    """
+    problem = Problem(model, runs, effects)
+    base = problem.start(known)
+    start_sigma = np.array([math.log(sigmas.get(s.name, s.median)) for s in model.scatters])
+    searches = [Search(problem, u, start_sigma.copy(), frozen) for u in _starts(problem, base, known)]
+    nothing = np.zeros(len(problem), dtype=bool)
+    promises = [search.promise(nothing) for search in searches]
+    best = searches[int(np.argmin(promises))]
+    safe = min(searches, key=lambda search: search.objective)
+    best.walk(_GLANCES, _LOOSE)
+    if safe.objective < best.objective:
+        safe.walk(_GLANCES, _LOOSE)
+        best = safe
+    arrived = best.promise(nothing) > best.objective - _LOOSE
+    found = _finish(best, arrived, 1, 1, exact=False)
+    found.settled = all(promise > best.objective - _SAME for promise in promises)
+    return found
+
+
 def _polish(search: Search, linear: Columns) -> bool:
     """Follow a search to its end: fresh columns, many steps with these, until fresh ones gain nothing."""
     nothing = np.zeros(len(search.problem), dtype=bool)
     for _ in range(_POLISH_ROUNDS):
-        search.known = dict(linear)
+        search.use(dict(linear))
         arrived = search.objective - search.promise(nothing) < TOLERANCE
         sigma = search.log_sigma.copy()
-        search.known = search.problem.columns_of(search.lines)
+        search.use(search.problem.columns_of(search.lines))
         search.run(6, 6)
         if arrived and np.all(np.abs(search.log_sigma - sigma) < 0.01):
             return True
@@ -170,7 +205,10 @@ def _starts(
 def _finish(search: Search, converged: bool, starts: int, agreeing: int, exact: bool) -> Fit:
     """Evidence, covariance and residuals at the end of a search."""
     problem = search.problem
-    search.linearise(exact)
+    if exact:
+        search.linearise(exact)
+    else:
+        search.linearise_if_moved()
     hessian, gradient, log_like = search.normal_equations(search.log_sigma)
     covariance: FloatArray = np.linalg.inv(hessian).astype(np.float64)
     _, log_det = np.linalg.slogdet(hessian)

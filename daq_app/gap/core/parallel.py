@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.features import Run
-from daq_app.gap.core.fit import Fit, fit
+from daq_app.gap.core.fit import Fit, fit, glance
 from daq_app.gap.core.held_out import HeldOutRun, score
 from daq_app.gap.core.model import Model
 from daq_app.gap.core.problem import Columns
@@ -42,6 +42,20 @@ class FitTask:
 
 
 @dataclass(frozen=True, slots=True)
+class GlanceTask:
+    """See what one hypothesis is worth before it is fitted."""
+
+    effects: tuple[Effect, ...]
+    known: dict[tuple[str, int | None], float]
+    sigmas: dict[str, float]
+    columns: Columns = field(default_factory=dict)
+    """Columns of the Jacobian beyond those without any effect."""
+
+    def run(self, model: Model, runs: Sequence[Run], frozen: Columns | None = None) -> Fit:
+        return glance(model, runs, self.effects, self.known, self.sigmas, {**(frozen or {}), **self.columns})
+
+
+@dataclass(frozen=True, slots=True)
 class ScoreTask:
     """Predict every run from the others under one hypothesis."""
 
@@ -53,6 +67,7 @@ class ScoreTask:
         return score(model, runs, self.effects, self.whole, self.by)
 
 
+Task = FitTask | GlanceTask | ScoreTask
 _STATE: dict[str, Any] = {}
 """In a worker process: the model and runs, sent once instead of with every task."""
 
@@ -61,7 +76,7 @@ def _prepare(model: Model, runs: Sequence[Run], frozen: Columns | None) -> None:
     _STATE["model"], _STATE["runs"], _STATE["frozen"] = model, runs, frozen
 
 
-def _work(task: FitTask | ScoreTask) -> Any:
+def _work(task: Task) -> Any:
     return task.run(_STATE["model"], _STATE["runs"], _STATE["frozen"])
 
 
@@ -110,7 +125,7 @@ class Workers:
         if self._pool is not None:
             self._pool.shutdown(wait=False, cancel_futures=True)
 
-    def run(self, tasks: Iterable[FitTask | ScoreTask], text: str) -> list[Any]:
+    def run(self, tasks: Iterable[Task], text: str) -> list[Any]:
         """Results in the order of the tasks. Raises `Interrupted` soon after `cancelled` says so."""
         listed = list(tasks)
         if self._count == 1 or len(listed) < 2:
@@ -129,7 +144,7 @@ class Workers:
         self._await(futures, text)
         return [future.result() for future in futures]
 
-    def _in_process(self, tasks: Sequence[FitTask | ScoreTask], text: str) -> list[Any]:
+    def _in_process(self, tasks: Sequence[Task], text: str) -> list[Any]:
         results = []
         for done, task in enumerate(tasks):
             self._check()

@@ -45,6 +45,8 @@ class Search:
         self.damping = 1e-3
         self._metrics: list[Metric | None] = [None] * len(problem.runs)
         self._prepared: list[FloatArray] = []
+        self._moved = True
+        """Whether the unknowns, or the columns to use, have changed since the last linearisation."""
         self.objective = self.value_at(u, self.predictions, log_sigma)
 
     def sigmas(self, log_sigma: FloatArray) -> dict[str, float]:
@@ -83,10 +85,21 @@ class Search:
             for i, prediction in enumerate(self.predictions)
         ]
         self.known = self.problem.columns_of(self.lines, linear_only=True) | self.known
+        self._moved = False
         self._prepared = []
         for i, line in enumerate(self.lines):
             columns = np.column_stack([line.jacobian[:, self.problem.columns(i)], line.residual])
             self._prepared.append(self._metric(i, line.prediction).prepare(columns))
+
+    def linearise_if_moved(self) -> None:
+        """The same, unless the Jacobians at hand are of this very point."""
+        if self._moved:
+            self.linearise()
+
+    def use(self, known: Columns) -> None:
+        """Take these columns of the Jacobian as they are from now on."""
+        self.known = known
+        self._moved = True
 
     def normal_equations(self, log_sigma: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         """Hessian (with priors), gradient of −log posterior, and log likelihood of the linearisation."""
@@ -113,7 +126,7 @@ class Search:
         """−log posterior that one step of the unknowns that are not `held` (a mask) would lead to."""
         if not math.isfinite(self.objective):
             return math.inf
-        self.linearise()
+        self.linearise_if_moved()
         hessian, gradient, _ = self.normal_equations(self.log_sigma)
         free = self._free(gradient) & np.asarray(~held)
         downhill = float(gradient[free] @ np.linalg.solve(hessian[np.ix_(free, free)], gradient[free]))
@@ -121,7 +134,7 @@ class Search:
 
     def step(self) -> float:
         """One accepted Levenberg–Marquardt step; returns the gain (0 when none was found)."""
-        self.linearise()
+        self.linearise_if_moved()
         hessian, gradient, _ = self.normal_equations(self.log_sigma)
         free = self._free(gradient)
         if not free.any():
@@ -138,6 +151,7 @@ class Search:
             objective = self.value_at(trial, predictions, self.log_sigma)
             if objective < before:
                 self.u, self.predictions, self.objective = trial, predictions, objective
+                self._moved = True
                 # Down to nothing: any damping left would leave a stiff direction short of its optimum.
                 self.damping = 0.0 if self.damping < 1e-7 else self.damping / 10
                 return before - objective
