@@ -1,9 +1,10 @@
 """Each effect of the library alone on six simulated runs: is it named first, is its strength covered?
 
-    python -m benchmarks.gap_effects [EFFECT …] [--out FOLDER] [--page docs/gap-effects.md] [--cores N]
+    python -m benchmarks.gap_effects [EFFECT …] [--seed S] [--again] [--page docs/gap-effects.md] [--cores N]
 
-One JSON per effect in FOLDER; those that exist are not done again, so that an interrupted study goes on.
-The whole results are kept too (`build/gap_effects/results`); the study of the loop goes on from them.
+One JSON per effect and seed, with the state of the code; those that exist are not done again, so that an
+interrupted study goes on (`--again`: those of another state are). The whole results are kept too, by state
+of the code (`build/gap_effects/results`); the study of the loop goes on from them.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.gap_campaign import Effects, simulate
-from benchmarks.gap_study import Found, run_study
+from benchmarks.gap_study import Found, mark_of, run_study, state_now, states_in_words
 from daq_app.gap.core import Options
 from daq_app.gap.rocking_model.study import diagnose_runs
 
@@ -102,8 +103,8 @@ SAME = (
 
 
 def diagnosed(name: str, seed: int, cores: int) -> dict[str, Any]:
-    """The result of one case as `daq-app gap diagnose` writes it; from the file where there is one."""
-    kept = FOLDER / "results" / f"{name}-{seed}.json"
+    """The result of one case as `daq-app gap diagnose` writes it; from the file of this code's, if any."""
+    kept = FOLDER / "results" / state_now().code / f"{name}-{seed}.json"
     if not kept.exists():
         kept.parent.mkdir(parents=True, exist_ok=True)
         diagnose_runs(simulate(CASES[name], seed), Options(workers=cores)).save(kept)
@@ -137,7 +138,7 @@ def study(name: str, seed: int, cores: int) -> Found:
         "family": first["family"],
         "estimate": [estimate["value"], estimate["low"], estimate["high"]] if estimate else None,
         "covered": bool(estimate and estimate["low"] <= value <= estimate["high"]),
-        "strength_sd": 4.0 * abs(value) / limit if limit else None,
+        "strength_sd": _strength(value, limit, estimate),
         "gap": [gap["before"], gap["after"], gap["closure"]] if gap else None,
         "worst": result["goodness"]["worst"],
         "passed": result["goodness"]["passed"],
@@ -163,57 +164,99 @@ def _cpu() -> float:
     return sum(u.ru_utime + u.ru_stime for u in usage)
 
 
+def _strength(value: float, limit: float | None, estimate: dict[str, Any] | None) -> float | None:
+    """Posterior sd that the effect is away from zero: of the fit of it alone, else from the interval."""
+    if limit:
+        return 4.0 * abs(value) / limit
+    if estimate and estimate["high"] > estimate["low"]:
+        return abs(value) * 3.92 / float(estimate["high"] - estimate["low"])
+    return None
+
+
 def page(found: list[Found]) -> str:
     """The table as Markdown, with every miss and what was said instead."""
-    right = [f for f in found if f["named_first"]]
-    equal = [f for f in found if f["equivalent"]]
-    asked = [f for f in found if f["truth"] and f["named_first"]]
-    covered = [f for f in asked if f["covered"]]
     lines = [
         "# Each effect alone, on the product's own simulated hardware",
         "",
-        "`python -m benchmarks.gap_effects` (this page is written by it). Six runs over four levels to both "
-        "sides, scatter of r 0.4 %, sensor noise, calibration errors of 0.2 %, one seed. The simulator is "
-        "the one that the diagnosis fits with, so this is the first hurdle and not the proof; the proof is "
-        "[blind-check.md](blind-check.md).",
+        "`python -m benchmarks.gap_effects --seed S` for each seed (the last with "
+        "`--page docs/gap-effects.md` writes this page). Six runs over four levels to both sides, scatter "
+        "of r 0.4 %, sensor noise, calibration errors of 0.2 %. The simulator is the one that the diagnosis "
+        "fits with, so this is the first hurdle and not the proof; the proof is "
+        f"[blind-check.md](blind-check.md). {states_in_words(found)}",
         "",
-        f"Named first: {len(right)} of {len(found)}; or one that no sensor of the rig tells from it: "
-        f"{len(equal)} of {len(found)}. Where named, the strength is inside the 95 % interval in "
-        f"{len(covered)} of {len(asked)}.",
+        *_counts(found),
         "",
-        "| effect | switched on | strength, posterior sd | named first | p | verdict | estimate (95 %) "
-        "| held-out gap |",
-        "|---|---|---|---|---|---|---|---|",
+        "| effect | switched on | seed | strength, posterior sd | named first | p | verdict "
+        "| estimate (95 %) | held-out gap |",
+        "|---|---|---|---|---|---|---|---|---|",
+        *(_row(f) for f in found),
     ]
-    for f in found:
-        on = ", ".join(f"{p} {v:g}" for given in f["truth"].values() for p, v in given.items())
-        strength = f"{f['strength_sd']:.0f}" if f["strength_sd"] else ""
-        estimate = "{:.4g} ({:.4g} … {:.4g})".format(*f["estimate"]) if f["estimate"] else ""
-        mark = "" if f["covered"] or not f["estimate"] else " **outside**"
-        gap = "{:.2f} → {:.2f}".format(*f["gap"][:2]) if f["gap"] else ""
-        named = " + ".join(f["first"]) or "nothing missing"
-        lines.append(
-            f"| {f['case']} | {on} | {strength} | {named if f['named_first'] else '**' + named + '**'} | "
-            f"{f['probability']:.3f} | {f['decision']} | {estimate}{mark} | {gap} |"
-        )
     misses = [f for f in found if not f["named_first"] or (f["estimate"] and not f["covered"])]
     lines += ["", "## Misses", ""]
-    lines += [f"- **{f['case']}**: {f['sentence']} Remaining: {f['worst']}. {_why(f)}" for f in misses] or [
-        "None."
+    lines += [_miss(f, f"Remaining: {f['worst']}.") for f in misses] or ["None."]
+    unnamed = [
+        f for f in found if f["named_first"] and f not in misses and f["truth"] and f["decision"] != "effect"
     ]
-    unnamed = [f for f in found if f["named_first"] and f["truth"] and f["decision"] != "effect"]
     if unnamed:
         lines += ["", "## First, but not given as the verdict", ""]
-        lines += [f"- **{f['case']}** ({f['decision']}): {f['sentence']} {_why(f)}" for f in unnamed]
-    waiting = [name for name in CASES if name not in {f["case"] for f in found}]
-    if waiting:
-        lines += ["", f"**Not run yet** ({len(waiting)}): {', '.join(waiting)}."]
+        lines += [_miss(f, "") for f in unnamed]
+    weak = [f for f in found if f["strength_sd"] and f["strength_sd"] < 4.0]
+    if weak:
+        lines += ["", f"Under four posterior sd: {', '.join(_who(f) for f in weak)}."]
+    for seed in _seeds(found):
+        waiting = [n for n in CASES if n not in {f["case"] for f in found if f["seed"] == seed}]
+        if waiting:
+            lines += ["", f"**Not run with seed {seed}** ({len(waiting)}): {', '.join(waiting)}."]
     seconds = sorted(f["cpu_s"] for f in found)
     lines += [
         "",
         f"Processor time per diagnosis, simulation included: median {seconds[len(seconds) // 2]:.0f} s.",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _seeds(found: list[Found]) -> list[int]:
+    return sorted({f["seed"] for f in found})
+
+
+def _counts(found: list[Found]) -> list[str]:
+    """How many were named and covered, seed by seed."""
+    lines = []
+    for seed in _seeds(found):
+        mine = [f for f in found if f["seed"] == seed]
+        right = [f for f in mine if f["named_first"]]
+        equal = [f for f in mine if f["equivalent"]]
+        asked = [f for f in right if f["estimate"]]
+        covered = [f for f in asked if f["covered"]]
+        lines.append(
+            f"- Seed {seed}: named first {len(right)} of {len(mine)}; or one that no sensor of the rig tells "
+            f"from it, {len(equal)} of {len(mine)}. Where named, the strength is inside the 95 % interval in "
+            f"{len(covered)} of {len(asked)}."
+        )
+    return lines
+
+
+def _row(f: Found) -> str:
+    on = ", ".join(f"{p} {v:g}" for given in f["truth"].values() for p, v in given.items())
+    strength = f"{f['strength_sd']:.0f}" if f["strength_sd"] else ""
+    estimate = "{:.4g} ({:.4g} … {:.4g})".format(*f["estimate"]) if f["estimate"] else ""
+    mark = "" if f["covered"] or not f["estimate"] else " **outside**"
+    gap = "{:.2f} → {:.2f}".format(*f["gap"][:2]) if f["gap"] else ""
+    named = " + ".join(f["first"]) or "nothing missing"
+    return (
+        f"| {f['case']}{mark_of(f)} | {on} | {f['seed']} | {strength} | "
+        f"{named if f['named_first'] else '**' + named + '**'} | {f['probability']:.3f} | {f['decision']} | "
+        f"{estimate}{mark} | {gap} |"
+    )
+
+
+def _who(f: Found) -> str:
+    return f"{f['case']} (seed {f['seed']})"
+
+
+def _miss(f: Found, more: str) -> str:
+    words = [f"- **{f['case']}**, seed {f['seed']} ({f['decision']}): {f['sentence']}", more, _why(f)]
+    return " ".join(filter(None, words))
 
 
 def _say(found: Found) -> str:

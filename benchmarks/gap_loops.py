@@ -1,6 +1,6 @@
 """Closing the loop: diagnose → apply → simulate → compare, for effects of every kind.
 
-    python -m benchmarks.gap_loops [EFFECT …] [--out FOLDER] [--page docs/gap-loops.md] [--cores N]
+    python -m benchmarks.gap_loops [EFFECT …] [--seed S] [--again] [--page docs/gap-loops.md] [--cores N]
 
 The first six runs are diagnosed and the result is applied to the rig file. Six further runs of the same
 wall, which nothing was fitted to, are then predicted by the rig file as it was and as it is now: α, p,
@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks.gap_campaign import RIG, quick_rig, simulate
 from benchmarks.gap_effects import CASES, diagnosed
-from benchmarks.gap_study import Found, run_study
+from benchmarks.gap_study import Found, mark_of, run_study, states_in_words
 from daq_app.gap.apply import apply_result
 from daq_app.gap.core import CannotDiagnose, Parameter, Prediction, Run, fit
 from daq_app.gap.core.held_out import strain_of
@@ -127,7 +127,8 @@ def page(found: list[Found]) -> str:
         "`python -m benchmarks.gap_loops` (this page is written by it). Gap: rms over noise and scatter of "
         "six runs that nothing was fitted to, predicted from the rig file before and after `gap apply`; the "
         "floor is 1. Calibrations that the fit has to set far from what their certificates "
-        "allow count as gap. Both are measured with the scatters found after.",
+        "allow count as gap. Both are measured with the scatters found after. "
+        f"{states_in_words(found)}",
         "",
         f"Within {WITHIN} of the floor: {len(good)} of {len(found)}.",
         "",
@@ -143,7 +144,8 @@ def page(found: list[Found]) -> str:
             for n, given in f["applied"].items()
         )
         lines.append(
-            f"| {f['effect']} | {' + '.join(f['named']) or 'nothing missing'} ({f['decision']}) | {on} | "
+            f"| {f['effect']}{mark_of(f)} | {' + '.join(f['named']) or 'nothing missing'} "
+            f"({f['decision']}) | {on} | "
             f"{f['before']:.2f} | {f['after']:.2f} | {f['scatter_before']:.4f} → {f['scatter_after']:.4f} | "
             f"{f['resimulated']:.2f} |"
         )

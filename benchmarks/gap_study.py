@@ -1,4 +1,8 @@
-"""A study of many cases that can be interrupted: one JSON per case, a page from all that there are."""
+"""A study of many cases that can be interrupted: one JSON per case and seed, a page from all that there are.
+
+Every row keeps the state of the code that it was measured with. Rows of another state are kept and shown
+as such, or with ``--again`` measured anew.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +10,29 @@ import argparse
 import json
 import time
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+from benchmarks.code_state import CodeState, code_state
+
 Found = dict[str, Any]
+MATTERS = (
+    "daq_app/gap/apply.py",
+    "daq_app/gap/core",
+    "daq_app/gap/rocking_model",
+    "daq_app/config",
+    "sim_hardware",
+    "configs/fr1.toml",
+    "benchmarks/gap_campaign.py",
+)
+"""What the figures of these studies depend on."""
+
+
+@cache
+def state_now() -> CodeState:
+    """State of the code that this process runs."""
+    return code_state(MATTERS)
 
 
 def run_study(
@@ -22,33 +45,69 @@ def run_study(
     arguments: Sequence[str] | None = None,
 ) -> int:
     """Do the cases whose JSON is not there yet, then write the page. Returns the exit code."""
-    raw = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(description=about, formatter_class=raw)
-    parser.add_argument("effects", nargs="*", help="cases to do; all if none is named")
-    parser.add_argument("--out", type=Path, default=folder)
-    parser.add_argument("--page", type=Path)
-    parser.add_argument("--cores", type=int, default=1)
-    parser.add_argument("--seed", type=int, default=11)
-    parser.add_argument("--for-s", type=float, default=float("inf"), help="begin no case after this long")
-    given = parser.parse_args(arguments)
-    unknown = [name for name in given.effects if name not in cases]
-    if unknown:
-        parser.error(f"unknown cases {', '.join(unknown)}; there are {', '.join(cases)}")
+    given = _arguments(about, cases, folder, arguments)
+    state = state_now()
     given.out.mkdir(parents=True, exist_ok=True)
     began = time.monotonic()
     for name in given.effects or cases:
-        target = given.out / f"{name}.json"
-        if target.exists():
+        target = given.out / f"{name}-{given.seed}.json"
+        if target.exists() and not (given.again and _read(target)["code"] != state.code):
             continue
         if time.monotonic() - began > given.for_s:
             break
-        found = do(name, given)
+        found = do(name, given) | {"seed": given.seed, "commit": state.commit, "code": state.code}
         target.write_text(json.dumps(found, indent=1), encoding="utf-8")
-        print(f"{name}: {say(found)}", flush=True)
-    done = [given.out / f"{name}.json" for name in cases if (given.out / f"{name}.json").exists()]
-    text = page([json.loads(path.read_text(encoding="utf-8")) for path in done])
+        print(f"{name}, seed {given.seed}: {say(found)}", flush=True)
+    if given.quiet:
+        return 0
+    done = [path for name in cases for path in sorted(given.out.glob(f"{name}-[0-9]*.json"))]
+    text = page([_read(path) for path in done])
     if given.page:
         given.page.write_text(text, encoding="utf-8")
     else:
         print(text)
     return 0
+
+
+def _arguments(
+    about: str, cases: Sequence[str], folder: Path, arguments: Sequence[str] | None
+) -> argparse.Namespace:
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=about, formatter_class=raw)
+    parser.add_argument("effects", nargs="*", help="cases to do; all if none is named")
+    parser.add_argument("--out", type=Path, default=folder)
+    parser.add_argument("--page", type=Path, help="write the page there instead of printing it")
+    parser.add_argument("--cores", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--for-s", type=float, default=float("inf"), help="begin no case after this long")
+    parser.add_argument("--again", action="store_true", help="measure rows of another state of the code anew")
+    parser.add_argument("--quiet", action="store_true", help="make no page")
+    given = parser.parse_args(arguments)
+    unknown = [name for name in given.effects if name not in cases]
+    if unknown:
+        parser.error(f"unknown cases {', '.join(unknown)}; there are {', '.join(cases)}")
+    return given
+
+
+def states_in_words(found: Sequence[Found]) -> str:
+    """The state of the code of all rows, as a sentence; rows of older states are marked by `mark_of`."""
+    names = {f["code"]: f["commit"] for f in found}
+    if len(names) <= 1:
+        return "".join(f"All rows were measured with the code of commit {c}." for c in names.values())
+    now = state_now().code
+    old = ", ".join(f"{mark_of(f)} {f['commit']}" for f in _first_of_each(found) if f["code"] != now)
+    return f"Rows without a mark were measured with the present code; others: {old}."
+
+
+def mark_of(found: Found) -> str:
+    """A mark for a row of another state of the code; empty for one of the present state."""
+    return "" if found["code"] == state_now().code else f"[{found['code'][:4]}]"
+
+
+def _first_of_each(found: Sequence[Found]) -> list[Found]:
+    return list({f["code"]: f for f in reversed(found)}.values())
+
+
+def _read(path: Path) -> Found:
+    found: Found = json.loads(path.read_text(encoding="utf-8"))
+    return found

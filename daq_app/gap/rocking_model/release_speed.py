@@ -37,13 +37,13 @@ def release_speed(
     count = (last - first) // step
     side = float(np.sign(swings.peak_rad[0]))
     seen = side * theta[first : first + count * step].reshape(count, step).mean(axis=1)
-    time_s = (first + step * (np.arange(count) + 0.5) - 0.5) / rate_hz - swings.release_s
-    starts = np.linspace(-SEARCHED_S, SEARCHED_S, _STEPS)
+    time_s = (first + step * (np.arange(count, dtype=np.float64) + 0.5) - 0.5) / rate_hz - swings.release_s
+    starts: FloatArray = np.linspace(-SEARCHED_S, SEARCHED_S, _STEPS, dtype=np.float64)
     lost = [_fit(seen, time_s, start, survey.p_rad_s)[0] for start in starts]
     best = int(np.argmin(lost))
     for _ in range(4):
         width = starts[1] - starts[0]
-        starts = starts[best] + np.linspace(-width, width, 9)
+        starts = starts[best] + np.linspace(-width, width, 9, dtype=np.float64)
         lost = [_fit(seen, time_s, start, survey.p_rad_s)[0] for start in starts]
         best = int(np.argmin(lost))
     left, found, design = _fit(seen, time_s, float(starts[best]), survey.p_rad_s)
