@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from daq_app.rocking import theory
 from daq_app.rocking.bias import BiasSettings, method_bias
 from daq_app.rocking.block import RigidBlock
-from daq_app.rocking.estimators import RestitutionEstimate, eav
+from daq_app.rocking.estimators import RestitutionEstimate, eav_series, estimate_all
 from daq_app.rocking.filtered_peaks import corrected_peaks, filtered_peaks
 from daq_app.rocking.fusion import Fused, best_value, level
 from daq_app.rocking.joint import JointMotion
@@ -136,8 +136,7 @@ def track_motion(
     track = MotionTrack.begin(
         settings, time_s[first:last], rotation_rad[first:last], times.release_s, times.hold_rad
     )
-    for impact in times.impacts_s:
-        track.add_impact(impact, time_s, rotation_rad)
+    track.add_impacts(times.impacts_s, time_s, rotation_rad)
     return track
 
 
@@ -148,13 +147,13 @@ def _estimates(
     p, alpha = signals.settings.p_rad_s, signals.settings.alpha_rad
     noise = np.full(peaks.size, velocity_filter.noise_rad_s(signals.noise_rad))
     corrected = corrected_peaks(peaks, velocity_filter, p, alpha)
-    found = {
-        "eav": track.eav(),
-        "crt": track.crt(),
-        "crt_exact": track.crt_exact(),
-        "eav_filtered": eav(peaks.tolist(), noise.tolist(), method="EAV, filtered peaks (biased low)"),
-        "eav_filtered_corrected": eav(
-            corrected.tolist(), noise.tolist(), method="EAV, filtered peaks, amplitude loss corrected"
+    series = {
+        "eav": track.eav_series(),
+        "crt": track.crt_series(),
+        "crt_exact": track.crt_exact_series(),
+        "eav_filtered": eav_series(peaks, noise, method="EAV, filtered peaks (biased low)"),
+        "eav_filtered_corrected": eav_series(
+            corrected, noise, method="EAV, filtered peaks, amplitude loss corrected"
         ),
     }
     if signals.fused is not None and signals.joint is not None:
@@ -162,9 +161,9 @@ def _estimates(
         for name, rotation in others.items():
             if np.isfinite(rotation).mean() > 0.9:
                 other = track_motion(signals.settings, times, signals.time_s, rotation)
-                found[f"eav_{name}"] = replace(other.eav(), method=f"EAV, rotation from {name}")
-                found[f"crt_{name}"] = replace(other.crt(), method=f"CRT, rotation from {name}")
-    return found
+                series[f"eav_{name}"] = other.eav_series(f"EAV, rotation from {name}")
+                series[f"crt_{name}"] = other.crt_series(f"CRT, rotation from {name}")
+    return dict(zip(series, estimate_all(list(series.values())), strict=True))
 
 
 def _typical_r(estimates: Mapping[str, RestitutionEstimate]) -> float:

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.estimators import RestitutionEstimate, eav
+from daq_app.rocking.estimators import RestitutionEstimate, eav_series, estimate_all
 from daq_app.rocking.filtered_peaks import corrected_peaks, filtered_peaks
 from daq_app.rocking.housner import free_rocking
 from daq_app.rocking.motion import MotionSettings, MotionTrack
-from daq_app.rocking.motion_fit import fit_motion
+from daq_app.rocking.motion_fit import MotionFit, fit_motion
 from daq_app.rocking.results import Bias
 from daq_app.rocking.velocity import VelocityFilter
 
@@ -47,9 +47,8 @@ class BiasSettings:
 def method_bias(settings: BiasSettings) -> dict[str, Bias]:
     """Bias by method (keys of `TestAnalysis.estimates`, and ``fit``)."""
     errors: dict[str, list[float]] = {}
-    rng = np.random.default_rng(settings.seed)
-    for run in range(settings.runs):
-        for method, r in _one(settings, rng, with_fit=settings.with_fit and run < _FIT_RUNS).items():
+    for found in _estimates(settings):
+        for method, r in found.items():
             errors.setdefault(method, []).append(r - settings.r)
     return {method: summarise(values) for method, values in errors.items()}
 
@@ -76,46 +75,74 @@ def bias_by(
     return {method: summarise(values) for method, values in errors.items()}
 
 
-def _one(wanted: BiasSettings, rng: np.random.Generator, *, with_fit: bool) -> dict[str, float]:
-    """r by every method on one simulated motion."""
+@dataclass(frozen=True, slots=True)
+class _Simulated:
+    """One simulated motion, tracked as a recording is."""
+
+    time_s: Floats
+    rotation_rad: Floats
+    track: MotionTrack
+    filtered_rad_s: Floats
+    """Peaks of the filtered velocity."""
+
+
+def _simulated(wanted: BiasSettings, rng: np.random.Generator) -> _Simulated:
     settings = wanted.settings
     p, alpha, rate = settings.p_rad_s, settings.alpha_rad, settings.rate_hz
     theta0 = math.copysign(min(abs(wanted.theta0_rad), 0.95 * alpha), wanted.theta0_rad)
     motion = free_rocking(theta0, wanted.r, p, alpha, release_s=0.6, max_impacts=max(wanted.impacts, 2))
     time = np.arange(round((motion.impacts_s[-1] + 0.1) * rate)) / rate
-    rotation = motion.at(time)[0] + rng.normal(0.0, wanted.noise_rad, time.size)
+    rotation = motion.rotation(time) + rng.normal(0.0, wanted.noise_rad, time.size)
     first = int(np.searchsorted(time, motion.impacts_s[0] + 1e-3))
     track = MotionTrack.begin(settings, time[:first], rotation[:first], motion.release_s, theta0)
-    for crossing, speed in zip(motion.impacts_s, motion.speeds_before_rad_s, strict=True):
-        # The detector finds a crossing from some 80 samples around it.
-        jitter = wanted.noise_rad / max(speed, 1e-3) / 6.0
-        track.add_impact(float(crossing + rng.normal(0.0, jitter)), time, rotation)
+    # The detector finds a crossing from some 80 samples around it.
+    jitter = wanted.noise_rad / np.maximum(motion.speeds_before_rad_s, 1e-3) / 6.0
+    track.add_impacts((motion.impacts_s + rng.normal(0.0, jitter)).tolist(), time, rotation)
     velocity = wanted.velocity_filter.velocity(rotation)
-    peaks = filtered_peaks(time, velocity, track.impacts_s)
-    noise = np.full(peaks.size, wanted.velocity_filter.noise_rad_s(wanted.noise_rad)).tolist()
-    corrected = corrected_peaks(peaks, wanted.velocity_filter, p, alpha)
-    by_speeds, by_peaks = track.eav(), track.crt()
-    found = {
-        "eav": by_speeds.r,
-        "crt": by_peaks.r,
-        "crt_exact": track.crt_exact().r,
-        "eav_filtered": eav(peaks.tolist(), noise).r,
-        "eav_filtered_corrected": eav(corrected.tolist(), noise).r,
+    return _Simulated(time, rotation, track, filtered_peaks(time, velocity, track.impacts_s))
+
+
+def _estimates(wanted: BiasSettings) -> list[dict[str, float]]:
+    """r by every method on each simulated motion; the slopes of all of them are found together."""
+    rng = np.random.default_rng(wanted.seed)
+    runs = [_simulated(wanted, rng) for _ in range(wanted.runs)]
+    p, alpha = wanted.settings.p_rad_s, wanted.settings.alpha_rad
+    filtered = np.array([run.filtered_rad_s for run in runs])
+    corrected = corrected_peaks(filtered, wanted.velocity_filter, p, alpha)
+    noise = np.full(filtered.shape[1], wanted.velocity_filter.noise_rad_s(wanted.noise_rad))
+    series = {
+        "eav": [run.track.eav_series() for run in runs],
+        "crt": [run.track.crt_series() for run in runs],
+        "crt_exact": [run.track.crt_exact_series() for run in runs],
+        "eav_filtered": [eav_series(row, noise) for row in filtered],
+        "eav_filtered_corrected": [eav_series(row, noise) for row in corrected],
     }
-    if with_fit:
-        fit = fit_motion(
-            time,
-            rotation,
-            release_s=track.release.time_s,
-            theta0_rad=track.theta0_rad,
-            impacts_s=track.impacts_s,
-            peaks_rad=track.peaks_rad,
-            speeds_rad_s=track.speeds_before_rad_s,
-            r=found["crt"] or wanted.r,
-            scatter=max(by_speeds.scatter, by_peaks.scatter),
-            noise_rad=wanted.noise_rad,
-            p_rad_s=p,
-            alpha_rad=alpha,
-        )
-        found["fit"] = None if fit is None else fit.r
-    return {method: r for method, r in found.items() if r is not None}
+    flat = iter(estimate_all([one for rows in series.values() for one in rows]))
+    estimates = {method: [next(flat) for _ in rows] for method, rows in series.items()}
+    found: list[dict[str, float]] = []
+    for number, run in enumerate(runs):
+        own = {method: rows[number] for method, rows in estimates.items()}
+        known = {method: estimate.r for method, estimate in own.items() if estimate.r is not None}
+        fit = _fitted(wanted, run, own) if wanted.with_fit and number < _FIT_RUNS else None
+        found.append(known if fit is None else {**known, "fit": fit.r})
+    return found
+
+
+def _fitted(
+    wanted: BiasSettings, run: _Simulated, estimates: Mapping[str, RestitutionEstimate]
+) -> MotionFit | None:
+    by_speeds, by_peaks = estimates["eav"], estimates["crt"]
+    return fit_motion(
+        run.time_s,
+        run.rotation_rad,
+        release_s=run.track.release.time_s,
+        theta0_rad=run.track.theta0_rad,
+        impacts_s=run.track.impacts_s,
+        peaks_rad=run.track.peaks_rad,
+        speeds_rad_s=run.track.speeds_before_rad_s,
+        r=by_peaks.r or wanted.r,
+        scatter=max(by_speeds.scatter, by_peaks.scatter),
+        noise_rad=wanted.noise_rad,
+        p_rad_s=wanted.settings.p_rad_s,
+        alpha_rad=wanted.settings.alpha_rad,
+    )

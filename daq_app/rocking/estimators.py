@@ -65,6 +65,21 @@ class RestitutionEstimate:
         return self.r - reach, self.r + reach
 
 
+@dataclass(frozen=True, slots=True)
+class DecaySeries:
+    """What falls by ln r from one impact to the next in one test by one method, and its points."""
+
+    method: str
+    points: tuple[RestitutionPoint, ...]
+    """Without points there is no estimate."""
+    values: Floats
+    """(n,)"""
+    variances: Floats
+    usable: NDArray[np.bool_]
+    levels: Floats
+    """(n, levels) 1 where a value counts from this level."""
+
+
 def eav(
     speeds_rad_s: Sequence[float], sigmas_rad_s: Sequence[float], *, method: str = "EAV"
 ) -> RestitutionEstimate:
@@ -72,12 +87,17 @@ def eav(
 
     Signs are ignored. Speeds that are not finite, or known worse than 15 %, make no pair.
     """
+    return estimate_all([eav_series(speeds_rad_s, sigmas_rad_s, method=method)])[0]
+
+
+def eav_series(
+    speeds_rad_s: Sequence[float] | Floats, sigmas_rad_s: Sequence[float] | Floats, *, method: str = "EAV"
+) -> DecaySeries:
+    """The speeds of `eav` before their slope is found."""
     speeds, sigmas = np.abs(np.asarray(speeds_rad_s)), np.asarray(sigmas_rad_s)
     usable = _usable(speeds, sigmas)
-    pairs = [(k, k + 2) for k in range(speeds.size - 2) if usable[k] and usable[k + 2]]
-    if not pairs:
-        return RestitutionEstimate(method, ())
     log, relative = np.log(np.where(usable, speeds, 1.0)), np.where(usable, sigmas / speeds, 0.0)
+    pairs = [(k, k + 2) for k in range(speeds.size - 2) if usable[k] and usable[k + 2]]
     points = []
     for first, last in pairs:
         r = math.exp(0.5 * (log[last] - log[first]))
@@ -85,7 +105,7 @@ def eav(
         points.append(RestitutionPoint(last + 1, first + 1, last + 1, r, sigma))
     side = np.arange(speeds.size) % 2
     levels = np.stack([side == 0, side == 1], axis=1).astype(np.float64)
-    return _combine(method, points, log, relative**2, usable, levels)
+    return DecaySeries(method, tuple(points), log, relative**2, usable, levels)
 
 
 def crt(
@@ -101,24 +121,32 @@ def crt(
     `exact` uses the nonlinear potential 1 − cos(α − |θ|) in place of the paper's (α − |θ|)²/2; the
     caller names the method accordingly.
     """
+    return estimate_all([crt_series(peaks_rad, sigmas_rad, alpha_rad, exact=exact, method=method)])[0]
+
+
+def crt_series(
+    peaks_rad: Sequence[float],
+    sigmas_rad: Sequence[float],
+    alpha_rad: float,
+    *,
+    exact: bool = False,
+    method: str = "CRT",
+) -> DecaySeries:
+    """The energies of `crt` before their slope is found."""
     peaks, sigmas = np.abs(np.asarray(peaks_rad)), np.asarray(sigmas_rad)
     inside = np.isfinite(peaks) & (peaks > 0.0) & (peaks < alpha_rad)
     safe = np.where(inside, peaks, alpha_rad / 2.0)
     energies = exact_energy(safe, alpha_rad) if exact else theory.energy(safe / alpha_rad)
     slope = 2.0 * (1.0 - safe / alpha_rad) / alpha_rad
     usable = inside & _usable(energies, slope * sigmas)
-    if peaks.size < 2 or not usable[0]:
-        return RestitutionEstimate(method, ())
-    counts = [n for n in range(1, peaks.size) if usable[n]]
-    if not counts:
-        return RestitutionEstimate(method, ())
     relative = np.where(usable, slope * sigmas / energies, 0.0)
     log = np.log(energies)
     points = []
-    for n in counts:
+    for n in [n for n in range(1, peaks.size) if usable[n]] if peaks.size and usable[0] else []:
         r = math.exp((log[n] - log[0]) / (2 * n))
         points.append(RestitutionPoint(n, 0, n, r, r * math.hypot(relative[0], relative[n]) / (2 * n)))
-    return _combine(method, points, log / 2.0, (relative / 2.0) ** 2, usable, np.ones((peaks.size, 1)))
+    levels = np.ones((peaks.size, 1))
+    return DecaySeries(method, tuple(points), log / 2.0, (relative / 2.0) ** 2, usable, levels)
 
 
 def _usable(values: Floats, sigmas: Floats) -> NDArray[np.bool_]:
@@ -128,24 +156,32 @@ def _usable(values: Floats, sigmas: Floats) -> NDArray[np.bool_]:
         )
 
 
-def _combine(
-    method: str,
-    points: list[RestitutionPoint],
-    values: Floats,
-    variances: Floats,
-    usable: NDArray[np.bool_],
-    levels: Floats,
-) -> RestitutionEstimate:
-    """Weighted mean from values that fall by ln r per impact, and the plain mean of the points."""
-    slope, variance, scatter = _slope(values, variances, usable, levels, len(points) >= 4)
-    single = np.array([point.r for point in points])
+def estimate_all(wanted: Sequence[DecaySeries]) -> list[RestitutionEstimate]:
+    """Weighted mean of each series from values that fall by ln r per impact, and plain mean of its points.
+
+    Series of the same length are worked on together: many cost little more than one.
+    """
+    found = [RestitutionEstimate(series.method, ()) for series in wanted]
+    alike: dict[tuple[int, ...], list[int]] = {}
+    for place, series in enumerate(wanted):
+        if series.points:
+            alike.setdefault(series.levels.shape, []).append(place)
+    for places in alike.values():
+        together = [wanted[place] for place in places]
+        for place, series, fallen in zip(places, together, _slopes(together), strict=True):
+            found[place] = _estimate(series, *fallen)
+    return found
+
+
+def _estimate(series: DecaySeries, slope: float, variance: float, scatter: float) -> RestitutionEstimate:
+    single = np.array([point.r for point in series.points])
     r = math.exp(slope)
     return RestitutionEstimate(
-        method=method,
-        points=tuple(points),
+        method=series.method,
+        points=series.points,
         r=r,
         standard_error=r * math.sqrt(variance),
-        degrees_of_freedom=_degrees(variances[usable], len(points), scatter),
+        degrees_of_freedom=_degrees(series.variances[series.usable], len(series.points), scatter),
         scatter=scatter,
         plain_mean=float(single.mean()),
         plain_standard_error=float(single.std(ddof=1) / math.sqrt(single.size)) if single.size > 1 else None,
@@ -164,37 +200,44 @@ def _degrees(variances: Floats, points: int, scatter: float) -> int:
     return max(round(informative) - 1, 1)
 
 
-def _slope(
-    values: Floats, variances: Floats, usable: NDArray[np.bool_], levels: Floats, find_scatter: bool
-) -> tuple[float, float, float]:
-    """Generalised least-squares slope of `values` against their index, its variance, and the scatter.
+def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float]]:
+    """Generalised least-squares slope of the values against their index, its variance, and the scatter.
 
     Errors are independent (`variances`) plus a random walk of step s. Every s of a grid is tried at
-    once by a Kalman filter that whitens values and regressors (Harvey's GLS by prediction errors);
-    the s of the largest restricted likelihood counts.
+    once, and every series (all of one length), by a Kalman filter that whitens values and regressors
+    (Harvey's GLS by prediction errors); the s of the largest restricted likelihood counts.
     """
-    walk = (_SCATTERS if find_scatter else _SCATTERS[:1]) ** 2
-    used = levels[:, levels[usable].any(axis=0)]
-    rows = np.column_stack([values, used, np.arange(values.size)])
-    state, spread = np.zeros((walk.size, rows.shape[1])), np.zeros(walk.size)
-    whitened, log_spread = [], np.zeros(walk.size)
-    for k in range(values.size):
+    usable = np.array([series.usable for series in together])
+    variances = np.array([series.variances for series in together])
+    index = np.arange(usable.shape[1], dtype=np.float64)
+    rows = np.stack([np.column_stack([s.values, s.levels, index]) for s in together])[:, None]
+    walk = np.broadcast_to(_SCATTERS**2, (len(together), _SCATTERS.size))
+    state, spread = np.zeros((*walk.shape, rows.shape[-1])), np.zeros(walk.shape)
+    whitened, log_spread = np.zeros((*walk.shape, usable.shape[1], rows.shape[-1])), np.zeros(walk.shape)
+    for k in range(usable.shape[1]):
         spread = spread + walk if k else spread
-        if usable[k]:
-            # Rounding and model error of a perfect recording keep the filter well conditioned.
-            total = spread + variances[k] + 1e-12
-            error = rows[k] - state
-            gain = spread / total
-            state = state + gain[:, None] * error
-            spread = spread * (1.0 - gain)
-            whitened.append(error / np.sqrt(total)[:, None])
-            log_spread += np.log(total)
-    table = np.stack(whitened, axis=1)
-    target, design = table[:, :, :1], table[:, :, 1:]
-    normal = np.swapaxes(design, 1, 2) @ design
+        there = usable[:, k, None]
+        # Rounding and model error of a perfect recording keep the filter well conditioned.
+        total = np.where(there, spread + variances[:, k, None] + 1e-12, 1.0)
+        error = np.where(there[..., None], rows[:, :, k] - state, 0.0)
+        gain = np.where(there, spread / total, 0.0)
+        state = state + gain[..., None] * error
+        spread = spread * (1.0 - gain)
+        whitened[:, :, k] = error / np.sqrt(total)[..., None]
+        log_spread += np.log(total)
+    target, design = whitened[..., :1], whitened[..., 1:]
+    normal = np.swapaxes(design, 2, 3) @ design
+    # A level that no usable value counts from has no column: a one in its place changes nothing.
+    empty = ~np.array([series.levels[series.usable].any(axis=0) for series in together])
+    for level in range(empty.shape[1]):
+        normal[empty[:, level], :, level, level] = 1.0
     inverse = np.linalg.inv(normal)
-    solution = inverse @ (np.swapaxes(design, 1, 2) @ target)
-    misfit = ((target - design @ solution) ** 2).sum(axis=(1, 2))
+    solution = inverse @ (np.swapaxes(design, 2, 3) @ target)
+    misfit = ((target - design @ solution) ** 2).sum(axis=(2, 3))
     likelihood = -0.5 * (log_spread + np.linalg.slogdet(normal)[1] + misfit)
-    best = int(np.argmax(likelihood))
-    return float(solution[best, -1, 0]), float(inverse[best, -1, -1]), float(_SCATTERS[best])
+    # Fewer than four points tell nothing of a scatter: it counts as none.
+    few = np.array([len(series.points) < 4 for series in together])
+    best = np.where(few, 0, np.argmax(likelihood, axis=1))
+    places = np.arange(best.size)
+    slope, variance = solution[places, best, -1, 0], inverse[places, best, -1, -1]
+    return list(zip(slope.tolist(), variance.tolist(), _SCATTERS[best].tolist(), strict=True))

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.estimators import eav
+from daq_app.rocking.estimators import eav_series, estimate_all
 from daq_app.rocking.housner import exact_amplitude
 from daq_app.rocking.velocity import VelocityFilter
 
@@ -39,17 +39,20 @@ def filtered_peaks(time_s: Floats, velocity_rad_s: Floats, impacts_s: Sequence[f
 def corrected_peaks(
     peaks_rad_s: Floats, velocity_filter: VelocityFilter, p_rad_s: float, alpha_rad: float
 ) -> Floats:
-    """Peaks divided by the filter's known ratio for half-cycles of that speed.
+    """Peaks divided by the filter's known ratio for half-cycles of that speed; (n,) or (tests, n).
 
     The ratio depends on r and on the true speed, both found by repetition.
     """
-    corrected = np.array(peaks_rad_s, dtype=np.float64)
+    peaks = np.atleast_2d(np.asarray(peaks_rad_s, dtype=np.float64))
+    corrected, exact = peaks, np.zeros(peaks.shape[1])
     for _ in range(3):
-        estimate = eav(corrected.tolist(), np.zeros(corrected.size).tolist())
-        restitution = min(estimate.r or 0.9, 0.999)
+        estimates = estimate_all([eav_series(row, exact) for row in corrected])
         # The amplitude whose fall gives this speed: v² = 4 p² sin²(α/2) E.
         energy = (corrected / (2.0 * p_rad_s * np.sin(alpha_rad / 2.0))) ** 2
         amplitude = exact_amplitude(np.clip(energy, 1e-6, 0.98), alpha_rad)
-        ratio = velocity_filter.peak_ratio(amplitude, restitution, p_rad_s, alpha_rad)
-        corrected = np.asarray(peaks_rad_s) / ratio
-    return np.asarray(corrected)
+        ratios = [
+            velocity_filter.peak_ratio(row, min(estimate.r or 0.9, 0.999), p_rad_s, alpha_rad)
+            for row, estimate in zip(amplitude, estimates, strict=True)
+        ]
+        corrected = peaks / np.array(ratios)
+    return np.asarray(corrected.reshape(np.shape(peaks_rad_s)))

@@ -19,6 +19,9 @@ from scipy.special import ellipj, ellipkinc
 
 Floats = NDArray[np.float64]
 
+_NODES = 64
+"""Intervals between peak and impact of the interpolated rotation."""
+
 
 def exact_energy(theta_rad: ArrayLike, alpha_rad: float) -> Floats:
     """Potential energy at |θ| as a fraction of the barrier: 1 − (1 − cos(α−|θ|)) / (1 − cos α)."""
@@ -118,6 +121,29 @@ class FreeRocking:
         index, local, sign = self.locate(time_s)
         rotation, speed = half_cycle_rotation(local, self.peaks_rad[index], self.p_rad_s, self.alpha_rad)
         return sign * rotation, sign * speed
+
+    def rotation(self, time_s: ArrayLike) -> Floats:
+        """θ at very many times, rad, signed: within 2e-9 rad of `at`, at a small part of its cost.
+
+        Cubic Hermite interpolation between exact rotations and speeds of each half-cycle.
+        """
+        index, local, sign = self.locate(time_s)
+        quarter = exact_quarter_period(self.peaks_rad, self.p_rad_s, self.alpha_rad)
+        # A half-cycle is symmetric about its peak: from there to the impact is enough.
+        share = np.linspace(0.0, 1.0, _NODES + 1)
+        nodes, speeds = half_cycle_rotation(
+            quarter[:, None] * share, self.peaks_rad[:, None], self.p_rad_s, self.alpha_rad
+        )
+        slopes = speeds * (quarter / _NODES)[:, None]
+        place = np.minimum(np.abs(local) * (_NODES / quarter)[index], _NODES)
+        node = np.minimum(place.astype(np.intp), _NODES - 1)
+        u = place - node
+        left = index * (_NODES + 1) + node
+        low, low_slope = nodes.ravel()[left], slopes.ravel()[left]
+        rise, high_slope = nodes.ravel()[left + 1] - low, slopes.ravel()[left + 1]
+        bend = low_slope + high_slope - 2.0 * rise
+        value = low + u * (low_slope + u * (rise - low_slope - bend + u * bend))
+        return np.asarray(sign * value)
 
 
 def free_rocking(

@@ -92,19 +92,23 @@ class WireGeometry:
 
     def rotation_of_each(self, shortening_m: Floats) -> Floats:
         """(wires, n) rotation that each wire alone shows; NaN where no rotation explains the reading."""
-        positive = shortening_m * np.sign(self.lever_m)[:, None] >= 0.0
-        pivot = np.where(positive, self.half_width_m, -self.half_width_m)
-        ax, az = self.anchor_m[:, :1] - pivot, self.anchor_m[:, 2:]
-        px, pz = self.position_m[:, :1] - pivot, self.position_m[:, 2:]
+        # Only two pivots exist: everything that does not depend on the sample is known per wire and side.
+        pivots = np.array([self.half_width_m, -self.half_width_m])
+        ax, px = self.anchor_m[:, :1] - pivots, self.position_m[:, :1] - pivots
+        az, pz = self.anchor_m[:, 2:], self.position_m[:, 2:]
         dy = (self.anchor_m - self.position_m)[:, 1:2]
-        # Only two pivots exist: everything that does not depend on the sample is chosen, not recomputed.
-        length = self.length0_m[:, None] - shortening_m
-        square = ax * ax + az * az + px * px + pz * pz + dy * dy - length * length
-        cosine = square / (2.0 * np.sqrt((ax * ax + az * az) * (px * px + pz * pz)))
-        gamma = np.arctan2(ax, az) - np.arctan2(px, pz)
-        with np.errstate(invalid="ignore"):
-            opening = np.arccos(cosine)
-        return np.asarray(gamma - np.sign(gamma) * opening)
+        squares = ax * ax + az * az + px * px + pz * pz + dy * dy
+        products = 2.0 * np.sqrt((ax * ax + az * az) * (px * px + pz * pz))
+        gammas = np.arctan2(ax, az) - np.arctan2(px, pz)
+        rotation = np.empty_like(shortening_m)
+        for wire, row in enumerate(shortening_m):
+            side = (row * np.sign(self.lever_m[wire]) < 0.0).astype(np.intp)
+            length = self.length0_m[wire] - row
+            with np.errstate(invalid="ignore"):
+                opening = np.arccos((squares[wire, side] - length * length) / products[wire, side])
+            gamma = gammas[wire, side]
+            rotation[wire] = gamma - np.copysign(opening, gamma)
+        return rotation
 
 
 class WireWatch:

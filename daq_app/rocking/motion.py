@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.arcs import Arc, fit_arc
-from daq_app.rocking.estimators import RestitutionEstimate, crt, eav
+from daq_app.rocking.arcs import Arc, fit_arcs
+from daq_app.rocking.estimators import DecaySeries, RestitutionEstimate, crt_series, eav_series, estimate_all
 from daq_app.rocking.release import Release, locate_release
 
 Floats = NDArray[np.float64]
@@ -68,21 +68,24 @@ class MotionTrack:
 
     def add_impact(self, crossing_s: float, time_s: Floats, rotation_rad: Floats) -> Arc | None:
         """Impact at about `crossing_s` ends a half-cycle, which is fitted and returned."""
-        index = len(self.crossings_s)
-        start = self.crossings_s[-1] if index else self.release.time_s
-        arc = fit_arc(
+        return self.add_impacts([crossing_s], time_s, rotation_rad)[0]
+
+    def add_impacts(
+        self, crossings_s: Sequence[float], time_s: Floats, rotation_rad: Floats
+    ) -> list[Arc | None]:
+        """The same for the next impacts, all at once."""
+        arcs = fit_arcs(
             time_s,
             rotation_rad,
-            start,
-            crossing_s,
-            index=index,
+            [self.crossings_s[-1] if self.crossings_s else self.release.time_s, *crossings_s],
+            first_index=len(self.crossings_s),
             p_rad_s=self.settings.p_rad_s,
             alpha_rad=self.settings.alpha_rad,
             zero_sigma_rad=self.settings.zero_sigma_rad,
         )
-        self.crossings_s.append(crossing_s)
-        self.arcs.append(arc)
-        return arc
+        self.crossings_s.extend(crossings_s)
+        self.arcs.extend(arcs)
+        return arcs
 
     @property
     def impacts_s(self) -> list[float]:
@@ -131,16 +134,28 @@ class MotionTrack:
 
     def eav(self) -> RestitutionEstimate:
         """EAV (4.4) from one-sided fits."""
-        return eav(self.speeds_before_rad_s, self.sigma_speeds_before_rad_s)
+        return estimate_all([self.eav_series()])[0]
 
     def crt(self) -> RestitutionEstimate:
         """CRT (4.5), the paper's linearised energy."""
-        return crt(self.peaks_rad, self.sigma_peaks_rad, self.settings.alpha_rad)
+        return estimate_all([self.crt_series()])[0]
 
     def crt_exact(self) -> RestitutionEstimate:
         """CRT with the exact potential of the nonlinear equation."""
+        return estimate_all([self.crt_exact_series()])[0]
+
+    def eav_series(self, method: str = "EAV") -> DecaySeries:
+        """What `eav` is found from: many series are estimated together at the cost of one."""
+        return eav_series(self.speeds_before_rad_s, self.sigma_speeds_before_rad_s, method=method)
+
+    def crt_series(self, method: str = "CRT") -> DecaySeries:
+        """What `crt` is found from."""
+        return crt_series(self.peaks_rad, self.sigma_peaks_rad, self.settings.alpha_rad, method=method)
+
+    def crt_exact_series(self, method: str = "CRT exact potential") -> DecaySeries:
+        """What `crt_exact` is found from."""
         alpha = self.settings.alpha_rad
-        return crt(self.peaks_rad, self.sigma_peaks_rad, alpha, exact=True, method="CRT exact potential")
+        return crt_series(self.peaks_rad, self.sigma_peaks_rad, alpha, exact=True, method=method)
 
 
 def hold_level(

@@ -9,18 +9,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
+from daq_app.rocking.least_squares import Minimum, least_squares
 from daq_app.rocking.motion_model import ALPHA_PRIOR, FIXED, P_PRIOR, POINT_S, ZERO_PRIOR_RAD, MotionModel
 
 Floats = NDArray[np.float64]
 
 _SMALLEST_SHARE = 0.02
 """The motion is fitted until its peaks fall below this share of the first."""
+
+_POOR = 1.5
+"""A fit that leaves more than this many times the noise may have ended in a minimum that is not the least."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,19 +101,23 @@ def fit_motion(
     # impact has its own, the speeds put all of them in phase from the start.
     for span in sorted({min(4, count), count}) if spread is None else [count]:
         x = np.concatenate((x, start[x.size - FIXED : span]))
-        end = impacts_s[span] if span < len(impacts_s) else stop
-        arguments = (span, min(end, stop))
-        result = least_squares(
-            problem.residual,
-            x,
-            args=arguments,
-            jac=problem.jacobian,
-            x_scale="jac",
-            method="trf",
-            max_nfev=60,
-        )
-        x = result.x
-    return _result(problem, result.x, result.jac, result.fun, count, sigma)
+        end = min(impacts_s[span] if span < len(impacts_s) else stop, stop)
+        found = _least(problem, x, span, end)
+        x = found.x
+    return _result(problem, found, count, sigma)
+
+
+def _least(problem: MotionModel, start: Floats, span: int, stop_s: float) -> Minimum:
+    """The fit of the first `span` impacts; where it leaves too much, from other starts as well."""
+    residual = partial(problem.residual, span=span, stop_s=stop_s)
+    jacobian = partial(problem.jacobian, span=span, stop_s=stop_s)
+    best = least_squares(residual, jacobian, start)
+    settled = np.concatenate((best.x[:FIXED], np.clip(best.x[FIXED:], -1.0, 1.0)))
+    for other, damping in ((start, 1.0), (settled, 0.0)):
+        if np.mean(best.residual**2) > _POOR**2:
+            found = least_squares(residual, jacobian, other, damping=damping)
+            best = min(best, found, key=lambda minimum: float(np.sum(minimum.residual**2)))
+    return best
 
 
 def _span(peaks_rad: list[float], impacts: int) -> int:
@@ -140,13 +148,12 @@ def _points(
     return t[good], y[good], noise_rad / math.sqrt(size)
 
 
-def _result(
-    problem: MotionModel, x: Floats, jacobian: Floats, residual: Floats, count: int, sigma: float
-) -> MotionFit | None:
-    data = residual[: residual.size - 3 - (x.size - FIXED)]
+def _result(problem: MotionModel, found: Minimum, count: int, sigma: float) -> MotionFit | None:
+    x = found.x
+    data = found.residual[: found.residual.size - 3 - (x.size - FIXED)]
     excess = max(1.0, float(data @ data) / max(data.size - FIXED, 1))
     # Data rows are weakened by what the model leaves; priors keep their weight.
-    scaled = jacobian.copy()
+    scaled = found.jacobian.copy()
     scaled[: data.size] /= math.sqrt(excess)
     try:
         covariance = np.linalg.inv(scaled.T @ scaled)

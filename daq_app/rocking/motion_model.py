@@ -85,16 +85,15 @@ class MotionModel:
         """
         time = self.time_s[self.time_s <= stop_s]
         motion = self.motion(x, span)
-        columns = np.zeros((time.size, x.size))
-        by_energy, by_peak_time = self._local(motion, time)
-        index = motion.locate(time)[0]
+        index, local, sign = motion.locate(time)
+        rotation, by_energy, by_peak_time = self._local(motion, index, local, sign)
         energy, peak_time = self._chain(x, motion)
-        columns += by_energy[:, None] * energy[index] + by_peak_time[:, None] * peak_time[index]
-        for column in (2, 3):
-            step = np.zeros(x.size)
-            step[column] = 1e-4
-            forth, back = self._rotation(x + step, span, time), self._rotation(x - step, span, time)
-            columns[:, column] = (forth - back) / 2e-4
+        columns = by_energy[:, None] * energy[index] + by_peak_time[:, None] * peak_time[index]
+        # All times after the release are as 1/p: a larger p shows later rotations.
+        columns[:, 2] = -P_PRIOR * np.maximum(time - motion.release_s, 0.0) * by_peak_time
+        step = np.zeros(x.size)
+        step[3] = _EPSILON
+        columns[:, 3] = (self.motion(x + step, span).at(time)[0] - rotation) / _EPSILON
         columns[:, 4] = ZERO_PRIOR_RAD
         priors = np.eye(x.size)[[2, 3, 4, *range(FIXED, x.size)]]
         return np.vstack((columns / self.sigma, priors))
@@ -111,14 +110,15 @@ class MotionModel:
         bend = -(motion.p_rad_s**2) * np.sin(motion.alpha_rad * np.sign(model) - model) * free
         return np.asarray(model + bend * POINT_S**2 / 24.0 + ZERO_PRIOR_RAD * x[4])
 
-    def _local(self, motion: FreeRocking, time_s: Floats) -> tuple[Floats, Floats]:
-        """dθ by d(ln E) of the half-cycle at fixed time from its peak, and by d(time of its peak)."""
-        index, local, sign = motion.locate(time_s)
+    def _local(
+        self, motion: FreeRocking, index: NDArray[np.int_], local: Floats, sign: Floats
+    ) -> tuple[Floats, Floats, Floats]:
+        """θ, dθ by d(ln E) of the half-cycle at fixed time from its peak, and by d(time of its peak)."""
         p, alpha = motion.p_rad_s, motion.alpha_rad
         rotation, speed = half_cycle_rotation(local, motion.peaks_rad[index], p, alpha)
         larger = exact_amplitude(exact_energy(motion.peaks_rad, alpha) * math.exp(_EPSILON), alpha)
         changed = half_cycle_rotation(local, larger[index], p, alpha)[0]
-        return sign * (changed - rotation) / _EPSILON, -sign * speed
+        return sign * rotation, sign * (changed - rotation) / _EPSILON, -sign * speed
 
     def _chain(self, x: Floats, motion: FreeRocking) -> tuple[Floats, Floats]:
         """(half-cycles, parameters) d(ln E_n)/dx and d(time of peak n)/dx, for θ0, release and r."""

@@ -47,37 +47,44 @@ def find_onsets(
     found: list[Onset | None] = []
     for k, impact in enumerate(impacts_s):
         reach = min(_REACH_S, 0.45 * gaps[k], 0.45 * gaps[k + 1])
+        alike: dict[int, list[tuple[int, int]]] = {}
+        for row, offset in enumerate(offsets_s):
+            low = max(round((impact - reach - first_s - offset) * rate_hz), 0)
+            high = min(round((impact + reach - first_s - offset) * rate_hz), acceleration.shape[1])
+            alike.setdefault(max(high - low, 0), []).append((row, low))
         picks = []
-        for row, offset in zip(acceleration, offsets_s, strict=True):
-            low = round((impact - reach - first_s - offset) * rate_hz)
-            high = round((impact + reach - first_s - offset) * rate_hz)
-            pick = _pick(row[max(low, 0) : max(high, 0)])
-            if pick is not None:
-                picks.append((first_s + (max(low, 0) + pick[0]) / rate_hz + offset, pick[1]))
+        for size, places in alike.items():
+            windows = np.array([acceleration[row, low : low + size] for row, low in places])
+            for (row, low), (sample, strength) in zip(places, _picks(windows), strict=True):
+                if strength >= _SHOCK_SIGMAS:
+                    picks.append((first_s + (low + sample) / rate_hz + offsets_s[row], strength))
         found.append(_agreement(picks))
     return found
 
 
-def _pick(window: Floats) -> tuple[float, float] | None:
-    """Sample of the onset in the window and its strength; None where there is no shock."""
-    if window.size < 2 * _MIN_SAMPLES or not np.isfinite(window).all():
-        return None
-    change = np.diff(window)
-    square = np.cumsum(change**2)
-    n = change.size
+def _picks(windows: Floats) -> list[tuple[float, float]]:
+    """Sample of the onset in each window (channels, n) and its strength in sigmas, 0 where there is none."""
+    if windows.shape[1] < 2 * _MIN_SAMPLES:
+        return [(0.0, 0.0)] * windows.shape[0]
+    known = np.asarray(np.isfinite(windows).all(axis=1))
+    change = np.diff(np.where(known[:, None], windows, 0.0), axis=1)
+    square = np.cumsum(change**2, axis=1)
+    n = change.shape[1]
     split = np.arange(_MIN_SAMPLES // 2, n - _MIN_SAMPLES // 2)
-    before = square[split - 1] / split
-    after = (square[-1] - square[split - 1]) / (n - split)
-    tiny = 1e-12 * (square[-1] / n + 1e-300)
+    before = square[:, split - 1] / split
+    after = (square[:, -1:] - square[:, split - 1]) / (n - split)
+    tiny = 1e-12 * (square[:, -1:] / n + 1e-300)
     score = split * np.log(before + tiny) + (n - split) * np.log(after + tiny)
-    best = int(split[np.argmin(score)])
-    noise = math.sqrt(float(square[best - 1]) / best)
-    shock = float(np.abs(change[best : best + _MIN_SAMPLES]).max())
-    if noise <= 0.0 or shock < _SHOCK_SIGMAS * noise:
-        return None
+    best = split[np.argmin(score, axis=1)]
+    rows = np.arange(best.size)
+    noise = np.sqrt(square[rows, best - 1] / best)
+    # The shock's own samples: those that the end of the window cuts off count as still.
+    reached = best[:, None] + np.arange(_MIN_SAMPLES)
+    shaken = np.abs(change[rows[:, None], np.minimum(reached, n - 1)]) * (reached < n)
+    strength = np.divide(shaken.max(axis=1), noise, out=np.zeros(best.size), where=known & (noise > 0.0))
     # change[i] = window[i+1] − window[i]: the first shaken sample is best + 1, the shock came within
     # the sampling interval before it.
-    return best + 0.5, shock / noise
+    return list(zip((best + 0.5).tolist(), strength.tolist(), strict=True))
 
 
 def _agreement(picks: list[tuple[float, float]]) -> Onset | None:

@@ -6,13 +6,13 @@ ones, and datasets that claim more than their bytes on disk could hold.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
 import h5py
-import numpy as np
 
 from daq_app.runfile.errors import RunFileError
 
@@ -66,27 +66,31 @@ def checked_dataset(
     def refuse(why: str) -> RunFileError:
         return RunFileError(f"{path}: {group.name.rstrip('/')}/{name} {why}")
 
-    if name not in group:
+    link = group.get(name, getlink=True)
+    if link is None:
         raise refuse("is missing")
-    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+    if not isinstance(link, h5py.HardLink):
         raise refuse("is a link to somewhere else, which a run never holds")
     dataset = group[name]
-    if not isinstance(dataset, h5py.Dataset) or len(dataset.shape or ()) > 1:
+    # Each of these asks the library anew: once is enough.
+    shape = dataset.shape if isinstance(dataset, h5py.Dataset) else None
+    if shape is None or len(shape) > 1:
         raise refuse("is not a column of data")
+    dtype, chunks = dataset.dtype, dataset.chunks
     creation = dataset.id.get_create_plist()
     if creation.get_layout() == h5py.h5d.VIRTUAL or creation.get_external_count():
         raise refuse("takes its data from another file, which a run never does")
     filters = [creation.get_filter(index)[0] for index in range(creation.get_nfilters())]
     if not _FILTERS.issuperset(filters):
         raise refuse("uses an unknown compression")
-    if itemsize is not None and (dataset.dtype.kind != "f" or dataset.dtype.itemsize != itemsize):
-        raise refuse(f"holds {dataset.dtype}, not {8 * itemsize}-bit floating point numbers")
-    if length is not None and dataset.shape != (length,):
-        raise refuse(f"has shape {dataset.shape}, not ({length},)")
-    n_bytes = dataset.size * dataset.dtype.itemsize
+    if itemsize is not None and (dtype.kind != "f" or dtype.itemsize != itemsize):
+        raise refuse(f"holds {dtype}, not {8 * itemsize}-bit floating point numbers")
+    if length is not None and shape != (length,):
+        raise refuse(f"has shape {shape}, not ({length},)")
+    n_bytes = math.prod(shape) * dtype.itemsize
     if n_bytes > _MAX_DEFLATE_RATIO * dataset.id.get_storage_size() + 2**16:
         raise refuse("claims more data than the file holds")
-    if dataset.chunks and int(np.prod(dataset.chunks)) * dataset.dtype.itemsize > _MAX_CHUNK_BYTES:
+    if chunks and math.prod(chunks) * dtype.itemsize > _MAX_CHUNK_BYTES:
         raise refuse("has absurdly large chunks")
     return dataset
 
@@ -111,12 +115,14 @@ def read_column(path: Path, group: h5py.Group, name: str) -> list[Any]:
         return list(dataset[()].tolist())
     texts: list[Any] = []
     budget = _MAX_TEXT_BYTES
-    # One by one: many rows may point to one long text, and only a sum tells.
+    # Some at a time: many rows may point to one long text, and only a sum tells. No text is longer than
+    # the file, so these fit into the budget whatever they are.
+    some = max(1, _MAX_TEXT_BYTES // max(group.file.id.get_filesize(), 1))
     strings = dataset.asstr(errors="replace")
-    for index in range(dataset.shape[0]):
-        text = strings[index]
-        budget -= len(text)
+    for start in range(0, dataset.shape[0], some):
+        read = strings[start : start + some].tolist()
+        budget -= sum(map(len, read))
         if budget < 0:
             raise RunFileError(f"{path}: {group.name}/{name} is absurdly long")
-        texts.append(text)
+        texts.extend(read)
     return texts

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final, Protocol
 
 import numpy as np
@@ -78,7 +79,13 @@ def rig_of(header: RunHeader) -> Rig | None:
     """
     if not header.rig_text or len(header.rig_text) > _MAX_RIG_CHARACTERS:
         return None
+    return _parsed(header.rig_text)
+
+
+@lru_cache(maxsize=8)
+def _parsed(rig_text: str) -> Rig | None:
+    """The runs of a campaign share one or two rig texts: each is read and checked once."""
     try:
-        return parse_rig(header.rig_text, "rig text of the run")
+        return parse_rig(rig_text, "rig text of the run")
     except ConfigError:
         return None

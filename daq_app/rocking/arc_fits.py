@@ -1,0 +1,221 @@
+"""Many half-cycles at once: local basis, least squares, choice of basis, zero crossings and extremum.
+
+Everything is written over a stack of half-cycles, one row each, on x ∈ [−1, 1]: x = (t − centre)/half
+length. A basis that leaves out powers has zeros among its coefficients and in their covariance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+STIFF: Final = 3
+"""Columns of every basis: 1, cosh, sinh."""
+ALL_POWERS: Final = (3, 4, 5, 6)
+POWERS: Final[tuple[tuple[int, ...], ...]] = ((), (4,), (3,), (3, 4), ALL_POWERS)
+"""Candidate additions to the basis, from stiff to free."""
+_COLUMNS: Final = STIFF + len(ALL_POWERS)
+_NESTED: Final = (0, 2, 3, 4)
+"""Candidates that are the first columns of the freest: one decomposition serves all of them."""
+_CLEARLY: Final = 10.0
+"""How much better in BIC a freer basis must be: noise alone must not choose it."""
+_MODEL_SHARE: Final = 1e-4
+"""Standard uncertainty of speeds and peaks that the basis itself leaves, as a share of the value."""
+
+
+@dataclass(frozen=True, slots=True)
+class ArcFits:
+    """Fitted bases of a stack of half-cycles."""
+
+    kappa: Floats
+    """(arcs,) q · half length"""
+    coefficients: Floats
+    """(arcs, 7)"""
+    covariance: Floats
+    """(arcs, 7, 7)"""
+    candidate: NDArray[np.intp]
+    """(arcs,) index into `POWERS`"""
+    residual: Floats
+    """(arcs,) rms of what the fit leaves"""
+
+    def rows(self, x: Floats) -> tuple[Floats, Floats, Floats]:
+        """Value, first and second derivative by x of every column at one place of each arc: (arcs, 7)."""
+        k = self.kappa
+        c, s = np.cosh(k * x), np.sinh(k * x)
+        even, odd = np.cosh(k) - 1.0, np.sinh(k)
+        value, slope, curve = (np.zeros((x.size, _COLUMNS)) for _ in range(3))
+        value[:, 0] = 1.0
+        value[:, 1], slope[:, 1], curve[:, 1] = (c - 1.0) / even, k * s / even, k * k * c / even
+        value[:, 2], slope[:, 2], curve[:, 2] = s / odd, k * c / odd, k * k * s / odd
+        power = x.copy()  # x to the (n − 2)
+        for column, n in enumerate(ALL_POWERS, start=STIFF):
+            curve[:, column] = n * (n - 1) * power
+            slope[:, column] = n * power * x
+            value[:, column] = power * x * x
+            power = power * x
+        return value, slope, curve
+
+
+def design(x: Floats, kappa: Floats) -> Floats:
+    """(arcs, points, 7) columns that reach about 1, at x (arcs, points)."""
+    k = kappa[:, None]
+    grow = np.exp(k * x)
+    shrink = 1.0 / grow
+    table = np.empty((*x.shape, _COLUMNS))
+    table[..., 0] = 1.0
+    table[..., 1] = (0.5 * (grow + shrink) - 1.0) / (np.cosh(k) - 1.0)
+    table[..., 2] = 0.5 * (grow - shrink) / np.sinh(k)
+    cube = x * x * x
+    for column in range(STIFF, _COLUMNS):
+        table[..., column] = cube
+        cube = cube * x
+    return table
+
+
+def fit_stack(x: Floats, y: Floats, present: Bools, kappa: Floats) -> ArcFits:
+    """The candidate with the smallest BIC for each arc; the stiffest unless another is clearly better.
+
+    `x`, `y` (arcs, points) with `present` where there is a point: an absent one has x = y = 0.
+    """
+    count = present.sum(axis=1)
+    table = design(x, kappa) * present[..., None]
+    q, triangle = np.linalg.qr(table)
+    inverse = np.linalg.inv(triangle)
+    projected = np.einsum("apk,ap->ak", q, y)
+    arcs = np.arange(count.size)
+    squares = np.full((count.size, len(POWERS)), np.inf)
+    left, done = y, 0
+    for candidate in _NESTED:
+        wide = STIFF + len(POWERS[candidate])
+        left = left - np.einsum("apk,ak->ap", q[..., done:wide], projected[:, done:wide])
+        squares[:, candidate] = np.einsum("ap,ap->a", left, left)
+        done = wide
+    apart = _may_gain(squares, count)
+    alone: tuple[Floats, Floats] | None = None
+    if apart.any():
+        columns = [*range(STIFF), STIFF + ALL_POWERS.index(4)]
+        alone = _separate(table[apart][..., columns], y[apart])
+        squares[apart, 1] = _left(table[apart][..., columns], alone[0], y[apart])
+    best = _best(squares, count)
+    coefficients = np.zeros((count.size, _COLUMNS))
+    covariance = np.zeros((count.size, _COLUMNS, _COLUMNS))
+    for candidate in _NESTED:
+        own = np.flatnonzero(best == candidate)
+        if own.size:
+            wide = STIFF + len(POWERS[candidate])
+            part = inverse[own, :wide, :wide]
+            coefficients[own, :wide] = np.einsum("ajk,ak->aj", part, projected[own, :wide])
+            covariance[own, :wide, :wide] = part @ np.swapaxes(part, 1, 2)
+    if alone is not None:
+        among = np.flatnonzero(best[apart] == 1)
+        own = np.flatnonzero(apart)[among]
+        coefficients[np.ix_(own, columns)] = alone[0][among]
+        covariance[np.ix_(own, columns, columns)] = alone[1][among]
+    square = squares[arcs, best]
+    widths = np.array([STIFF + len(powers) for powers in POWERS])[best]
+    covariance *= (square / (count - widths))[:, None, None]
+    return ArcFits(kappa, coefficients, covariance, best, np.sqrt(square / count))
+
+
+def _separate(table: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Coefficients (arcs, columns) and their covariance for unit variance."""
+    q, triangle = np.linalg.qr(table)
+    inverse = np.linalg.inv(triangle)
+    coefficients = np.einsum("ajk,apk,ap->aj", inverse, q, y, optimize=True)
+    return coefficients, inverse @ np.swapaxes(inverse, 1, 2)
+
+
+def _left(table: Floats, coefficients: Floats, y: Floats) -> Floats:
+    left = y - np.einsum("apk,ak->ap", table, coefficients)
+    return np.asarray(np.einsum("ap,ap->a", left, left))
+
+
+def _scores(squares: Floats, count: NDArray[np.intp]) -> Floats:
+    """(arcs, candidates) BIC; infinite where an arc has too few points for the candidate."""
+    widths = np.array([STIFF + len(powers) for powers in POWERS])
+    n = count[:, None]
+    scores = n * np.log(np.maximum(squares, 1e-300) / n) + widths * np.log(n)
+    return np.where(n >= 3 * widths, scores, np.inf)
+
+
+def _may_gain(squares: Floats, count: NDArray[np.intp]) -> Bools:
+    """Whether the candidate that is not nested can be clearly better than the stiffest.
+
+    It leaves at least what the freest leaves, which holds its power too: often it cannot.
+    """
+    scores = _scores(squares, count)
+    spared = (len(ALL_POWERS) - 1) * np.log(count)
+    known = np.isfinite(scores[:, -1])
+    return np.asarray(~known | (scores[:, -1] - spared < scores[:, 0] - _CLEARLY))
+
+
+def _best(squares: Floats, count: NDArray[np.intp]) -> NDArray[np.intp]:
+    scores = _scores(squares, count)
+    best = np.argmin(scores, axis=1)
+    clearly = scores[np.arange(best.size), best] < scores[:, 0] - _CLEARLY
+    return np.where(clearly, best, 0)
+
+
+def crossings(fits: ArcFits, guess: float, half_s: Floats, zero_sigma: float) -> Floats:
+    """(4, arcs): x of the zero near `guess`, its sigma, the signed speed there (1/s) and its sigma.
+
+    NaN where there is no zero within a quarter of the half length.
+    """
+    x = np.full(half_s.size, guess)
+    moving = np.ones(x.size, dtype=bool)
+    with np.errstate(all="ignore"):
+        for _ in range(8):
+            value, slope, curve = fits.rows(x)
+            speed = _dot(slope, fits.coefficients)
+            step = _dot(value, fits.coefficients) / speed
+            moving &= np.abs(step) >= 1e-10
+            if not moving.any():
+                break
+            x = np.where(moving, x - step, x)
+            x = np.where(np.abs(x - guess) <= 0.25, x, np.nan)
+        curvature = _dot(curve, fits.coefficients)
+        # The speed is read where the fit crosses zero: its error counts through the shift of that place.
+        gradient = slope - (curvature / speed)[:, None] * value
+        shift = np.hypot(np.sqrt(_square(value, fits.covariance)), zero_sigma) / np.abs(speed)
+        own = np.maximum(_square(gradient, fits.covariance), 0.0)
+        sigma = np.sqrt(own + (curvature / speed * zero_sigma) ** 2 + (_MODEL_SHARE * speed) ** 2)
+    found = np.stack([x, shift, speed / half_s, sigma / half_s])
+    found[:, ~np.isfinite(found).all(axis=0)] = np.nan
+    return found
+
+
+def extrema(fits: ArcFits) -> Floats:
+    """(3, arcs): x, value and sigma of the extremum between the impacts; NaN where there is none."""
+    grid = np.linspace(-0.9, 0.9, 13)
+    shape = (fits.kappa.size, grid.size)
+    values = np.einsum("agk,ak->ag", design(np.broadcast_to(grid, shape), fits.kappa), fits.coefficients)
+    x = grid[np.argmax(np.abs(values), axis=1)]
+    moving = np.ones(x.size, dtype=bool)
+    with np.errstate(all="ignore"):
+        for _ in range(12):
+            _, slope, curve = fits.rows(x)
+            step = _dot(slope, fits.coefficients) / _dot(curve, fits.coefficients)
+            x = np.where(moving, x - np.clip(step, -0.3, 0.3), x)
+            moving &= np.abs(step) >= 1e-9
+            if not moving.any():
+                break
+        row = fits.rows(x)[0]
+        value = _dot(row, fits.coefficients)
+        sigma = np.hypot(np.sqrt(_square(row, fits.covariance)), _MODEL_SHARE * value)
+    found = np.stack([x, value, sigma])
+    found[:, ~(np.abs(x) < 1.0)] = np.nan
+    return found
+
+
+def _dot(rows: Floats, coefficients: Floats) -> Floats:
+    return np.asarray(np.einsum("ak,ak->a", rows, coefficients))
+
+
+def _square(rows: Floats, covariance: Floats) -> Floats:
+    return np.asarray(np.einsum("aj,ajk,ak->a", rows, covariance, rows, optimize=True))
