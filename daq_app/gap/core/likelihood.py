@@ -81,8 +81,12 @@ class Covariance:
         if self._loadings is None:
             plain: FloatArray = residual / np.sqrt(self.diagonal)
             return plain
-        matrix = np.diag(self.diagonal) + self._loadings @ self._loadings.T
-        whitened: FloatArray = solve_triangular(np.linalg.cholesky(matrix), residual, lower=True)
+        whitened: FloatArray = residual / np.sqrt(self.diagonal)
+        # Rows that share no random effect are independent of all others: only the coupled ones are turned.
+        rows = np.flatnonzero(self._loadings.any(axis=1))
+        shared = self._loadings[rows]
+        matrix = np.diag(self.diagonal[rows]) + shared @ shared.T
+        whitened[rows] = solve_triangular(np.linalg.cholesky(matrix), residual[rows], lower=True)
         return whitened
 
 

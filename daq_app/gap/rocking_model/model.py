@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -25,6 +26,12 @@ SCATTER_SENSOR = "scatter of sensors"
 PUSH_RAD_S = 3e-4
 """Speed that a clean release may leave; nobody lets go of five tonnes without touching them."""
 _REMEMBERED = 6
+
+
+@lru_cache(maxsize=1024)
+def _acting(part: str, names: tuple[str, ...], reference: str) -> tuple[str, ...]:
+    """Those of the values that a part of the prediction depends on."""
+    return tuple(name for name in names if acts_on(part, name, reference))
 
 
 class RockingModel:
@@ -170,8 +177,11 @@ class RockingModel:
 
         Differences move one parameter at a time, and most parameters move one part only.
         """
-        kept: dict[tuple[tuple[str, float], ...], tuple[FloatArray, ...]] = run.cache.setdefault(part, {})
-        key = tuple(item for item in values.items() if acts_on(part, item[0], run.reference))
+        kept: dict[tuple[tuple[str, ...], tuple[float, ...]], tuple[FloatArray, ...]] = run.cache.setdefault(
+            part, {}
+        )
+        chosen = _acting(part, tuple(values), run.reference)
+        key = (chosen, tuple(map(values.__getitem__, chosen)))
         found = kept.get(key)
         if found is None:
             if len(kept) >= _REMEMBERED:
