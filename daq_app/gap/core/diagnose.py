@@ -140,12 +140,17 @@ class _Study:
         tasks = [self._task(h, s, polish=polish) for h, s in zip(hypotheses, starts, strict=True)]
         return self.workers.run(tasks, text)
 
+    def _glance(self, effects: Hypothesis, start: Fit) -> GlanceTask:
+        """A pair is started from what each of its effects was alone, or without the weaker one."""
+        task = self._task(effects, start, polish=False)
+        hint = None
+        if len(effects) > 1:
+            hint = {k: u for name in effects for k, u in self.fits[(name,)].known().items() if "." in k[0]}
+        return GlanceTask(task.effects, task.known, task.sigmas, task.columns, hint)
+
     def _screened(self, hypotheses: Sequence[Hypothesis], starts: Sequence[Fit], text: str) -> list[Fit]:
         """Fits of hypotheses, of those without a chance a glance only."""
-        tasks = [
-            GlanceTask(t.effects, t.known, t.sigmas, t.columns)
-            for t in (self._task(h, s, polish=False) for h, s in zip(hypotheses, starts, strict=True))
-        ]
+        tasks = [self._glance(h, s) for h, s in zip(hypotheses, starts, strict=True)]
         found: list[Fit] = self.workers.run(tasks, text)
         null = self.fits[NULL].log_evidence
         best = max(f.log_evidence for f in (*self.fits.values(), *found))

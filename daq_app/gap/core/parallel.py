@@ -50,9 +50,12 @@ class GlanceTask:
     sigmas: dict[str, float]
     columns: Columns = field(default_factory=dict)
     """Columns of the Jacobian beyond those without any effect."""
+    hint: dict[tuple[str, int | None], float] | None = None
+    """Unit coordinates to start from besides zero, in place of the effects' own starts."""
 
     def run(self, model: Model, runs: Sequence[Run], frozen: Columns | None = None) -> Fit:
-        return glance(model, runs, self.effects, self.known, self.sigmas, {**(frozen or {}), **self.columns})
+        known = {**(frozen or {}), **self.columns}
+        return glance(model, runs, self.effects, self.known, self.sigmas, known, self.hint)
 
 
 @dataclass(frozen=True, slots=True)
