@@ -7,9 +7,6 @@ The result is the JSON of ``daq-app gap diagnose`` (docs/gap-method.md). A diagn
 from __future__ import annotations
 
 import importlib
-import json
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
@@ -20,7 +17,7 @@ Result = dict[str, Any]
 Diagnoser = Callable[[Path], Result]
 
 PRODUCT: Final = "daq_app.gap.blind.diagnosers:product"
-"""The diagnosis of this program, as its command does it."""
+"""The diagnosis of this program."""
 
 
 class DiagnoserError(Exception):
@@ -43,15 +40,19 @@ def load_diagnoser(name: str) -> Diagnoser:
 
 
 def product(case: Path) -> Result:
-    """``daq-app gap diagnose`` on all runs of the case with its rig file, as a user would call it.
+    """What ``daq-app gap diagnose`` says of all runs of the case with its rig file.
 
     One process: the cases fill the cores.
     """
-    out = case / "result.json"
-    command = [sys.executable, "-m", "daq_app.cli", "gap", "diagnose", *map(str, run_files(case))]
-    command += ["--rig", str(case / RIG_FILE), "--json", str(out), "--cores", "1"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if not out.exists():
-        raise DiagnoserError(f"gap diagnose ended with {done.returncode}: {done.stderr.strip()[-2000:]}")
-    result: Result = json.loads(out.read_text(encoding="utf-8"))
-    return result
+    from daq_app.config import ConfigError, load_rig
+    from daq_app.gap.core import CannotDiagnose, Options
+    from daq_app.gap.rocking_model.records import load_run
+    from daq_app.gap.rocking_model.study import diagnose_runs
+    from daq_app.runfile import RunFileError
+
+    try:
+        rig = load_rig(case / RIG_FILE)
+        runs = [load_run(path, rig) for path in run_files(case)]
+        return diagnose_runs(runs, Options(workers=1)).to_dict()
+    except (CannotDiagnose, ConfigError, RunFileError) as refusal:
+        raise DiagnoserError(f"gap diagnose refuses: {refusal}") from None
