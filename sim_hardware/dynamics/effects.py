@@ -44,7 +44,7 @@ MOTION_EFFECTS: Final[tuple[EffectSpec, ...]] = (
         "Lagrange's equation of a block rolling on an arc",
         (Parameter("rho", "m", 0.005, 0.1, "radius of the edges", index=par.EDGE_RADIUS, minimum=0.0),),
         ("pivot_shift",),
-        "several levels: α depends on θ",
+        "height of the LVDTs' points above the joint; with it, how the opening grows with θ²",
     ),
     EffectSpec(
         "crushing",

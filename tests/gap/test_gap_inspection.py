@@ -8,7 +8,10 @@ from simulated_wall import simulate
 
 from benchmarks.gap_campaign import simulate as longer_held
 from daq_app.gap.rocking_model.inspection import found_channels, found_marks
+from daq_app.gap.rocking_model.model import RockingModel
 from daq_app.gap.rocking_model.run_features import RockingRun
+from daq_app.gap.rocking_model.sensor_blocks import Block
+from daq_app.gap.rocking_model.sensor_response import block_coefficients
 from daq_app.gap.rocking_model.study import model_and_library, prepare
 
 LEVELS = (0.25, -0.35)
@@ -169,3 +172,21 @@ def test_gravity_is_read_from_a_held_wall_that_still_sways() -> None:
     block = next(b for b in run.blocks if b.family == "accelerometer")
     place = block.names.index("gain of gravity")
     assert abs(block.values[place]) < 2.0 * np.sqrt(block.covariance[place, place])
+
+
+def test_pivots_inside_the_edge_are_no_slip_of_the_base() -> None:
+    """About another pivot the base moves by Δu (1 − cos θ), which comes and goes with the swings."""
+    levels = (0.4, -0.35)
+    run = prepare(longer_held({"pivot_shift": {"a": 0.04}}, 11, levels=levels))[0][0]
+    base = next(b for b in run.blocks if b.family == "base")
+    values = {p.name: p.mean for p in RockingModel(run.survey).nuisance} | {"zero": 0.0, "omega0": 0.0}
+    place = base.names.index("slip per speed")
+    seen = float(base.values[place]) - _predicted(run, values, base, place)
+    explained = float(base.values[place]) - _predicted(run, values | {"pivot_shift.a": 0.04}, base, place)
+    assert abs(explained) < 0.3 * abs(seen)
+
+
+def _predicted(run: RockingRun, values: dict[str, float], block: Block, place: int) -> float:
+    before = list(run.blocks).index(block)
+    first = sum(len(b.names) for b in run.blocks[:before])
+    return float(block_coefficients(run, values)[0][first + place])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from daq_app.gap.rocking_model.motion_grid import GRID_HZ, coarse
-from daq_app.gap.rocking_model.sensor_blocks import UPRIGHT_RAD, moment_shape, side_of
+from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
+from daq_app.gap.rocking_model.sensor_blocks import UPRIGHT_RAD, moment_shape, side_of, slip_shape
 
 RATE_HZ = 4000.0
 ALPHA = 0.215
@@ -34,3 +34,16 @@ def test_a_base_that_gives_way_is_found_without_bias() -> None:
     columns = np.column_stack([moment_shape(mean, ALPHA), mean, np.gradient(mean) * GRID_HZ])
     step = np.linalg.lstsq(columns, seen, rcond=None)[0][0]
     assert abs(step - 1.0) < 2e-3
+
+
+def test_a_slip_within_an_interval_counts_for_the_part_of_it_that_follows() -> None:
+    impacts, speeds = np.array([0.5013, 0.9471, 1.2]), np.array([0.3, -0.25, 0.2])
+    fine = np.arange(0.0, 2.0, 1.0 / RATE_HZ) + 0.5 / RATE_HZ
+    slipped = np.sum(speeds[:, None] * (fine[None, :] > impacts[:, None]), axis=0) - speeds.sum()
+    empty = np.zeros(0)
+    time_s = coarse(fine, RATE_HZ)
+    none = np.zeros(time_s.size, dtype=bool)
+    grid = Grid(
+        time_s, empty, empty, empty, none, none, impacts, empty, 1.5, empty, jumps=empty, approach=speeds
+    )
+    assert np.abs(slip_shape(grid) - coarse(slipped, RATE_HZ)).max() < 0.02

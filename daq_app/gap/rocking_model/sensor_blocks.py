@@ -295,9 +295,12 @@ def _twist_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool
 
 
 def slip_shape(grid: Grid) -> FloatArray:
-    """Sum of the signed approach speeds of the impacts so far, less its last value (the zero is at rest)."""
-    steps = np.concatenate([[0.0], np.cumsum(grid.approach)])
-    shape: FloatArray = steps[np.searchsorted(grid.impact_s, grid.time_s)] - steps[-1]
+    """Sum of the signed approach speeds of the impacts so far, less its last value (the zero is at rest).
+
+    The mean over each interval of the grid: in that of an impact only a part of it is after the slip.
+    """
+    after = (grid.time_s[:, None] - grid.impact_s[None, :]) * GRID_HZ + 0.5
+    shape: FloatArray = np.clip(after, 0.0, 1.0) @ grid.approach - float(np.sum(grid.approach))
     return shape
 
 

@@ -233,6 +233,7 @@ def _wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatAr
         found = found + values["sliding.c"] / run.wire_height_m * _unit(
             run, block, "slip", partial(slip_shape, run.grid)
         )
+    found = found + _travel(run, block, values) / run.wire_height_m
     series = _difference_of(run, "wire", "lvdt", values)
     return found if series is None else found + block.coefficients(series)
 
@@ -273,6 +274,32 @@ def _impact_timing(run: RockingRun, block: Block, values: Mapping[str, float]) -
     return np.array([values["onset"] + late])
 
 
+def _edges(run: RockingRun, values: Mapping[str, float]) -> tuple[float, float]:
+    """(distance of the pivots from the middle beyond the survey's, half its difference right to left), m."""
+    half, alpha = values["half_base"], values["alpha"]
+    tall = half / np.tan(alpha)
+    worn = values.get("crushing.loss", 0.0) * 0.01 * run.impacts_before * alpha * tall
+    inwards = half - run.survey.half_base_m - values.get("pivot_shift.a", 0.0) - worn
+    inwards -= values.get("rounded_edge.rho", 0.0)
+    return inwards, values.get("alpha_asymmetry.delta", 0.0) * tall / np.cos(alpha) ** 2
+
+
+def _travel(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """Displacement of the base along x because its pivots are not where the survey has them: Δu (1 − cos θ).
+
+    It grows and falls with the swings as a slip does; left out, a shifted pivot looks like some sliding.
+    """
+    theta = run.grid.theta
+    inwards, apart = _edges(run, values)
+    found = inwards * _unit(run, block, "travel", lambda: np.sign(theta) * (1.0 - np.cos(theta)))
+    found = found + apart * _unit(run, block, "lopsided travel", lambda: 1.0 - np.cos(theta))
+    if "winkler.theta_c" in values:
+        root = np.sqrt(values["winkler.theta_c"] / np.maximum(np.abs(theta), values["winkler.theta_c"]))
+        moved = -2.0 * values["half_base"] * root * np.sign(theta) * (1.0 - np.cos(theta))
+        found = found + block.coefficients(moved)
+    return found
+
+
 def _joint(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     """Opening at the middle of the base: u_z = (b/2 − a) sin|θ| and what the joint's effects make of it.
 
@@ -280,19 +307,14 @@ def _joint(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatA
     """
     theta = run.grid.theta
     size = np.abs(theta)
-    half, alpha = values["half_base"], values["alpha"]
-    tall = half / np.tan(alpha)
-    worn = values.get("crushing.loss", 0.0) * 0.01 * run.impacts_before * alpha * tall
-    inwards = half - run.survey.half_base_m - values.get("pivot_shift.a", 0.0) - worn
-    inwards -= values.get("rounded_edge.rho", 0.0)
-    apart = values.get("alpha_asymmetry.delta", 0.0) * tall / np.cos(alpha) ** 2
+    inwards, apart = _edges(run, values)
     curved = 0.5 * (values.get("rounded_edge.rho", 0.0) - values["mount_height"])
     found: FloatArray = inwards * _unit(run, block, "size", lambda: size) + apart * _unit(
         run, block, "theta", lambda: theta
     )
     found = found + curved * _unit(run, block, "square", lambda: size**2)
     if "winkler.theta_c" in values:
-        theta_c = values["winkler.theta_c"]
+        theta_c, half = values["winkler.theta_c"], values["half_base"]
         opened = half * (theta_c - 2.0 * np.sqrt(theta_c * np.maximum(size, theta_c)))
         found = found + block.coefficients(np.where(size > theta_c, opened, -half * size))
     if "drift@lvdt.rate" in values:
@@ -311,6 +333,7 @@ def _base(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatAr
     total: FloatArray = found + values.get("sliding.c", 0.0) * _unit(
         run, block, "slip", partial(slip_shape, run.grid)
     )
+    total = total + _travel(run, block, values)
     if "wire_cosine@wire.kappa" in values:
         bend = values["wire_cosine@wire.kappa"] * run.base_bend_m2
         total = total + bend * _unit(run, block, "square", lambda: run.grid.theta**2)
