@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -12,15 +12,17 @@ from pathlib import Path
 import numpy as np
 
 from daq_app.campaign.names import TestName
+from daq_app.campaign.recorded import orphans, test_of, unreadable, verdicts_of
 from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.campaign.summary import MethodResult, TestSummary
+from daq_app.campaign.verdicts import OperatorVerdict
 from daq_app.campaign.workers import run_all
 from daq_app.config import Rig
 from daq_app.rocking.analysis import AnalysisOptions, analyse_record
 from daq_app.rocking.record import TestRecord
 from daq_app.rocking.results import Series, TestAnalysis
-from daq_app.runfile import RunFileError, open_run
-from daq_app.runfile.folder import RUN_SUFFIX
+from daq_app.runfile import Run, RunFileError, open_run
+from daq_app.runfile.folder import RUN_SUFFIX, find_runs
 
 _KEYS = {"CRT": "crt", "EAV": "eav"}
 _SHOWN_RATE_HZ = 200.0
@@ -42,49 +44,92 @@ class Failure:
     """Somebody or the recorder had rejected it before: nobody expected an analysis."""
 
 
+@dataclass(frozen=True, slots=True)
+class Collected:
+    """A folder of runs, each opened once: what it holds and what the analysis made of it."""
+
+    recorded: tuple[RecordedTest, ...]
+    tests: tuple[TestSummary, ...]
+    failures: tuple[Failure, ...]
+
+
 def collect(
-    recorded: Sequence[RecordedTest],
+    folder: Path,
     *,
     options: AnalysisOptions | None = None,
     workers: int | None = None,
     progress: Progress | None = None,
-) -> tuple[list[TestSummary], list[Failure]]:
-    """Analyse all run files among `recorded`, in the order given.
+) -> Collected:
+    """Judge and analyse all runs of a folder and below; lost tests are not analysed.
 
-    Ctrl-C ends it cleanly: `KeyboardInterrupt` once the workers have stopped.
+    Raises what `read_recorded` raises. Ctrl-C ends it cleanly: `KeyboardInterrupt` once the workers have
+    stopped.
     """
-    work = partial(summarise_run, options=options or AnalysisOptions())
-    jobs = [test for test in recorded if test.path is not None and test.verdict is not TestVerdict.LOST]
+    verdicts = verdicts_of(folder)
+    runs = find_runs(folder)
+    work = partial(read_and_summarise, verdicts=verdicts, options=options or AnalysisOptions())
 
-    def done(number: int, test: RecordedTest) -> None:
+    def done(number: int, path: Path) -> None:
         if progress:
-            progress(number, len(jobs), str(test.name))
+            progress(number, len(runs), path.stem)
 
-    ordered = run_all(work, jobs, workers, done)
-    summaries = [answer for answer in ordered if isinstance(answer, TestSummary)]
-    return summaries, [answer for answer in ordered if isinstance(answer, Failure)]
+    answers = run_all(work, runs, workers, done)
+    loose = [(test, _journal_only(test)) for test in orphans(folder, verdicts)]
+    pairs = [(test, made) for test, made in [*answers, *loose] if test is not None]
+    return Collected(
+        recorded=tuple(test for test, _ in pairs),
+        tests=tuple(made for _, made in pairs if isinstance(made, TestSummary)),
+        failures=tuple(made for _, made in pairs if isinstance(made, Failure)),
+    )
+
+
+def read_and_summarise(
+    path: Path, verdicts: Mapping[str, OperatorVerdict], options: AnalysisOptions
+) -> tuple[RecordedTest | None, TestSummary | Failure | None]:
+    """Judge and analyse one run file, opened once; None where there is nothing to judge or analyse."""
+    try:
+        with open_run(path) as run:
+            test = test_of(run, verdicts)
+            if test is None or test.verdict is TestVerdict.LOST:
+                return test, None
+            return test, _analysed(test, run, options)
+    except RunFileError as error:
+        return unreadable(path, error), None
 
 
 def summarise_run(test: RecordedTest, options: AnalysisOptions) -> TestSummary | Failure:
     """Analyse one run file. Whatever is wrong with it comes back as a `Failure`, in words."""
     assert test.path is not None
-    bad = test.verdict is TestVerdict.BAD
-
-    def failed(reason: str) -> Failure:
-        return Failure(str(test.name), Path(test.path or ""), reason, bad)
-
     if test.path.suffix != RUN_SUFFIX:
-        return failed("only a journal so far: `daq-app recover` makes its run file")
+        return _journal_only(test) or _failure(test, "a lost test")
     try:
         with open_run(test.path) as run:
-            if run.rig is None:
-                return failed("the run does not say which rig it was made with")
-            analysis = analyse_record(TestRecord.from_run(run, run.rig), options_for(test.name, options))
-            if not analysis.found:
-                return failed("; ".join(note.text for note in analysis.notes))
-            return summarise(test, run.rig, analysis)
+            return _analysed(test, run, options)
+    except RunFileError as error:
+        return _failure(test, str(error))
+
+
+def _analysed(test: RecordedTest, run: Run, options: AnalysisOptions) -> TestSummary | Failure:
+    if run.rig is None:
+        return _failure(test, "the run does not say which rig it was made with")
+    try:
+        analysis = analyse_record(TestRecord.from_run(run, run.rig), options_for(test.name, options))
+        if not analysis.found:
+            return _failure(test, "; ".join(note.text for note in analysis.notes))
+        return summarise(test, run.rig, analysis)
     except (RunFileError, ValueError) as error:
-        return failed(str(error))
+        return _failure(test, str(error))
+
+
+def _journal_only(test: RecordedTest) -> Failure | None:
+    """Why a test of which only the journal is there is not analysed; None where it is lost anyway."""
+    if test.verdict is TestVerdict.LOST:
+        return None
+    return _failure(test, "only a journal so far: `daq-app recover` makes its run file")
+
+
+def _failure(test: RecordedTest, reason: str) -> Failure:
+    return Failure(str(test.name), Path(test.path or ""), reason, test.verdict is TestVerdict.BAD)
 
 
 def options_for(name: TestName, options: AnalysisOptions) -> AnalysisOptions:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -25,24 +25,29 @@ def read_recorded(folder: Path) -> list[RecordedTest]:
 
     Raises `ConfigError` if the operator's verdicts cannot be read, `RunFileError` if there is no folder.
     """
+    verdicts = verdicts_of(folder)
+    tests = (recorded_test(path, verdicts) for path in find_runs(folder))
+    return [*filter(None, tests), *orphans(folder, verdicts)]
+
+
+def verdicts_of(folder: Path) -> dict[str, OperatorVerdict]:
+    """The operator's verdicts on the runs of a folder, by run id. Raises what `read_recorded` raises."""
     if not folder.is_dir():
         raise RunFileError(f"{folder} is no folder", advice="Give the folder that holds the runs.")
-    verdicts = read_verdicts(folder)
-    return [*_runs(folder, verdicts), *_orphans(folder, verdicts)]
+    return read_verdicts(folder)
 
 
-def _runs(folder: Path, verdicts: dict[str, OperatorVerdict]) -> Iterator[RecordedTest]:
-    for path in find_runs(folder):
-        try:
-            with open_run(path) as run:
-                test = _of_run(run, verdicts)
-        except RunFileError as error:
-            test = _unreadable(path, error)
-        if test is not None:
-            yield test
+def recorded_test(path: Path, verdicts: Mapping[str, OperatorVerdict]) -> RecordedTest | None:
+    """What a run file says of itself and its verdict by run id; a damaged one is a lost test."""
+    try:
+        with open_run(path) as run:
+            return test_of(run, verdicts)
+    except RunFileError as error:
+        return unreadable(path, error)
 
 
-def _of_run(run: Run, verdicts: dict[str, OperatorVerdict]) -> RecordedTest | None:
+def test_of(run: Run, verdicts: Mapping[str, OperatorVerdict]) -> RecordedTest | None:
+    """The same of an opened run; None where it is no release of a named test."""
     name = _name(run.header.test)
     if name is None or not was_released(run.events):
         return None
@@ -88,7 +93,7 @@ def _judged(run: Run) -> tuple[TestVerdict, str]:
     return TestVerdict.UNCHECKED, ""
 
 
-def _orphans(folder: Path, verdicts: dict[str, OperatorVerdict]) -> Iterator[RecordedTest]:
+def orphans(folder: Path, verdicts: Mapping[str, OperatorVerdict]) -> Iterator[RecordedTest]:
     """Journals that no run file was made of yet: their samples are there, so they count as unchecked."""
     for path in find_journals(folder):
         if path.with_suffix(RUN_SUFFIX).exists():
@@ -97,7 +102,7 @@ def _orphans(folder: Path, verdicts: dict[str, OperatorVerdict]) -> Iterator[Rec
             with read_journal(path) as contents:
                 header, events = contents.header, tuple(contents.events)
         except RunFileError as error:
-            test = _unreadable(path, error)
+            test = unreadable(path, error)
             if test is not None:
                 yield test
             continue
@@ -110,7 +115,7 @@ def _orphans(folder: Path, verdicts: dict[str, OperatorVerdict]) -> Iterator[Rec
         yield RecordedTest(name, verdict, header.start_utc_ns, path, reason)
 
 
-def _unreadable(path: Path, error: RunFileError) -> RecordedTest | None:
+def unreadable(path: Path, error: RunFileError) -> RecordedTest | None:
     """A damaged file still burns its number; its name begins with the test's."""
     name = _name(path.stem.split("_")[0])
     if name is None:

@@ -100,7 +100,11 @@ def write_report(
     restitution += tables.mean_of_specimens(restitution)
     repetitions = tables.repetition_effect(tests)
     pictures = campaign_figures(tests)
-    drawn = {picture.name: picture.svg for picture in pictures}
+    drawn = {}
+    for picture in pictures:
+        drawn[picture.name] = picture.svg
+        # Drawn once, everything has its place: the PDF does not look for it again.
+        picture.figure.set_layout_engine(None)
     written = tables.write_csv(folder, places, tests, restitution, repetitions)
     for picture in pictures:
         path = folder / f"{picture.name}.svg"

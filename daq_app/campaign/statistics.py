@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, special
+from scipy import special
 
 Floats = NDArray[np.float64]
+
+_GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,5 +73,22 @@ def _scatter(y: Floats, s: Floats) -> float:
         return float(np.log(variance).sum() + np.log(weights.sum()) + weights @ (y - mean) ** 2)
 
     top = 3.0 * float(y.std()) + float(s.max())
-    found = optimize.minimize_scalar(cost, bounds=(0.0, top), method="bounded", options={"xatol": 1e-9})
-    return 0.0 if cost(0.0) <= found.fun else float(found.x)
+    tau = _least(cost, 0.0, top)
+    return 0.0 if cost(0.0) <= cost(tau) else tau
+
+
+def _least(cost: Callable[[float], float], low: float, high: float) -> float:
+    """Where a function with one minimum in low … high is least, to 1e-9 of the range (golden section)."""
+    left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    at_left, at_right = cost(left), cost(right)
+    end = 1e-9 * (high - low)
+    while high - low > end:
+        if at_left <= at_right:
+            high, right, at_right = right, left, at_left
+            left = high - _GOLDEN * (high - low)
+            at_left = cost(left)
+        else:
+            low, left, at_left = left, right, at_right
+            right = low + _GOLDEN * (high - low)
+            at_right = cost(right)
+    return (low + high) / 2.0

@@ -7,12 +7,14 @@ import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_all_start_methods, get_context
+from multiprocessing.context import BaseContext
 from typing import Final, TypeVar
 
 _Job = TypeVar("_Job")
 _Answer = TypeVar("_Answer")
 
+_FORK_SERVER: Final = "forkserver" in get_all_start_methods()
 _THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -46,8 +48,7 @@ def run_all(
 @contextmanager
 def process_pool(workers: int | None = None) -> Iterator[ProcessPoolExecutor]:
     """A pool whose jobs have one thread each; whatever ends it, no job that waits is begun."""
-    # Spawned, not forked: the parent may hold threads (a window, a reader), which a fork would break.
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_leave_interrupts)
+    pool = ProcessPoolExecutor(workers, mp_context=_context(), initializer=_leave_interrupts)
     try:
         with _one_thread_each():
             yield pool
@@ -55,6 +56,24 @@ def process_pool(workers: int | None = None) -> Iterator[ProcessPoolExecutor]:
         pool.shutdown(cancel_futures=True)
         raise
     pool.shutdown()
+
+
+def warm_up(*modules: str) -> None:
+    """Begin to import `modules` for the workers of later pools, and go on at once.
+
+    Where the platform forks its workers from a process kept for it: elsewhere each imports for itself.
+    """
+    if _FORK_SERVER:
+        from multiprocessing import forkserver
+
+        forkserver.set_forkserver_preload(list(modules))
+        with _one_thread_each():
+            forkserver.ensure_running()
+
+
+def _context() -> BaseContext:
+    """Never forked from this process, which may hold threads (a window, a reader) that a fork would break."""
+    return get_context("forkserver" if _FORK_SERVER else "spawn")
 
 
 def _leave_interrupts() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,8 +14,8 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.status import CampaignStatus
+from daq_app.campaign.workers import warm_up
 from daq_app.cli.campaign_progress import DEFAULT_PLAN, open_plan, progress_bar
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
 
@@ -38,23 +39,20 @@ def report(
     Runs with a bad verdict are shown and left out of the means. Exit code 1 when a run that nobody had
     flagged bad could not be analysed.
     """
-    # Imported here: `--help` should not load SciPy.
-    from daq_app.campaign import collect as gathering
-    from daq_app.campaign.report import write_report
-    from daq_app.campaign.tables import mean_of_specimens, table_4_1
-    from daq_app.rocking.analysis import AnalysisOptions
-
     with reported():
         campaign = open_plan(plan_file)
-        recorded = read_recorded(folder)
-        status = CampaignStatus(campaign, recorded)
+        # The workers' process reads the analysis while this one reads what draws.
+        warm_up("daq_app.campaign.collect")
+        # Imported here: `--help` should not load SciPy.
+        from daq_app.campaign import collect as gathering
+        from daq_app.campaign.report import write_report
+        from daq_app.campaign.tables import mean_of_specimens, table_4_1
+        from daq_app.rocking.analysis import AnalysisOptions
+
         with progress_bar("analysing") as advance:
-            tests, failures = gathering.collect(
-                recorded,
-                options=AnalysisOptions(bias_runs=bias_runs),
-                workers=workers,
-                progress=advance,
-            )
+            options = AnalysisOptions(bias_runs=bias_runs)
+            found = gathering.collect(folder, options=options, workers=workers, progress=advance)
+        tests, failures = found.tests, found.failures
         for failure in failures:
             print_paragraph("Not analysed", f"{failure.test} ({failure.path}): {failure.reason}")
         if not tests:
@@ -62,7 +60,8 @@ def report(
             raise typer.Exit(EXIT_FAILED)
         target = out or folder / "report"
         made = time.strftime("%Y-%m-%d %H:%M", time.localtime())
-        footer = f"Made {made} from {len(recorded)} recorded tests in {folder.name}."
+        footer = f"Made {made} from {len(found.recorded)} recorded tests in {folder.name}."
+        status = CampaignStatus(campaign, found.recorded)
         write_report(target, campaign.name, status, tests, footer, failures)
         rows = table_4_1(tests)
         _print(rows + mean_of_specimens(rows), tests, target, as_json)
@@ -75,7 +74,7 @@ def _known(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
-def _print(rows: list[RestitutionRow], tests: list[TestSummary], target: Path, as_json: bool) -> None:
+def _print(rows: list[RestitutionRow], tests: Sequence[TestSummary], target: Path, as_json: bool) -> None:
     if as_json:
         document = [
             {
