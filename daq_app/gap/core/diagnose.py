@@ -31,6 +31,8 @@ REACH = 60.0
 REACH_SHARE = 0.5
 """A hypothesis is fitted if a glance puts it within 60 of the best in log evidence, or if it gains half as
 much as the best; the others keep what the glance gave them, which leaves them without a chance."""
+STRAINED = 4.0
+"""Prior sd from which a parameter of the model looks as if it stood for an effect."""
 LITTLE = 3.0
 """A glance that has arrived and gained less than this over what it started from, and is no nearer to the
 best, is kept too: the scatter that it took over is its own."""
@@ -223,7 +225,21 @@ class _Study:
             p.log_evidence > self.fits[best.effects].log_evidence + self.thresholds.probe_log_bayes
             for p in self.probes.values()
         )
-        return beaten or not self.goodness(best.effects).passed or self._leftover(best.effects) > 1.1
+        left = not self.goodness(best.effects).passed or self._leftover(best.effects) > 1.1
+        return beaten or left or self._strain(best.effects) > STRAINED
+
+    def _strain(self, effects: Hypothesis) -> float:
+        """The largest distance of a parameter of the model from its prior, in prior sd.
+
+        A parameter that all runs share can hide a second effect without a trace in the residuals.
+        """
+        found = self.fits[effects]
+        own = [
+            abs(float(u))
+            for (key, run), u in zip(found.keys, found.u, strict=True)
+            if run is None and "." not in key
+        ]
+        return max(own, default=0.0)
 
     def _leftover(self, effects: Hypothesis) -> float:
         whitened = np.concatenate(self.fits[effects].whitened)

@@ -90,10 +90,11 @@ def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray |
     rest = values[-count:] - values[-count:].mean()
     t = (np.arange(values.size) - (values.size - count)) / rate_hz
     design = _wave_columns(t[-count:], MAINS_HZ)
-    left = rest - design @ np.linalg.lstsq(design, rest, rcond=None)[0]
+    found = np.linalg.lstsq(design, rest, rcond=None)[0]
+    left = rest - design @ found
     noise = float(np.sqrt(np.mean(left**2)))
     sd = noise * np.sqrt(2.0 / count)
-    amplitude = float(np.hypot(*np.linalg.lstsq(design, rest, rcond=None)[0][:2]))
+    amplitude = float(np.hypot(*found[:2]))
     if amplitude < 6.0 * sd:
         return 0.0, float(sd), None
     # Over the whole record the frequency is sharp enough for the phase to hold.
@@ -120,7 +121,7 @@ def _stairs(values: FloatArray, noise_si: float) -> tuple[float, float]:
     From sample to sample such a reading stays, or goes on by whole steps; noise does neither.
     """
     change = np.abs(np.diff(values))
-    top = float(np.quantile(change, 0.9995))
+    top = _quantile(change, 0.9995)
     large = change > 0.4 * top
     if top <= 0.0 or np.mean(large) < FEWEST_STEPS:
         return 0.0, 1.0
@@ -132,6 +133,15 @@ def _stairs(values: FloatArray, noise_si: float) -> tuple[float, float]:
     if step < 3.0 * noise_si or step < SMALLEST_STEP * float(np.ptp(values)):
         return 0.0, 1.0  # that is the converter's own step
     return step, 0.02 * step
+
+
+def _quantile(values: FloatArray, share: float) -> float:
+    """As `np.quantile`, in a tenth of its time for one share of a long row."""
+    at = share * (values.size - 1)
+    low = int(at)
+    high = min(low + 1, values.size - 1)
+    ordered = np.partition(values, (low, high))
+    return float(ordered[low] + (at - low) * (ordered[high] - ordered[low]))
 
 
 def _frozen(

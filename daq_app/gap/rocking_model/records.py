@@ -125,8 +125,11 @@ class GapRun:
         offset = self.time_offset_s[index] if self.time_offset_s.size else 0.0
         if offset == 0.0:
             return values
-        k = np.arange(values.size, dtype=float)
-        shifted: FloatArray = np.interp(k, k + offset * self.rate_hz, values)
+        # Straight lines between samples, a constant share of each; beyond the ends the end values.
+        whole, share = divmod(-offset * self.rate_hz, 1.0)
+        place = np.arange(values.size) + int(whole)
+        before, after = values.take(place, mode="clip"), values.take(place + 1, mode="clip")
+        shifted: FloatArray = before + share * (after - before)
         return shifted
 
 

@@ -120,19 +120,25 @@ def _between(grid: Grid, mask_s: float) -> NDArray[np.bool_]:
 
 def ring_columns(grid: Grid, frequency_hz: float, zeta: float) -> FloatArray:
     """Sine and cosine of the ring-down per unit jump of θ̇, shape (m, 2)."""
-    natural = 2.0 * np.pi * frequency_hz
-    rate = -zeta * natural + 1j * natural * np.sqrt(1.0 - zeta**2)
-    jumps = grid.jumps
-    wave = np.zeros(grid.time_s.size, dtype=complex)
-    state = 0.0 + 0.0j
-    edges = np.append(np.searchsorted(grid.time_s, grid.impact_s), grid.time_s.size)
-    for k, start in enumerate(grid.impact_s):
-        if k:
-            state = state * np.exp(rate * (start - grid.impact_s[k - 1]))
-        state += jumps[k]
-        part = slice(edges[k], edges[k + 1])
-        wave[part] = state * np.exp(rate * (grid.time_s[part] - start))
-    return np.column_stack([wave.imag, wave.real])
+    return ring_table(grid, np.array([frequency_hz]), np.array([zeta]))
+
+
+def ring_table(grid: Grid, frequencies_hz: FloatArray, zetas: FloatArray) -> FloatArray:
+    """`ring_columns` of many oscillators, (k,) each, beside one another, shape (m, 2 k)."""
+    natural = 2.0 * np.pi * frequencies_hz
+    rates = -zetas * natural + 1j * natural * np.sqrt(1.0 - zetas**2)
+    last = np.searchsorted(grid.impact_s, grid.time_s, side="right")
+    # What is left of all jumps so far, at each impact; nothing before the first.
+    states = np.zeros((rates.size, grid.impact_s.size + 1), dtype=complex)
+    for k, (jump, pause) in enumerate(
+        zip(grid.jumps, np.diff(grid.impact_s, prepend=grid.impact_s[:1]), strict=True)
+    ):
+        states[:, k + 1] = states[:, k] * np.exp(rates * pause) + jump
+    since = grid.time_s - np.concatenate([grid.time_s[:1], grid.impact_s])[last]
+    waves = states[:, last] * np.exp(rates[:, None] * since)
+    table = np.empty((grid.time_s.size, 2 * rates.size))
+    table[:, 0::2], table[:, 1::2] = waves.imag.T, waves.real.T
+    return table
 
 
 def _cleaner(grid: Grid, pick: NDArray[np.bool_], slow: bool) -> list[tuple[NDArray[np.intp], FloatArray]]:
@@ -208,12 +214,11 @@ def _score(
             if signal.pick.sum() < 100:
                 continue
             if waves is None:
-                waves = np.column_stack(
-                    [ring_columns(grid, float(f), z) for f in frequencies for z in damping]
-                )
-            both = _clean(np.column_stack([signal.values, waves]), _cleaner(grid, signal.pick, slow))
-            if len(both) >= 60:
-                score += _gains(both[:, 0], both[:, 1:]).reshape(score.shape)
+                both = np.meshgrid(frequencies, damping, indexing="ij")
+                waves = ring_table(grid, both[0].ravel(), both[1].ravel())
+            cleaned = _clean(np.column_stack([signal.values, waves]), _cleaner(grid, signal.pick, slow))
+            if len(cleaned) >= 60:
+                score += _gains(cleaned[:, 0], cleaned[:, 1:]).reshape(score.shape)
     return score
 
 
@@ -241,7 +246,7 @@ def _colour(
 ) -> float:
     """Size of chance at frequencies around the ring's, over that of white noise; at least 1."""
     factors = [f for f in (0.55, 0.62, 0.7, 0.78, 1.28, 1.43, 1.6, 1.8) if ring.frequency_hz * f < 60.0]
-    waves = np.column_stack([ring_columns(grid, ring.frequency_hz * f, 0.03) for f in factors])
+    waves = ring_table(grid, ring.frequency_hz * np.array(factors), np.full(len(factors), 0.03))
     waves = _clean(waves, bases)
     own = _clean(ring_columns(grid, ring.frequency_hz, ring.zeta), bases)
     # The ring itself, if there is one, must not count as its own surroundings.

@@ -240,8 +240,12 @@ def _wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatAr
 
 def _tiltmeter(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     theta = run.grid.theta
-    own = values["cal_tiltmeter"] - _own_gain(run, values)
-    found = own * _unit(run, block, "theta", lambda: first_order(theta, 0.3))
+    found = values["cal_tiltmeter"] * _unit(run, block, "theta", lambda: first_order(theta, 0.3))
+    # Each face of the joint has its own calibration: the slow response makes their difference a drift.
+    first, second = ("face_a", "face_b") if run.reference == "lvdt" else ("cal_wire", "cal_wire")
+    positive = _unit(run, block, "positive", lambda: first_order(np.maximum(theta, 0.0), 0.3))
+    negative = _unit(run, block, "negative", lambda: first_order(np.minimum(theta, 0.0), 0.3))
+    found = found - values[first] * positive - values[second] * negative
     if "compliance.phi" in values:
         found = found + _base_rotation(run, block, values)
     series = _difference_of(run, "tiltmeter", run.reference, values)
