@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import time
+import datetime as dt
 from concurrent.futures import ThreadPoolExecutor
 from threading import Condition, RLock
 from typing import TYPE_CHECKING, Literal
 
+import hightime
 import numpy as np
 
 from sim_hardware.daqmx_server.clock import BenchClock, SteppedClock
@@ -48,16 +49,16 @@ class Bench:
         self._owners: dict[str, str] = {}
         self._edges: dict[str, list[tuple[float, bool]]] = {}
         self._swapped: dict[str, Device] = {}
-        self._epoch_s = time.time()
+        self._epoch = hightime.datetime.now(dt.UTC)
 
     @property
     def readers_drive_time(self) -> bool:
         """Whether the clock stands still unless somebody waits."""
         return isinstance(self.clock, SteppedClock)
 
-    def utc_s(self, time_s: float) -> float:
-        """Wall-clock time (Unix seconds) of an instant of the bench."""
-        return self._epoch_s + time_s
+    def utc(self, time_s: float) -> hightime.datetime:
+        """Wall-clock time of an instant of the bench, finer than a float's seconds since 1970 could be."""
+        return self._epoch + hightime.timedelta(seconds=time_s)
 
     def task(self, name: str) -> Task:
         try:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from collections.abc import Callable
 from typing import Any, Final
 
-import hightime
 import numpy as np
 from ni.protobuf.types.precision_timestamp_conversion import hightime_datetime_to_protobuf
 from nidaqmx._stubs import nidaqmx_pb2 as pb
@@ -70,10 +68,6 @@ def read_scalar(bench: Bench, request: Any) -> Any:
     return pb.ReadAnalogScalarF64Response(value=float(task.scan.readings(got.codes, got.rows)[0, 0]))
 
 
-def _timestamp(utc_s: float) -> Any:
-    return hightime_datetime_to_protobuf(hightime.datetime.fromtimestamp(utc_s, dt.UTC))
-
-
 def _binary_handler(rpc: str, dtype: str) -> Handler:
     reply = getattr(pb, f"{rpc}Response")
 
@@ -116,7 +110,7 @@ def read_waveforms(bench: Bench, request: Any) -> Any:
     for values, channel in zip(task.scan.readings(got.codes, got.rows), _chosen(task, got), strict=True):
         waveform = reply.waveforms.add(dt=1.0 / task.timing.rate_hz if task.is_buffered else 0.0)
         waveform.y_data.extend(values.tolist())
-        waveform.t0.CopyFrom(_timestamp(bench.utc_s(got.first_time_s)))
+        waveform.t0.CopyFrom(hightime_datetime_to_protobuf(bench.utc(got.first_time_s)))
         waveform.attributes["NI_ChannelName"].string_value = channel.name
         waveform.attributes["NI_UnitDescription"].string_value = channel.unit_name
     return reply
