@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from simulated_wall import simulate
@@ -9,10 +11,13 @@ from simulated_wall import simulate
 from benchmarks.gap_campaign import simulate as longer_held
 from daq_app.gap.rocking_model.inspection import found_channels, found_marks
 from daq_app.gap.rocking_model.model import RockingModel
+from daq_app.gap.rocking_model.rings import ring_columns
 from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.sensor_blocks import Block
 from daq_app.gap.rocking_model.sensor_response import block_coefficients
 from daq_app.gap.rocking_model.study import model_and_library, prepare
+from sim_hardware.dynamics import parameters as par
+from sim_hardware.sensors.scene import pivots
 
 LEVELS = (0.25, -0.35)
 
@@ -190,3 +195,34 @@ def _predicted(run: RockingRun, values: dict[str, float], block: Block, place: i
     before = list(run.blocks).index(block)
     first = sum(len(b.names) for b in run.blocks[:before])
     return float(block_coefficients(run, values)[0][first + place])
+
+
+def test_a_ring_down_is_known_as_well_as_its_damping() -> None:
+    """Its size follows from the damping that it was fitted with; both come from all runs, once."""
+    effects = {"yaw": {"kick": 0.04, "frequency": 5.0, "zeta": 0.03}}
+    runs = _prepared(effects)
+    for run in runs:
+        block = next(b for b in run.blocks if b.rule == "turning")
+        frequency, zeta, _ = block.ring
+        assert zeta == pytest.approx(0.03, rel=0.3)
+        dying = ring_columns(run.grid, frequency, 1.2 * zeta)
+        seen = float(block.projection[0] @ dying[:, 0]), float(block.projection[1] @ dying[:, 1])
+        for size, slope in zip(seen, block.fading, strict=False):
+            assert size == pytest.approx(1.0 + slope * np.log(1.2), abs=0.03)
+            assert size < 0.97
+
+
+def test_worn_edges_are_where_the_simulator_has_them() -> None:
+    run = replace(_prepared({})[0], impacts_before=120.0, cache={})
+    model = RockingModel(run.survey)
+    values = {p.name: p.mean for p in model.nuisance} | {"zero": 0.0, "omega0": 0.0}
+    vector = np.zeros(par.N_PARAMETERS)
+    alpha = values["alpha"]
+    vector[par.ALPHA], vector[par.R0] = alpha, values["half_base"] / np.sin(alpha)
+    vector[par.CRUSH_ALPHA], vector[par.IMPACTS_BEFORE] = 0.02, 120.0
+    shifted = values["half_base"] - pivots(vector)[0]
+    joint = next(b for b in run.blocks if b.family == "joint")
+    place = joint.names.index("pivot")
+    plain = _predicted(run, values, joint, place)
+    worn = _predicted(run, values | {"crushing.loss": 0.02}, joint, place)
+    assert plain - worn == pytest.approx(shifted, rel=1e-6)

@@ -113,6 +113,7 @@ def bending(
                 found[k] = values.get("flexible_wall.frequency", block.values[k])
             case "damping":
                 found[k] = values.get("flexible_wall.zeta", block.values[k])
+    found = found * _faded(block, values.get("flexible_wall.zeta", zeta))
     return found if wires is None else found + _in_wires(block, wires)
 
 
@@ -139,6 +140,13 @@ def turning(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
                 found[k] = values.get(f"{other}.frequency", block.values[k])
             case "damping":
                 found[k] = values.get(f"{other}.zeta", block.values[k])
+    return found * _faded(block, values.get(f"{other}.zeta", zeta))
+
+
+def _faded(block: Block, zeta: float) -> FloatArray:
+    """Size of each coefficient, made with the block's damping, of a ring-down with another damping."""
+    found = np.ones(len(block.names))
+    found[: len(block.fading)] += np.array(block.fading) * np.log(zeta / block.ring[1])
     return found
 
 

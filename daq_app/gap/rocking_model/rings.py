@@ -50,6 +50,8 @@ class Ring:
     zeta: float
     gain: float
     frequency_sd: float
+    zeta_sd: float
+    """Relative."""
 
 
 def bend_signals(run: GapRun, joint: Rotation, grid: Grid, height_m: float) -> list[Signal]:
@@ -183,9 +185,19 @@ def scan(grids: Sequence[Grid], signals: Sequence[list[Signal]], *, slow: bool) 
     frequency = float(fine_hz[0] * np.exp(spacing * along))
     sd = frequency * spacing / np.sqrt(max(bend, 0.05))
     # A damping between the steps would leave the ring too small: its size follows the damping.
-    across, _ = _vertex(score[k], int(j))
-    zeta = float(np.exp(np.interp(across, np.arange(len(FINE_DAMPING)), np.log(FINE_DAMPING))))
-    return Ring(frequency, zeta, float(score[k, j]), float(min(sd, 0.3 * frequency)))
+    zetas = FINE_DAMPING[int(j)] * np.geomspace(1.0 / 1.7, 1.7, 13)
+    score = _score(grids, signals, np.array([frequency]), list(zetas), slow=slow)[0]
+    across, bend = _vertex(score, int(np.argmax(score)))
+    spacing = float(np.log(zetas[1] / zetas[0]))
+    zeta = float(zetas[0] * np.exp(spacing * np.clip(across, 0.0, zetas.size - 1.0)))
+    zeta_sd = spacing / np.sqrt(max(bend, 1e-9))
+    return Ring(
+        frequency,
+        zeta,
+        float(score.max()),
+        float(min(sd, 0.3 * frequency)),
+        float(np.clip(zeta_sd, 0.02, 0.4)),
+    )
 
 
 def _vertex(values: FloatArray, k: int) -> tuple[float, float]:
@@ -258,7 +270,7 @@ def _colour(
 
 def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, slow: bool) -> Block | None:
     """Coefficients of sine and cosine of every signal at the common oscillator; accelerations over ω²."""
-    names, units, values, variances, rows, levers = [], [], [], [], [], []
+    names, units, values, variances, rows, levers, fading = [], [], [], [], [], [], []
     waves = ring_columns(grid, ring.frequency_hz, ring.zeta)
     natural = 2.0 * np.pi * ring.frequency_hz
     for signal in signals:
@@ -267,7 +279,7 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
         if len(both) < 60:
             continue
         places = np.concatenate([part for part, _ in bases])
-        inverse = np.linalg.pinv(both[:, 1:])
+        inverse: FloatArray = np.linalg.pinv(both[:, 1:]).astype(np.float64)
         found = inverse @ both[:, 0]
         left = both[:, 0] - both[:, 1:] @ found
         fraction = max(independent_fraction(left), 0.05)
@@ -281,7 +293,9 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
         # Removing the bases is part of the projection.
         for part, basis in bases:
             full[:, part] -= (full[:, part] @ basis) @ basis.T
+        slopes = _fading(grid, bases, ring, inverse)
         for k, word in enumerate(("sine", "cosine")):
+            fading.append(float(slopes[k]))
             names.append(f"{word} in {signal.family}s")
             units.append("m s/rad" if not slow else "s")
             values.append(found[k] / scale)
@@ -293,7 +307,7 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
     names += ["frequency", "damping"]
     units += ["Hz", "1"]
     values += [ring.frequency_hz, ring.zeta]
-    variances += [ring.frequency_sd**2, (0.4 * ring.zeta) ** 2]
+    variances += [ring.frequency_sd**2, (ring.zeta_sd * ring.zeta) ** 2]
     rows += [np.zeros(grid.time_s.size)] * 2
     return Block(
         name,
@@ -306,13 +320,27 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
         kind=name,
         ring=(ring.frequency_hz, ring.zeta, GRID_HZ),
         levers=tuple(levers),
+        fading=tuple(fading),
     )
+
+
+def _fading(
+    grid: Grid, bases: list[tuple[NDArray[np.intp], FloatArray]], ring: Ring, inverse: FloatArray
+) -> FloatArray:
+    """d coefficient / d ln ζ of a ring-down of unit size, (2,): what dies sooner looks smaller."""
+    sizes = []
+    for factor in (1.1, 1.0 / 1.1):
+        waves = _clean(ring_columns(grid, ring.frequency_hz, factor * ring.zeta), bases)
+        sizes.append(np.diag(inverse @ waves))
+    slopes: FloatArray = (sizes[0] - sizes[1]) / (2.0 * np.log(1.1))
+    return slopes
 
 
 def with_repeatability(blocks: Sequence[Block]) -> list[Block]:
     """The blocks of all runs with what the ring-down itself repeats by, a share of its usual size.
 
-    Of its own size in each run it would make the small ones the sure ones.
+    Of its own size in each run it would make the small ones the sure ones. Frequency and damping come
+    from all runs at once: what is said in every run is known only once.
     """
     parts = {
         name: np.array([b.values[b.names.index(name)] for b in blocks if name in b.names])
@@ -323,11 +351,13 @@ def with_repeatability(blocks: Sequence[Block]) -> list[Block]:
         for name, values in parts.items()
         if name.startswith("sine")
     }
-    return [
-        replace(
-            block,
-            covariance=block.covariance
-            + np.diag([(REPEATABILITY * usual.get(n.partition(" in ")[2], 0.0)) ** 2 for n in block.names]),
-        )
-        for block in blocks
-    ]
+    found = []
+    for block in blocks:
+        covariance = block.covariance.copy()
+        for k, name in enumerate(block.names):
+            if " in " in name:
+                covariance[k, k] += (REPEATABILITY * usual.get(name.partition(" in ")[2], 0.0)) ** 2
+            else:
+                covariance[k, k] *= len(blocks)
+        found.append(replace(block, covariance=covariance))
+    return found

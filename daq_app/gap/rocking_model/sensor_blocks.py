@@ -54,6 +54,8 @@ class Block:
     levers: tuple[float, ...] = ()
     """Of a ring-down: what a rotation error of the family makes of each coefficient's signal, m. Of a
     single channel: the relative error of its prediction."""
+    fading: tuple[float, ...] = ()
+    """Of a ring-down: change of each coefficient of unit size per ln of the damping ratio."""
     tags: Mapping[str, str] = field(default_factory=dict)
     """Sensor family behind a channel or a mark."""
 

@@ -282,7 +282,8 @@ def _edges(run: RockingRun, values: Mapping[str, float]) -> tuple[float, float]:
     """(distance of the pivots from the middle beyond the survey's, half its difference right to left), m."""
     half, alpha = values["half_base"], values["alpha"]
     tall = half / np.tan(alpha)
-    worn = values.get("crushing.loss", 0.0) * 0.01 * run.impacts_before * alpha * tall
+    wear = values.get("crushing.loss", 0.0) * 0.01 * run.impacts_before
+    worn = half - tall * np.tan(alpha * (1.0 - wear))
     inwards = half - run.survey.half_base_m - values.get("pivot_shift.a", 0.0) - worn
     inwards -= values.get("rounded_edge.rho", 0.0)
     return inwards, values.get("alpha_asymmetry.delta", 0.0) * tall / np.cos(alpha) ** 2
