@@ -56,7 +56,7 @@ def _plain(value: object) -> object:
 
 _Text = Annotated[str, AfterValidator(clean_text)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
-_LATEST_NS = 250_000_000_000 * 10**9
+LATEST_NS = 250_000_000_000 * 10**9
 """A moment near the year 9892: the last that a calendar here can show."""
 
 
@@ -87,7 +87,7 @@ class RunHeader(BaseModel):
     """Reading found at rest beyond the certificate's offset, by channel id."""
     tare_record: dict[str, Any] = Field(default_factory=dict)
     """When and on how many samples the tare was taken, scatter by channel."""
-    start_utc_ns: Annotated[int, Field(ge=0, le=_LATEST_NS)] = 0
+    start_utc_ns: Annotated[int, Field(ge=0, le=LATEST_NS)] = 0
     """Wall clock at the run's first sample. A stamp only: time is sample index / rate."""
     host: _Text = ""
     versions: dict[str, _Text] = Field(default_factory=dict)

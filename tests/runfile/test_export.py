@@ -15,8 +15,10 @@ import xarray as xr
 from nptdms import TdmsFile
 from scipy.io import loadmat
 
+from daq_app.config import Rig
 from daq_app.runfile import RunFileError, RunHeader, finalise, open_run
 from daq_app.runfile.exporters import FORMATS, export_run, selection
+from daq_app.runfile.importers import import_file
 
 Read = tuple[np.ndarray, dict[str, np.ndarray], dict[str, str]]
 """Times, channels, units."""
@@ -139,6 +141,20 @@ def test_a_part_of_the_run(tmp_path: Path, run: Path, format_: str) -> None:
     assert times[0] == pytest.approx(0.3, abs=1e-9) and times[-1] == pytest.approx(0.49975, abs=1e-9)
     with open_run(run) as source:
         np.testing.assert_array_equal(channels["WP-1"], source.si(["WP-1"], 200, 1000)[0])
+
+
+@pytest.mark.parametrize("format_", ["csv", "mat", "npz", "tdms"])
+def test_an_export_comes_back_in_with_its_time(tmp_path: Path, run: Path, rig: Rig, format_: str) -> None:
+    """The first row was taken 0.05 s after the run's first sample; to the microsecond of a TDMS stamp."""
+    path = export_run(run, tmp_path / f"part{FORMATS[format_]}", format_, units="raw", from_s=0.3, to_s=0.5)
+    report = import_file(path, rig, "", tmp_path / "again.h5")
+    with open_run(run) as source, open_run(report.run) as again:
+        late_ns = again.header.start_utc_ns - source.header.start_utc_ns
+        assert late_ns == pytest.approx(50_000_000, abs=1000)
+        assert again.rate_hz == source.rate_hz
+        part = source.readings(["WP-1", "AC-1"], 200, 1000)
+        np.testing.assert_allclose(again.readings(["WP-1", "AC-1"]), part, rtol=1e-12)
+    assert not any("when it was recorded" in doubt for doubt in report.doubts)
 
 
 def test_times_outside_the_run_are_told(tmp_path: Path, run: Path) -> None:

@@ -70,3 +70,10 @@ def test_real_encoder_file(shared_data: Path, bring) -> None:
     )
     assert report.n_samples == len(path.read_text().split("\n")) - 3
     assert any("is deg the right unit?" in doubt for doubt in report.doubts)
+
+
+@pytest.mark.parametrize("stamp", ["9999999999999999999", "0", "-5", "1e18", "soon"])
+def test_an_impossible_time_of_recording_is_not_believed(tmp_path: Path, bring, stamp: str) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text(f"# first_row_utc_ns: {stamp}\ntime_s,WP-1 (mm)\n0,1.5\n0.01,2.5\n0.02,3.5\n")
+    assert any("when it was recorded" in doubt for doubt in bring(path).doubts)

@@ -125,6 +125,7 @@ class Selection:
             "first_sample": first,
             "n_samples": self.n_samples,
             "start_utc_ns": run.header.start_utc_ns,
+            "first_row_utc_ns": self._first_row_utc_ns(),
             "raw_sha256": run.attributes.raw_sha256,
             "values": "readings of the NI channels"
             if self.units == "raw"
@@ -140,6 +141,11 @@ class Selection:
                 if g.first_sample < last and g.end > first
             ],
         }
+
+    def _first_row_utc_ns(self) -> int:
+        """Wall clock at the first sample of the selection; 0 where the run does not know it."""
+        started = self.run.header.start_utc_ns
+        return started + round(self.start / self.run.rate_hz * 1e9) if started else 0
 
 
 def _column(run: Run, time_s: float) -> int:

@@ -26,6 +26,7 @@ def write(path: Path, selection: Selection) -> None:
         )
     names = _variable_names(selection.ids)
     run = selection.metadata()
+    run_json = json.dumps(run)
     run["events"] = _records(run["events"], ("sample", "kind", "text"))
     run["gaps"] = _records(run["gaps"], ("first_sample", "n_samples", "reason"))
     with path.open("wb") as file:
@@ -44,7 +45,9 @@ def write(path: Path, selection: Selection) -> None:
             channels.append({"id": channel_id, "variable": names[channel_id], "unit": unit, "known": known})
             selection.report((number + 1) / len(selection.ids))
         listing = [{key: row[key] for key in ("id", "variable", "unit")} for row in channels]
-        _put(file, "channels_json", json.dumps(listing))  # for programs that read no structures
+        # For programs that read no structures.
+        _put(file, "channels_json", json.dumps(listing))
+        _put(file, "run_json", run_json)
         _put(file, "channels", _records(channels, ("id", "variable", "unit", "known")))
 
 
@@ -63,7 +66,7 @@ def _records(rows: list[dict[str, Any]], fields: tuple[str, ...]) -> object:
 def _variable_names(ids: tuple[str, ...]) -> dict[str, str]:
     """MATLAB identifiers, each used once."""
     names: dict[str, str] = {}
-    used = {"run", "time_s", "channels", "channels_json"}
+    used = {"run", "run_json", "time_s", "channels", "channels_json"}
     for channel_id in ids:
         stem = re.sub(r"\W", "_", channel_id, flags=re.ASCII)
         stem = (stem if stem[0].isalpha() else f"ch_{stem}")[:56]

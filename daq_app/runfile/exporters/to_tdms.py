@@ -17,8 +17,10 @@ GROUP: Final = "Measurement"
 def write(path: Path, selection: Selection) -> None:
     """One segment per piece; the properties stand in the first."""
     run = selection.run
-    # The waveform of a TDMS channel starts at a wall-clock time plus an offset in seconds.
-    started = np.datetime64(run.header.start_utc_ns // 1000, "us")
+    # The waveform of a TDMS channel starts at a wall-clock time plus an offset in seconds: the offset is the
+    # run's own time of the first row, so the wall clock is that of the run's time zero.
+    zero_ns = run.header.start_utc_ns - round(run.first_sample / run.rate_hz * 1e9)
+    started = np.datetime64(zero_ns // 1000 if run.header.start_utc_ns else 0, "us")
     known = {
         key: json.dumps(value, ensure_ascii=False) if isinstance(value, list) else value
         for key, value in selection.metadata().items()

@@ -9,6 +9,7 @@ from typing import Final
 
 from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.importers.import_map import SourceMap
+from daq_app.runfile.importers.own_export import start_in_line, start_of
 from daq_app.runfile.importers.recording import Findings, ForeignChannel, Spool
 from daq_app.runfile.importers.text_rows import ColumnWriter, lines_of, number, open_text
 from daq_app.runfile.importers.unit_text import is_time
@@ -29,6 +30,8 @@ class CsvReader:
         self._units: dict[str, str] = {}
         self._full_names: dict[str, str] = {}
         """Names as written, with the unit behind them."""
+        self._told: dict[str, object] = {}
+        """What the comments of this program's own export tell of the time."""
         self._data_line = 0
         """Lines before the first row of numbers."""
         head = self._head_lines()
@@ -44,9 +47,13 @@ class CsvReader:
         ]
         self.time_channel = times[0] if times and not source.time_column else None
         self.time_hint: str | None = None
+        start = start_of(self._told)
         self.channels = tuple(
             ForeignChannel(
-                name, unit=self._units.get(name, ""), aliases=(name, self._full_names.get(name, name))
+                name,
+                unit=self._units.get(name, ""),
+                start_utc_ns=start,
+                aliases=(name, self._full_names.get(name, name)),
             )
             for name in self._names
         )
@@ -84,6 +91,9 @@ class CsvReader:
                 own = _OWN_CHANNEL.match(line)
                 if own:
                     self._units[own[1]] = own[2]
+                told = start_in_line(line)
+                if told:
+                    self._told[told[0]] = told[1]
                 if count < self._source.skip_lines or not line.strip() or line.startswith("#"):
                     continue
                 head.append(line)

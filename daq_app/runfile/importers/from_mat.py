@@ -12,6 +12,7 @@ import numpy as np
 from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.importers.import_map import SourceMap
 from daq_app.runfile.importers.mat5 import Mat5File, Variable
+from daq_app.runfile.importers.own_export import start_in_json
 from daq_app.runfile.importers.recording import Findings, ForeignChannel, Reader, Spool
 from daq_app.runfile.safe_hdf5 import damage_told, open_hdf5
 
@@ -50,7 +51,9 @@ class Mat5Reader:
                 if name in known and known[name].is_real and known[name].size == 1
             }
             units = self._units(known.get("channels_json"))
-            self.channels = _described(self._vectors, units, _increment(rates))
+            told = known.get("run_json")
+            start = start_in_json(self._file.text(told)) if told and told.is_text else None
+            self.channels = _described(self._vectors, units, _increment(rates), start)
             _require_column(path, source, self._vectors)
         except BaseException:
             self._file.close()
@@ -132,7 +135,10 @@ class Mat73Reader:
 
 
 def _described(
-    vectors: dict[str, int], units: dict[str, str], increment: float | None
+    vectors: dict[str, int],
+    units: dict[str, str],
+    increment: float | None,
+    start_utc_ns: int | None = None,
 ) -> tuple[ForeignChannel, ...]:
     # MATLAB has no minus in names: LV-A01 is LV_A01 there.
     return tuple(
@@ -140,6 +146,7 @@ def _described(
             name,
             unit=units.get(name, ""),
             increment_s=increment,
+            start_utc_ns=start_utc_ns,
             aliases=(name, name.replace("_", "-"), name.replace("_", "-", 1)),
         )
         for name in vectors

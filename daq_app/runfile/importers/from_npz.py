@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.importers.import_map import SourceMap
+from daq_app.runfile.importers.own_export import start_in_json
 from daq_app.runfile.importers.recording import Findings, ForeignChannel, Spool
 
 _SMALL_BYTES: Final = 2**24
@@ -116,8 +117,11 @@ class NpzReader:
             units = [""] * len(names)
         rate = next((float(self._small(name)[0]) for name in _RATES if name in self._shapes), 0.0)
         increment = 1.0 / rate if np.isfinite(rate) and rate > 0 else None
+        told = self._shapes.get("metadata_json")
+        text = str(self._small("metadata_json")[0]) if told and told[0] == () and told[1].kind == "U" else ""
+        start = start_in_json(text)
         return tuple(
-            ForeignChannel(name, unit=unit, increment_s=increment, aliases=(name,))
+            ForeignChannel(name, unit=unit, increment_s=increment, start_utc_ns=start, aliases=(name,))
             for name, unit in zip(names, units, strict=True)
         )
 

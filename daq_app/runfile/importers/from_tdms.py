@@ -23,6 +23,8 @@ _WHOLE_CHUNK_BYTES: Final = 2**26
 """Chunks of all channels up to this size are read at once; larger ones channel by channel."""
 _MAX_LISTED: Final = 20_000
 _MAX_MESSAGE: Final = 200
+_LONGEST_OFFSET_S: Final = 1e8
+"""A waveform that begins years after its own start is not believed."""
 
 
 class TdmsReader:
@@ -128,17 +130,19 @@ def _describe(name: str, channel: TdmsChannel, levels: dict[str, Any]) -> Foreig
         name,
         unit=str(properties.get("unit_string", "")),
         increment_s=float(increment) if isinstance(increment, int | float) and increment != 0 else None,
-        start_utc_ns=_start(properties.get("wf_start_time")),
+        start_utc_ns=_start(properties.get("wf_start_time"), properties.get("wf_start_offset")),
         aliases=tuple(aliases),
         preferred=levels.get(channel.group_name, 0) == 0,
     )
 
 
-def _start(value: object) -> int | None:
-    """UTC of a TDMS timestamp; its epoch (1904) means that none was set."""
+def _start(value: object, offset_s: object) -> int | None:
+    """UTC of the first sample: a TDMS timestamp and the seconds behind it; its epoch (1904) means none."""
     if not isinstance(value, np.datetime64) or np.isnat(value) or value < np.datetime64("1970-01-01"):
         return None
-    return int(value.astype("datetime64[us]").astype(np.int64)) * 1000
+    known = isinstance(offset_s, int | float) and abs(offset_s) < _LONGEST_OFFSET_S
+    late_us = round(float(offset_s) * 1e6) if known and isinstance(offset_s, int | float) else 0
+    return (int(value.astype("datetime64[us]").astype(np.int64)) + late_us) * 1000
 
 
 def _numbers(values: NDArray[Any]) -> NDArray[np.float64]:
