@@ -105,10 +105,10 @@ def decay(tests: Sequence[TestSummary], title: str) -> Figure:
         r_max = good[0].r_max
         left.plot(n[1:], period_after(n[1:], phi0, r_max, good[0].p_rad_s), ls="--", color="#888888")
         right.plot(
-            n, amplitude_after(n, phi0, r_max), ls="--", color="#888888", label=f"theory, r_max = {r_max:.3f}"
+            n, amplitude_after(n, phi0, r_max), ls="--", color="#888888", label=f"theory, rₘₐₓ = {r_max:.3f}"
         )
-    left.set_ylabel("period T_n (s)")
-    right.set_ylabel("peak rotation φ_n = θ_n/α")
+    left.set_ylabel("period Tₙ (s)")
+    right.set_ylabel("peak rotation φₙ = θₙ/α")
     for axis in (left, right):
         axis.set_xlabel("impact n")
         axis.set_xlim(left=0)
@@ -146,25 +146,18 @@ def restitution_by_level(tests: Sequence[TestSummary]) -> Figure:
                     label=method if good else f"{method}, left out of the mean",
                 )
         if own:
-            axis.axhline(own[0].r_max, color="#333333", ls="--", lw=1)
-            axis.annotate(
-                f"r_max = {own[0].r_max:.3f}",
-                (0.01, own[0].r_max),
-                xycoords=("axes fraction", "data"),
-                fontsize=9,
-                va="bottom",
-            )
+            axis.axhline(own[0].r_max, color="#333333", ls="--", lw=1, label="rₘₐₓ of the block")
         axis.set_xticks(range(len(labels)), labels)
         axis.set_xlim(-0.6, len(labels) - 0.4)
         axis.set_xlabel("level")
-        axis.set_title(specimen)
+        axis.set_title(f"{specimen}, rₘₐₓ = {own[0].r_max:.3f}" if own else specimen)
     handles = {
         label: handle
         for axis in axes
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
     }
     figure.legend(
-        handles.values(), handles.keys(), loc="outside upper center", ncols=2 * len(axes), frameon=False
+        handles.values(), handles.keys(), loc="outside upper center", ncols=3 * len(axes), frameon=False
     )
     axes[0].set_ylabel("coefficient of restitution r")
     return figure

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from daq_app.campaign import figures, tables
 from daq_app.campaign.collect import Failure
-from daq_app.campaign.report_pdf import interval, number, report_pdf
+from daq_app.campaign.report_pdf import interval, number, report_pdf, signed
 from daq_app.campaign.status import CampaignStatus
 from daq_app.campaign.summary import TestSummary
 
@@ -56,7 +56,7 @@ def campaign_figures(tests: Sequence[TestSummary]) -> list[CaptionedFigure]:
     )
     for specimen, level in richest.items():
         own = [t for t in tests if (t.specimen, t.level) == (specimen, level)]
-        caption = f"Figure 4.3: periods T_n and rotations φ_n of {specimen}-{level} against the impact n"
+        caption = f"Figure 4.3: periods Tₙ and rotations φₙ of {specimen}-{level} against the impact n"
         picture = figures.decay(own, f"{specimen}-{level}")
         found.append(CaptionedFigure(f"figure_4_3_{specimen}_{level}", picture, caption))
     found.append(
@@ -152,6 +152,7 @@ def _environment() -> Environment:
         loader=PackageLoader("daq_app.campaign"), autoescape=select_autoescape(), trim_blocks=True
     )
     environment.filters["number"] = number
+    environment.filters["signed"] = signed
     environment.filters["interval"] = interval
     return environment
 

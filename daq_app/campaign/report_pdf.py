@@ -73,6 +73,11 @@ def number(value: float, digits: int) -> str:
     return "–" if math.isnan(value) else f"{value:.{digits}f}"
 
 
+def signed(value: float) -> str:
+    """A change, always with its sign."""
+    return f"{value:+.4f}".replace("-", "−")
+
+
 def interval(group: GroupMean) -> str:
     """The 95 % interval of a mean; a dash where it has none."""
     if math.isnan(group.low95):
@@ -108,8 +113,8 @@ def _repetition_rows(rows: Sequence[tables.RepetitionRow]) -> tuple[list[str], l
             row.method,
             number(row.first.mean, 4),
             number(row.repeated.mean, 4),
-            f"{row.change:+.4f}",
-            "{:+.4f} … {:+.4f}".format(*row.change_interval95),
+            signed(row.change),
+            " … ".join(map(signed, row.change_interval95)),
         ]
         for row in rows
     ]
