@@ -88,6 +88,8 @@ class GapRun:
     survey: Survey
     time_offset_s: FloatArray = field(default_factory=lambda: np.zeros(0))
     impacts_before: float = 0.0
+    start_utc_ns: int = 0
+    """Wall clock of the first sample, which orders the campaign; 0 where it is not known."""
     excluded: tuple[str, ...] = ()
     """Channels that are examined on their own and not used with their family."""
 
@@ -162,6 +164,7 @@ def load_run(path: Path, rig: Rig | None = None) -> GapRun:
             channels=np.asarray(run.si(ids), dtype=float),
             survey=Survey.from_specimen(rig.specimen),
             time_offset_s=offsets,
+            start_utc_ns=run.header.start_utc_ns,
         )
 
 

@@ -37,7 +37,8 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
     check_consistent(runs)
     limits: list[str] = []
     usable: list[GapRun] = []
-    for run in runs:
+    # What wears, wears in the order of the tests, whatever the files are called; unknown times keep theirs.
+    for run in sorted(runs, key=lambda run: run.start_utc_ns):
         try:
             usable.append(_without_gaps(run))
         except CannotDiagnose as problem:
