@@ -56,8 +56,8 @@ def _plain(value: object) -> object:
 
 _Text = Annotated[str, AfterValidator(clean_text)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
-LATEST_NS = 250_000_000_000 * 10**9
-"""A moment near the year 9892: the last that a calendar here can show."""
+LATEST_NS = 2**63 - 1
+"""A moment in the year 2262: the last that 64 bits of nanoseconds, and so a run file, can hold."""
 
 
 class RunHeader(BaseModel):

@@ -77,3 +77,12 @@ def test_an_impossible_time_of_recording_is_not_believed(tmp_path: Path, bring, 
     path = tmp_path / "x.csv"
     path.write_text(f"# first_row_utc_ns: {stamp}\ntime_s,WP-1 (mm)\n0,1.5\n0.01,2.5\n0.02,3.5\n")
     assert any("when it was recorded" in doubt for doubt in bring(path).doubts)
+
+
+def test_a_year_that_a_run_cannot_hold_is_not_believed(tmp_path: Path, bring) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text("time_s,WP-1 (mm)\n0,1.5\n0.01,2.5\n0.02,3.5\n")
+    report = bring(path, source={"start_utc": "2400-01-01T00:00:00Z"})
+    assert any("after 2262" in doubt for doubt in report.doubts)
+    with open_run(report.run) as run:
+        assert run.header.start_utc_ns == 0

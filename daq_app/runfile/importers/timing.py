@@ -12,7 +12,7 @@ from daq_app.runfile.importers.import_map import SourceMap
 from daq_app.runfile.importers.mapping import MappedChannel
 from daq_app.runfile.importers.recording import Reader, Spool
 from daq_app.runfile.importers.time_axis import time_axis
-from daq_app.runfile.model import MAX_GAP_SAMPLES
+from daq_app.runfile.model import LATEST_NS, MAX_GAP_SAMPLES
 
 _SAME: Final = 1e-6
 """Relative difference up to which two increments are the same number, written differently."""
@@ -170,7 +170,7 @@ def _stated_rate(
 
 def _start(mapped: tuple[MappedChannel, ...], source: SourceMap, doubts: list[str]) -> int:
     if source.start_utc is not None:
-        return int(source.start_utc.timestamp() * 1_000_000) * 1000
+        return _possible(int(source.start_utc.timestamp() * 1_000_000) * 1000, doubts)
     starts = {item.foreign.start_utc_ns for item in mapped if item.foreign.start_utc_ns is not None}
     if not starts:
         doubts.append("the file does not say when it was recorded")
@@ -178,4 +178,11 @@ def _start(mapped: tuple[MappedChannel, ...], source: SourceMap, doubts: list[st
     if max(starts) != min(starts):
         late = (max(starts) - min(starts)) / 1e9
         doubts.append(f"channels start up to {late:g} s apart according to the file; they were taken as one")
-    return max(0, min(starts))
+    return _possible(min(starts), doubts)
+
+
+def _possible(start_utc_ns: int, doubts: list[str]) -> int:
+    if 0 <= start_utc_ns <= LATEST_NS:
+        return start_utc_ns
+    doubts.append("the time of recording lies before 1970 or after 2262: it was not believed")
+    return 0
