@@ -1,4 +1,4 @@
-"""Cost of one blind case of six runs: simulated, and written as proven run files."""
+"""Cost of one blind case of six runs: simulated, and written as run files."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from daq_app.config import Rig, plan_tasks
 from daq_app.gap.blind.layout import RIG_FILE
 from daq_app.gap.blind.world.campaign import MadeRun, World
 from daq_app.runfile import Event, Gap, RunHeader, plan_to_dict
-from daq_app.runfile.saving import save_run
+from daq_app.runfile.hdf5_write import write_run
 from daq_app.runfile.source import Provenance
 
 
@@ -50,8 +50,10 @@ def write_case(folder: Path, case: str, world: World, rig_text: str, start_utc_n
     for run in world.make():
         header = _header(case, run, world, rig_text, start_utc_ns)
         path = folder / f"{run.plan.test}.h5"
-        path.unlink(missing_ok=True)
-        save_run(MemoryRun(header, run.readings), path, Provenance(closed=True))
+        part = path.with_suffix(".tmp")
+        # Not read back as a recording is: the seal holds what was written, and it can be made again.
+        write_run(part, MemoryRun(header, run.readings), Provenance(closed=True))
+        part.replace(path)
         made.append(MadeRun(run.plan, np.empty((0, 0)), run.motion))
     return made
 

@@ -44,9 +44,11 @@ class RockingModel:
 
     name = "free rocking"
     scatters = (
-        Scatter(SCATTER_R, 0.004, 0.7, 0.02, "1", "relative scatter of r from impact to impact"),
-        Scatter(SCATTER_TIME, 3e-5, 1.0, 1e-3, "s", "what half-cycle times scatter by beyond sensor noise"),
-        Scatter(SCATTER_RELEASE, 3e-5, 1.0, 4e-3, "s", "what the times of the first fall scatter by besides"),
+        Scatter(SCATTER_R, 0.004, 0.7, 0.012, "1", "relative scatter of r from impact to impact"),
+        Scatter(SCATTER_TIME, 3e-5, 1.0, 8e-5, "s", "what half-cycle times scatter by beyond sensor noise"),
+        Scatter(
+            SCATTER_RELEASE, 3e-5, 1.0, 1.5e-4, "s", "what the times of the first fall scatter by besides"
+        ),
         Scatter(
             SCATTER_SENSOR, 0.7, 0.35, 2.0, "1", "repeatability of sensor coefficients, in their own units"
         ),
