@@ -86,7 +86,7 @@ def check(
                 passed = False
                 worst_size = max(worst_size, size)
     if excessive:
-        worst = f"the scatter {', '.join(excessive)} is larger than repeatability explains"
+        worst = f"the {', '.join(excessive)} is larger than repeatability explains"
     return Goodness(passed, p_min, worst, worst_size, tuple(tests), excessive)
 
 

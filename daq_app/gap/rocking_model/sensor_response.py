@@ -352,7 +352,9 @@ def _twist(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatA
 
 
 def _bending(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
-    return extra.bending(run, block, values, _difference_of(run, "wire", "lvdt", values))
+    # What bends is told against the rotation of the reference; wires as the reference show none of it.
+    wires = None if run.reference == "wire" else _difference_of(run, "wire", "lvdt", values)
+    return extra.bending(run, block, values, wires)
 
 
 def _turning(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
