@@ -20,10 +20,11 @@ from sim_hardware.dynamics import parameters as par
 from sim_hardware.sensors.scene import pivots
 
 LEVELS = (0.25, -0.35)
+ONE = LEVELS[1:]
 
 
-def _prepared(effects: dict[str, dict[str, float]]) -> list[RockingRun]:
-    return prepare(simulate(effects, LEVELS))[0]
+def _prepared(effects: dict[str, dict[str, float]], levels: tuple[float, ...] = LEVELS) -> list[RockingRun]:
+    return prepare(simulate(effects, levels))[0]
 
 
 def _mark(run: RockingRun, name: str) -> float:
@@ -87,14 +88,13 @@ def test_exchanged_plugs_are_put_back() -> None:
     ("target", "places", "words"),
     [
         ("wire", 1.0, "WP-2 shows WP-1, WP-3 shows WP-2, WP-4 shows WP-3"),
-        ("wire", 2.0, "WP-3 shows WP-1, WP-4 shows WP-2, WP-5 shows WP-3"),
         ("lvdt", 1.0, "LV-A01 and LV-B01 exchanged"),
     ],
 )
 def test_plugs_that_are_all_moved_on_are_put_back(target: str, places: float, words: str) -> None:
     """Two wires of one height show the same: which of these is which stays open, and needs no answer."""
     key = f"swap@{target}"
-    crossed, limits = prepare(simulate({key: {"places": places}}, LEVELS))
+    crossed, limits = prepare(simulate({key: {"places": places}}, ONE))
     assert set(found_marks(crossed)) == {key}
     assert _mark(crossed[0], key) == places
     assert abs(_value(crossed[0], "wire", "gain")) < 5e-3
@@ -102,7 +102,7 @@ def test_plugs_that_are_all_moved_on_are_put_back(target: str, places: float, wo
 
 
 def test_a_channel_that_shows_no_sensor_of_its_kind_does_not_hide_exchanged_plugs() -> None:
-    runs = simulate({}, LEVELS)
+    runs = simulate({}, ONE)
     place = {sensor.id: i for i, sensor in enumerate(runs[0].sensors)}
     for run in runs:
         run.channels[[place["WP-1"], place["WP-4"]]] = run.channels[[place["WP-4"], place["WP-1"]]]
@@ -114,12 +114,12 @@ def test_a_channel_that_shows_no_sensor_of_its_kind_does_not_hide_exchanged_plug
 
 def test_curvature_of_all_wires_is_no_fault_of_one() -> None:
     """The error grows with the square of the travel, which differs from wire to wire."""
-    family = _prepared({"wire_cosine@wire": {"kappa": 0.2}})
+    family = _prepared({"wire_cosine@wire": {"kappa": 0.2}}, ONE)
     assert found_channels(family) == {}
     run = family[0]
     seen = _value(run, "wire", "even harmonic")
     assert seen == pytest.approx(0.2 * run.wire_bend_m, abs=0.01)
-    assert found_channels(_prepared({"wire_cosine@WP-4": {"kappa": 0.2}})) == {"WP-4": "wire"}
+    assert found_channels(_prepared({"wire_cosine@WP-4": {"kappa": 0.2}}, ONE)) == {"WP-4": "wire"}
 
 
 def test_a_family_that_stops_short_of_its_range_is_found_and_the_motion_read_elsewhere() -> None:
@@ -181,8 +181,7 @@ def test_gravity_is_read_from_a_held_wall_that_still_sways() -> None:
 
 def test_pivots_inside_the_edge_are_no_slip_of_the_base() -> None:
     """About another pivot the base moves by Δu (1 − cos θ), which comes and goes with the swings."""
-    levels = (0.4, -0.35)
-    run = prepare(longer_held({"pivot_shift": {"a": 0.04}}, 11, levels=levels))[0][0]
+    run = prepare(longer_held({"pivot_shift": {"a": 0.04}}, 11, levels=(0.4,)))[0][0]
     base = next(b for b in run.blocks if b.family == "base")
     values = {p.name: p.mean for p in RockingModel(run.survey).nuisance} | {"zero": 0.0, "omega0": 0.0}
     place = base.names.index("slip per speed")
@@ -212,8 +211,8 @@ def test_a_ring_down_is_known_as_well_as_its_damping() -> None:
             assert size < 0.97
 
 
-def test_worn_edges_are_where_the_simulator_has_them() -> None:
-    run = replace(_prepared({})[0], impacts_before=120.0, cache={})
+def test_worn_edges_are_where_the_simulator_has_them(healthy: list[RockingRun]) -> None:
+    run = replace(healthy[0], impacts_before=120.0, cache={})
     model = RockingModel(run.survey)
     values = {p.name: p.mean for p in model.nuisance} | {"zero": 0.0, "omega0": 0.0}
     vector = np.zeros(par.N_PARAMETERS)

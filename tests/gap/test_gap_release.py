@@ -36,7 +36,9 @@ def test_a_wall_thrown_up_and_one_pushed_down_are_told_apart() -> None:
 
 
 def test_a_clean_or_a_slow_release_claims_no_speed() -> None:
-    for effects in ({}, {"slow_release": {"tau": 0.04}}):
-        found, sd = _features(prepare(simulate(effects, 11, levels=(0.35,)))[0][0])
+    clean = simulate({}, 11, levels=(0.35,))
+    slow = simulate({"slow_release": {"tau": 0.04}}, 12, levels=(0.25,))
+    for run in prepare([*clean, *slow])[0]:
+        found, sd = _features(run)
         assert abs(found) < 2.5 * sd
         assert sd > 1e-3
