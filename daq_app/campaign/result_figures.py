@@ -104,7 +104,7 @@ def _draw_restitution(axis: Axes, test: TestSummary) -> None:
         )
         low, high = method.r - method.standard_error, method.r + method.standard_error
         axis.axhspan(low, high, color=METHOD_COLOURS[name], alpha=0.18, lw=0)
-    axis.axhline(test.r_max, color="#333333", ls="--", lw=1, label=f"r_max {test.r_max:.3f}")
+    axis.axhline(test.r_max, color="#333333", ls="--", lw=1, label=f"rₘₐₓ {test.r_max:.3f}")
     axis.set_xlabel("impact")
     axis.set_ylabel("coefficient of restitution r")
     axis.set_xlim(left=0)
