@@ -25,6 +25,10 @@ _PRODUCT = "daq_app.gap.blind.diagnosers:product"
 _LabelsOption = Annotated[
     Path | None, typer.Option(help="Folder of the labels; beside the cases, as DIR-labels, if left out.")
 ]
+_WithoutOption = Annotated[
+    str,
+    typer.Option(help="Part of the method to leave out: scatter, channels, probes or multistart."),
+]
 _WorkersOption = Annotated[int, typer.Option(min=0, help="Processes; 0 takes one for each core.")]
 
 
@@ -94,24 +98,32 @@ def make(
 def run(
     folder: Annotated[Path, typer.Argument(help="Folder of the cases.", metavar="DIR")],
     diagnoser: Annotated[str, typer.Option(help="module:function that diagnoses a case.")] = _PRODUCT,
+    without: _WithoutOption = "",
     scheduler: Annotated[str, typer.Option(help="Address of a dask scheduler, tcp://HOST:PORT.")] = "",
     workers: _WorkersOption = 0,
     timeout: Annotated[float, typer.Option(min=1, help="Longest time for one case, seconds.")] = 1800.0,
 ) -> None:
-    """Diagnose every case in a process that has nothing but its files. Goes on where it was interrupted."""
-    from daq_app.gap.blind.diagnosers import load_diagnoser
+    """Diagnose every case in a process that has nothing but its files. Goes on where it was interrupted.
+
+    With --without the diagnosis lacks a part of its method, and its results are kept apart: score them
+    with the same option.
+    """
+    from daq_app.gap.blind.diagnosers import ABLATIONS, load_diagnoser
+    from daq_app.gap.blind.layout import results_without
     from daq_app.gap.blind.runner import case_folders, pending, run_pending
     from daq_app.gap.blind.scheduler import run_on_scheduler
 
     with _refusals():
+        kept = results_without(_part(without))
+        diagnoser = ABLATIONS.get(without, diagnoser)
         load_diagnoser(diagnoser)
-        total, todo = len(case_folders(folder)), len(pending(folder, diagnoser))
+        total, todo = len(case_folders(folder)), len(pending(folder, diagnoser, kept))
         if total == 0:
             raise ValueError(f"{folder} holds no sealed cases. Make some: daq-app gap blind make --out DIR")
         outcomes = (
-            run_on_scheduler(folder, diagnoser, scheduler, timeout)
+            run_on_scheduler(folder, diagnoser, scheduler, timeout, kept)
             if scheduler
-            else run_pending(folder, diagnoser, _workers(workers), timeout)
+            else run_pending(folder, diagnoser, _workers(workers), timeout, kept)
         )
         failed = 0
         with _progress("diagnosing", total) as advance:
@@ -129,15 +141,17 @@ def run(
 def score(
     folder: Annotated[Path, typer.Argument(help="Folder of the cases.", metavar="DIR")],
     labels: _LabelsOption = None,
+    without: _WithoutOption = "",
     html: Annotated[Path | None, typer.Option(help="Write a page with pictures.")] = None,
     page: Annotated[Path | None, typer.Option(help="The same as Markdown, pictures in images/.")] = None,
     json_out: Annotated[Path | None, typer.Option("--json", help="Write all numbers as JSON.")] = None,
 ) -> None:
     """Open the labels, check the seals, say how good the diagnosis is. Exit code 1: a target is missed."""
+    from daq_app.gap.blind.layout import results_without
     from daq_app.gap.blind.score import score_folder
 
     with _refusals():
-        found = score_folder(folder, labels or _beside(folder))
+        found = score_folder(folder, labels or _beside(folder), results_without(_part(without)))
         _print_score(found)
         if json_out:
             json_out.write_text(json.dumps(found.to_dict(), ensure_ascii=False, indent=1), encoding="utf-8")
@@ -199,6 +213,15 @@ def _progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
     with Progress(*columns, console=Console(stderr=True)) as progress:
         task = progress.add_task(what, total=total)
         yield lambda n: progress.advance(task, n)
+
+
+def _part(without: str) -> str:
+    """The part of the method to leave out, if there is one of that name."""
+    from daq_app.gap.blind.diagnosers import ABLATIONS
+
+    if without and without not in ABLATIONS:
+        raise ValueError(f"--without is {', '.join(ABLATIONS)}, not {without}")
+    return without
 
 
 def _beside(folder: Path) -> Path:

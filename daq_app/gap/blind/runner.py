@@ -40,32 +40,35 @@ def case_folders(folder: Path) -> list[Path]:
     return sorted(p.parent for p in folder.glob(f"{CASE_PREFIX}*/{SEAL_FILE}"))
 
 
-def result_path(folder: Path, case: str) -> Path:
-    return folder / RESULTS / f"{case}.json"
+def result_path(folder: Path, case: str, kept: str = RESULTS) -> Path:
+    """Where the outcome of a case is kept: each way to diagnose has a folder `kept` of its own."""
+    return folder / kept / f"{case}.json"
 
 
-def pending(folder: Path, diagnoser: str) -> list[Path]:
+def pending(folder: Path, diagnoser: str, kept: str = RESULTS) -> list[Path]:
     """Cases without a result of this diagnoser for exactly this data."""
     todo = []
     for case in case_folders(folder):
-        known = read_outcome(folder, case.name)
+        known = read_outcome(folder, case.name, kept)
         current = file_sha256(case / SEAL_FILE)
         if known is None or (known.diagnoser, known.seal_sha256) != (diagnoser, current):
             todo.append(case)
     return todo
 
 
-def read_outcome(folder: Path, case: str) -> Outcome | None:
+def read_outcome(folder: Path, case: str, kept: str = RESULTS) -> Outcome | None:
     """The kept outcome of a case; None if there is none or it was cut off while being written."""
     try:
-        return Outcome(**json.loads(result_path(folder, case).read_text(encoding="utf-8")))
+        return Outcome(**json.loads(result_path(folder, case, kept).read_text(encoding="utf-8")))
     except (FileNotFoundError, ValueError, TypeError):
         return None
 
 
-def run_pending(folder: Path, diagnoser: str, workers: int, timeout_s: float) -> Iterator[Outcome]:
+def run_pending(
+    folder: Path, diagnoser: str, workers: int, timeout_s: float, kept: str = RESULTS
+) -> Iterator[Outcome]:
     """Diagnose what is pending, by `workers` processes; yields outcomes as they are saved."""
-    todo = pending(folder, diagnoser)
+    todo = pending(folder, diagnoser, kept)
     free: queue.SimpleQueue[Apart] = queue.SimpleQueue()
 
     def diagnose(case: Path) -> Outcome:
@@ -83,15 +86,15 @@ def run_pending(folder: Path, diagnoser: str, workers: int, timeout_s: float) ->
         try:
             for job in as_completed(jobs):
                 outcome = job.result()
-                save_outcome(folder, outcome)
+                save_outcome(folder, outcome, kept)
                 yield outcome
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def save_outcome(folder: Path, outcome: Outcome) -> None:
+def save_outcome(folder: Path, outcome: Outcome, kept: str = RESULTS) -> None:
     """Keep an outcome; a name appears only with its whole content."""
-    path = result_path(folder, outcome.case)
+    path = result_path(folder, outcome.case, kept)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_suffix(".tmp")
     temporary.write_text(json.dumps(asdict(outcome), ensure_ascii=False), encoding="utf-8")

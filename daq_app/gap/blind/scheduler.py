@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from daq_app.gap.blind.layout import RESULTS
 from daq_app.gap.blind.runner import Outcome, diagnose_apart, pending, save_outcome
 
 
@@ -12,7 +13,9 @@ class SchedulerMissing(Exception):
     """dask.distributed is not installed, or its scheduler does not answer."""
 
 
-def run_on_scheduler(folder: Path, diagnoser: str, address: str, timeout_s: float) -> Iterator[Outcome]:
+def run_on_scheduler(
+    folder: Path, diagnoser: str, address: str, timeout_s: float, kept: str = RESULTS
+) -> Iterator[Outcome]:
     """As `runner.run_pending`, on the workers of the scheduler at `address` (``tcp://HOST:PORT``).
 
     Every worker must see the folder under the same path and have this program installed. Outcomes
@@ -27,11 +30,11 @@ def run_on_scheduler(folder: Path, diagnoser: str, address: str, timeout_s: floa
     except (OSError, ValueError) as error:
         raise SchedulerMissing(f"no scheduler answers at {address} ({error})") from None
     with client:
-        cases = [case.resolve() for case in pending(folder, diagnoser)]
+        cases = [case.resolve() for case in pending(folder, diagnoser, kept)]
         jobs = client.map(
             diagnose_apart, cases, diagnoser=diagnoser, timeout_s=timeout_s, pure=False, retries=2
         )
         for job in as_completed(jobs):
             outcome: Outcome = job.result()
-            save_outcome(folder, outcome)
+            save_outcome(folder, outcome, kept)
             yield outcome

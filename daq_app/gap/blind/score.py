@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from daq_app.gap.blind.judge import Judged, judge
-from daq_app.gap.blind.layout import SEAL_FILE
+from daq_app.gap.blind.layout import RESULTS, SEAL_FILE
 from daq_app.gap.blind.runner import case_folders, read_outcome
 from daq_app.gap.blind.seal import SealBroken, file_sha256, open_label
 from daq_app.gap.blind.statistics import (
@@ -81,8 +81,8 @@ class Score:
         return cleaned
 
 
-def score_folder(folder: Path, labels: Path) -> Score:
-    """Open the labels and score every case that has a result.
+def score_folder(folder: Path, labels: Path, kept: str = RESULTS) -> Score:
+    """Open the labels and score every case that has a result in the folder `kept`.
 
     Raises `SealBroken` at the first label or file that is not what was sealed, and for a result that
     was given for other data.
@@ -94,7 +94,7 @@ def score_folder(folder: Path, labels: Path) -> Score:
         raise SealBroken(f"{folder}: there are no sealed cases")
     for case in cases:
         label = open_label(case, labels / f"{case.name}.json")
-        outcome = read_outcome(folder, case.name)
+        outcome = read_outcome(folder, case.name, kept)
         if outcome is None:
             waiting.append(case.name)
         elif outcome.seal_sha256 != file_sha256(case / SEAL_FILE):

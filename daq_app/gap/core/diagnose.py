@@ -45,6 +45,8 @@ class Options:
     pairs: bool = True
     """Fit pairs of effects where a single one does not pass the gate, or always (`always_pairs`)."""
     always_pairs: bool = False
+    multistart: bool = True
+    """Start the fit of an effect from several strengths, not only from none."""
     hold_out: str = "level"
     workers: int = 1
     pair_width: int = 5
@@ -129,7 +131,8 @@ class _Study:
         again = start is not None and start.effects == effects
         # A pair keeps the columns of the effect that it starts from while it looks for the other.
         columns = {} if start is None else {k: c for k, c in start.columns.items() if "." in k[0]}
-        return FitTask(effects_of(effects, self.library), known, sigmas, polish, not again, columns)
+        several = self.options.multistart and not again
+        return FitTask(effects_of(effects, self.library), known, sigmas, polish, several, columns)
 
     def _fit(
         self,
@@ -145,7 +148,7 @@ class _Study:
     def _glance(self, effects: Hypothesis, start: Fit) -> GlanceTask:
         """A pair is started from what each of its effects was alone, or without the weaker one."""
         task = self._task(effects, start, polish=False)
-        hint = None
+        hint: dict[tuple[str, int | None], float] | None = None if self.options.multistart else {}
         if len(effects) > 1:
             hint = {k: u for name in effects for k, u in self.fits[(name,)].known().items() if "." in k[0]}
         return GlanceTask(task.effects, task.known, task.sigmas, task.columns, hint)

@@ -124,7 +124,9 @@ def glance(
     problem = Problem(model, runs, effects)
     base = problem.start(known)
     start_sigma = np.array([math.log(sigmas.get(s.name, s.median)) for s in model.scatters])
-    starts = _starts(problem, base, known) if hint is None else [base, problem.start({**hint, **known})]
+    starts = _starts(problem, base, known) if hint is None else [base]
+    if hint:
+        starts.append(problem.start({**hint, **known}))
     searches = [Search(problem, u, start_sigma.copy(), frozen) for u in starts]
     nothing = np.zeros(len(problem), dtype=bool)
     promises = [search.promise(nothing) for search in searches]

@@ -238,3 +238,9 @@ class RockingModel:
         shooting.half_cycles(vector, run.swings.peak_s, true, levels, side, True, table)
         run.cache["key"], run.cache["table"] = key, table
         return table
+
+
+class UnscatteredModel(RockingModel):
+    """The same with a likelihood that knows no scatter of r, to see what it is worth."""
+
+    scatters = (Scatter(SCATTER_R, 1e-6, 1e-3, 1.0, "1", "held at nothing"), *RockingModel.scatters[1:])

@@ -21,7 +21,7 @@ from daq_app.gap.rocking_model.inspection import (
     without_suspects,
 )
 from daq_app.gap.rocking_model.library import rocking_library
-from daq_app.gap.rocking_model.model import RockingModel
+from daq_app.gap.rocking_model.model import RockingModel, UnscatteredModel
 from daq_app.gap.rocking_model.records import GapRun, check_consistent
 from daq_app.gap.rocking_model.run_features import Examined, RockingRun, examine
 
@@ -101,12 +101,20 @@ def _without_gaps(run: GapRun) -> GapRun:
     return run
 
 
+PARTS = ("scatter", "channels", "probes", "multistart")
+"""Parts of the method that a diagnosis can be made without, to see what each is worth."""
+
+
 def diagnose_runs(
-    runs: Sequence[GapRun], options: Options | None = None, only: Collection[str] = ()
+    runs: Sequence[GapRun],
+    options: Options | None = None,
+    only: Collection[str] = (),
+    without: Collection[str] = (),
 ) -> Diagnosis:
     """Where, which and how far, for tests of one specimen on one rig.
 
     With `only`, no effects but these are considered (and no probes): a quick answer to a narrow question.
+    `without` names some of `PARTS`: no scatter of r, no channels beyond the rotation, …
 
     Raises `CannotDiagnose` with the reason in words, and `parallel.Interrupted` when stopped.
     """
@@ -120,7 +128,15 @@ def diagnose_runs(
         limits.append(
             "All releases are to one side: release effects cannot be told from a difference of sides."
         )
+    if "channels" in without:
+        prepared = [run.rotation_alone() for run in prepared]
     model, library = model_and_library(prepared)
+    if "scatter" in without:
+        model = UnscatteredModel(model.survey, model.channels)
+    if "probes" in without:
+        library = library.without(*(probe.name for probe in library.probes))
+    if "multistart" in without:
+        options = replace(options or Options(), multistart=False)
     if only:
         library = library.without(*(name for name in library if name not in only))
         limits.append(f"Only {', '.join(sorted(only))} were considered.")
