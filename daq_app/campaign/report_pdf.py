@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 import textwrap
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
@@ -18,8 +17,9 @@ from matplotlib.textpath import text_to_path
 from matplotlib.transforms import Bbox
 
 from daq_app.campaign import tables
+from daq_app.campaign.captioned import campaign_figures
 from daq_app.campaign.collect import Failure
-from daq_app.campaign.statistics import GroupMean
+from daq_app.campaign.number_words import interval, number, signed
 from daq_app.campaign.summary import TestSummary
 
 _ROWS = 40
@@ -36,14 +36,13 @@ _HEADER_FONT: Final = FontProperties(size=9, weight="bold")
 
 def report_pdf(
     title: str,
-    pictures: Sequence[tuple[Figure, str]],
     places: Sequence[tables.PlaceRow],
     restitution: Sequence[tables.RestitutionRow],
     repetitions: Sequence[tables.RepetitionRow],
     tests: Sequence[TestSummary],
     failures: Sequence[Failure],
 ) -> bytes:
-    """A whole document; `pictures` are figures with their captions."""
+    """A whole document."""
     buffer = io.BytesIO()
     with PdfPages(buffer, metadata={"Title": title}) as pages:
         for page in _tables(title, "Table 4.1: coefficient of restitution", *_restitution_rows(restitution)):
@@ -51,12 +50,12 @@ def report_pdf(
         if repetitions:
             for page in _tables(title, "Effect of the repetitions", *_repetition_rows(repetitions)):
                 pages.savefig(page)
-        for figure, caption in pictures:
+        for picture in campaign_figures(tests):
+            figure = picture.figure
             width, height = figure.get_size_inches()
-            text = figure.text(0.02, -0.02, caption, fontsize=9, va="top")
+            figure.text(0.02, -0.02, picture.caption, fontsize=9, va="top")
             # Room for the caption below: a tight box would lay out and draw everything once more to find it.
             pages.savefig(figure, bbox_inches=Bbox([[-_MARGIN, -0.8], [width + _MARGIN, height + _MARGIN]]))
-            text.remove()
         for page in _tables(title, "Table 3.2: sequence and status", *_place_rows(places)):
             pages.savefig(page)
         for page in _tables(title, "All tests", *_test_rows(tests)):
@@ -66,23 +65,6 @@ def report_pdf(
             for page in _tables(title, "Not analysed", ["Test", "Run", "Why"], rows):
                 pages.savefig(page)
     return buffer.getvalue()
-
-
-def number(value: float, digits: int) -> str:
-    """With so many digits; a dash for what is not known."""
-    return "–" if math.isnan(value) else f"{value:.{digits}f}"
-
-
-def signed(value: float) -> str:
-    """A change, always with its sign."""
-    return f"{value:+.4f}".replace("-", "−")
-
-
-def interval(group: GroupMean) -> str:
-    """The 95 % interval of a mean; a dash where it has none."""
-    if math.isnan(group.low95):
-        return "–"
-    return f"{number(group.low95, 4)} … {number(group.high95, 4)}"
 
 
 def _restitution_rows(rows: Sequence[tables.RestitutionRow]) -> tuple[list[str], list[list[str]]]:

@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, select_autoescape
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
-from daq_app.campaign.report import CaptionedFigure
+from daq_app.campaign.captioned import CaptionedFigure
 from daq_app.campaign.result_figures import measured_periods, result_figure
 from daq_app.campaign.summary import TestSummary
 from daq_app.config.wording import plus_minus

@@ -41,9 +41,8 @@ def report(
     """
     with reported():
         campaign = open_plan(plan_file)
-        # The workers' process reads the analysis while this one reads what draws.
-        warm_up("daq_app.campaign.collect")
         # Imported here: `--help` should not load SciPy.
+        warm_up("daq_app.campaign.collect", "daq_app.campaign.captioned", "daq_app.campaign.report_pdf")
         from daq_app.campaign import collect as gathering
         from daq_app.campaign.report import write_report
         from daq_app.campaign.tables import mean_of_specimens, table_4_1
@@ -62,7 +61,7 @@ def report(
         made = time.strftime("%Y-%m-%d %H:%M", time.localtime())
         footer = f"Made {made} from {len(found.recorded)} recorded tests in {folder.name}."
         status = CampaignStatus(campaign, found.recorded)
-        write_report(target, campaign.name, status, tests, footer, failures)
+        write_report(target, campaign.name, status, tests, footer, failures, at_once=workers != 1)
         rows = table_4_1(tests)
         _print(rows + mean_of_specimens(rows), tests, target, as_json)
     if any(not failure.flagged_bad for failure in failures):
