@@ -1,23 +1,26 @@
-"""Cost of the gap diagnosis: features of a run, one prediction, a whole diagnosis with the full library."""
+"""Cost of the gap diagnosis: a run's features, one prediction, whole diagnoses, and how they grow."""
 
 from __future__ import annotations
 
 import os
+import resource
 import statistics
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.bench_simulation import least_s, scipy_run, trajectory_s
 from benchmarks.figure import Figure
 from daq_app.config import load_rig, plan_tasks
 from daq_app.config.scaling import Scaling
-from daq_app.gap.core import Options, fit
+from daq_app.gap.core import Options, diagnose, fit
 from daq_app.gap.rocking_model.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun, Sensor, Survey
-from daq_app.gap.rocking_model.run_features import extract
-from daq_app.gap.rocking_model.study import diagnose_runs
+from daq_app.gap.rocking_model.run_features import RockingRun, extract
+from daq_app.gap.rocking_model.study import diagnose_runs, model_and_library, prepare
 from sim_hardware.direct import synthesise_test
 
 _RIG = Path(__file__).parents[1] / "configs" / "fr1.toml"
@@ -63,12 +66,28 @@ def _median_ms(action: Callable[[], object], count: int) -> float:
     return statistics.median(times)
 
 
+def _growth(prepared: list[RockingRun]) -> list[Figure]:
+    """Fits of a diagnosis in processor time of one core: by number of runs, and by size of the library."""
+    model, library = model_and_library(prepared)
+    names = [effect.name for effect in library.named]
+    found = []
+    for runs, share in ((3, 1.0), (6, 1.0), (12, 1.0), (6, 0.25), (6, 0.5)):
+        kept = library.without(*names[round(share * len(names)) :])
+        fresh = [replace(run, cache={}) for run in prepared[:runs]]
+        start = time.process_time()
+        diagnose(model, fresh, kept, Options(workers=1))
+        spent = time.process_time() - start
+        effects = len(kept.named)
+        found.append(Figure(f"fits of {runs} runs, {effects} effects", spent, "s of one core", 1))
+    return found
+
+
 def figures() -> list[Figure]:
     """Measured on all cores of the machine."""
     runs = _runs()
-    features = [extract(run) for run in runs]
+    features = [extract(run) for run in runs[:2]]
     model = RockingModel(features[0].survey)
-    found = fit(model, features[:2])
+    found = fit(model, features)
     values = {key: value for key, (value, _, _) in (found.values | found.local_values[0]).items()}
     step = iter(np.linspace(0.0, 1e-3, 100_000))
 
@@ -76,14 +95,25 @@ def figures() -> list[Figure]:
         # Another α every time, so that the remembered half-cycles are of no use.
         model.predict(features[0], {**values, "alpha": values["alpha"] * (1 + float(next(step)))})
 
+    cores = os.cpu_count() or 1
     start = time.perf_counter()
-    result = diagnose_runs(runs, Options(workers=os.cpu_count() or 1))
+    result = diagnose_runs(runs, Options(workers=cores))
     seconds = time.perf_counter() - start
+    memory = [
+        resource.getrusage(who).ru_maxrss / 1e3 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    ]
     named = " + ".join(result.which[0].effects) or "nothing missing"
+    slow, fast = trajectory_s(200.0), trajectory_s(4000.0)
+    scipy_s = least_s(lambda: scipy_run(1e-9, 200.0, 55), 3)
     return [
         Figure("features of a run, 41 channels", _median_ms(lambda: extract(runs[0]), 5), "ms", 5),
         Figure(
             "prediction of a run, half-cycles and all channels", _median_ms(predict, 300), "ms", 300, aim=0.5
+        ),
+        Figure("10 s simulated, θ at 200 Hz", slow * 1e3, "ms", 60, aim=0.1, note="least"),
+        Figure("10 s simulated, θ at 4 kHz", fast * 1e3, "ms", 60, aim=0.5, note="least"),
+        Figure(
+            "solve_ivp with events / this simulator", scipy_s / slow, "×", 3, note="DOP853, rtol 1e-9, 200 Hz"
         ),
         Figure(
             f"diagnosis of {_RUNS} runs, full library, all channels",
@@ -91,6 +121,11 @@ def figures() -> list[Figure]:
             "s",
             1,
             aim=30.0,
-            note=f"{os.cpu_count()} cores; {result.decision.verdict}: {named}",
+            note=f"{cores} cores, features included; {result.decision.verdict}: {named}",
         ),
+        Figure(
+            "largest memory of the process that leads", memory[0], "MB", 1, note=f"{_RUNS} runs in memory"
+        ),
+        Figure("largest memory of a process that fits", memory[1], "MB", 1),
+        *_growth(prepare(runs)[0]),
     ]
