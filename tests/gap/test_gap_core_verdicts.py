@@ -7,7 +7,8 @@ import json
 import pytest
 from toy_wave import LIBRARY, DecayModel, make_runs
 
-from daq_app.gap.core import CannotDiagnose, Effect, Library, Options, diagnose
+from daq_app.gap.core import CannotDiagnose, Effect, Library, Options, diagnose, fit
+from daq_app.gap.core.fit import glance
 from daq_app.gap.core.parallel import Interrupted
 from daq_app.gap.core.parameters import signed
 
@@ -145,3 +146,22 @@ def test_several_processes_give_the_same_answer() -> None:
     together = diagnose(DecayModel(), runs, LIBRARY, Options(workers=2))
     assert together.which[0].log_evidence == pytest.approx(alone.which[0].log_evidence, abs=1e-6)
     assert together.decision.verdict == alone.decision.verdict
+
+
+@pytest.mark.parametrize("strength", [{}, {"slope_k": 0.01}, {"slope_k": 0.05}, {"shift_s": 0.04}])
+def test_a_glance_says_what_a_fit_says_of_hypotheses_that_matter(strength: dict[str, float]) -> None:
+    """What is left at a glance must have no chance, or be known as well as by a fit."""
+    model, runs = DecayModel(), make_runs(4, **strength)
+    null = fit(model, runs)
+    fitted, seen = {}, {}
+    for effect in LIBRARY.values():
+        fitted[effect.name] = fit(model, runs, (effect,), null.known(), null.sigmas, True, null.columns)
+        seen[effect.name] = glance(model, runs, (effect,), null.known(), null.sigmas, null.columns)
+    best = max(found.log_evidence for found in fitted.values())
+    for name, found in fitted.items():
+        assert seen[name].log_evidence < best + 0.5, "a glance never promises what a fit does not keep"
+        if found.log_evidence > best - 3.0 and strength:
+            gained = found.log_evidence - null.log_evidence
+            assert seen[name].log_evidence - null.log_evidence > 0.5 * gained - 3.0, name
+        if seen[name].settled and abs(seen[name].log_evidence - null.log_evidence) < 3.0:
+            assert seen[name].log_evidence == pytest.approx(found.log_evidence, abs=0.5), name
