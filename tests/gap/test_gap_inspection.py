@@ -13,7 +13,7 @@ from daq_app.gap.rocking_model.inspection import found_channels, found_marks
 from daq_app.gap.rocking_model.model import RockingModel
 from daq_app.gap.rocking_model.rings import ring_columns
 from daq_app.gap.rocking_model.run_features import RockingRun
-from daq_app.gap.rocking_model.sensor_blocks import Block
+from daq_app.gap.rocking_model.sensor_blocks import Block, first_order
 from daq_app.gap.rocking_model.sensor_response import block_coefficients
 from daq_app.gap.rocking_model.study import model_and_library, prepare
 from sim_hardware.dynamics import parameters as par
@@ -225,3 +225,19 @@ def test_worn_edges_are_where_the_simulator_has_them(healthy: list[RockingRun]) 
     plain = _predicted(run, values, joint, place)
     worn = _predicted(run, values | {"crushing.loss": 0.02}, joint, place)
     assert plain - worn == pytest.approx(shifted, rel=1e-6)
+
+
+def test_a_tiltmeter_with_another_time_constant_is_another_filter_and_no_mere_delay(
+    healthy: list[RockingRun],
+) -> None:
+    run = healthy[0]
+    values = {p.name: p.mean for p in RockingModel(run.survey).nuisance} | {"zero": 0.0, "omega0": 0.0}
+    block = next(b for b in run.blocks if b.family == "tiltmeter")
+    theta = run.grid.theta
+    for changed, time_constant_s in (({"tilt_response": 0.01}, 0.31), ({"clock.error": -0.03}, 0.3 / 0.97)):
+        slower = block.coefficients(first_order(theta, time_constant_s) - first_order(theta, 0.3))
+        for place in range(len(block.names)):
+            plain = _predicted(run, values, block, place)
+            change = _predicted(run, values | changed, block, place) - plain
+            assert change == pytest.approx(float(slower[place]), rel=0.1)
+    assert abs(slower[block.names.index("gain")]) > 1e-3, "a delay alone would leave the gain as it is"

@@ -251,8 +251,14 @@ def _tiltmeter(run: RockingRun, block: Block, values: Mapping[str, float]) -> Fl
     series = _difference_of(run, "tiltmeter", run.reference, values)
     if series is not None:
         found = found + block.coefficients(first_order(series, 0.3))
-    found[block.names.index("lag")] += values["tilt_response"]
-    return found
+    # A clock that is off shows the time constant as another one.
+    response = values["tilt_response"] + 0.3 / (1.0 + values.get("clock.error", 0.0)) - 0.3
+
+    def slower() -> FloatArray:
+        difference: FloatArray = (first_order(theta, 0.31) - first_order(theta, 0.29)) / 0.02
+        return difference
+
+    return found + response * _unit(run, block, "response", slower)
 
 
 def _accelerometer(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
