@@ -130,6 +130,17 @@ def test_a_family_that_stops_short_of_its_range_is_found_and_the_motion_read_els
     assert by_amplitude[-1].reference == "wire"
 
 
+def test_a_limit_is_found_where_the_other_side_travels_further_from_a_zero_that_is_off() -> None:
+    """A wire stops at a reading: with a zero of 20 mm it clips after 150 mm to one side only."""
+    runs = simulate({}, (0.35,))
+    place = next(i for i, sensor in enumerate(runs[0].sensors) if sensor.id == "WP-4")
+    raw = runs[0].channels[place]
+    other_way = 0.155 / float(np.abs(raw[-400:].mean() - raw.min()))
+    centred = raw - raw[-400:].mean()
+    runs[0].channels[place] = np.minimum(np.where(centred < 0, other_way * centred, centred) + 0.02, 0.17)
+    assert set(found_marks(prepare(runs)[0])) == {"saturation@WP-4"}
+
+
 def test_one_channel_with_another_gain_is_examined_on_its_own() -> None:
     runs = _prepared({"gain@WP-2": {"error": 0.05}})
     assert found_channels(runs) == {"WP-2": "wire"}

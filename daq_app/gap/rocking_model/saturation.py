@@ -116,12 +116,13 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None) -> tuple[float, 
         expected = np.abs(wire_reading(rotation, sensor.position_m, sensor.anchor_m, half))
     else:
         expected = half * np.abs(rotation) - sensor.position_m[0] * rotation
-    largest = float(mine.max())
     if reaches_its_range(run.aligned(i), sensor.range_si):
         return 0.0, furthest
-    # On the side of its largest reading only: the other side may have another gain.
-    side = np.sign(rotation[int(np.argmax(mine))])
+    # On the side of its largest reading only: the other side may have another gain, and where the zero
+    # is far off it may travel further there without an end.
+    side = np.sign(rotation[int(np.argmax(reading))])
     same = np.sign(rotation) == side
+    largest = float(mine[same].max(initial=0.0))
     below = same & (mine > _BELOW[0] * largest) & (mine < _BELOW[1] * largest)
     top = same & (mine > 0.985 * largest)
     if below.sum() < 20 or top.sum() < round(0.05 * GRID_HZ):
