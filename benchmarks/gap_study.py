@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
@@ -61,7 +62,7 @@ def run_study(
     if given.quiet:
         return 0
     done = [path for name in cases for path in sorted(given.out.glob(f"{name}-[0-9]*.json"))]
-    text = page([_read(path) for path in done])
+    text = page(_marked([_read(path) for path in done]))
     if given.page:
         given.page.write_text(text, encoding="utf-8")
     else:
@@ -90,22 +91,26 @@ def _arguments(
 
 
 def states_in_words(found: Sequence[Found]) -> str:
-    """The state of the code of all rows, as a sentence; rows of older states are marked by `mark_of`."""
-    names = {f["code"]: f["commit"] for f in found}
-    if len(names) <= 1:
-        return "".join(f"All rows were measured with the code of commit {c}." for c in names.values())
-    now = state_now().code
-    old = ", ".join(f"{mark_of(f)} {f['commit']}" for f in _first_of_each(found) if f["code"] != now)
-    return f"Rows without a mark were measured with the present code; others: {old}."
+    """The state of the code of all rows, as a sentence; `mark_of` marks those of another than most."""
+    if not found:
+        return ""
+    usual = next((f["commit"] for f in found if not mark_of(f)), "")
+    if not any(mark_of(f) for f in found):
+        return f"All rows were measured with the code of commit {usual}."
+    return (
+        f"Rows without a mark were measured with the code of commit {usual}, the others with that of the "
+        "commit in their mark."
+    )
 
 
 def mark_of(found: Found) -> str:
-    """A mark for a row of another state of the code; empty for one of the present state."""
-    return "" if found["code"] == state_now().code else f"[{found['code'][:4]}]"
+    """A mark for a row of another state of the code than most."""
+    return str(found.get("mark", ""))
 
 
-def _first_of_each(found: Sequence[Found]) -> list[Found]:
-    return list({f["code"]: f for f in reversed(found)}.values())
+def _marked(found: list[Found]) -> list[Found]:
+    usual = Counter(f["code"] for f in found).most_common(1)
+    return [f | {"mark": "" if f["code"] == usual[0][0] else f" [{f['commit']}]"} for f in found]
 
 
 def _read(path: Path) -> Found:

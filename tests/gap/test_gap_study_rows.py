@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from benchmarks.gap_study import Found, run_study
+from benchmarks.gap_study import Found, mark_of, run_study
 
 
 def _run(folder: Path, *arguments: str) -> tuple[list[str], list[Found]]:
@@ -32,7 +32,9 @@ def test_cases_are_done_once_per_seed_and_rows_of_older_code_only_when_asked(tmp
     assert _run(tmp_path, "--seed", "2")[0] == ["a", "b@c"]
     older = tmp_path / "a-1.json"
     older.write_text(older.read_text().replace(json.loads(older.read_text())["code"], "0" * 12))
-    assert _run(tmp_path)[0] == []
+    done, rows = _run(tmp_path)
+    assert done == []
+    assert [bool(mark_of(row)) for row in rows] == [True, False, False, False], "of another state than most"
     done, rows = _run(tmp_path, "--again")
     assert done == ["a"]
     assert [(row["case"], row["seed"]) for row in rows] == [("a", 1), ("a", 2), ("b@c", 1), ("b@c", 2)]
