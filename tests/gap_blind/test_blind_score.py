@@ -254,7 +254,8 @@ def test_a_result_for_other_data_and_a_changed_label_are_refused(check: Path, tm
         score_folder(check, tmp_path / "labels")
 
 
-def test_cases_without_a_result_are_named(check: Path, tmp_path: Path) -> None:
+def test_cases_without_a_result_are_named_and_their_labels_stay_sealed(check: Path, tmp_path: Path) -> None:
     (check / "results" / "case_0007.json").unlink()
+    (tmp_path / "labels" / "case_0007.json").write_text("whoever opens this fails", encoding="utf-8")
     found = score_folder(check, tmp_path / "labels")
     assert found.waiting == ("case_0007",) and not found.passed

@@ -82,10 +82,10 @@ class Score:
 
 
 def score_folder(folder: Path, labels: Path, kept: str = RESULTS) -> Score:
-    """Open the labels and score every case that has a result in the folder `kept`.
+    """Open the label of every case that has a result in the folder `kept`, and score it.
 
-    Raises `SealBroken` at the first label or file that is not what was sealed, and for a result that
-    was given for other data.
+    Raises `SealBroken` at the first of these labels or files that is not what was sealed, and for a
+    result that was given for other data.
     """
     judged: list[Judged] = []
     waiting: list[str] = []
@@ -93,14 +93,14 @@ def score_folder(folder: Path, labels: Path, kept: str = RESULTS) -> Score:
     if not cases:
         raise SealBroken(f"{folder}: there are no sealed cases")
     for case in cases:
-        label = open_label(case, labels / f"{case.name}.json")
         outcome = read_outcome(folder, case.name, kept)
         if outcome is None:
-            waiting.append(case.name)
-        elif outcome.seal_sha256 != file_sha256(case / SEAL_FILE):
+            waiting.append(case.name)  # its label stays sealed until there is an answer
+            continue
+        label = open_label(case, labels / f"{case.name}.json")
+        if outcome.seal_sha256 != file_sha256(case / SEAL_FILE):
             raise SealBroken(f"{case.name}: the result belongs to other data. Run the diagnosis again")
-        else:
-            judged.append(judge(label, outcome))
+        judged.append(judge(label, outcome))
     return Score(tuple(table(judged)), tuple(judged), tuple(waiting))
 
 
