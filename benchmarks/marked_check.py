@@ -109,10 +109,13 @@ class _Walk:
         return previous + int(distance[np.argmin(np.abs(distance))])
 
 
-def check_marked(path: Path, rig: Rig, lag: int | None = 0, speed: float = 1.0) -> MarkedReport:
+def check_marked(
+    path: Path, rig: Rig, lag: int | None = 0, speed: float = 1.0, *, clock_ppm: float = 0.0
+) -> MarkedReport:
     """Walk through a run. `lag` is where its marks stand at its first sample; None: found from there.
 
-    `speed` is how much faster than real time the device ran.
+    `speed` is how much faster than real time the device ran; `clock_ppm` how much faster than it said: its
+    marks slip by one each time that this has come to a sample, and no more often.
     """
     report = MarkedReport()
     with open_run(path) as run:
@@ -124,6 +127,9 @@ def check_marked(path: Path, rig: Rig, lag: int | None = 0, speed: float = 1.0) 
             _walk_window(walk, run.first_sample + start, readings, report, run)
         for leap in report.leaps:
             leap.explained = _is_explained(leap, run, speed)
+    slips = [leap for leap in report.leaps if leap.by * clock_ppm < 0 and abs(leap.by) == 1]
+    for slip in slips[: 1 + int(report.n_samples * abs(clock_ppm) * 1e-6)]:
+        slip.explained = True
     return report
 
 

@@ -245,12 +245,17 @@ class RunFacts:
 
 
 def look_at(
-    path: Path | str, rig: Rig | None, lag: int | None = None, *, one_device: bool = True
+    path: Path | str,
+    rig: Rig | None,
+    lag: int | None = None,
+    *,
+    one_device: bool = True,
+    clock_ppm: float = 0.0,
 ) -> RunFacts:
     """Verify a run and, on a marked line (`rig` given), show of every sample that it is the right one.
 
     `one_device`: the marks went on behind the gaps, so that they say how long each was; a server that was
-    started anew begins its marks anew.
+    started anew begins its marks anew. `clock_ppm`: how much faster than it says the clock was made to run.
     """
     path = Path(path)
     report = verify(path)
@@ -264,7 +269,7 @@ def look_at(
         quality = quality or {"verdict": "none", "reasons": []}
         first, end = run.first_sample, run.first_sample + run.n_samples
     if rig is not None:
-        marks = check_marked(path, rig, lag, SPEED)
+        marks = check_marked(path, rig, lag, SPEED, clock_ppm=clock_ppm)
         assert marks.unexplained == 0, marks
         assert not one_device or all(leap.explained for leap in marks.leaps), marks.leaps
     assert missing == report.lost_samples, "samples lost and the table of gaps are the same count"

@@ -255,7 +255,8 @@ def test_a_clock_that_is_50_ppm_off(drifting: Drifting, rig: Rig, row: Row) -> N
     lab._mark = 0
     told = lab.told("runs fast by at least")
     lab.arm()
-    facts = look_at(lab.stop().run_path, rig)
+    lab.record(24_000)  # more than the 20 000 in which such a clock gains a sample
+    facts = look_at(lab.stop().run_path, rig, clock_ppm=50.0)
     assert facts.lost == 0
     said = next(text for text in facts.reasons if "runs fast by at least" in text)
     assert 20 <= float(said.partition("at least ")[2].partition(" ppm")[0]) <= 50, said
