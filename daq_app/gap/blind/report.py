@@ -135,10 +135,11 @@ def _draw_confusion(axes: Axes, score: Score) -> None:
     grid = np.zeros((max(1, len(found.rows)), max(1, len(found.columns))))
     for (truth, answer), count in found.counts.items():
         grid[found.rows.index(truth), found.columns.index(answer)] = count
-    axes.imshow(grid, cmap="Blues", aspect="auto")
+    axes.imshow(grid, cmap="Blues", aspect="auto", vmax=1.3 * grid.max() or 1.0)
     for (truth, answer), count in found.counts.items():
         column, row = found.columns.index(answer), found.rows.index(truth)
-        axes.text(column, row, str(count), ha="center", va="center", fontsize=7)
+        ink = "white" if count > 0.5 * grid.max() else "black"
+        axes.text(column, row, str(count), ha="center", va="center", fontsize=7, color=ink)
     axes.set_xticks(range(len(found.columns)), found.columns, rotation=90, fontsize=7)
     axes.set_yticks(range(len(found.rows)), found.rows, fontsize=7)
     axes.set_xlabel("answer")
