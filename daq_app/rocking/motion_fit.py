@@ -13,9 +13,9 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import OptimizeResult, least_squares
 from scipy.special import stdtrit
 
-from daq_app.rocking.least_squares import Minimum, least_squares
 from daq_app.rocking.motion_model import ALPHA_PRIOR, FIXED, P_PRIOR, POINT_S, ZERO_PRIOR_RAD, MotionModel
 
 Floats = NDArray[np.float64]
@@ -107,16 +107,16 @@ def fit_motion(
     return _result(problem, found, count, sigma)
 
 
-def _least(problem: MotionModel, start: Floats, span: int, stop_s: float) -> Minimum:
-    """The fit of the first `span` impacts; where it leaves too much, from other starts as well."""
-    residual = partial(problem.residual, span=span, stop_s=stop_s)
-    jacobian = partial(problem.jacobian, span=span, stop_s=stop_s)
-    best = least_squares(residual, jacobian, start)
+def _least(problem: MotionModel, start: Floats, span: int, stop_s: float) -> OptimizeResult:
+    """The fit of the first `span` impacts; where it leaves too much, in smaller steps and from another start as well."""
+    search = partial(
+        least_squares, problem.residual, jac=problem.jacobian, args=(span, stop_s), x_scale="jac", max_nfev=60
+    )
+    best = search(start, method="lm")
     settled = np.concatenate((best.x[:FIXED], np.clip(best.x[FIXED:], -1.0, 1.0)))
-    for other, damping in ((start, 1.0), (settled, 0.0)):
-        if np.mean(best.residual**2) > _POOR**2:
-            found = least_squares(residual, jacobian, other, damping=damping)
-            best = min(best, found, key=lambda minimum: float(np.sum(minimum.residual**2)))
+    for other, method in ((start, "trf"), (settled, "lm")):
+        if np.mean(best.fun**2) > _POOR**2:
+            best = min(best, search(other, method=method), key=lambda found: float(found.cost))
     return best
 
 
@@ -148,12 +148,12 @@ def _points(
     return t[good], y[good], noise_rad / math.sqrt(size)
 
 
-def _result(problem: MotionModel, found: Minimum, count: int, sigma: float) -> MotionFit | None:
+def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: float) -> MotionFit | None:
     x = found.x
-    data = found.residual[: found.residual.size - 3 - (x.size - FIXED)]
+    data = found.fun[: found.fun.size - 3 - (x.size - FIXED)]
     excess = max(1.0, float(data @ data) / max(data.size - FIXED, 1))
     # Data rows are weakened by what the model leaves; priors keep their weight.
-    scaled = found.jacobian.copy()
+    scaled = found.jac.copy()
     scaled[: data.size] /= math.sqrt(excess)
     try:
         covariance = np.linalg.inv(scaled.T @ scaled)

@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from daq_app.rocking.housner import exact_quarter_period, half_cycle_rotation
-from daq_app.rocking.least_squares import least_squares
 
 Floats = NDArray[np.float64]
 
@@ -69,8 +69,8 @@ class _Fall:
     def fitted(self) -> tuple[float, float, float]:
         """start / quarter, height / α, and the rms misfit in rad."""
         start = np.array([0.0, self.level_rad / self.alpha_rad, 1.0])
-        found = least_squares(self._residual, self._jacobian, start)
-        rms = math.sqrt(float(np.mean(found.residual[:-1] ** 2))) * _SHARE * self.level_rad
+        found = least_squares(self._residual, start, jac=self._jacobian, method="lm", max_nfev=60)
+        rms = math.sqrt(float(np.mean(found.fun[:-1] ** 2))) * _SHARE * self.level_rad
         return float(found.x[0]), float(found.x[1]), rms
 
     def _elapsed(self, x: Floats) -> tuple[Floats, Floats]:
