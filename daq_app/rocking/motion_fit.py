@@ -108,7 +108,7 @@ def fit_motion(
 
 
 def _least(problem: MotionModel, start: Floats, span: int, stop_s: float) -> OptimizeResult:
-    """The fit of the first `span` impacts; where it leaves too much, in smaller steps and from another start as well."""
+    """The fit of the first `span` impacts; where it leaves too much, another way and start as well."""
     search = partial(
         least_squares, problem.residual, jac=problem.jacobian, args=(span, stop_s), x_scale="jac", max_nfev=60
     )
