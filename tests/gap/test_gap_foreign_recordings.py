@@ -62,6 +62,7 @@ def test_foreign_null_case_is_blamed_on_nothing() -> None:
 def test_foreign_lag_is_named_with_its_size() -> None:
     result = _diagnose("case_004")
     assert result.which[0].effects == ("lag@lvdt",)
+    assert result.decision.verdict == "effect", result.goodness.worst
     estimate = result.effect_parameters[0]
     assert estimate.low < 5.197e-3 < estimate.high
 

@@ -324,6 +324,9 @@ def _joint(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatA
         run, block, "theta", lambda: theta
     )
     found = found + curved * _unit(run, block, "square", lambda: size**2)
+    # The opening is told against |θ|, whose zero is where the wall came to rest: a wall that rests a
+    # hundredth of a milliradian off upright makes a step from side to side of it.
+    found = found - values["half_base"] * values["zero"] * _unit(run, block, "sides", lambda: np.sign(theta))
     if "winkler.theta_c" in values:
         theta_c, half = values["winkler.theta_c"], values["half_base"]
         opened = half * (theta_c - 2.0 * np.sqrt(theta_c * np.maximum(size, theta_c)))

@@ -32,7 +32,7 @@ _BLOCKS_ONLY = frozenset(
 ) | {"mount_height", "wire_even"}
 _STILL = ("bias_", "flexible_wall.", "yaw.", "twist.", "sliding.")
 """Effects that do not move the rotation of the joint."""
-_SWINGS_ONLY = frozenset(("p", "r", "zero", "theta0", "omega0", "viscous.zeta", "coulomb.mu"))
+_SWINGS_ONLY = frozenset(("p", "r", "theta0", "omega0", "viscous.zeta", "coulomb.mu"))
 
 
 @cache
