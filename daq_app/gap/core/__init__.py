@@ -6,15 +6,17 @@ of the gap it closes. The same core serves the rocking wall (`daq_app.gap.rockin
 small models of `benchmarks/real_gap`.
 """
 
-from daq_app.gap.core.diagnose import Options, diagnose
-from daq_app.gap.core.effects import Confusion, Effect, Library
+from daq_app.gap.core.diagnose import diagnose
+from daq_app.gap.core.effects import Alike, Confusion, Effect, Library
 from daq_app.gap.core.features import FeatureSet, Label, Run
 from daq_app.gap.core.fit import Fit, fit
+from daq_app.gap.core.hypotheses import Options
 from daq_app.gap.core.model import Model, Prediction, Scatter
 from daq_app.gap.core.parameters import Parameter
 from daq_app.gap.core.result import CannotDiagnose, Diagnosis
 
 __all__ = [
+    "Alike",
     "CannotDiagnose",
     "Confusion",
     "Diagnosis",

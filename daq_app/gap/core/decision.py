@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from daq_app.gap.core.effects import Library
-from daq_app.gap.core.evidence import Priors, Ranked, credible_set
+from daq_app.gap.core.evidence import Answer, Priors, credible_set
 from daq_app.gap.core.fit import Fit
 from daq_app.gap.core.goodness import Goodness
 from daq_app.gap.core.result import Decision, Verdict
@@ -42,7 +42,8 @@ class Material:
     """What the verdict is made from."""
 
     library: Library
-    ranked: Sequence[Ranked]
+    answers: Sequence[Answer]
+    """By what sensors can tell apart, most probable first: the best hypothesis is the first of the first."""
     fits: Mapping[tuple[str, ...], Fit]
     probes: Mapping[tuple[str, ...], Fit]
     goodness: Mapping[tuple[str, ...], Goodness]
@@ -57,36 +58,54 @@ class Material:
 
 def decide(material: Material, thresholds: Thresholds) -> tuple[Decision, str]:
     """The verdict and the next measurement."""
-    library, ranked = material.library, material.ranked
-    best = ranked[0]
+    library, best = material.library, material.answers[0]
     unexplained = _unexplained(material, thresholds)
     if unexplained is not None:
         return unexplained
     if not best.effects:
         return _null(material, thresholds)
     fit = material.fits[best.effects]
+    words = describe(best, library)
     strength = min(fit.strength(name) for name in best.effects)
-    null = next((r.probability for r in ranked if not r.effects), 0.0)
+    null = next((a.probability for a in material.answers if not a.effects), 0.0)
+    others = tuple(r.effects for r in best.alternatives[1:])
     if strength < thresholds.minimum_strength and null > 1e-3:
-        words = (
-            f"{fit.name} fits best, but at {strength:.1f} posterior sd it is below detection "
+        sentence = (
+            f"{words} fits best, but at {strength:.1f} posterior sd it is below detection "
             f"(nothing missing: {100 * null:.0f} %)."
         )
         advice = f"Repeat at the highest level: {library[best.effects[0]].name} needs a stronger signal."
-        return Decision("below_detection", best.effects, best.family, words, best.probability), advice
-    members = credible_set(ranked)
+        return Decision(
+            "below_detection", best.effects, best.first.family, sentence, best.probability, others
+        ), advice
+    members = credible_set(material.answers)
     if best.probability >= thresholds.name_probability or len(members) == 1:
         verdict: Verdict = "effect" if len(best.effects) == 1 else "pair"
-        words = f"{fit.name} ({best.family}) explains the gap, probability {best.probability:.3f}."
-        return Decision(verdict, best.effects, best.family, words, best.probability), _check_advice(
-            library, best
-        )
+        sentence = f"{words} ({best.first.family}) explains the gap, probability {best.probability:.3f}."
+        decision = Decision(verdict, best.effects, best.first.family, sentence, best.probability, others)
+        return decision, _check_advice(library, best)
     return _cannot_tell(library, members)
+
+
+def describe(answer: Answer, library: Library) -> str:
+    """The hypothesis in words; effects that no sensor tells apart are all named, the likelier first."""
+    if not answer.effects:
+        return "nothing missing"
+    words = []
+    for name in answer.effects:
+        alike = library.alike_to(name)
+        if alike is None:
+            words.append(name)
+            continue
+        others = [n for r in answer.alternatives for n in r.effects if n in alike.names and n != name]
+        names = list(dict.fromkeys([name, *others]))
+        words.append(" or ".join(names) + (", which no sensor here tells apart," if others else ""))
+    return " + ".join(words).removesuffix(",")
 
 
 def _unexplained(material: Material, thresholds: Thresholds) -> tuple[Decision, str] | None:
     """None of these: the best hypothesis fails the gate, or a probe sees more than it explains."""
-    best = material.ranked[0]
+    best = material.answers[0]
     good = material.goodness[best.effects]
     explained = good.passed or _forgiven(material, thresholds, good)
     log_best = material.fits[best.effects].log_evidence
@@ -121,7 +140,7 @@ def _forgiven(material: Material, thresholds: Thresholds, good: Goodness) -> boo
     No model is perfect: where an effect explains nearly all of a large gap, a small rest in one group
     does not speak for something else. A form that is only near the true one leaves more.
     """
-    best = material.ranked[0]
+    best = material.answers[0]
     if not best.effects or good.excessive_scatter:
         return False
     closed = 1.0 - max(material.best_gap**2 - 1.0, 0.0) / max(material.null_gap**2 - 1.0, 1e-9)
@@ -130,7 +149,7 @@ def _forgiven(material: Material, thresholds: Thresholds, good: Goodness) -> boo
 
 
 def _null(material: Material, thresholds: Thresholds) -> tuple[Decision, str]:
-    probability = material.ranked[0].probability
+    probability = material.answers[0].probability
     if material.nominal_gap > thresholds.parameters_gap:
         words = (
             "No effect is missing: other parameter values close the gap "
@@ -141,25 +160,29 @@ def _null(material: Material, thresholds: Thresholds) -> tuple[Decision, str]:
     return Decision("nothing_missing", (), "none", words, probability), "None needed at these levels."
 
 
-def _check_advice(library: Library, best: Ranked) -> str:
+def _check_advice(library: Library, best: Answer) -> str:
+    if len(best.alternatives) > 1:
+        alike = next(group for group in map(library.alike_to, best.effects) if group is not None)
+        return f"To tell {' from '.join(alike.names)}: {alike.measure}."
     own = [c for name in best.effects for c in library[name].confusable_with]
     if not own:
         return "Repeat at another level to confirm the parameter."
     return f"To confirm against {own[0].effect}: {own[0].measure}."
 
 
-def _cannot_tell(library: Library, members: Sequence[Ranked]) -> tuple[Decision, str]:
-    names = [" + ".join(m.effects) or "nothing missing" for m in members]
+def _cannot_tell(library: Library, members: Sequence[Answer]) -> tuple[Decision, str]:
+    names = [describe(m, library) for m in members]
     advice = ""
     if len(members) > 1:
         first, second = set(members[0].effects), set(members[1].effects)
         for a in sorted(first - second):
             for b in sorted(second - first):
                 advice = advice or (library.separating_measurement(a, b) or "")
-    families = {m.family for m in members}
-    family = members[0].family if len(families) == 1 else "several"
+    families = {m.first.family for m in members}
+    family = members[0].first.family if len(families) == 1 else "several"
     if not advice:
         advice = "Repeat over more levels; the held-out score of each hypothesis is in the report."
     words = "Cannot tell " + " from ".join(names[:4]) + f": {advice}."
     total = sum(m.probability for m in members)
-    return Decision("cannot_tell", members[0].effects, family, words, total), advice
+    others = tuple(r.effects for r in members[0].alternatives[1:])
+    return Decision("cannot_tell", members[0].effects, family, words, total, others), advice

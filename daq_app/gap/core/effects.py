@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from daq_app.gap.core.parameters import Parameter
@@ -38,6 +38,8 @@ class Effect:
     """A probe is a non-parametric form of its family: it can name the family, never the effect."""
     null_value: Mapping[str, float] = field(default_factory=dict)
     """Parameter values at which the effect vanishes; 0 for each that is not listed."""
+    unsteady: tuple[str, ...] = ()
+    """Scatters of the model that this effect brings along: with it they may be larger than repeatability."""
 
     @property
     def shared(self) -> tuple[Parameter, ...]:
@@ -52,10 +54,23 @@ class Effect:
         return f"{self.name}.{parameter.name}"
 
 
+@dataclass(frozen=True, slots=True)
+class Alike:
+    """Effects that are the same equation in everything that the sensors measure.
+
+    Not effects that these runs happen not to separate: those may differ in the next ones.
+    """
+
+    names: tuple[str, ...]
+    reason: str
+    measure: str
+    """What would tell them apart, beyond the sensors that there are."""
+
+
 class Library(Mapping[str, Effect]):
     """Effects by name; checks on construction that names are unique and confusions known."""
 
-    def __init__(self, effects: Iterable[Effect]) -> None:
+    def __init__(self, effects: Iterable[Effect], alike: Iterable[Alike] = ()) -> None:
         self._effects: dict[str, Effect] = {}
         for effect in effects:
             if effect.name in self._effects:
@@ -67,6 +82,13 @@ class Library(Mapping[str, Effect]):
             unknown = [c.effect for c in effect.confusable_with if c.effect not in self._effects]
             if unknown:
                 raise ValueError(f"effect {effect.name} is said to be confusable with unknown {unknown}")
+        self.alike = tuple(alike)
+        self._alike: dict[str, Alike] = {}
+        for group in self.alike:
+            for name in group.names:
+                if name not in self._effects or name in self._alike:
+                    raise ValueError(f"{name} is said to be alike to others, but is unknown or said so twice")
+                self._alike[name] = group
 
     def __getitem__(self, name: str) -> Effect:
         return self._effects[name]
@@ -98,20 +120,18 @@ class Library(Mapping[str, Effect]):
             if effect.name in names:
                 continue
             confusions = tuple(c for c in effect.confusable_with if c.effect not in names)
-            kept.append(
-                Effect(
-                    effect.name,
-                    effect.family,
-                    effect.parameters,
-                    effect.equation,
-                    effect.reference,
-                    effect.signature,
-                    confusions,
-                    effect.kind,
-                    effect.null_value,
-                )
-            )
-        return Library(kept)
+            kept.append(replace(effect, confusable_with=confusions))
+        groups = ((group, tuple(n for n in group.names if n not in names)) for group in self.alike)
+        alike = [Alike(left, group.reason, group.measure) for group, left in groups if len(left) > 1]
+        return Library(kept, alike)
+
+    def alike_to(self, name: str) -> Alike | None:
+        """The effects that no sensor tells from this one, itself among them; None if there are none."""
+        return self._alike.get(name)
+
+    def class_of(self, effects: Iterable[str]) -> tuple[str, ...]:
+        """The same for all hypotheses that differ only by effects that are alike: each by its first name."""
+        return tuple(sorted(self._alike[n].names[0] if n in self._alike else n for n in effects))
 
     def separating_measurement(self, first: str, second: str) -> str | None:
         """What to measure to tell two effects apart, if the library knows."""

@@ -76,12 +76,41 @@ def family_of(effects: tuple[str, ...], library: Library) -> str:
     return " + ".join(dict.fromkeys(library[name].family for name in effects)) or "none"
 
 
-def credible_set(ranked: Sequence[Ranked], content: float = 0.95) -> list[Ranked]:
-    """Smallest set of hypotheses that holds `content` of the probability."""
-    kept, total = [], 0.0
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """One hypothesis, or several that differ only by effects that no sensor tells apart."""
+
+    alternatives: tuple[Ranked, ...]
+    """Most probable first."""
+
+    @property
+    def first(self) -> Ranked:
+        return self.alternatives[0]
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        return self.first.effects
+
+    @property
+    def probability(self) -> float:
+        """Of the whole class: which of its forms it is, no recording can say."""
+        return math.fsum(r.probability for r in self.alternatives)
+
+
+def answers(ranked: Sequence[Ranked], library: Library) -> list[Answer]:
+    """Hypotheses by what sensors can tell apart, most probable first."""
+    groups: dict[tuple[str, ...], list[Ranked]] = {}
     for hypothesis in ranked:
-        kept.append(hypothesis)
-        total += hypothesis.probability
+        groups.setdefault(library.class_of(hypothesis.effects), []).append(hypothesis)
+    return sorted((Answer(tuple(g)) for g in groups.values()), key=lambda a: -a.probability)
+
+
+def credible_set(found: Sequence[Answer], content: float = 0.95) -> list[Answer]:
+    """Smallest set of answers that holds `content` of the probability."""
+    kept, total = [], 0.0
+    for answer in found:
+        kept.append(answer)
+        total += answer.probability
         if total >= content:
             break
     return kept

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import log_ndtr, ndtr
+from scipy.special import log_ndtr
 
 from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.features import FloatArray, Run
@@ -58,13 +58,25 @@ class Fit:
     def name(self) -> str:
         return " + ".join(self.effects) or "nothing missing"
 
+    @property
+    def objective(self) -> float:
+        """−log posterior of the unknowns at the end, with the scatter sizes as they are."""
+        return 0.5 * float(self.u @ self.u) - self.log_likelihood
+
     def known(self) -> dict[tuple[str, int | None], float]:
         """Unit coordinates by (key, run), to start another fit from."""
         return dict(zip(self.keys, (float(v) for v in self.u), strict=True))
 
-    def strength(self, effect: str) -> float:
-        """How many posterior sd the effect's parameters are from zero (Mahalanobis distance / √k)."""
-        index = [i for i, (key, _) in enumerate(self.keys) if key.startswith(effect + ".")]
+    def strength(self, effect: str, only: Collection[str] = ()) -> float:
+        """How many posterior sd the effect's parameters are from zero (Mahalanobis distance / √k).
+
+        With `only`, of the parameters with these keys.
+        """
+        index = [
+            i
+            for i, (key, _) in enumerate(self.keys)
+            if key.startswith(effect + ".") and (not only or key in only)
+        ]
         block = self.covariance[np.ix_(index, index)]
         u = self.u[index]
         return math.sqrt(max(float(u @ np.linalg.solve(block, u)), 0.0) / max(len(index), 1))
@@ -121,13 +133,8 @@ def glance(
     With a `hint` (unit
     coordinates of what is not in `known`) the starts are that and zero.
     """
-    problem = Problem(model, runs, effects)
-    base = problem.start(known)
-    start_sigma = np.array([math.log(sigmas.get(s.name, s.median)) for s in model.scatters])
-    starts = _starts(problem, base, known) if hint is None else [base]
-    if hint:
-        starts.append(problem.start({**hint, **known}))
-    searches = [Search(problem, u, start_sigma.copy(), frozen) for u in starts]
+    searches = _glanced(model, runs, effects, known, sigmas, frozen, hint)
+    problem = searches[0].problem
     nothing = np.zeros(len(problem), dtype=bool)
     promises = [search.promise(nothing) for search in searches]
     best = searches[int(np.argmin(promises))]
@@ -140,6 +147,44 @@ def glance(
     found = _finish(best, arrived, 1, 1, exact=False)
     found.settled = all(promise > best.objective - _SAME for promise in promises)
     return found
+
+
+def promised(
+    model: Model,
+    runs: Sequence[Run],
+    effects: Sequence[Effect],
+    known: Mapping[tuple[str, int | None], float],
+    sigmas: Mapping[str, float],
+    frozen: Columns,
+    hint: Mapping[tuple[str, int | None], float] | None = None,
+) -> float:
+    """The lowest −log posterior (`Fit.objective`) that one linear step from any start of a glance promises.
+
+    From the columns of a fit without one of the effects this is the score test of that effect, in which
+    all other unknowns give way as far as they can. It costs a part of a glance. Arguments as of `glance`.
+    """
+    searches = _glanced(model, runs, effects, known, sigmas, frozen, hint)
+    nothing = np.zeros(len(searches[0].problem), dtype=bool)
+    return min(search.promise(nothing) - search.scatter_prior(search.log_sigma) for search in searches)
+
+
+def _glanced(
+    model: Model,
+    runs: Sequence[Run],
+    effects: Sequence[Effect],
+    known: Mapping[tuple[str, int | None], float],
+    sigmas: Mapping[str, float],
+    frozen: Columns,
+    hint: Mapping[tuple[str, int | None], float] | None,
+) -> list[Search]:
+    """Searches from the starts of a glance."""
+    problem = Problem(model, runs, effects)
+    base = problem.start(known)
+    start_sigma = np.array([math.log(sigmas.get(s.name, s.median)) for s in model.scatters])
+    starts = _starts(problem, base, known) if hint is None else [base]
+    if hint:
+        starts.append(problem.start({**hint, **known}))
+    return [Search(problem, u, start_sigma.copy(), frozen) for u in starts]
 
 
 def _polish(search: Search, linear: Columns) -> bool:
@@ -259,17 +304,27 @@ def _bound_correction(
 ) -> list[float]:
     """ln of the posterior mass inside the bounds over the prior mass inside them, per bounded unknown.
 
+    Inside the bounds, and outside of what is too weak to be an effect (`Parameter.smallest`).
     At a bound the gradient does not vanish; the Gaussian is then that of the Newton step beyond it.
     """
     corrections = []
     for k in np.flatnonzero(np.isfinite(problem.low) | np.isfinite(problem.high)):
+        parameter = problem.unknowns[k].parameter
         sd = math.sqrt(covariance[k, k])
         slope = float(gradient[k]) if u[k] <= problem.low[k] or u[k] >= problem.high[k] else 0.0
-        centre = u[k] - slope * sd**2
-        inside = _log_mass((problem.low[k] - centre) / sd, (problem.high[k] - centre) / sd)
-        prior = math.log(max(float(ndtr(problem.high[k]) - ndtr(problem.low[k])), 1e-300))
-        corrections.append(0.5 * (slope * sd) ** 2 + inside - prior)
+        least = parameter.smallest / parameter.sd
+        pieces = [(max(problem.low[k], least) if least else problem.low[k], problem.high[k])]
+        if least and problem.low[k] < -least:
+            pieces.append((problem.low[k], -least))
+        corrections.append(_in_pieces(pieces, float(u[k]) - slope * sd**2, sd) + 0.5 * (slope * sd) ** 2)
     return corrections
+
+
+def _in_pieces(pieces: Sequence[tuple[float, float]], centre: float, sd: float) -> float:
+    """ln of the posterior mass over the prior mass in intervals of a unit coordinate."""
+    inside = [_log_mass((low - centre) / sd, (high - centre) / sd) for low, high in pieces]
+    prior = [_log_mass(low, high) for low, high in pieces]
+    return float(np.logaddexp.reduce(inside) - np.logaddexp.reduce(prior))
 
 
 def _log_mass(low: float, high: float) -> float:

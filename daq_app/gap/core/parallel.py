@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.features import Run
-from daq_app.gap.core.fit import Fit, fit, glance
+from daq_app.gap.core.fit import Fit, fit, glance, promised
 from daq_app.gap.core.held_out import HeldOutRun, score
 from daq_app.gap.core.model import Model
 from daq_app.gap.core.problem import Columns
@@ -59,6 +59,22 @@ class GlanceTask:
 
 
 @dataclass(frozen=True, slots=True)
+class PromiseTask:
+    """What some further effects promise, each by one linear step from the same fit."""
+
+    glances: tuple[GlanceTask, ...]
+    columns: Columns
+    """All columns of that fit, sent once for all of them."""
+
+    def run(self, model: Model, runs: Sequence[Run], frozen: Columns | None = None) -> list[float]:
+        columns = {**(frozen or {}), **self.columns}
+        return [
+            promised(model, runs, seen.effects, seen.known, seen.sigmas, columns, seen.hint)
+            for seen in self.glances
+        ]
+
+
+@dataclass(frozen=True, slots=True)
 class ScoreTask:
     """Predict every run from the others under one hypothesis."""
 
@@ -70,7 +86,7 @@ class ScoreTask:
         return score(model, runs, self.effects, self.whole, self.by)
 
 
-Task = FitTask | GlanceTask | ScoreTask
+Task = FitTask | GlanceTask | PromiseTask | ScoreTask
 _STATE: dict[str, Any] = {}
 """In a worker process: the model and runs, sent once instead of with every task."""
 

@@ -31,12 +31,17 @@ class Parameter:
     """Values from which a fit is started; empty means one prior sd to either side, within bounds."""
     linear: bool = False
     """The prediction is a straight line in it whose slope no other parameter changes: one column for all."""
+    smallest: float = 0.0
+    """Of an effect's strength (on a linear scale, centred on zero): what is weaker, to either side, is no
+    effect. The prior has nothing there."""
 
     def __post_init__(self) -> None:
         if self.sd <= 0:
             raise ValueError(f"parameter {self.name}: the prior's sd must be positive, not {self.sd}")
         if self.scale == "log" and (self.mean <= 0 or self.low < 0):
             raise ValueError(f"parameter {self.name}: a log parameter must be positive")
+        if self.smallest and (self.scale == "log" or self.mean != 0.0 or self.smallest >= self.high):
+            raise ValueError(f"parameter {self.name}: only a linear strength about zero has a smallest size")
         if not self.low <= self.mean <= self.high:
             raise ValueError(
                 f"parameter {self.name}: prior mean {self.mean} is outside [{self.low}, {self.high}]"

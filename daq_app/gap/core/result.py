@@ -62,6 +62,9 @@ class Decision:
     family: str
     sentence: str
     confidence: float
+    alternatives: tuple[tuple[str, ...], ...] = ()
+    """Hypotheses that the answer stands for too: they differ from it only by effects that no sensor tells
+    apart. `confidence` is that of all of them together."""
 
 
 @dataclass(frozen=True, slots=True)

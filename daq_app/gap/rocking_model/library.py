@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
-from daq_app.gap.core import Confusion, Effect, Library, Parameter
+from daq_app.gap.core import Alike, Confusion, Effect, Library, Parameter
 from daq_app.gap.core.parameters import between, positive, signed
+from daq_app.gap.rocking_model.model import SCATTER_RELEASE
 from daq_app.gap.rocking_model.vector import PROBE_SPEEDS
 from sim_hardware.dynamics.effects import MOTION_EFFECTS
 from sim_hardware.dynamics.spec import EffectSpec
@@ -82,6 +83,28 @@ _WIDER = {("yaw", "kick"): 0.4, ("twist", "kick"): 0.4, ("flexible_wall", "gain"
 _DRIFT_REACH = {"lvdt": 1e-3, "wire": 2e-3, "tiltmeter": 1e-3, "accelerometer": 1e-2}
 
 
+_WEAKEST_SIGNED = {
+    "restitution_slope": 5e-3,
+    "restitution_asymmetry": 2e-3,
+    "alpha_asymmetry": 2e-4,
+    "base_tilt": 2e-4,
+    "eccentric_mass": 3e-4,
+    "gain": 0.01,
+}
+"""Where the design's ranges begin for strengths of either sign, which the simulator's do not say. A mass off
+centre begins where it turns gravity as a tilt of 0.2 mrad does, the slope of r at a tenth of its range."""
+NEGLIGIBLE = 0.5
+"""Share of the weakest strength of a range up to which it is what sound walls and sensors differ by."""
+
+
+def _smallest(spec: EffectSpec, parameter: SpecParameter) -> float:
+    """Strength below which an effect is none; 0 where no range says so."""
+    if parameter is not spec.strength:
+        return 0.0
+    weakest = max(parameter.low, 0.0) or _WEAKEST_SIGNED.get(spec.name, 0.0)
+    return NEGLIGIBLE * weakest
+
+
 def _parameter(spec: EffectSpec, parameter: SpecParameter) -> Parameter:
     """The prior of one of the simulator's parameters: its range is about two prior sd."""
     per_run = (spec.name, parameter.name) in _PER_RUN
@@ -90,9 +113,9 @@ def _parameter(spec: EffectSpec, parameter: SpecParameter) -> Parameter:
         found = between(parameter.name, low, parameter.high, parameter.unit, parameter.text)
         return replace(found, per_run=per_run)
     reach = _WIDER.get((spec.name, parameter.name), parameter.high)
-    if parameter.low < 0:
-        return signed(parameter.name, reach, parameter.unit, parameter.text, per_run=per_run)
-    return positive(parameter.name, reach, parameter.unit, parameter.text, per_run=per_run)
+    of_sign = signed if parameter.low < 0 else positive
+    found = of_sign(parameter.name, reach, parameter.unit, parameter.text, per_run=per_run)
+    return found if per_run else replace(found, smallest=_smallest(spec, parameter))
 
 
 _FORMS = {
@@ -109,6 +132,10 @@ _FORMS = {
 """Parameters of the form of an effect, beyond those of the simulator, which has one form only."""
 
 
+_UNSTEADY = {"slow_release": (SCATTER_RELEASE,)}
+"""A hand that lets go over tens of milliseconds does not let go alike to a tenth of one."""
+
+
 def _motion_effect(spec: EffectSpec, known: set[str]) -> Effect:
     names = _FREE.get(spec.name, tuple(p.name for p in spec.parameters if p.name != "v_mean"))
     return Effect(
@@ -119,6 +146,7 @@ def _motion_effect(spec: EffectSpec, known: set[str]) -> Effect:
         spec.reference,
         spec.summary,
         tuple(Confusion(other, spec.separated_by) for other in spec.confusable if other in known),
+        unsteady=_UNSTEADY.get(spec.name, ()),
     )
 
 
@@ -151,7 +179,9 @@ def mark_effect(mark: str, family: str) -> Effect:
         parameter = between(strength.name, strength.low, strength.high, strength.unit, strength.text)
     else:
         reach = _MARK_REACH[name].get(family, _MARK_REACH[name].get("", 1.0))
-        parameter = positive(strength.name, reach, strength.unit, strength.text)
+        # When a channel freezes is chance: how much of a run it loses is each run's own.
+        own = name == "dropout"
+        parameter = positive(strength.name, reach, strength.unit, strength.text, per_run=own)
     return Effect(mark, "sensor", (parameter,), spec.equation, spec.reference, f"{spec.summary} ({target})")
 
 
@@ -213,6 +243,32 @@ def _probes() -> Iterable[Effect]:
         )
 
 
+_ALIKE = (
+    # Not dwell and bounce: a hop lasts longer the faster the wall comes, which several levels show.
+    Alike(
+        ("base_tilt", "eccentric_mass"),
+        "Both turn gravity against the wall by the same angle; a mass off centre also changes the p of the "
+        "two sides, by 0.1 %, which the calibrations of the two faces of the joint may feign.",
+        "a level on the base",
+    ),
+)
+_ALIKE_ON_SENSORS = (
+    ("lag", "filter_delay"),
+    "Where the rotation has its energy, below 20 Hz, a Bessel filter of some milliseconds is a delay.",
+    "a step or a knock on the sensor: a filter rounds it, a delay does not",
+)
+
+
+def _alike(names: Collection[str]) -> Iterable[Alike]:
+    """Effects that no sensor of the rig tells apart, as far as the library has them."""
+    yield from _ALIKE
+    first, *others = _ALIKE_ON_SENSORS[0]
+    for target in sorted({name.partition("@")[2] for name in names if name.startswith(first + "@")}):
+        same = tuple(f"{name}@{target}" for name in (first, *others))
+        if all(name in names for name in same):
+            yield Alike(same, *_ALIKE_ON_SENSORS[1:])
+
+
 def rocking_library(
     channels: Mapping[str, str] | None = None, marks: Mapping[str, str] | None = None
 ) -> Library:
@@ -234,4 +290,5 @@ def rocking_library(
         } | {"saturation@lvdt": "lvdt", "saturation@wire": "wire", "polarity": "", "swap": ""}
     conditions = [mark_effect(mark, family) for mark, family in marks.items()]
     motion = (_motion_effect(spec, known) for spec in specs)
-    return Library([*motion, *_sensor_effects(known), *single, *conditions, *_probes()])
+    effects = [*motion, *_sensor_effects(known), *single, *conditions, *_probes()]
+    return Library(effects, _alike({effect.name for effect in effects}))
