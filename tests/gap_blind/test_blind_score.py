@@ -16,13 +16,14 @@ from daq_app.gap.blind.confusion import confusion
 from daq_app.gap.blind.judge import Judged, judge
 from daq_app.gap.blind.layout import SEAL_FILE
 from daq_app.gap.blind.mix import category_of
-from daq_app.gap.blind.names import COMPARABLE, accepted_names, base_name
+from daq_app.gap.blind.names import COMPARABLE, accepted_names, base_name, class_of
 from daq_app.gap.blind.report import write_markdown, write_report
 from daq_app.gap.blind.runner import Outcome, save_outcome
 from daq_app.gap.blind.score import Row, Score, score_folder, table
 from daq_app.gap.blind.seal import SealBroken, file_sha256, read_seal, seal_case
 from daq_app.gap.blind.statistics import auroc, calibration_error, reliability, share
 from daq_app.gap.blind.world.catalogue import ENTRIES, LIBRARY, OUTSIDE
+from daq_app.gap.rocking_model.library import rocking_library
 
 Answer = Callable[[dict[str, Any], np.random.Generator], dict[str, Any]]
 N = 200
@@ -176,6 +177,29 @@ def test_a_pair_half_found_is_not_exact_and_a_synonym_is() -> None:
         "effects": [{**tilt["effects"][0], "name": "base_tilt", "accept": accepted_names("base_tilt")}],
     }
     assert judge(tilt, Outcome("c", "t", "", 1.0, claim(["eccentric_mass"], 0.9))).first_right
+
+
+def test_forms_that_no_sensor_tells_apart_are_one_answer() -> None:
+    """Their probabilities add up and they count once in the set, by the scorer's classes alone."""
+    label = next(label for label in labels() if label["category"] == "single")
+    effect = {**label["effects"][0], "name": "base_tilt", "accept": accepted_names("base_tilt")}
+    tilt = {**label, "effects": [effect]}
+    split = [("viscous", 0.38), ("base_tilt", 0.32), ("eccentric_mass", 0.30)]
+    which = [{"effects": [name], "family": "geometry", "probability": p} for name, p in split]
+    told = judge(tilt, Outcome("c", "t", "", 1.0, {"which": which, "set95": which, "decision": "effect"}))
+    assert told.first_right
+    assert told.named == ("base_tilt",)
+    assert told.claimed == pytest.approx(0.62)
+    assert told.set_size == 2
+    # Whatever a diagnosis thinks alike: a lag of one wire is not that of another.
+    wires = [{"effects": [f"lag@WP-{k}"], "family": "sensor", "probability": 0.5} for k in (1, 2)]
+    other = judge(tilt, Outcome("c", "t", "", 1.0, {"which": wires, "set95": wires, "decision": "effect"}))
+    assert (other.set_size, other.claimed) == (2, 0.5)
+
+
+def test_what_the_diagnosis_calls_alike_the_scorer_does_too() -> None:
+    for group in rocking_library({"WP-1": "wire"}).alike:
+        assert len({class_of([name]) for name in group.names}) == 1
 
 
 def test_cannot_tell_is_right_only_with_the_truth_in_the_set_and_a_measurement() -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from daq_app.gap.blind.names import COMPARABLE, base_name, families_of
+from daq_app.gap.blind.names import COMPARABLE, base_name, class_of, families_of
 from daq_app.gap.blind.runner import Outcome
 
 DECISIONS: Final = (
@@ -48,11 +48,12 @@ class Judged:
     """Effects of the answer; empty for answers that name none."""
     named_family: str
     claimed: float
-    """Probability that the diagnosis gives its first hypothesis."""
+    """Probability that the diagnosis gives its first answer: of all forms that no sensor tells apart."""
     first_right: bool
     family_right: bool
     in_set: bool
     set_size: int
+    """Forms that no sensor tells apart count once."""
     outside_score: float
     """How much it says "none of these", for ranking."""
     closure: float
@@ -109,10 +110,10 @@ def judge(label: dict[str, Any], outcome: Outcome) -> Judged:
         named=named,
         named_family=family,
         claimed=claimed,
-        first_right=bool(which) and _matches(which[0].effects, accept),
+        first_right=bool(which) and _matches(_first(which)[0].effects, accept),
         family_right=set(families_of(family)) == {effect["family"] for effect in effects},
         in_set=any(_matches(hypothesis.effects, accept) for hypothesis in set95),
-        set_size=len(set95),
+        set_size=len({class_of(hypothesis.effects) for hypothesis in set95}),
         outside_score=_outside_score(decision, result, which),
         closure=_number(gap, "closure"),
         after_to_floor=_ratio(_number(gap, "after"), _number(gap, "floor")),
@@ -137,11 +138,23 @@ def _answer(
     decision: str, result: dict[str, Any], which: Sequence[Hypothesis]
 ) -> tuple[tuple[str, ...], str, float]:
     """(effects named, family named, claimed probability of the first hypothesis)."""
-    first = which[0] if which else Hypothesis((), "", 0.0)
+    first, claimed = _first(which) if which else (Hypothesis((), "", 0.0), 0.0)
     if decision in _BLAMING:
-        return first.effects, first.family, first.probability
+        return first.effects, first.family, claimed
     detail = result.get("decision_detail") or {}
-    return (), str(detail.get("family") or ""), first.probability
+    return (), str(detail.get("family") or ""), claimed
+
+
+def _first(which: Sequence[Hypothesis]) -> tuple[Hypothesis, float]:
+    """(likeliest hypothesis, probability) of the most probable class of forms that no sensor tells apart.
+
+    The scorer's own classes hold, not what a diagnosis says that it cannot tell apart.
+    """
+    classes: dict[tuple[str, ...], list[Hypothesis]] = {}
+    for hypothesis in which:
+        classes.setdefault(class_of(hypothesis.effects), []).append(hypothesis)
+    best = max(classes.values(), key=lambda forms: math.fsum(h.probability for h in forms))
+    return best[0], math.fsum(h.probability for h in best)
 
 
 def _matches(claimed: Sequence[str], accept: Sequence[tuple[str, ...]]) -> bool:
@@ -169,7 +182,7 @@ def _outside_score(decision: str, result: dict[str, Any], which: Sequence[Hypoth
         size = -math.log10(max(float(p_value), 1e-300))
         inner = max(0.0, size) / (1.0 + max(0.0, size))
     else:
-        inner = 1.0 - (which[0].probability if which else 0.0)
+        inner = 1.0 - (_first(which)[1] if which else 0.0)
     return inner + (1.0 if decision == "none_of_these" else 0.0)
 
 

@@ -6,6 +6,7 @@ may carry a target (``gain@WP-1``): the part before the ``@`` is compared here.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final
 
 FAMILIES: Final = (
@@ -78,6 +79,17 @@ def accepted_names(truth: str) -> tuple[str, ...]:
     for name in tuple(names):
         names += _OTHER_WORDS.get(name, ())
     return tuple(dict.fromkeys(names))
+
+
+def class_of(names: Iterable[str]) -> tuple[str, ...]:
+    """The same for all hypotheses that differ only by effects that no sensor tells apart."""
+    return tuple(sorted(_first_of_class(name) for name in names))
+
+
+def _first_of_class(name: str) -> str:
+    effect, at, target = name.partition("@")
+    group = next((g for g in _SAME_TO_ALL_SENSORS if effect in g), (effect,))
+    return group[0] + at + target
 
 
 def families_of(text: str) -> tuple[str, ...]:
