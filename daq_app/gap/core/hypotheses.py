@@ -24,7 +24,10 @@ POLISH_REACH = 40.0
 REACH = 60.0
 REACH_SHARE = 0.5
 """A hypothesis is fitted if a glance puts it within 60 of the best in log evidence, or if it gains half as
-much as the best; the others keep what the glance gave them, which leaves them without a chance."""
+much as the best over the best with one effect less; the others keep what the glance gave them, which leaves
+them without a chance."""
+PAIR_REACH = 20.0
+"""Of pairs within 20 only: a glance starts from effects that were fitted."""
 STRAINED = 4.0
 """Prior sd from which a parameter of the model looks as if it stood for an effect."""
 PROMISE = 2.0
@@ -104,9 +107,10 @@ class Hypotheses:
         """Fits of hypotheses, of those without a chance a glance only."""
         tasks = [self._glance(h, s) for h, s in zip(hypotheses, starts, strict=True)]
         found: list[Fit] = self.workers.run(tasks, text)
-        null = self.fits[NULL].log_evidence
         best = max(f.log_evidence for f in (*self.fits.values(), *found))
-        bar = best - max(REACH, REACH_SHARE * (best - null))
+        less = max(f.log_evidence for h, f in self.fits.items() if len(h) < max(len(hypotheses[0]), 1))
+        reach = REACH if len(hypotheses[0]) < 2 else PAIR_REACH
+        bar = best - max(reach, REACH_SHARE * (best - less))
         near = [
             k
             for k, f in enumerate(found)

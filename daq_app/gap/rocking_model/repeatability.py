@@ -34,7 +34,7 @@ SIZES: dict[tuple[str, str], Size] = {
     ("wire", "step with moment"): Size(3e-6, 4e-6, "rad"),
     ("wire", "drift"): Size(2e-6, 5e-6, "rad/s"),
     ("tiltmeter", "gain"): Size(3e-4),
-    ("tiltmeter", "lag"): Size(1e-4),
+    ("tiltmeter", "lag"): Size(1e-4, 3e-4, "s"),
     ("tiltmeter", "drift"): Size(2e-6, 6e-6, "rad/s"),
     ("accelerometer", "gain of gravity"): Size(1e-2),
     ("accelerometer", "gain of inertia"): Size(1e-3, 1e-3, "1"),
