@@ -11,6 +11,7 @@ from scipy.stats import norm
 from toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
 
 from daq_app.gap.core import Effect, Library, Options, Parameter, Prediction, diagnose, fit
+from daq_app.gap.core.decision import Thresholds
 from daq_app.gap.core.hypotheses import Hypotheses
 from daq_app.gap.core.parallel import Workers
 from daq_app.gap.core.parameters import positive, signed
@@ -96,6 +97,15 @@ def test_a_pair_whose_second_effect_is_not_there_is_no_hypothesis() -> None:
         study.fit_all()
         names = {h for h in study.fits if len(h) == 2}
         assert names
-        weak = {h for h in names if min(study.fits[h].strength(e) for e in h) < 2.0}
+        weak = {h for h in names if min(study.fits[h].strength(e) for e in h) < 4.9}
         assert weak
         assert weak.isdisjoint(r.effects for r in study.ranked())
+
+
+def test_a_second_effect_of_four_sd_is_a_stated_limit_and_no_pair() -> None:
+    runs = make_runs(4, slope_k=0.02, shift_s=0.05)
+    strict = Options(thresholds=Thresholds(second_strength=50.0))
+    result = diagnose(DecayModel(), runs, LIBRARY, strict)
+    assert result.decision.verdict == "effect"
+    assert result.decision.effects == ("shift",)
+    assert any("Perhaps shift + slope" in limit for limit in result.limits)

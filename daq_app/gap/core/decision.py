@@ -20,6 +20,9 @@ class Thresholds:
     """An effect is named alone from this probability on."""
     minimum_strength: float = 4.0
     """Posterior sd below which an effect is `below_detection`."""
+    second_strength: float = 5.0
+    """Posterior sd that each effect of a pair needs: a second one also takes up what the first one's form
+    leaves, so it needs more than an effect that stands alone."""
     probe_log_bayes: float = 6.0
     """Log evidence by which a probe must beat the best named hypothesis of its family to say that the
     family's form is unknown."""

@@ -102,6 +102,9 @@ class _Study(Hypotheses):
         gap = self._held_out(best)
         if decision.verdict in ("effect", "pair") and not self.goodness(best).passed:
             limits.append(f"A small structure remains: {self.goodness(best).worst}.")
+        suspected = self.suspected(best)
+        if suspected is not None:
+            limits.append(f"Perhaps {' + '.join(suspected)}: the second effect is too weak to be sure of.")
         if not self.fits[best].converged or self.fits[best].starts_agreeing * 3 < self.fits[best].starts:
             limits.append(
                 f"Only {self.fits[best].starts_agreeing} of {self.fits[best].starts} starts reached "

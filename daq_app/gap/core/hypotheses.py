@@ -251,9 +251,19 @@ class Hypotheses:
         return min(sizes, default=math.inf)
 
     def ranked(self) -> list[Ranked]:
-        """All hypotheses but pairs of which one effect is not there: they are the other alone once more."""
-        kept = {h: f for h, f in self.fits.items() if len(h) < 2 or self._strength(h) >= PRESENT}
-        return rank(kept, self.library, self.thresholds.priors, self.thresholds.temperature)
+        """All hypotheses but pairs of which one effect is too weak to be there beside the other."""
+        return self._rank({h: f for h, f in self.fits.items() if not self._weak(h)})
+
+    def suspected(self, best: Hypothesis) -> Hypothesis | None:
+        """The pair that would be more probable than the best hypothesis, were it not too weak."""
+        first = self._rank(self.fits)[0].effects
+        return first if first != best and self._weak(first) else None
+
+    def _weak(self, effects: Hypothesis) -> bool:
+        return len(effects) > 1 and self._strength(effects) < self.thresholds.second_strength
+
+    def _rank(self, fits: dict[Hypothesis, Fit]) -> list[Ranked]:
+        return rank(fits, self.library, self.thresholds.priors, self.thresholds.temperature)
 
     def goodness(self, effects: Hypothesis) -> Goodness:
         if effects not in self._goodness:
