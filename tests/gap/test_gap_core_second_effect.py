@@ -109,3 +109,16 @@ def test_a_second_effect_of_four_sd_is_a_stated_limit_and_no_pair() -> None:
     assert result.decision.verdict == "effect"
     assert result.decision.effects == ("shift",)
     assert any("Perhaps shift + slope" in limit for limit in result.limits)
+
+
+def test_on_its_way_a_strength_may_still_be_too_weak_to_count() -> None:
+    """What is withheld is the evidence of a strength below its smallest, so that screening can go without."""
+    shift = LIBRARY["shift"]
+    least = replace(shift, parameters=(replace(shift.parameters[0], smallest=0.02),))
+    runs = make_runs(2, shift_s=0.005)
+    known = fit(DecayModel(), runs)
+    free = fit(DecayModel(), runs, (shift,), known.known(), known.sigmas)
+    held = fit(DecayModel(), runs, (least,), known.known(), known.sigmas)
+    assert free.withheld == 0.0
+    assert held.withheld > 20.0
+    assert held.log_evidence + held.withheld == pytest.approx(free.log_evidence, abs=1e-3)

@@ -43,6 +43,8 @@ class Fit:
     residuals: tuple[FloatArray, ...]
     scales: tuple[FloatArray, ...]
     """√diag C of each run: what one feature alone scatters by."""
+    withheld: float = 0.0
+    """What the log evidence would be more by, if effects might be too weak to be any."""
     starts: int = 1
     starts_agreeing: int = 1
     converged: bool = True
@@ -264,8 +266,10 @@ def _finish(search: Search, converged: bool, starts: int, agreeing: int, exact: 
     covariance: FloatArray = np.linalg.inv(hessian).astype(np.float64)
     _, log_det = np.linalg.slogdet(hessian)
     evidence = log_like - 0.5 * float(search.u @ search.u) - 0.5 * float(log_det)
-    evidence += math.fsum(_bound_correction(problem, search.u, gradient, covariance))
-    evidence += _scatter_evidence(search)
+    any_size, real = (
+        math.fsum(_bound_correction(problem, search.u, gradient, covariance, weak)) for weak in (True, False)
+    )
+    evidence += real + _scatter_evidence(search)
     sigmas = search.sigmas(search.log_sigma)
     whitened, scales = [], []
     for line, run in zip(search.lines, problem.runs, strict=True):
@@ -287,6 +291,7 @@ def _finish(search: Search, converged: bool, starts: int, agreeing: int, exact: 
         sigmas=sigmas,
         log_likelihood=log_like,
         log_evidence=evidence,
+        withheld=any_size - real,
         whitened=tuple(whitened),
         residuals=tuple(line.residual for line in search.lines),
         scales=tuple(scales),
@@ -300,11 +305,11 @@ def _finish(search: Search, converged: bool, starts: int, agreeing: int, exact: 
 
 
 def _bound_correction(
-    problem: Problem, u: FloatArray, gradient: FloatArray, covariance: FloatArray
+    problem: Problem, u: FloatArray, gradient: FloatArray, covariance: FloatArray, weak: bool
 ) -> list[float]:
     """ln of the posterior mass inside the bounds over the prior mass inside them, per bounded unknown.
 
-    Inside the bounds, and outside of what is too weak to be an effect (`Parameter.smallest`).
+    What is too weak to be an effect (`Parameter.smallest`) is inside only if `weak`.
     At a bound the gradient does not vanish; the Gaussian is then that of the Newton step beyond it.
     """
     corrections = []
@@ -312,7 +317,7 @@ def _bound_correction(
         parameter = problem.unknowns[k].parameter
         sd = math.sqrt(covariance[k, k])
         slope = float(gradient[k]) if u[k] <= problem.low[k] or u[k] >= problem.high[k] else 0.0
-        least = parameter.smallest / parameter.sd
+        least = 0.0 if weak else parameter.smallest / parameter.sd
         pieces = [(max(problem.low[k], least) if least else problem.low[k], problem.high[k])]
         if least and problem.low[k] < -least:
             pieces.append((problem.low[k], -least))

@@ -26,12 +26,10 @@ REACH_SHARE = 0.5
 """A hypothesis is fitted if a glance puts it within 60 of the best in log evidence, or if it gains half as
 much as the best over the best with one effect less; the others keep what the glance gave them, which leaves
 them without a chance."""
-PAIR_REACH = 20.0
-"""Of pairs within 20 only: a glance starts from effects that were fitted."""
 STRAINED = 4.0
 """Prior sd from which a parameter of the model looks as if it stood for an effect."""
-PROMISE = 2.0
-"""Gain in log posterior from which a second effect is fitted. No smaller one pays for a further effect."""
+PROMISE = 5.0
+"""Gain in log posterior from which a second effect is fitted: one of five posterior sd gains 12.5."""
 PRESENT = 2.0
 """Posterior sd from which an effect counts as there, so that another may be sought beside it."""
 LITTLE = 3.0
@@ -109,12 +107,12 @@ class Hypotheses:
         found: list[Fit] = self.workers.run(tasks, text)
         best = max(f.log_evidence for f in (*self.fits.values(), *found))
         less = max(f.log_evidence for h, f in self.fits.items() if len(h) < max(len(hypotheses[0]), 1))
-        reach = REACH if len(hypotheses[0]) < 2 else PAIR_REACH
-        bar = best - max(reach, REACH_SHARE * (best - less))
+        bar = best - max(REACH, REACH_SHARE * (best - less))
+        # On its way a strength may still be too weak to be an effect: that is judged at the end.
         near = [
             k
             for k, f in enumerate(found)
-            if f.log_evidence >= bar and not self._done(f, starts[k].log_evidence, best)
+            if f.log_evidence + f.withheld >= bar and not self._done(f, starts[k].log_evidence, best)
         ]
         # A glance whose other starts promise no more is gone on with; else all starts are followed.
         fitted = self._fit(
