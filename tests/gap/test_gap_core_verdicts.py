@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 from toy_wave import LIBRARY, DecayModel, make_runs
@@ -44,6 +45,17 @@ def test_scatter_is_not_mistaken_for_physics() -> None:
         for seed in range(6)
     ]
     assert not {"effect", "pair"} & set(verdicts), verdicts
+
+
+def test_a_scatter_that_an_effect_brings_along_does_not_fail_the_gate() -> None:
+    """Three times what repeatability allows: no answer, unless the effect itself is known to be unsteady."""
+    runs = make_runs(3, scatter=0.06, shift_s=0.2)
+    assert diagnose(DecayModel(), runs, LIBRARY, FAST).decision.verdict == "none_of_these"
+    unsteady = replace(LIBRARY["shift"], unsteady=("scatter of r",))
+    others = [effect for effect in LIBRARY.values() if effect.name != "shift"]
+    result = diagnose(DecayModel(), runs, Library([*others, unsteady]), FAST)
+    assert result.decision.verdict == "effect"
+    assert result.decision.effects == ("shift",)
 
 
 def test_unknown_form_of_a_known_family_is_called_so() -> None:
