@@ -81,14 +81,17 @@ def _record(contents: JournalContents, rig: Rig, start: int, stop: int) -> TestR
     header = contents.header
     row = {channel_id: index for index, channel_id in enumerate(header.channel_ids)}
 
-    def load(wanted: tuple[str, ...]) -> Floats:
+    begin, whole = contents.first_sample + start, stop - start
+
+    def load(ids: tuple[str, ...], start: int = 0, stop: int | None = None) -> Floats:
         """Some channels of what is analysed; the journal is walked through once for each call."""
-        rows = [row[channel_id] for channel_id in wanted]
-        scaling = Scaling.of([rig.channel(channel_id) for channel_id in wanted], header.tare)
-        si = np.empty((len(rows), stop - start))
+        rows = [row[channel_id] for channel_id in ids]
+        scaling = Scaling.of([rig.channel(channel_id) for channel_id in ids], header.tare)
+        first_column, last_column, _ = slice(start, stop).indices(whole)
+        si = np.empty((len(rows), max(last_column - first_column, 0)))
         for first, window in contents.windows(_WINDOW):
-            at = first - contents.first_sample - start
-            low, high = max(at, 0), min(at + window.shape[1], stop - start)
+            at = first - begin - first_column
+            low, high = max(at, 0), min(at + window.shape[1], si.shape[1])
             if low < high:
                 si[:, low:high] = scaling.to_si(window[rows, low - at : high - at])
         return si
@@ -96,10 +99,10 @@ def _record(contents: JournalContents, rig: Rig, start: int, stop: int) -> TestR
     return TestRecord(
         rig=rig,
         rate_hz=header.rate_hz,
-        n_samples=stop - start,
+        n_samples=whole,
         channel_ids=header.channel_ids,
         load=load,
-        first_sample=contents.first_sample + start,
+        first_sample=begin,
         time_offsets_s={channel_id: header.time_offset_s(channel_id) for channel_id in header.channel_ids},
         tared=bool(header.tare),
         label=header.test or header.run_id,

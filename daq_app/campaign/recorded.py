@@ -76,8 +76,7 @@ def _outcome(events: Sequence[Event]) -> str:
 
 def _judged(run: Run) -> tuple[TestVerdict, str]:
     """What the run says of itself: its quality check if it has one, else how it ended."""
-    derived = run.derived
-    quality = derived.results.get("quality") if derived is not None else None
+    quality = run.results.get("quality")
     if isinstance(quality, dict) and quality.get("verdict") in ("good", "bad"):
         reasons = quality.get("reasons")
         text = "; ".join(map(str, reasons)) if isinstance(reasons, list) else ""

@@ -5,7 +5,8 @@ What draws is imported by the processes that draw: this module is light.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,13 +52,15 @@ class _Content:
             self.title, self.places, self.restitution, self.repetitions, self.tests, self.failures
         )
 
-    def drawn(self, *, at_once: bool) -> tuple[list[Picture], bytes]:
-        """Pictures and PDF, each in a process of its own or one after the other in this one."""
+    @contextmanager
+    def drawing(self, *, at_once: bool) -> Iterator[tuple[Callable[[], list[Picture]], Callable[[], bytes]]]:
+        """Give pictures and PDF when asked: each is drawn in a process of its own, or in this one."""
         if not at_once:
-            return self.pictures(), self.pdf()
+            yield self.pictures, self.pdf
+            return
         with process_pool(2) as pool:
             pdf, pictures = pool.submit(self.pdf), pool.submit(self.pictures)
-            return pictures.result(), pdf.result()
+            yield pictures.result, pdf.result
 
 
 def write_report(
@@ -88,34 +91,29 @@ def write_report(
         tests=tuple(tests),
         failures=tuple(failures),
     )
-    pictures, pdf = content.drawn(at_once=at_once)
-    written = tables.write_csv(folder, content.places, tests, restitution, content.repetitions)
-    for picture in pictures:
-        path = folder / f"{picture.name}.svg"
-        path.write_text('<?xml version="1.0" encoding="utf-8"?>\n' + picture.svg, encoding="utf-8")
-        written.append(path)
-    good = sum(test.good for test in tests)
-    html = (
-        _environment()
-        .get_template("campaign.html")
-        .render(
+    with content.drawing(at_once=at_once) as (pictures, pdf):
+        page = _environment().get_template("campaign.html")
+        drawn = pictures()
+        html = page.render(
             title=title,
-            subtitle=f"{len(tests)} runs analysed, {good} of them in the means",
+            subtitle=f"{len(tests)} runs analysed, {sum(test.good for test in tests)} of them in the means",
             places=content.places,
             tests=tests,
             restitution=restitution,
             repetitions=content.repetitions,
-            figures=pictures,
+            figures=drawn,
             methods=[m for m in tables.METHODS if any(m in t.methods for t in tests)],
             left_out=[test for test in tests if not test.good],
             failures=failures,
             footer=footer,
         )
-    )
-    written += [
-        _replace(folder / "report.html", html.encode()),
-        _replace(folder / "report.pdf", pdf),
-    ]
+        document = pdf()
+    written = tables.write_csv(folder, content.places, tests, restitution, content.repetitions)
+    for picture in drawn:
+        path = folder / f"{picture.name}.svg"
+        path.write_text('<?xml version="1.0" encoding="utf-8"?>\n' + picture.svg, encoding="utf-8")
+        written.append(path)
+    written += [_replace(folder / "report.html", html.encode()), _replace(folder / "report.pdf", document)]
     return written
 
 

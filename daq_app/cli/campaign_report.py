@@ -42,7 +42,9 @@ def report(
     with reported():
         campaign = open_plan(plan_file)
         # Imported here: `--help` should not load SciPy.
-        warm_up("daq_app.campaign.collect", "daq_app.campaign.captioned", "daq_app.campaign.report_pdf")
+        drawing = ("daq_app.campaign.captioned", "daq_app.campaign.report_pdf")
+        # The program itself too: each worker imports it anew otherwise.
+        warm_up("daq_app.campaign.collect", *drawing, "daq_app.cli.app")
         from daq_app.campaign import collect as gathering
         from daq_app.campaign.report import write_report
         from daq_app.campaign.tables import mean_of_specimens, table_4_1

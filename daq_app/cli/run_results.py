@@ -20,7 +20,7 @@ def as_document(path: Path, outcome: str) -> dict[str, Any]:
 
 def _document(run: Run, outcome: str) -> dict[str, Any]:
     lost = sum(gap.n_samples for gap in run.gaps)
-    results = run.derived.results if run.derived is not None else {}
+    results = run.results
     document: dict[str, Any] = {
         "run": str(run.path),
         "run_id": run.header.run_id,

@@ -29,9 +29,12 @@ class Scaling:
         gain = [channel.polarity / channel.sensitivity_reading_per_si for channel in channels]
         return cls(np.array(zero, dtype=np.float64)[:, None], np.array(gain, dtype=np.float64)[:, None])
 
-    def to_si(self, readings: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n, m) readings to SI."""
-        return (readings - self.zero) * self.gain
+    def to_si(
+        self, readings: NDArray[np.float64], out: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
+        """(n, m) readings to SI, into `out` (which may be `readings` themselves) if given."""
+        tared = np.subtract(readings, self.zero, out=out)
+        return np.multiply(tared, self.gain, out=tared)
 
     def to_readings(self, si: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n, m) SI to readings."""

@@ -78,9 +78,7 @@ def _analyse(
     side = 1 if track.theta0_rad > 0 else -1
     peaks = filtered_peaks(signals.time_s, velocity, track.impacts_s)
     estimates = _estimates(signals, times, track, peaks, velocity_filter)
-    onsets = find_onsets(
-        signals.acceleration, record.rate_hz, signals.first_s, signals.acceleration_offsets_s, track.impacts_s
-    )
+    onsets = _onsets(record, signals, track)
     fit = _fit(signals, track, estimates) if options.fit else None
     theta0 = _theta0(signals, track)
     headline = theta0.get("tiltmeters", theta0["wires"])
@@ -138,6 +136,17 @@ def track_motion(
     )
     track.add_impacts(times.impacts_s, time_s, rotation_rad)
     return track
+
+
+def _onsets(record: TestRecord, signals: Signals, track: MotionTrack) -> list[Onset | None]:
+    """The shocks that the accelerometers show; they are read about the impacts only."""
+    ids = record.family("accelerometer")
+
+    def read(start: int, stop: int) -> Floats:
+        return record.load(ids, start, stop)
+
+    offsets = [record.offset_s(channel_id) for channel_id in ids]
+    return find_onsets(read, record.n_samples, record.rate_hz, signals.first_s, offsets, track.impacts_s)
 
 
 def _estimates(

@@ -218,4 +218,4 @@ def _dot(rows: Floats, coefficients: Floats) -> Floats:
 
 
 def _square(rows: Floats, covariance: Floats) -> Floats:
-    return np.asarray(np.einsum("aj,ajk,ak->a", rows, covariance, rows, optimize=True))
+    return np.asarray(np.einsum("ak,ak->a", (rows[:, None, :] @ covariance)[:, 0], rows))

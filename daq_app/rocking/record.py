@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -42,6 +42,12 @@ class RunLike(Protocol):
     def si(self, ids: Sequence[str] | None = None, start: int = 0, stop: int | None = None) -> Floats: ...
 
 
+class Load(Protocol):
+    """SI values (len(ids), stop − start) of channels, NaN in gaps; the columns count from 0."""
+
+    def __call__(self, ids: tuple[str, ...], start: int = 0, stop: int | None = None) -> Floats: ...
+
+
 @dataclass(frozen=True)
 class TestRecord:
     """One recording: everything from arming to the end, rows by channel id."""
@@ -53,8 +59,8 @@ class TestRecord:
     n_samples: int
     channel_ids: tuple[str, ...]
     """Channels that the recording has; a channel of the rig may be missing."""
-    load: Callable[[tuple[str, ...]], Floats]
-    """SI values (len(ids), n_samples) of channels, NaN in gaps."""
+    load: Load
+    """Reads channels, whole or in part."""
     first_sample: int = 0
     time_offsets_s: Mapping[str, float] = field(default_factory=dict)
     """Sample k of a channel shows the instant k / rate + this; 0 where not listed."""
@@ -76,31 +82,30 @@ class TestRecord:
         label: str = "",
     ) -> TestRecord:
         """A record in memory: `si` (n_channels, n) in the order of `channel_ids` (the rig's if not given)."""
-        ids = tuple(channel_ids) if channel_ids is not None else rig.channel_ids
-        if si.ndim != 2 or si.shape[0] != len(ids):
-            raise ValueError(f"{len(ids)} channels need an array with as many rows, not of shape {si.shape}")
-        row = {channel_id: index for index, channel_id in enumerate(ids)}
+        known = tuple(channel_ids) if channel_ids is not None else rig.channel_ids
+        if si.ndim != 2 or si.shape[0] != len(known):
+            raise ValueError(
+                f"{len(known)} channels need an array with as many rows, not of shape {si.shape}"
+            )
+        row = {channel_id: index for index, channel_id in enumerate(known)}
 
-        def load(wanted: tuple[str, ...]) -> Floats:
-            return si[[row[channel_id] for channel_id in wanted]]
+        def load(ids: tuple[str, ...], start: int = 0, stop: int | None = None) -> Floats:
+            return si[[row[channel_id] for channel_id in ids], start:stop]
 
         return cls(
-            rig, rate_hz, si.shape[1], ids, load, first_sample, dict(time_offsets_s or {}), tared, label
+            rig, rate_hz, si.shape[1], known, load, first_sample, dict(time_offsets_s or {}), tared, label
         )
 
     @classmethod
     def from_run(cls, run: RunLike, rig: Rig) -> TestRecord:
         """A record on an opened run, which must stay open while it is analysed."""
 
-        def load(wanted: tuple[str, ...]) -> Floats:
-            return run.si(wanted)
-
         return cls(
             rig=rig,
             rate_hz=run.rate_hz,
             n_samples=run.n_samples,
             channel_ids=run.channel_ids,
-            load=load,
+            load=run.si,
             first_sample=run.first_sample,
             time_offsets_s={cid: run.header.time_offset_s(cid) for cid in run.channel_ids},
             tared=bool(run.header.tare),

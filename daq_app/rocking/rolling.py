@@ -36,7 +36,7 @@ class RollingArray:
 
     def append(self, values: Floats) -> None:
         """Append (n,) or (rows, n) values."""
-        block = np.atleast_2d(values)
+        block = values if values.ndim == 2 else values[None]
         n = block.shape[1]
         if n > self._capacity:
             self._end += n - self._capacity

@@ -26,7 +26,7 @@ _SHORTEST_REST_S = 0.3
 
 @dataclass(frozen=True)
 class Signals:
-    """Rotation, tilt, joint and acceleration of a record; arrays (n,) or (channels, n)."""
+    """Rotation, tilt and joint of a record; arrays (n,) or (channels, n)."""
 
     record: TestRecord
     geometry: RotationGeometry
@@ -48,8 +48,6 @@ class Signals:
     joint: JointMotion | None
     lvdt_noise_rad: float
     fused: Fused | None
-    acceleration: Floats
-    acceleration_offsets_s: tuple[float, ...] = ()
     zeroed_at_rest: bool = False
     """Whether the zeros were taken from the rest after the test."""
 
@@ -69,8 +67,6 @@ class Signals:
             _zero(self.wires_m, rest),
             _zero(self.tilts_rad, settled),
             _zero(self.openings_m, rest),
-            self.acceleration,
-            self.acceleration_offsets_s,
         )
         return replace(zeroed, zeroed_at_rest=True)
 
@@ -103,7 +99,6 @@ def read_signals(record: TestRecord) -> Signals:
     rig = record.rig.model_copy(update={"channels": kept})
     frame = PhaseSettings.from_rig(rig, record.rate_hz, 0.0).frame_samples
     geometry = RotationGeometry.from_rig(rig, frame_samples=frame)
-    accelerometers = record.family("accelerometer")
     empty = np.empty((0, record.n_samples))
     tilts, lvdts = record.family("tiltmeter", "x"), record.family("lvdt")
     base = geometry.time_offset_s(record.time_offsets_s)
@@ -114,8 +109,6 @@ def read_signals(record: TestRecord) -> Signals:
         record.load(ids),
         record.load(tilts) if tilts else empty,
         _aligned(record.load(lvdts), lags) if lvdts else empty,
-        record.load(accelerometers) if accelerometers else empty,
-        tuple(record.offset_s(channel_id) for channel_id in accelerometers),
     )
 
 
@@ -125,8 +118,6 @@ def _combine(
     wires_m: Floats,
     tilts_rad: Floats,
     openings_m: Floats,
-    acceleration: Floats,
-    acceleration_offsets_s: tuple[float, ...],
 ) -> Signals:
     combined = geometry.rotation(wires_m)
     rotation = combined.rotation_rad
@@ -167,8 +158,6 @@ def _combine(
         joint=joint,
         lvdt_noise_rad=lvdt_noise,
         fused=fused,
-        acceleration=acceleration,
-        acceleration_offsets_s=acceleration_offsets_s,
     )
 
 
@@ -242,8 +231,21 @@ def _aligned(rows: Floats, lags: Sequence[float]) -> Floats:
     for row, lag in enumerate(lags):
         whole = math.floor(lag)
         share = lag - whole
-        index = np.clip(np.arange(-whole, rows.shape[1] - whole), 0, last)
-        aligned[row] = rows[row, index]
+        _shift(rows[row], min(max(whole, -last), last), aligned[row])
         if share:
-            aligned[row] += share * (rows[row, np.maximum(index - 1, 0)] - aligned[row])
+            earlier = np.empty(rows.shape[1])
+            _shift(rows[row], min(max(whole + 1, -last), last), earlier)
+            earlier -= aligned[row]
+            earlier *= share
+            aligned[row] += earlier
     return aligned
+
+
+def _shift(values: Floats, by: int, out: Floats) -> None:
+    """`values` moved `by` samples to later into `out`; the ends are continued as constant."""
+    if by > 0:
+        out[by:], out[:by] = values[:-by], values[0]
+    elif by < 0:
+        out[:by], out[by:] = values[-by:], values[-1]
+    else:
+        out[:] = values

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,7 +31,8 @@ class Onset:
 
 
 def find_onsets(
-    acceleration: Floats,
+    read: Callable[[int, int], Floats],
+    n_samples: int,
     rate_hz: float,
     first_s: float,
     offsets_s: Sequence[float],
@@ -39,25 +40,40 @@ def find_onsets(
 ) -> list[Onset | None]:
     """Shock near each impact time; None where fewer than two channels show one and agree.
 
-    `acceleration` (channels, n) in any unit, sample k at first_s + k / rate + its channel's offset.
+    `read(start, stop)` gives acceleration (channels, stop − start) in any unit of a record of `n_samples`;
+    sample k lies at first_s + k / rate + its channel's offset. Only what lies about the impacts is read.
     Each channel is differenced (slow motion falls away, the shock stays), and its onset is where
     two variances, before and after, describe the window best (Akaike's criterion on a split).
     """
     gaps = np.diff(np.asarray(impacts_s, dtype=np.float64), prepend=-math.inf, append=math.inf)
-    found: list[Onset | None] = []
+    windows = []
     for k, impact in enumerate(impacts_s):
         reach = min(_REACH_S, 0.45 * gaps[k], 0.45 * gaps[k + 1])
-        alike: dict[int, list[tuple[int, int]]] = {}
-        for row, offset in enumerate(offsets_s):
-            low = max(round((impact - reach - first_s - offset) * rate_hz), 0)
-            high = min(round((impact + reach - first_s - offset) * rate_hz), acceleration.shape[1])
-            alike.setdefault(max(high - low, 0), []).append((row, low))
+        places = [
+            (
+                max(round((impact - reach - first_s - offset) * rate_hz), 0),
+                min(round((impact + reach - first_s - offset) * rate_hz), n_samples),
+            )
+            for offset in offsets_s
+        ]
+        windows.append([(low, max(high, low)) for low, high in places])
+    if not offsets_s or not windows:
+        return [None] * len(windows)
+    start = min(low for places in windows for low, _ in places)
+    acceleration = read(start, max(high for places in windows for _, high in places))
+    found: list[Onset | None] = []
+    for places in windows:
+        alike: dict[int, list[int]] = {}
+        for row, (low, high) in enumerate(places):
+            alike.setdefault(high - low, []).append(row)
         picks = []
-        for size, places in alike.items():
-            windows = np.array([acceleration[row, low : low + size] for row, low in places])
-            for (row, low), (sample, strength) in zip(places, _picks(windows), strict=True):
+        for rows in alike.values():
+            parts = np.array(
+                [acceleration[row, places[row][0] - start : places[row][1] - start] for row in rows]
+            )
+            for row, (sample, strength) in zip(rows, _picks(parts), strict=True):
                 if strength >= _SHOCK_SIGMAS:
-                    picks.append((first_s + (low + sample) / rate_hz + offsets_s[row], strength))
+                    picks.append((first_s + (places[row][0] + sample) / rate_hz + offsets_s[row], strength))
         found.append(_agreement(picks))
     return found
 

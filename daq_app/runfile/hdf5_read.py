@@ -132,7 +132,8 @@ class Run:
         if len(scaling.rows) != len(ids):
             unknown = [channel_id for channel_id in ids if channel_id not in scaling.channels]
             raise RunFileError(f"{self.path}: its rig does not say how to scale {', '.join(unknown)}")
-        return scaling.to_si(self.readings(ids, start, stop))
+        values = self.readings(ids, start, stop)
+        return scaling.to_si(values, out=values)
 
     def time_s(self, start: int = 0, stop: int | None = None) -> NDArray[np.float64]:
         """Times of columns: absolute sample index / rate."""
@@ -144,6 +145,14 @@ class Run:
         """Signals that were computed when the run was saved, or None."""
         with damage_told(self.path, "the group of derived signals"):
             return self._read_derived() if layout.DERIVED in self._file else None
+
+    @property
+    def results(self) -> dict[str, Any]:
+        """The results of `derived` alone, without its signals; empty where there are none."""
+        with damage_told(self.path, "the results of the run"):
+            if layout.DERIVED not in self._file:
+                return {}
+            return self._json(self._group(layout.DERIVED), layout.RESULTS_JSON)
 
     def _require_memory(self, n_bytes: int) -> None:
         if n_bytes > _SMALL_BYTES and n_bytes > 0.75 * psutil.virtual_memory().available:

@@ -66,33 +66,34 @@ def checked_dataset(
     def refuse(why: str) -> RunFileError:
         return RunFileError(f"{path}: {group.name.rstrip('/')}/{name} {why}")
 
-    link = group.get(name, getlink=True)
-    if link is None:
+    # The plain calls below h5py's classes: a run has a hundred datasets, and each is asked all of this.
+    octets = name.encode()
+    if not group.id.__contains__(octets):
         raise refuse("is missing")
-    if not isinstance(link, h5py.HardLink):
+    if group.id.links.get_info(octets).type != h5py.h5l.TYPE_HARD:
         raise refuse("is a link to somewhere else, which a run never holds")
-    dataset = group[name]
-    # Each of these asks the library anew: once is enough.
-    shape = dataset.shape if isinstance(dataset, h5py.Dataset) else None
+    opened = h5py.h5o.open(group.id, octets)
+    shape = opened.shape if isinstance(opened, h5py.h5d.DatasetID) else None
     if shape is None or len(shape) > 1:
         raise refuse("is not a column of data")
-    dtype, chunks = dataset.dtype, dataset.chunks
-    creation = dataset.id.get_create_plist()
-    if creation.get_layout() == h5py.h5d.VIRTUAL or creation.get_external_count():
+    dtype, creation = opened.dtype, opened.get_create_plist()
+    kind = creation.get_layout()
+    if kind == h5py.h5d.VIRTUAL or creation.get_external_count():
         raise refuse("takes its data from another file, which a run never does")
     filters = [creation.get_filter(index)[0] for index in range(creation.get_nfilters())]
     if not _FILTERS.issuperset(filters):
         raise refuse("uses an unknown compression")
+    chunks = creation.get_chunk() if kind == h5py.h5d.CHUNKED else ()
     if itemsize is not None and (dtype.kind != "f" or dtype.itemsize != itemsize):
         raise refuse(f"holds {dtype}, not {8 * itemsize}-bit floating point numbers")
     if length is not None and shape != (length,):
         raise refuse(f"has shape {shape}, not ({length},)")
     n_bytes = math.prod(shape) * dtype.itemsize
-    if n_bytes > _MAX_DEFLATE_RATIO * dataset.id.get_storage_size() + 2**16:
+    if n_bytes > _MAX_DEFLATE_RATIO * opened.get_storage_size() + 2**16:
         raise refuse("claims more data than the file holds")
     if chunks and math.prod(chunks) * dtype.itemsize > _MAX_CHUNK_BYTES:
         raise refuse("has absurdly large chunks")
-    return dataset
+    return h5py.Dataset(opened)
 
 
 def read_text(path: Path, group: h5py.Group, name: str) -> str:

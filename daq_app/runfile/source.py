@@ -61,10 +61,12 @@ class RunScaling:
         channels = [known[header.channel_ids[row]] for row in rows]
         return cls({c.id: c for c in channels}, rows, Scaling.of(channels, header.tare))
 
-    def to_si(self, window: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n_channels, m) readings to (len(rows), m) SI."""
+    def to_si(
+        self, window: NDArray[np.float64], out: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
+        """(n_channels, m) readings to (len(rows), m) SI, into `out` if given."""
         known = window if len(self.rows) == len(window) else window[list(self.rows)]
-        return self.scaling.to_si(known)
+        return self.scaling.to_si(known, out)
 
     def stored_si(self, window: NDArray[np.float64]) -> NDArray[np.float32]:
         """Engineering units as the run file keeps them: SI in single precision."""
