@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
-from daq_app.gap.rocking_model.motion_grid import GRID_HZ, SMOOTH_HZ, Grid, coarse
+from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rotation import Rotation, wall_rotation, wire_reading, zeroed
 from daq_app.gap.rocking_model.swings import Swings
@@ -235,8 +235,8 @@ def _acceleration_block(run: GapRun, grid: Grid, pick: NDArray[np.bool_]) -> Blo
     ]
     if not chosen:
         return None
-    low_pass = butter(4, SMOOTH_HZ, fs=run.rate_hz, output="sos")
-    measured = coarse(sosfiltfilt(low_pass, np.mean([zeroed(run, i) for i in chosen], axis=0)), run.rate_hz)
+    # Means over 5 ms and no filter: one that rings carries an impact past the samples left out around it.
+    measured = coarse(np.mean([zeroed(run, i) for i in chosen], axis=0), run.rate_hz)
     height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))
     x = float(np.mean([run.sensors[i].position_m[0] for i in chosen]))
     arm = x - np.sign(grid.theta) * run.survey.half_base_m
