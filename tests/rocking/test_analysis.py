@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -42,6 +43,24 @@ def test_the_papers_filtered_peaks_are_biased_and_the_bias_is_told(whole):
     assert raw.r - told.mean == pytest.approx(0.895, abs=0.003)
     assert corrected.r == pytest.approx(0.895, abs=0.002)
     assert abs(analysis.bias["eav"].mean) < 3e-4 and abs(analysis.bias["crt"].mean) < 3e-4
+
+
+def test_accelerometers_are_read_about_the_impacts_only(whole):
+    test, expected = whole
+    record, read = record_of(test), []
+
+    def load(ids, start=0, stop=None):
+        if "AC-1" in ids:
+            read.append((start, stop))
+        return record.load(ids, start, stop)
+
+    analysis = analyse_record(replace(record, load=load), QUICK)
+    shocks = [cycle.accelerometer_s for cycle in analysis.half_cycles[1:]]
+    np.testing.assert_array_equal(shocks, [cycle.accelerometer_s for cycle in expected.half_cycles[1:]])
+    first, last = test.motion.impacts_s[0] * test.rate_hz, analysis.half_cycles[-1].start_s * test.rate_hz
+    ((start, stop),) = read
+    assert start == pytest.approx(first, abs=0.05 * test.rate_hz)
+    assert stop == pytest.approx(last, abs=0.05 * test.rate_hz)
 
 
 def test_theta0_by_family(whole):

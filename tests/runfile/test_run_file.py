@@ -49,6 +49,13 @@ def test_every_sample_comes_back(run, header: RunHeader, rig: Rig) -> None:
         derived = opened.derived
         assert derived is not None and derived.results == {"r": 0.9} and derived.step == 2
         np.testing.assert_array_equal(derived.signals["rotation"].values, np.arange(7.0))
+        assert opened.results == {"r": 0.9}
+
+
+def test_results_of_a_run_without_any(tmp_path: Path, make_journal) -> None:
+    make_journal(tmp_path / "a.journal")
+    with open_run(finalise(tmp_path / "a.journal", tmp_path / "a.h5")) as opened:
+        assert opened.results == {} and opened.derived is None
 
 
 def test_the_journal_is_kept_unless_told_otherwise(tmp_path: Path, make_journal) -> None:
