@@ -107,10 +107,11 @@ def test_twins_cannot_be_told_apart_and_the_measurement_is_named() -> None:
         (signed("k", 0.1),),
         "r + k (a − ½)",
         "test",
-        confusable_with=(Confusion("twin", "a torque sensor at the hinge"),),
+        confusable_with=(Confusion("twin", "Fit a torque sensor at the hinge."),),
     )
     result = diagnose(Twins(), make_runs(0, slope_k=0.05), Library([slope, twin, LIBRARY["shift"]]), FAST)
     assert result.decision.verdict == "cannot_tell"
+    assert ".." not in result.decision.sentence
     assert {h.effects for h in result.set95} == {("slope",), ("twin",)}
     assert "torque sensor" in result.next_measurement
 

@@ -185,7 +185,7 @@ def _cannot_tell(library: Library, members: Sequence[Answer]) -> tuple[Decision,
     family = members[0].first.family if len(families) == 1 else "several"
     if not advice:
         advice = "Repeat over more levels; the held-out score of each hypothesis is in the report."
-    words = "Cannot tell " + " from ".join(names[:4]) + f": {advice}."
+    words = "Cannot tell " + " from ".join(names[:4]) + f": {advice.rstrip('.')}."
     total = sum(m.probability for m in members)
     others = tuple(r.effects for r in members[0].alternatives[1:])
     return Decision("cannot_tell", members[0].effects, family, words, total, others), advice
