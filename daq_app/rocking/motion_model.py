@@ -7,7 +7,7 @@ deviation of ln r of each impact].
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,21 @@ _SOFT = 100.0
 _EPSILON = 1e-6
 
 
+@dataclass(frozen=True, slots=True)
+class _Course:
+    """The motion of one set of parameters at the fitted instants."""
+
+    motion: FreeRocking
+    index: NDArray[np.int_]
+    """Half-cycle of each instant."""
+    local: Floats
+    """Time from its peak."""
+    sign: Floats
+    rotation: Floats
+    """Unsigned, as the half-cycle has it."""
+    speed: Floats
+
+
 @dataclass(frozen=True)
 class MotionModel:
     """Residuals in units of their sigma, priors included."""
@@ -48,6 +63,8 @@ class MotionModel:
     log_r: float
     spread: float | None
     """None: r is the same at every impact."""
+    _last: dict[tuple[bytes, int, int], _Course] = field(default_factory=dict, init=False, repr=False)
+    """A fit asks for residuals and derivatives at the same place, one after the other."""
 
     def restitutions(self, x: Floats) -> Floats:
         """r of each impact (one value where all are the same), kept below 1 without a corner.
@@ -73,7 +90,7 @@ class MotionModel:
     def residual(self, x: Floats, span: int, stop_s: float) -> Floats:
         """(points + priors,) of the points up to `stop_s`, with `span` impacts in the motion."""
         inside = self.time_s <= stop_s
-        model = self._rotation(x, span, self.time_s[inside])
+        model = self._rotation(x, self._course(x, span, self.time_s[inside]), self.time_s[inside])
         priors = np.concatenate((x[2:5], x[FIXED:]))
         return np.concatenate(((model - self.rotation_rad[inside]) / self.sigma, priors))
 
@@ -84,9 +101,10 @@ class MotionModel:
         every r before through sums. So all columns of r need one further evaluation, not one each.
         """
         time = self.time_s[self.time_s <= stop_s]
-        motion = self.motion(x, span)
-        index, local, sign = motion.locate(time)
-        rotation, by_energy, by_peak_time = self._local(motion, index, local, sign)
+        course = self._course(x, span, time)
+        motion, index = course.motion, course.index
+        rotation = course.sign * course.rotation
+        by_energy, by_peak_time = self._local(course)
         energy, peak_time = self._chain(x, motion)
         columns = by_energy[:, None] * energy[index] + by_peak_time[:, None] * peak_time[index]
         # All times after the release are as 1/p: a larger p shows later rotations.
@@ -102,23 +120,33 @@ class MotionModel:
         deviations = np.zeros(1) if self.spread is None else self.spread * x[FIXED:]
         return np.asarray(self.log_r + _R_STEP * x[5] + deviations)
 
-    def _rotation(self, x: Floats, span: int, time_s: Floats) -> Floats:
-        motion = self.motion(x, span)
-        model = motion.at(time_s)[0]
+    def _course(self, x: Floats, span: int, time_s: Floats) -> _Course:
+        key = (x.tobytes(), span, time_s.size)
+        found = self._last.get(key)
+        if found is None:
+            motion = self.motion(x, span)
+            index, local, sign = motion.locate(time_s)
+            rotation, speed = half_cycle_rotation(
+                local, motion.peaks_rad[index], motion.p_rad_s, motion.alpha_rad
+            )
+            found = _Course(motion, index, local, sign, rotation, speed)
+            self._last.clear()
+            self._last[key] = found
+        return found
+
+    def _rotation(self, x: Floats, course: _Course, time_s: Floats) -> Floats:
+        motion, model = course.motion, course.sign * course.rotation
         # A point is a mean over `POINT_S`: of a parabola that is its middle plus θ̈ h²/24.
         free = time_s > motion.release_s
         bend = -(motion.p_rad_s**2) * np.sin(motion.alpha_rad * np.sign(model) - model) * free
         return np.asarray(model + bend * POINT_S**2 / 24.0 + ZERO_PRIOR_RAD * x[4])
 
-    def _local(
-        self, motion: FreeRocking, index: NDArray[np.int_], local: Floats, sign: Floats
-    ) -> tuple[Floats, Floats, Floats]:
-        """θ, dθ by d(ln E) of the half-cycle at fixed time from its peak, and by d(time of its peak)."""
-        p, alpha = motion.p_rad_s, motion.alpha_rad
-        rotation, speed = half_cycle_rotation(local, motion.peaks_rad[index], p, alpha)
+    def _local(self, course: _Course) -> tuple[Floats, Floats]:
+        """dθ by d(ln E) of the half-cycle at fixed time from its peak, and by d(time of its peak)."""
+        motion, alpha = course.motion, course.motion.alpha_rad
         larger = exact_amplitude(exact_energy(motion.peaks_rad, alpha) * math.exp(_EPSILON), alpha)
-        changed = half_cycle_rotation(local, larger[index], p, alpha)[0]
-        return sign * rotation, sign * (changed - rotation) / _EPSILON, -sign * speed
+        changed = half_cycle_rotation(course.local, larger[course.index], motion.p_rad_s, alpha)[0]
+        return course.sign * (changed - course.rotation) / _EPSILON, -course.sign * course.speed
 
     def _chain(self, x: Floats, motion: FreeRocking) -> tuple[Floats, Floats]:
         """(half-cycles, parameters) d(ln E_n)/dx and d(time of peak n)/dx, for θ0, release and r."""
