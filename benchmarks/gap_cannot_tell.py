@@ -1,0 +1,108 @@
+"""When the diagnosis cannot tell A from B and names a measurement: does that measurement resolve it?
+
+    python -m benchmarks.gap_cannot_tell [CASE …] [--seed S] [--again] [--page docs/gap-cannot-tell.md]
+
+A wall with effect A is simulated by the blind check's generator (`daq_app.gap.blind.world`, which shares
+nothing with the diagnosis), and diagnosed from little: one level, no LVDTs, a short record. Then what the
+library names as telling A from B is added for the same wall and the same sensors, and it is diagnosed again.
+One JSON per case and seed; those that exist are not done again.
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.cannot_tell_cases import CASES, Case
+from benchmarks.cannot_tell_measured import diagnose_with
+from benchmarks.cannot_tell_page import page
+from benchmarks.cannot_tell_wall import part_of, simulate
+from benchmarks.gap_study import Found, run_study
+from daq_app.gap.core import CannotDiagnose, Diagnosis, Options
+from daq_app.gap.rocking_model.study import diagnose_runs
+
+FOLDER = Path("build/gap_cannot_tell")
+
+
+def study(name: str, seed: int, cores: int) -> Found:
+    """Both diagnoses of one case; everything that the table needs."""
+    case, began = CASES[name], _cpu()
+    runs = simulate(case.truth, case.everything, seed)
+    options = Options(workers=cores)
+    little = part_of(runs, case.everything, case.little)
+    first = _answer(lambda: diagnose_runs(little, options))
+    more = part_of(runs, case.everything, case.more)
+    reading = case.reading + (0.0 if case.instrument is None else _error(case, seed))
+    second = _answer(
+        lambda: (
+            diagnose_runs(more, options)
+            if case.instrument is None
+            else diagnose_with(more, case.instrument, reading, options)
+        )
+    )
+    return {
+        "case": name,
+        "truth": case.name,
+        "parameters": case.truth.parameters,
+        "little": case.before,
+        "added": case.added,
+        "first": first,
+        "second": second,
+        "cpu_s": _cpu() - began,
+    }
+
+
+def _error(case: Case, seed: int) -> float:
+    """What the reading of the instrument is off by."""
+    assert case.instrument is not None
+    return float(case.instrument.sd * np.random.default_rng([seed, 23]).standard_normal())
+
+
+def _answer(ask: Callable[[], Diagnosis]) -> dict[str, Any]:
+    """What is kept of a diagnosis; a refusal is an answer too."""
+    try:
+        result = ask().to_dict()
+    except CannotDiagnose as refusal:
+        return {"decision": "refused", "sentence": str(refusal), "set95": [], "next": "", "top": []}
+    return {
+        "decision": result["decision"],
+        "sentence": result["decision_detail"]["sentence"],
+        "set95": [r["effects"] for r in result["set95"]],
+        "next": result["next_measurement"],
+        "top": [[r["effects"], r["probability"]] for r in result["which"][:6]],
+        "worst": result["goodness"]["worst"],
+    }
+
+
+def _cpu() -> float:
+    usage = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(u.ru_utime + u.ru_stime for u in usage)
+
+
+def _say(found: Found) -> str:
+    words = [
+        f"{which}: {found[which]['decision']} {found[which]['top'][:3]}" for which in ("first", "second")
+    ]
+    return " | ".join(words) + f" ({found['cpu_s']:.0f} s)"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run what is missing, then write the page."""
+    return run_study(
+        __doc__ or "",
+        list(CASES),
+        lambda name, given: study(name, given.seed, given.cores),
+        _say,
+        page,
+        FOLDER,
+        arguments,
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
