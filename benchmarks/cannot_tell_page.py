@@ -78,15 +78,16 @@ def _counts(found: list[Found]) -> list[str]:
 
 def _row(f: Found) -> str:
     strength = ", ".join(f"{name} {value:g}" for name, value in f["parameters"].items())
+    kind = outcome(f)
     cells = (
         f"{f['truth']}{mark_of(f)} ({strength})",
         str(f["seed"]),
         f["little"],
         _set(f["first"]),
         f["first"]["next"].rstrip("."),
-        f["added"],
-        _set(f["second"]),
-        _WORDS[outcome(f)],
+        "" if kind == "clear" else f["added"],
+        "" if kind == "clear" else _set(f["second"]),
+        _WORDS[kind],
     )
     return "| " + " | ".join(cells) + " |"
 
