@@ -61,7 +61,7 @@ def _case(
 
 
 def _both() -> list[Case]:
-    level, rule = "static tilt", "height of the LVDTs' points"
+    level, rule = "a level on the base", "height of the LVDTs' points"
     spread, again = "several levels", "half-cycle durations at equal peaks"
     later = "five tests at all levels, L1 and L2 repeated at the end"
     four = "four tests, L1 to L4"

@@ -50,14 +50,15 @@ LEVEL = Instrument(
 """A machinist's level of 0.05 mm/m."""
 RULE = Instrument("height of the LVDTs' points", "m", 2e-3, lambda values: values["mount_height"])
 """A steel rule."""
+_FORMING = ("filter_delay@wire", "slow_response@wire", "wire_inertia@wire")
 KNOCK = Instrument(
-    "rounding of a knock",
+    "form of a step",
     "1",
     0.2,
-    lambda values: float("filter_delay@wire.tau" in values),
+    lambda values: float(any(name.partition(".")[0] in _FORMING for name in values)),
     ("lag@wire", "filter_delay@wire"),
 )
-"""1 where a knock comes out rounded, 0 where it comes out later only: seen, not measured."""
+"""1 where a step comes out in another form (rounded, slower, ringing), 0 where only later: a look at it."""
 
 
 @dataclass(frozen=True)

@@ -68,12 +68,30 @@ def _counts(found: list[Found]) -> list[str]:
     kinds = [outcome(f) for f in ambiguous]
     resolved = kinds.count("resolved")
     held = sum([f["truth"]] in f["first"]["set95"] for f in ambiguous)
-    return [
+    said = sum(_says_so(f) for f in ambiguous)
+    lines = [
         f"{len(found)} rows; in {len(ambiguous)} the first set held several hypotheses (the truth among "
         f"them in {held}). Of these the measurement left the truth alone in {resolved}, a smaller set with "
         f"the truth in it in {kinds.count('smaller')}, one no smaller in {kinds.count('open')}, and one "
-        f"without the truth in {kinds.count('wrong')}."
+        f"without the truth in {kinds.count('wrong')}. In {said} of them the first diagnosis said that it "
+        "could not tell, or named the forms that it cannot tell apart; in the others its verdict was "
+        "another, though the set was open (one test of one level: other parameters explain it as well).",
+        "",
     ]
+    for seed in sorted({f["seed"] for f in ambiguous}):
+        mine = [outcome(f) for f in ambiguous if f["seed"] == seed]
+        lines.append(f"- Seed {seed}: {mine.count('resolved')} of {len(mine)} resolved.")
+    lost = [f for f in found if outcome(f) == "wrong" and len(f["first"]["set95"]) == 1]
+    if lost:
+        names = ", ".join(f"{f['truth']} (seed {f['seed']})" for f in lost)
+        lines.append(f"- Named wrongly from the first, with nothing else in the set: {names}.")
+    return lines
+
+
+def _says_so(found: Found) -> bool:
+    """Whether the first diagnosis says itself that it cannot tell."""
+    first = found["first"]
+    return first["decision"] == "cannot_tell" or "which no sensor here tells apart" in first["sentence"]
 
 
 def _row(f: Found) -> str:
