@@ -16,6 +16,7 @@ from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.sensor_blocks import Block, first_order
 from daq_app.gap.rocking_model.sensor_response import block_coefficients
 from daq_app.gap.rocking_model.study import model_and_library, prepare
+from daq_app.gap.rocking_model.wiring import mend
 from sim_hardware.dynamics import parameters as par
 from sim_hardware.sensors.scene import pivots
 
@@ -115,6 +116,16 @@ def test_a_channel_that_shows_no_sensor_of_its_kind_does_not_hide_exchanged_plug
     crossed, limits = prepare(runs)
     assert "swap@wire" in found_marks(crossed)
     assert any("WP-1 and WP-4 exchanged" in limit for limit in limits)
+
+
+def test_exchanged_accelerometers_are_seen_beside_one_that_is_off() -> None:
+    """What the others misfit as they are and as they would be says nothing about the two plugs."""
+    runs = simulate({"gain@AC-1": {"error": 0.3}}, ONE)
+    place = {sensor.id: i for i, sensor in enumerate(runs[0].sensors)}
+    for run in runs:
+        run.channels[[place["AC-3"], place["AC-5"]]] = run.channels[[place["AC-5"], place["AC-3"]]]
+    _, wiring = mend(runs)
+    assert wiring.exchanged == (("AC-3", "AC-5"), ("AC-5", "AC-3"))
 
 
 def test_curvature_of_all_wires_is_no_fault_of_one() -> None:
@@ -257,3 +268,9 @@ def test_a_tiltmeter_with_another_time_constant_is_another_filter_and_no_mere_de
             change = _predicted(run, values | changed, block, place) - plain
             assert change == pytest.approx(float(slower[place]), rel=0.1)
     assert abs(slower[block.names.index("gain")]) > 1e-3, "a delay alone would leave the gain as it is"
+
+
+def test_a_wall_that_sways_on_its_joint_at_rest_is_no_vibration_of_the_floor() -> None:
+    """A compliant joint makes a pendulum of the wall, which the accelerometers see after the last impact."""
+    runs = _prepared({"winkler": {"theta_c": 8e-4}})
+    assert all(run.vibration is not None and not run.vibration.found for run in runs)

@@ -125,13 +125,16 @@ def _order(misfit: FloatArray) -> tuple[list[int], int]:
     order = list(range(n))
     known = np.flatnonzero(misfit.min(axis=1) < EXCHANGE_MISFIT)
     table = misfit[np.ix_(known, known)]
-    straight = float(np.trace(table))
-    if known.size < 2 or straight <= EXCHANGE_MISFIT:
+    if known.size < 2 or float(np.trace(table)) <= EXCHANGE_MISFIT:
         return order, 0
+    at = np.arange(known.size)
     _, best = linear_sum_assignment(table + _MOVED * (1.0 - np.eye(known.size)))
-    left = float(table[np.arange(known.size), best].sum())
-    if left >= EXCHANGE_GAIN * straight:
+    # Those that stay where they are misfit before and after: they say nothing about the others' plugs.
+    moved = at != best
+    straight, after = float(table[at, at][moved].sum()), float(table[at, best][moved].sum())
+    if straight <= EXCHANGE_MISFIT or after >= EXCHANGE_GAIN * straight:
         return order, 0
+    left = float(table[at, best].sum())
     for i, j in zip(known, known[best], strict=True):
         order[int(i)] = int(j)
     turned = [float(np.trace(np.roll(misfit, k, axis=1))) for k in range(1, n)]
