@@ -63,6 +63,8 @@ CASES: dict[str, Effects] = {
     "drift@wire": {"drift@wire": {"rate": 4e-4}},
     "drift@tiltmeter": {"drift@tiltmeter": {"rate": 2e-4}},
     "drift@WP-2": {"drift@WP-2": {"rate": 4e-4}},
+    "wire_anchor@wire": {"wire_anchor@wire": {"height": 0.2}},
+    "wire_anchor@WP-2": {"wire_anchor@WP-2": {"height": 0.2}},
     "wire_cosine@wire": {"wire_cosine@wire": {"kappa": 0.2}},
     "wire_inertia@wire": {"wire_inertia@wire": {"frequency": 15.0, "zeta": 0.2}},
     "slow_response@LV-B03": {"slow_response@LV-B03": {"tau": 0.015}},

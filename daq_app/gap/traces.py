@@ -22,7 +22,14 @@ from scipy.signal import bessel, bilinear, lfilter
 from daq_app.gap.core import CannotDiagnose, Diagnosis
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.records import GapRun, Survey
-from daq_app.gap.rocking_model.rotation import joint_rotation, wall_rotation, zeroed
+from daq_app.gap.rocking_model.rotation import (
+    WireInverse,
+    anchors_off,
+    joint_rotation,
+    wall_rotation,
+    wires_of,
+    zeroed,
+)
 from daq_app.gap.rocking_model.swings import Swings, find_swings
 from sim_hardware.dynamics import Body, Motion, Release, Restitution
 from sim_hardware.dynamics import parameters as par
@@ -160,6 +167,7 @@ def _trace(
         slow_s=slow_s,
         rest_s=swings.rest_s - swings.release_s,
         height_m=float(np.sum(heights**2) / np.sum(heights)),
+        wires=wires_of(run),
     )
     return Trace(
         run.name,
@@ -283,6 +291,7 @@ def _seen(
     slow_s: float,
     rest_s: float,
     height_m: float,
+    wires: Sequence[WireInverse],
 ) -> FloatArray:
     """A motion as the family that is shown would show it; `height_m` is where the wires look."""
     fine = np.arange(time[0], time[-1] + 0.5e-3, 0.5e-3)
@@ -296,6 +305,8 @@ def _seen(
         b, a = bilinear(*bessel(2, 1.0 / delay, analog=True, norm="delay"), fs=1.0 / (fine[1] - fine[0]))
         theta = theta[0] + lfilter(b, a, theta - theta[0])
     theta = theta * (1.0 + terms.get("gain", {}).get("error", 0.0))
+    if higher := terms.get("wire_anchor", {}).get("height", 0.0):
+        theta = theta + anchors_off(wires, theta, higher)[0]
     theta = theta + terms.get("wire_cosine", {}).get("kappa", 0.0) * height_m * theta**2
     # A drift of all LVDTs lifts the joint and turns nothing; one of the wires looks like a rotation.
     for name, per in (("drift@wire", height_m), ("drift@tiltmeter", 1.0)):

@@ -141,6 +141,16 @@ SENSOR_EFFECTS: Final[tuple[EffectSpec, ...]] = (
         "wires at several heights",
     ),
     EffectSpec(
+        "wire_anchor",
+        _FAMILY,
+        "an anchor is not as high as the rig file says: the wire slopes, and sees the wall lift on one side",
+        "A_z' = A_z + h",
+        "geometry of the wire",
+        (Parameter("height", "m", -0.5, 0.5, "how much higher the anchor is", index=la.RW_ANCHOR + 2),),
+        ("wire_cosine",),
+        "height of the anchor by spirit level",
+    ),
+    EffectSpec(
         "wire_sag",
         _FAMILY,
         "a wire hangs through",
@@ -266,6 +276,8 @@ def _change(
             row[la.RW_GAIN] *= 1.0 + strength
         case "calibration":
             row[la.RW_GAIN] *= 1.0 + strength * generator(seed, name, "calibration").standard_normal()
+        case "wire_anchor":
+            row[la.RW_ANCHOR + 2] += strength
         case "clock":
             row[la.RW_CLOCK] = 1.0 + strength
         case "noise":

@@ -22,6 +22,7 @@ from daq_app.gap.traces import traces
         ("gain@wire", "error", 0.03, "wire"),
         ("lag@lvdt", "tau", 0.006, "lvdt"),
         ("wire_cosine@wire", "kappa", 0.8, "wire"),
+        ("wire_anchor@wire", "height", 0.3, "wire"),
     ],
 )
 def test_the_trace_with_the_effect_lies_on_the_record_and_the_one_without_does_not(

@@ -26,7 +26,8 @@ _SAME_TO_ALL_SENSORS: Final = (
     ("alpha_asymmetry", "base_tilt", "eccentric_mass"),
     ("dwell", "bounce"),
     ("lag", "filter_delay"),
-    ("wire_cosine", "wire_sag"),
+    # What makes a wire's length no straight measure of travel: the world's is an anchor at another height.
+    ("wire_cosine", "wire_sag", "wire_anchor"),
 )
 _OTHER_WORDS: Final[dict[str, tuple[str, ...]]] = {
     "winkler": ("compliant_joint", "semi_rigid_winkler"),

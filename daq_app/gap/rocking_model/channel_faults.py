@@ -17,7 +17,7 @@ from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.rotation import wall_rotation, zeroed
+from daq_app.gap.rocking_model.rotation import WireInverse, wall_rotation, zeroed
 from daq_app.gap.rocking_model.sensor_blocks import Block
 
 SHAPES = ("gain", "lag", "curvature", "drift")
@@ -159,9 +159,15 @@ def channel_block(run: GapRun, grid: Grid, family: Family, name: str) -> Block |
         expected=beside.expected,
         design=found.design,
         noise=found.noise * float(np.exp(max(usual, 0.0))),
+        wire=_wire(run, name) if family == "wire" else None,
         tags={name: family},
         levers=(CALIBRATION * beside.spread, *(_SOUND * beside.spread * t for t in TOLERANCE[family][1:])),
     )
+
+
+def _wire(run: GapRun, name: str) -> WireInverse:
+    sensor = next(sensor for sensor in run.sensors if sensor.id == name)
+    return WireInverse.of(sensor, run.survey.half_base_m)
 
 
 def deviation(beside: Others) -> Deviation:

@@ -10,6 +10,7 @@ from scipy.signal import cont2discrete, lfilter
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion_grid import GRID_HZ
+from daq_app.gap.rocking_model.rotation import TAIL_S
 from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.sensor_blocks import Block, first_order
 
@@ -72,20 +73,37 @@ def responded(values: FloatArray, effect: str, given: Mapping[str, float]) -> Fl
     raise KeyError(effect)
 
 
+def _rotation(block: Block) -> FloatArray:
+    """What the other wires say of the rotation."""
+    assert block.expected is not None
+    assert block.wire is not None
+    return block.expected / block.wire.sensor.position_m[2]
+
+
 def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     """Coefficients of one channel against its family, and the logarithm of what they leave over noise."""
     assert block.expected is not None
     assert block.design is not None
+    # A wire's faults act on its length, of which its height times the rotation is a curved picture.
+    true = block.expected if block.wire is None else block.wire.shortening(_rotation(block))
     total: FloatArray | None = None
     for key in {k.rpartition(".")[0] for k in values if k.rpartition(".")[0].endswith("@" + block.family)}:
         effect = key.partition("@")[0]
         if effect in MARKS:
             continue
         given = {k.rpartition(".")[2]: v for k, v in values.items() if k.rpartition(".")[0] == key}
-        series = responded(block.expected, effect, given) - block.expected
+        if effect == "wire_anchor":
+            assert block.wire is not None
+            series = block.wire.shortening(_rotation(block), given["height"]) - true
+        else:
+            series = responded(true, effect, given) - true
         total = series if total is None else total + series
     found = np.zeros(len(block.names))
     if total is not None:
+        if block.wire is not None:
+            # The zero of every channel is its rest at the end of the record.
+            total = total - total[-round(TAIL_S * GRID_HZ) :].mean()
+            total = block.wire.sensor.position_m[2] * block.wire.rotation(true + total) - block.expected
         seen = total[block.pick]
         found[:-1] = block.projection @ seen
         left = seen - block.design @ (block.design.T @ seen)

@@ -77,7 +77,6 @@ def _quiet(run: GapRun, grid: Grid) -> _Quiet | None:
         return None
     measured = np.mean([coarse(zeroed(run, i), run.rate_hz) for i in chosen], axis=0)
     height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))
-    low_pass = butter(3, 8.0, fs=GRID_HZ, output="sos")
     calm = quiet(run, grid)
     held, resting = calm & (grid.time_s < -0.05), calm & (grid.time_s > grid.rest_s + _REST_MARGIN_S)
     # Too short a part says nothing, but the other may: a quick pull leaves a swaying wall.
@@ -85,16 +84,24 @@ def _quiet(run: GapRun, grid: Grid) -> _Quiet | None:
     pick = held | resting
     if pick.sum() < _ENOUGH:
         return None
-    # Only the held part sways: its own rotation says by how much.
-    sway = np.zeros((2, grid.time_s.size))
-    before = grid.time_s < 0.0
-    theta = sosfiltfilt(low_pass, grid.raw[before] - grid.raw[before].mean())
-    twice = np.gradient(np.gradient(theta, 1 / GRID_HZ), 1 / GRID_HZ)
-    sway[0, before], sway[1, before] = -9.81 * theta, height * twice
-    columns = np.column_stack([held, resting, sway[0], sway[1]])[pick].astype(float)
+    # The held wall sways, and a compliant joint does at rest: its own rotation says by how much.
+    before, after = grid.time_s < 0.0, grid.time_s > grid.rest_s
+    sway = [column for part in (before, after) for column in _sway(grid.raw, part, height)]
+    columns = np.column_stack([held, resting, *sway])[pick].astype(float)
     columns[:, 2:] /= np.abs(columns[:, 2:]).max(axis=0) + 1e-30
     basis, _ = np.linalg.qr(columns[:, np.any(columns != 0.0, axis=0)])
     return _Quiet(grid.time_s[pick], measured[pick], basis, resting[pick])
+
+
+def _sway(rotation: FloatArray, part: NDArray[np.bool_], height: float) -> list[FloatArray]:
+    """What a rotation of the wall in one part of the run makes of the accelerometers, and of late ones."""
+    found = np.zeros((3, rotation.size))
+    if part.sum() >= _SHORTEST:
+        low_pass = butter(3, 8.0, fs=GRID_HZ, output="sos")
+        theta = sosfiltfilt(low_pass, rotation[part] - rotation[part].mean())
+        twice = np.gradient(np.gradient(theta, 1 / GRID_HZ), 1 / GRID_HZ)
+        found[:, part] = -9.81 * theta, height * twice, np.gradient(height * twice, 1 / GRID_HZ)
+    return list(found)
 
 
 def quiet(run: GapRun, grid: Grid) -> NDArray[np.bool_]:

@@ -45,6 +45,7 @@ _FREE = {
     "restitution_slope": ("k",),
     "twist": ("kick", "frequency", "zeta"),
     "ambient": ("amplitude", "frequency"),
+    "slow_release": ("tau",),
 }
 """Which parameters are fitted where not all are; the others keep the simulator's defaults."""
 _LOGARITHMIC = {("winkler", "theta_c"), ("slow_release", "tau"), ("residual_cable", "slack")} | {
@@ -61,11 +62,13 @@ _SENSORS = {
     "filter_delay": ("lvdt", "wire"),
     "drift": ("lvdt", "wire", "tiltmeter"),
     "wire_cosine": ("wire",),
+    "wire_anchor": ("wire",),
     "wire_inertia": ("wire",),
 }
+_OF_ALL = ("gain", "lag", "slow_response", "filter_delay", "drift")
 _ONE_CHANNEL: dict[str, tuple[str, ...]] = {
-    "lvdt": ("gain", "lag", "slow_response", "filter_delay", "drift"),
-    "wire": ("gain", "lag", "slow_response", "filter_delay", "drift", "wire_cosine", "wire_inertia"),
+    "lvdt": _OF_ALL,
+    "wire": (*_OF_ALL, "wire_cosine", "wire_anchor", "wire_inertia"),
     "accelerometer": ("gain", "drift"),
 }
 _INERTIA_STARTS = {"frequency": (8.0, 14.0, 24.0), "zeta": (0.1, 0.3)}
@@ -90,6 +93,7 @@ _WEAKEST_SIGNED = {
     "base_tilt": 2e-4,
     "eccentric_mass": 3e-4,
     "gain": 0.01,
+    "wire_anchor": 0.03,
 }
 """Where the design's ranges begin for strengths of either sign, which the simulator's do not say. A mass off
 centre begins where it turns gravity as a tilt of 0.2 mrad does, the slope of r at a tenth of its range."""
@@ -122,6 +126,8 @@ _FORMS = {
     "compliance": (
         Parameter("fall", 0.5, 0.4, "1", 0.0, 1.0, meaning="share that falls with the overturning moment"),
     ),
+    # Nobody knows how a hand or a winch lets go: from a force that dies away to one paid out evenly.
+    "slow_release": (Parameter("even", 0.5, 0.4, "1", 0.0, 1.0, meaning="how evenly the force falls"),),
     # Read from the run itself while the wall stands still, and carried on over its motion.
     "ambient": (
         Parameter(

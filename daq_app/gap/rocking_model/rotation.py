@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,12 +10,13 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.records import GapRun, Sensor
 
 TAIL_S = 0.3
 """The wall stands at rest at the end of a record; this much of it is the zero of every channel."""
 HOLD_S = 0.5
 NOISE_S = 0.45
+_ROTATIONS = np.linspace(-0.15, 0.15, 1201)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,21 +148,65 @@ def wire_reading(
     return shortening
 
 
+@dataclass(frozen=True, slots=True)
+class WireInverse:
+    """Rotation from the shortening of one wire, by its real geometry about the nominal edges."""
+
+    sensor: Sensor
+    half_base: float
+    shortenings: FloatArray
+    """Of the rotations `_ROTATIONS`, times `direction`: increasing."""
+    direction: float
+
+    @classmethod
+    def of(cls, sensor: Sensor, half_base: float) -> WireInverse:
+        """For a wire of the rig file, which says where its anchor is."""
+        assert sensor.anchor_m is not None
+        table = wire_reading(_ROTATIONS, sensor.position_m, sensor.anchor_m, half_base)
+        direction = 1.0 if table[-1] > table[0] else -1.0
+        return cls(sensor, half_base, direction * table, direction)
+
+    def rotation(self, shortening: FloatArray) -> FloatArray:
+        """θ, rad, at which the wire is shorter by `shortening`, m."""
+        return np.asarray(np.interp(self.direction * shortening, self.shortenings, _ROTATIONS))
+
+    def shortening(self, theta: FloatArray, anchor_higher: float = 0.0) -> FloatArray:
+        """Shortening, m, at `theta`, rad, with the anchor higher by `anchor_higher`, m."""
+        assert self.sensor.anchor_m is not None
+        x, y, z = self.sensor.anchor_m
+        return wire_reading(theta, self.sensor.position_m, (x, y, z + anchor_higher), self.half_base)
+
+
+def wires_of(run: GapRun) -> tuple[WireInverse, ...]:
+    """All wires whose geometry is known."""
+    chosen = (run.sensors[i] for i in run.indices("wire"))
+    return tuple(WireInverse.of(s, run.survey.half_base_m) for s in chosen if s.anchor_m is not None)
+
+
+def anchors_off(
+    wires: Sequence[WireInverse], theta: FloatArray, higher: float
+) -> tuple[FloatArray, FloatArray]:
+    """(rad, m): what higher anchors add to the wires' mean rotation (weights z²) and to the base."""
+    z = np.array([wire.sensor.position_m[2] for wire in wires])
+    longer = np.array([wire.shortening(theta, higher) for wire in wires])
+    turned = np.array([w.rotation(s) - theta for w, s in zip(wires, longer, strict=True)])
+    moved = longer - np.array([wire.shortening(theta) for wire in wires])
+    at_base = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
+    return np.tensordot(z**2 / np.sum(z**2), turned, 1), np.tensordot(at_base, moved, 1)
+
+
 def wall_rotation(run: GapRun) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
     """θ of each wire (w, n), their heights (w,), and their ids; clipped wires are left out.
 
     Each reading is turned into a rotation by the wire's real geometry about the nominal edges.
     """
-    grid = np.linspace(-0.15, 0.15, 1201)
     rows, heights, names = [], [], []
     for i in run.indices("wire"):
         sensor = run.sensors[i]
         raw = run.aligned(i)
         if sensor.anchor_m is None or not np.all(np.isfinite(raw)) or _clipped(raw, sensor.range_si).any():
             continue
-        table = wire_reading(grid, sensor.position_m, sensor.anchor_m, run.survey.half_base_m)
-        direction = 1.0 if table[-1] > table[0] else -1.0
-        rows.append(np.interp(direction * zeroed(run, i), direction * table, grid))
+        rows.append(WireInverse.of(sensor, run.survey.half_base_m).rotation(zeroed(run, i)))
         heights.append(sensor.position_m[2])
         names.append(sensor.id)
     return np.array(rows), np.array(heights), tuple(names)

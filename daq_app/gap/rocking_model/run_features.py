@@ -17,7 +17,14 @@ from daq_app.gap.rocking_model.impact_timing import acceleration_delay
 from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse, make_grid
 from daq_app.gap.rocking_model.records import GapRun, Survey
 from daq_app.gap.rocking_model.release_speed import release_speed
-from daq_app.gap.rocking_model.rotation import Rotation, joint_rotation, sample_noise, wall_rotation
+from daq_app.gap.rocking_model.rotation import (
+    Rotation,
+    WireInverse,
+    joint_rotation,
+    sample_noise,
+    wall_rotation,
+    wires_of,
+)
 from daq_app.gap.rocking_model.sensor_blocks import Block, blocks_of
 
 _SMALLEST_LOADING = 1e-3
@@ -54,6 +61,8 @@ class RockingRun:
     """(n, k): measurement covariance of the blocks as loadings."""
     notes: tuple[str, ...] = ()
     vibration: Vibration | None = None
+    wires: tuple[WireInverse, ...] = ()
+    """All wires whose geometry is known."""
     cache: dict[Any, Any] = field(default_factory=dict, compare=False)
 
     def rotation_alone(self) -> RockingRun:
@@ -153,6 +162,7 @@ def examine(run: GapRun, reference: str = "") -> Examined:
         *_wire_heights(run),
         np.zeros((len(values), 0)),
         notes,
+        wires=wires_of(run),
     )
     return Examined(run, joint, features.with_blocks(blocks))
 

@@ -17,7 +17,7 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.rotation import Rotation, wall_rotation, wire_reading, zeroed
+from daq_app.gap.rocking_model.rotation import Rotation, WireInverse, wall_rotation, wire_reading, zeroed
 from daq_app.gap.rocking_model.swings import Swings
 
 SWAY_HZ = 8.0
@@ -49,6 +49,8 @@ class Block:
     """Of a single channel: the shapes of the regression at the samples of `pick`."""
     noise: float = 1.0
     """Of a single channel: rms at rest."""
+    wire: WireInverse | None = None
+    """Of a single wire: how its rotation was made from its length, which is what its faults act on."""
     ring: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Of a ring-down: frequency in Hz, damping ratio, rate of the grid in Hz."""
     levers: tuple[float, ...] = ()

@@ -12,6 +12,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import extra_response as extra
 from daq_app.gap.rocking_model.memo import Memo
 from daq_app.gap.rocking_model.repeatability import bias_names, repeatability
+from daq_app.gap.rocking_model.rotation import anchors_off
 from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.sensor_blocks import (
     Block,
@@ -28,6 +29,7 @@ _FAMILY_EFFECTS = (
     ("filter_delay", "tau"),
     ("drift", "rate"),
     ("wire_cosine", "kappa"),
+    ("wire_anchor", "height"),
     ("wire_inertia", "frequency"),
 )
 """Effects on a whole family, and the parameter that says that they are there."""
@@ -47,15 +49,22 @@ def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
     rest = run.swings.rest_s - run.swings.release_s
     drift = values.get("drift@wire.rate", 0.0) / run.wire_height_m if name == "wire" else 0.0
     offset = values["zero"] + drift * (run.swings.peak_s - rest)
-    bend = values.get(f"wire_cosine@{name}.kappa", 0.0) * run.wire_bend_m
+    levels = side[:, None] * run.swings.levels
     slow = _second_order(values, name)
     acceleration = -(values["p"] ** 2) * np.sin(values["alpha"] - np.abs(peaks)) * side
     lost = np.where(np.arange(peaks.size) > 0, slow * acceleration, 0.0)
-    true = (peaks - offset - bend * peaks**2 - lost) / gain
+    true = (peaks - offset - _bent(run, values, peaks) - lost) / gain
     true[0] += side[0] * values["theta0"]
-    levels = side[:, None] * run.swings.levels
-    behind = (levels - offset[:, None] - bend * levels**2) / gain[:, None]
+    behind = (levels - offset[:, None] - _bent(run, values, levels)) / gain[:, None]
     return true, np.abs(behind)
+
+
+def _bent(run: RockingRun, values: Mapping[str, float], theta: FloatArray) -> FloatArray:
+    """What wires out of line add to a rotation that is read from them."""
+    found = values.get(f"wire_cosine@{run.reference}.kappa", 0.0) * run.wire_bend_m * theta**2
+    if higher := values.get(f"wire_anchor@{run.reference}.height", 0.0):
+        found = found + anchors_off(run.wires, theta, higher)[0]
+    return found
 
 
 def _second_order(values: Mapping[str, float], name: str) -> float:
@@ -174,6 +183,8 @@ def _added(run: RockingRun, family: str, values: Mapping[str, float], theta: Flo
             case "drift":
                 scale = {"wire": run.wire_height_m, "lvdt": np.inf}.get(family, 1.0)
                 parts.append(value / scale * (time_s - (run.swings.rest_s - run.swings.release_s)))
+            case "wire_anchor":
+                parts.append(anchors_off(run.wires, theta, value)[0])
             case "wire_cosine":
                 parts.append(run.wire_bend_m * value * theta**2)
     return np.sum(parts, axis=0) if parts else None
@@ -351,6 +362,8 @@ def _base(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatAr
     if "wire_cosine@wire.kappa" in values:
         bend = values["wire_cosine@wire.kappa"] * run.base_bend_m2
         total = total + bend * _unit(run, block, "square", lambda: run.grid.theta**2)
+    if higher := values.get("wire_anchor@wire.height", 0.0):
+        total = total + block.coefficients(anchors_off(run.wires, run.grid.theta, higher)[1])
     return total
 
 

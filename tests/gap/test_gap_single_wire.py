@@ -1,0 +1,41 @@
+"""One faulty wire among sound ones: what the model says of it is what the simulated rig shows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from simulated_wall import simulate
+
+from daq_app.gap.rocking_model.extra_response import channel
+from daq_app.gap.rocking_model.inspection import found_channels
+from daq_app.gap.rocking_model.sensor_blocks import Block
+from daq_app.gap.rocking_model.study import prepare
+
+LEVEL = (-0.35,)
+
+
+def _block(key: str, given: dict[str, float]) -> tuple[Block, np.ndarray]:
+    """The faulty wire's block, and what the model makes of the fault that it has."""
+    (run,) = prepare(simulate({key: given}, LEVEL))[0]
+    name = key.partition("@")[2]
+    assert found_channels([run]) == {name: "wire"}
+    block = next(b for b in run.blocks if b.kind == "channel")
+    values = {f"{key}.{parameter}": value for parameter, value in given.items()}
+    return block, channel(run, block, values)
+
+
+@pytest.mark.parametrize(
+    ("key", "given"),
+    [
+        ("drift@WP-1", {"rate": 8e-4}),
+        ("wire_anchor@WP-2", {"height": 0.34}),
+        ("wire_anchor@WP-3", {"height": -0.4}),
+        ("wire_cosine@WP-4", {"kappa": 0.2}),
+    ],
+)
+def test_a_wires_fault_acts_on_its_length(key: str, given: dict[str, float]) -> None:
+    """The wall lifts on one side only, so height times θ is a curved picture of a wire's length."""
+    block, predicted = _block(key, given)
+    sd = np.sqrt(np.diag(block.covariance))
+    sd[0] = np.hypot(sd[0], 1e-3)  # sound wires of the simulated rig differ in gain
+    np.testing.assert_array_less(np.abs(block.values - predicted), 4.0 * sd)
