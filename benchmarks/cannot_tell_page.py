@@ -15,6 +15,15 @@ _WORDS: Final = {
     "wrong": "**no, truth lost**",
 }
 
+_WHY: Final = {
+    "bounce": "The generator's hop lasts as long at every speed, the library's longer the faster the wall "
+    "comes: in all that is read of it, it is the library's dwell (gap-method.md, *What cannot be "
+    "separated*). The second mark on the accelerometers, which the library names, is not read.",
+    "ambient": "Without accelerometers nothing shows that the floor moves; the gate refuses every other "
+    "explanation.",
+}
+"""Of rows that are no plain ambiguity."""
+
 
 def outcome(found: Found) -> str:
     """One of the keys of the words: resolved, clear (nothing was ambiguous), smaller, open or wrong."""
@@ -50,6 +59,7 @@ def page(found: list[Found]) -> str:
         *(_row(f) for f in found),
         "",
         *_asked(found),
+        *(f"- **{name}**: {why}" for name, why in _WHY.items() if any(f["truth"] == name for f in found)),
     ]
     seconds = sorted(f["cpu_s"] for f in found)
     if seconds:
@@ -128,4 +138,4 @@ def _asked(found: list[Found]) -> list[str]:
     if not other:
         return []
     words = ", ".join(f"{f['truth']} (seed {f['seed']})" for f in other)
-    return [f"The first diagnosis asked for something else than was added: {words}."]
+    return [f"- The first diagnosis asked for something else than was added: {words}."]
