@@ -68,7 +68,8 @@ TWIST_FOLLOW: Final = 41  # rad/m per rad: twist in step with the rotation
 YAW_KICK: Final = 42  # rad per rad: yaw rate per velocity jump
 COMPLIANCE: Final = 43  # rad: rotation of the base under the moment m g R sin α
 SLIDE: Final = 44  # m per (rad/s): base slip at an impact
-N_PARAMETERS: Final = 45
+RELEASE_EVEN: Final = 45  # 0: the holding force dies away as exp(−t/τ); 1: it falls evenly to nothing
+N_PARAMETERS: Final = 46
 
 BOUNCE_SPEED: Final = 0.2
 """Approach speed (rad/s) at which a bounce takes `BOUNCE` seconds; the flight grows with the speed."""

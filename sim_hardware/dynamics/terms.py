@@ -43,7 +43,8 @@ C_PLAIN: Final = 21
 C_RISING: Final = 22  # sign of v, for Coulomb friction
 C_OPEN: Final = 23  # 1 beyond θc of the compliant joint
 C_TAUT: Final = 24  # 1 beyond θs of the residual cable
-N_COEFFICIENTS: Final = 25
+C_HOLD_EVEN: Final = 25
+N_COEFFICIENTS: Final = 26
 
 _GAUSS_X: Final = (0.0469100770306680, 0.2307653449471585, 0.5, 0.7692346550528415, 0.9530899229693320)
 _GAUSS_W: Final = (
@@ -83,6 +84,7 @@ def setup(
     c[C_SLACK] = vector[par.CABLE_SLACK]
     c[C_HOLD] = 0.0
     c[C_HOLD_RATE] = 0.0
+    c[C_HOLD_EVEN] = 0.0
     c[C_AMBIENT] = -side * vector[par.AMBIENT] / g * c[C_STIFF]
     c[C_AMBIENT_W] = 2.0 * math.pi * vector[par.AMBIENT_HZ]
     c[C_AMBIENT_PHASE] = vector[par.AMBIENT_PHASE]
@@ -138,6 +140,15 @@ def _restoring(q: float, v: float, c: NDArray[np.float64]) -> float:
 
 
 @part
+def _held_share(x: float, even: float) -> float:
+    """(1 − e x)^(1/e): exp(−x) for e = 0, a force that falls evenly to nothing for e = 1."""
+    if even < 1e-6:
+        return math.exp(-x)
+    left = even * x
+    return math.exp(math.log1p(-left) / even) if left < 1.0 else 0.0
+
+
+@part
 def acceleration(q: float, v: float, t: float, c: NDArray[np.float64]) -> float:
     """q̈ in the branch that `set_region` fixed."""
     if c[C_PLAIN] > 0.0:
@@ -150,17 +161,18 @@ def acceleration(q: float, v: float, t: float, c: NDArray[np.float64]) -> float:
         forcing = math.sin(c[C_AMBIENT_W] * t + c[C_AMBIENT_PHASE])
         a += c[C_AMBIENT] * forcing * math.cos(c[C_ALPHA] - q)
     if c[C_HOLD] > 0.0:
-        a += c[C_HOLD] * math.exp(-t * c[C_HOLD_RATE])
+        a += c[C_HOLD] * _held_share(t * c[C_HOLD_RATE], c[C_HOLD_EVEN])
     return float(a)
 
 
 @part
 def hold_back(vector: NDArray[np.float64], q: float, c: NDArray[np.float64]) -> None:
-    """Slow release: the force that held the wall at `q` dies away as exp(−t/τ) instead of at once."""
+    """Slow release: the force that held the wall at `q` dies away with the mean time τ, not at once."""
     if vector[par.SLOW_RELEASE] > 0.0:
         set_region(c, q, False)
         c[C_HOLD] = max(-_restoring(q, 0.0, c), 0.0)
-        c[C_HOLD_RATE] = 1.0 / vector[par.SLOW_RELEASE]
+        c[C_HOLD_EVEN] = vector[par.RELEASE_EVEN]
+        c[C_HOLD_RATE] = 1.0 / (vector[par.SLOW_RELEASE] * (1.0 + c[C_HOLD_EVEN]))
         c[C_PLAIN] = 0.0
 
 

@@ -244,6 +244,9 @@ def test_release_effects() -> None:
     hold = P2 * math.sin(ALPHA - THETA0)
     held = reference(lambda t, q, w: gravity(q) + (hold * math.exp(-t / tau) if q > 0 else 0.0), 2)
     agrees(simulated({"slow_release": {"tau": tau}}), held)
+    length = 2.0 * tau
+    evenly = reference(lambda t, q, w: gravity(q) + (hold * max(1.0 - t / length, 0.0) if q > 0 else 0.0), 2)
+    agrees(simulated({"slow_release": {"tau": tau, "even": 1.0}}), evenly, 2e-7)
 
 
 def test_a_vibrating_floor() -> None:
