@@ -138,6 +138,18 @@ def test_curvature_of_all_wires_is_no_fault_of_one() -> None:
     assert found_channels(_prepared({"wire_cosine@WP-4": {"kappa": 0.2}}, ONE)) == {"WP-4": "wire"}
 
 
+def test_a_drift_of_one_channel_is_no_curvature_of_its_family() -> None:
+    """u² of the opened face goes with a drift, so that a curvature of all LVDTs takes up much of it."""
+    assert found_channels(_prepared({"drift@LV-B09": {"rate": 3.5e-4}}, ONE)) == {"LV-B09": "lvdt"}
+
+
+def test_steps_of_all_wires_are_no_fault_of_one() -> None:
+    """At rest such a reading shows no step, and in motion the same ones in every half-cycle."""
+    runs = _prepared({"quantisation@wire": {"step": 7e-3}})
+    assert set(found_marks(runs)) == {"quantisation@wire"}
+    assert found_channels(runs) == {}
+
+
 def test_a_family_that_stops_short_of_its_range_is_found_and_the_motion_read_elsewhere() -> None:
     runs = _prepared({"saturation@lvdt": {"limit": 0.04}})
     assert set(found_marks(runs)) == {"saturation@lvdt"}

@@ -6,8 +6,9 @@ the whole family does cancels. What is left is regressed on a few shapes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,10 @@ class Others:
     pick: NDArray[np.bool_]
     spread: float
     """How many times one channel's calibration error the relative error of the prediction is."""
+    rough: float = 0.0
+    """Rms of what the steps of these readings make of the difference; 0 where they have none."""
+    repeats: int = 1
+    """Half-cycles, in each of which the same steps come back."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,29 +88,40 @@ class _Family:
     signals: FloatArray
     design: FloatArray
     pick: NDArray[np.bool_]
+    step: float = 0.0
+    repeats: int = 1
 
 
-def suspects(runs: Sequence[GapRun], grids: Sequence[Grid]) -> dict[Family, str]:
-    """The one channel of each family that disagrees with all others, where the others agree."""
+def suspects(
+    runs: Sequence[GapRun], grids: Sequence[Grid], steps: Mapping[str, float] = MappingProxyType({})
+) -> dict[Family, str]:
+    """The one channel of each family that disagrees with all others, where the others agree.
+
+    `steps` are those of the families, m, whose readings go in steps.
+    """
     found: dict[Family, str] = {}
     for family in TOLERANCE:
-        data = [_family(run, grid, family) for run, grid in zip(runs, grids, strict=True)]
+        step = steps.get(family, 0.0)
+        data = [_family(run, grid, family, step) for run, grid in zip(runs, grids, strict=True)]
         usable = [d for d in data if d is not None]
         if len(usable) < len(data) or not usable:
             continue
         some = usable[:: max(len(usable) // SCREENED, 1)][:SCREENED]
         sizes = _sizes(some, family, ())
         order = [name for name in sorted(sizes, key=lambda name: -sizes[name]) if sizes[name] > 0.5 * SUSPECT]
+        # A bad channel spoils the prediction of the others: right is the one without which all agree best.
+        agreed: list[tuple[float, float, str]] = []
         for name in order[:3]:
-            # A bad channel spoils the prediction of the others: right is the one without which all agree.
             rest = _sizes(usable, family, (name,))
             own = rest.pop(name)
             agree = max(SUSPECT, 0.4 * own)
             if own > SUSPECT and max(rest.values()) < agree:
-                # Curvature is the one fault of a whole family that does not cancel between its channels.
-                if max(_sizes([_straightened(d) for d in usable], family, ()).values()) > agree:
-                    found[family] = name
-                break
+                agreed.append((max(rest.values()), agree, name))
+        if agreed:
+            _, agree, name = min(agreed)
+            # Curvature is the one fault of a whole family that does not cancel between its channels.
+            if max(_sizes([_straightened(d) for d in usable], family, ()).values()) > agree:
+                found[family] = name
     return found
 
 
@@ -129,14 +145,19 @@ def _sizes(data: Sequence[_Family], family: Family, without: tuple[str, ...]) ->
 def _straightened(data: _Family) -> _Family:
     """The family less the error κ u² that, with one κ for all channels, explains most of its disagreement."""
     apart = np.eye(len(data.ids)) - data.design @ np.linalg.pinv(data.design)
-    seen, bent = (apart @ data.signals)[:, data.pick], (apart @ data.signals**2)[:, data.pick]
+    # A zero that is off or drifts is no curvature, though u² would take up most of it on one face.
+    steady = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, data.pick.size)[data.pick], 2))[0]
+    seen, bent = (
+        rows - (rows @ steady) @ steady.T
+        for rows in ((apart @ data.signals)[:, data.pick], (apart @ data.signals**2)[:, data.pick])
+    )
     kappa = float(np.sum(bent * seen)) / max(float(np.sum(bent**2)), 1e-300)
     return replace(data, signals=data.signals - kappa * data.signals**2)
 
 
-def channel_block(run: GapRun, grid: Grid, family: Family, name: str) -> Block | None:
-    """The coefficients of one channel as a block of features."""
-    data = _family(run, grid, family, include=(name,))
+def channel_block(run: GapRun, grid: Grid, family: Family, name: str, step: float = 0.0) -> Block | None:
+    """The coefficients of one channel as a block of features; `step` as for `suspects`."""
+    data = _family(run, grid, family, step, include=(name,))
     if data is None or name not in data.ids:
         return None
     beside = _beside(data, name, (name,))
@@ -186,10 +207,14 @@ def deviation(beside: Others) -> Deviation:
     inverse = np.linalg.pinv(columns / scale, rcond=1e-9) / scale[:, None]
     difference = (beside.measured - e)[beside.pick]
     left = difference - columns @ (inverse @ difference)
-    variance = float(left @ left) / max(left.size - columns.shape[1], 1)
+    variance = left_over = float(left @ left) / max(left.size - columns.shape[1], 1)
     fraction = max(independent_fraction(left), 0.01)
     rest = (beside.measured - e)[-round(0.4 * GRID_HZ) :]
     noise = float(np.std(rest - np.linspace(rest[:8].mean(), rest[-8:].mean(), rest.size))) + 1e-12
+    # At rest a reading in steps shows none of them, and in motion the same ones in every half-cycle.
+    noise = float(np.hypot(noise, beside.rough))
+    if beside.rough > 0.0:
+        variance *= max(beside.repeats, 1)
     kept = slice(0, len(SHAPES))
     covariance = variance / fraction * (inverse @ inverse.T)[kept, kept]
     return Deviation(
@@ -197,7 +222,7 @@ def deviation(beside: Others) -> Deviation:
         covariance,
         inverse[kept],
         np.linalg.qr(columns / scale)[0],
-        0.5 * float(np.log(variance / noise**2)),
+        0.5 * float(np.log(left_over / noise**2)),
         noise,
     )
 
@@ -211,20 +236,24 @@ def _beside(data: _Family, name: str, without: tuple[str, ...]) -> Others:
     sizes = np.sqrt(np.mean(data.signals[others] ** 2, axis=1))
     own = float(np.sqrt(np.mean(expected**2))) + 1e-300
     spread = float(np.sqrt(1.0 + np.sum((weights * sizes / own) ** 2)))
-    return Others(data.signals[place], expected, data.pick, spread)
+    rough = data.step / np.sqrt(12.0) * float(np.sqrt(1.0 + np.sum(weights**2)))
+    return Others(data.signals[place], expected, data.pick, spread, rough, data.repeats)
 
 
-def _family(run: GapRun, grid: Grid, family: Family, include: tuple[str, ...] = ()) -> _Family | None:
+def _family(
+    run: GapRun, grid: Grid, family: Family, step: float = 0.0, include: tuple[str, ...] = ()
+) -> _Family | None:
     whole = run.including(include)
     moving = (grid.time_s > -0.5) & (grid.time_s < grid.rest_s + 0.2)
+    found: _Family | None = None
     match family:
         case "lvdt":
-            return _lvdts(whole, moving & grid.valid)
+            found = _lvdts(whole, moving & grid.valid)
         case "wire":
-            return _wires(whole, moving)
+            found = _wires(whole, moving)
         case "accelerometer":
-            return _accelerometers(whole, moving & ~grid.near_impact)
-    return None
+            found = _accelerometers(whole, moving & ~grid.near_impact)
+    return found and replace(found, step=step, repeats=grid.impact_s.size)
 
 
 def _lvdts(run: GapRun, pick: NDArray[np.bool_]) -> _Family | None:

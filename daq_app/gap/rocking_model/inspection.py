@@ -68,13 +68,7 @@ def inspect(runs: Sequence[GapRun]) -> Inspected:
         if mark.value > 0 and _spoils(mark, families)
     }
     clean = [run.excluding(single) for run in clean]
-    stairs = {
-        m.key.partition("@")[2]
-        for row in marks
-        for m in row
-        if m.key.startswith("quantisation") and m.value > 0
-    }
-    clean, limits = saturated(clean, stairs)
+    clean, limits = saturated(clean, _steps(marks))
     marks = [[*row, *more] for row, more in zip(marks, limits, strict=True)]
     clipped = {
         mark.key.partition("@")[2]
@@ -138,10 +132,10 @@ def _coefficient(run: RockingRun, family: str, name: str) -> float | None:
 
 
 def without_suspects(
-    examined: Sequence[Examined], reference: str
+    examined: Sequence[Examined], marks: Sequence[Sequence[Mark]], reference: str
 ) -> tuple[list[Examined], dict[str, Family]]:
     """The runs with the channel of each family that disagrees with it taken out, and these channels."""
-    found = suspects([e.run for e in examined], [e.features.grid for e in examined])
+    found = suspects([e.run for e in examined], [e.features.grid for e in examined], _steps(marks))
     if not found:
         return list(examined), {}
     again = []
@@ -152,6 +146,15 @@ def without_suspects(
     return again, {name: family for family, name in found.items()}
 
 
+def _steps(marks: Sequence[Sequence[Mark]]) -> dict[str, float]:
+    """Step of the reading, m, of the families and channels that go in steps."""
+    seen: dict[str, list[float]] = {}
+    for mark in (mark for row in marks for mark in row):
+        if mark.key.startswith("quantisation") and mark.value > 0:
+            seen.setdefault(mark.key.partition("@")[2], []).append(mark.value)
+    return {target: float(np.median(values)) for target, values in seen.items()}
+
+
 def completed(
     examined: Sequence[Examined], marks: Sequence[Sequence[Mark]], channels: dict[str, Family]
 ) -> list[RockingRun]:
@@ -159,9 +162,10 @@ def completed(
     grids = [e.features.grid for e in examined]
     height = examined[0].features.survey.height_m
     more: list[list[Block]] = [[] for _ in examined]
+    steps = _steps(marks)
     for row, entry in zip(more, examined, strict=True):
         for name, family in channels.items():
-            block = channel_block(entry.run, entry.features.grid, family, name)
+            block = channel_block(entry.run, entry.features.grid, family, name, steps.get(family, 0.0))
             if block is not None:
                 row.append(block)
     bends = [bend_signals(e.run, e.joint, e.features.grid, height) for e in examined]
@@ -193,8 +197,7 @@ def _beside_stairs(run: RockingRun, marks: Sequence[Mark]) -> RockingRun:
     Steps are no noise: the same ones come back in every half-cycle, so that a regression does not see
     what they do to it.
     """
-    families = {m.key.partition("@")[2] for m in marks if m.key.startswith("quantisation") and m.value > 0}
-    spoilt = {name for family in families for name in _READ_FROM.get(family, ())}
+    spoilt = {name for family in _steps([marks]) for name in _READ_FROM.get(family, ())}
     if not spoilt:
         return run
     kept = tuple(

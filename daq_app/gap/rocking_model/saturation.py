@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -23,22 +24,25 @@ _GOES_ON = 1.025
 """How much further the rotation must go on than the channel."""
 
 
-def saturated(runs: Sequence[GapRun], stairs: Collection[str] = ()) -> tuple[list[GapRun], list[list[Mark]]]:
+def saturated(
+    runs: Sequence[GapRun], steps: Mapping[str, float] = MappingProxyType({})
+) -> tuple[list[GapRun], list[list[Mark]]]:
     """Runs with the ranges that the channels really have, and a mark per family: 1/limit, 0 for no limit.
 
-    `stairs` are families and channels whose reading goes in steps: their tops are flat for that.
+    `steps` are those, m, of families and channels whose reading goes in steps: their tops are flat for that.
     """
     rotations = {family: [_rotation(run, family) for run in runs] for family in _OTHER}
     marks: list[list[Mark]] = [[] for _ in runs]
     limits: dict[str, float] = {}
     for family, other in _OTHER.items():
         ids = [runs[0].sensors[i].id for i in runs[0].indices(family)]
+        roughness = [_roughness(run, other, steps.get(other, 0.0)) for run in runs]
         cells = [
             [
-                (0.0, 0.0) if family in stairs or name in stairs else _limit(run, name, rotation)
+                (0.0, 0.0) if family in steps or name in steps else _limit(run, name, rotation, rough)
                 for name in ids
             ]
-            for run, rotation in zip(runs, rotations[other], strict=True)
+            for run, rotation, rough in zip(runs, rotations[other], roughness, strict=True)
         ]
         table = np.array(cells).reshape(len(runs), len(ids), 2)
         # A limit is one in all runs: what a channel has gone beyond in another run was none.
@@ -101,8 +105,18 @@ def _rotation(run: GapRun, family: Family) -> FloatArray | None:
     return np.asarray(middle / (2.0 * run.survey.half_base_m), dtype=float)
 
 
-def _limit(run: GapRun, name: str, rotation: FloatArray | None) -> tuple[float, float]:
-    """(limit, reach) of a channel in m; limit 0 where it follows as far as the rotation goes."""
+def _roughness(run: GapRun, family: Family, step: float) -> float:
+    """Step of a family's readings as a share of what its middle channel travels."""
+    travels = [float(np.abs(zeroed(run, i)).max()) for i in run.indices(family)] if step > 0.0 else []
+    finite = [travel for travel in travels if np.isfinite(travel)]
+    return step / max(float(np.median(finite)), step) if finite else 0.0
+
+
+def _limit(run: GapRun, name: str, rotation: FloatArray | None, rough: float) -> tuple[float, float]:
+    """(limit, reach) of a channel in m; limit 0 where it follows as far as the rotation goes.
+
+    `rough` is the share of its largest by which the rotation itself goes in steps.
+    """
     i = next(k for k, sensor in enumerate(run.sensors) if sensor.id == name)
     sensor = run.sensors[i]
     if rotation is None or not np.all(np.isfinite(run.channels[i])):
@@ -130,9 +144,9 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None) -> tuple[float, 
     gain = float(np.median(mine[below] / np.maximum(expected[below], 1e-9)))
     reach = gain * expected[top]
     noise = float(np.std(mine[-40:]))
-    goes_on = float(np.quantile(reach, 0.98)) > _GOES_ON * largest
+    goes_on = float(np.quantile(reach, 0.98)) > (_GOES_ON + rough) * largest
     # Standing still while the rotation moves on is clipping; following at another rate is not.
     travel = float(np.quantile(reach, 0.99) - np.quantile(reach, 0.01))
     moved = float(np.quantile(mine[top], 0.95) - np.quantile(mine[top], 0.05))
-    steady = travel > 0.02 * largest + 3.0 * noise and moved < 0.5 * travel + 2.0 * noise
+    steady = travel > (0.02 + rough) * largest + 3.0 * noise and moved < 0.5 * travel + 2.0 * noise
     return (float(np.median(reading[top])), furthest) if goes_on and steady else (0.0, furthest)

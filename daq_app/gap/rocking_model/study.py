@@ -66,7 +66,7 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
         impacts = entry.features.impacts_before + entry.features.swings.peak_s.size
     if not examined:
         raise CannotDiagnose("None of the runs can be used.", " ".join(limits))
-    examined, channels = without_suspects(examined, reference)
+    examined, channels = without_suspects(examined, marks, reference)
     for entry in examined:
         limits += entry.features.notes
     limits += _stated(marks, channels)
