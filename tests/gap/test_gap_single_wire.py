@@ -39,3 +39,9 @@ def test_a_wires_fault_acts_on_its_length(key: str, given: dict[str, float]) -> 
     sd = np.sqrt(np.diag(block.covariance))
     sd[0] = np.hypot(sd[0], 1e-3)  # sound wires of the simulated rig differ in gain
     np.testing.assert_array_less(np.abs(block.values - predicted), 4.0 * sd)
+
+
+def test_of_two_wires_that_may_be_wrong_it_is_the_one_without_which_the_base_stands_still() -> None:
+    """Five wires at four heights leave one check: a gain of WP-1 or of WP-2 may explain the same."""
+    gains = {"gain@WP-1": {"error": 0.013}, "gain@WP-2": {"error": -0.027}}
+    assert found_channels(prepare(simulate(gains, LEVEL))[0]) == {"WP-2": "wire"}

@@ -109,20 +109,32 @@ def suspects(
         some = usable[:: max(len(usable) // SCREENED, 1)][:SCREENED]
         sizes = _sizes(some, family, ())
         order = [name for name in sorted(sizes, key=lambda name: -sizes[name]) if sizes[name] > 0.5 * SUSPECT]
-        # A bad channel spoils the prediction of the others: right is the one without which all agree best.
+        # A bad channel spoils the prediction of the others: right is one without which all agree. Of few
+        # sensors at few heights two may do, of which one asks for a base that moves with the wall.
         agreed: list[tuple[float, float, str]] = []
         for name in order[:3]:
             rest = _sizes(usable, family, (name,))
             own = rest.pop(name)
             agree = max(SUSPECT, 0.4 * own)
             if own > SUSPECT and max(rest.values()) < agree:
-                agreed.append((max(rest.values()), agree, name))
+                doubt = max(rest.values()) if family == "lvdt" else _base_moves(usable, name)
+                agreed.append((doubt, agree, name))
         if agreed:
             _, agree, name = min(agreed)
             # Curvature is the one fault of a whole family that does not cancel between its channels.
             if max(_sizes([_straightened(d) for d in usable], family, ()).values()) > agree:
                 found[family] = name
     return found
+
+
+def _base_moves(data: Sequence[_Family], without: str) -> float:
+    """Rms that the channels but one make of the base's movement: a wall stands still there, or nearly."""
+    total = 0.0
+    for entry in data:
+        others = [i for i, other in enumerate(entry.ids) if other != without]
+        moved = np.linalg.pinv(entry.design[others])[0] @ entry.signals[others]
+        total += float(np.mean(moved[entry.pick] ** 2))
+    return float(np.sqrt(total))
 
 
 def _sizes(data: Sequence[_Family], family: Family, without: tuple[str, ...]) -> dict[str, float]:
