@@ -286,3 +286,10 @@ def test_a_wall_that_sways_on_its_joint_at_rest_is_no_vibration_of_the_floor() -
     """A compliant joint makes a pendulum of the wall, which the accelerometers see after the last impact."""
     runs = _prepared({"winkler": {"theta_c": 8e-4}})
     assert all(run.vibration is not None and not run.vibration.found for run in runs)
+
+
+def test_a_floors_wave_in_the_accelerometers_is_no_calibration_of_theirs() -> None:
+    """Its share is found while the wall stands and taken out: what is left is the wall's own motion."""
+    for run in _prepared({"ambient": {"amplitude": 0.1, "frequency": 0.9}}):
+        assert run.vibration is not None and run.vibration.found
+        assert abs(_value(run, "accelerometer", "gain of inertia")) < 6e-3

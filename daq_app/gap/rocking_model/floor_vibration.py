@@ -7,7 +7,7 @@ what a sway implies at the accelerometers is taken out with the rotation's own r
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +65,19 @@ def find_vibration(runs: Sequence[GapRun], grids: Sequence[Grid]) -> list[Vibrat
     bend = float(np.gradient(np.gradient(sharp, fine[1] - fine[0]), fine[1] - fine[0]).min())
     sd = float(1.0 / np.sqrt(max(-bend, 1.0)))
     return [None if d is None else _share(d, best, sd, found) for d in data]
+
+
+def without_vibration(run: GapRun, grid: Grid, found: Vibration) -> GapRun:
+    """The run whose accelerometers show the wall alone: beside inertia a floor's wave looks like a gain."""
+    count = run.channels.shape[1]
+    time_s = grid.time_s[0] + (np.arange(count) + 0.5) / run.rate_hz - 0.5 / GRID_HZ
+    angle = 2.0 * np.pi * found.frequency_hz * time_s + found.phase
+    wave = found.amplitude * np.sin(angle) * np.cos(np.interp(time_s, grid.time_s, grid.theta))
+    channels = run.channels.copy()
+    for i in run.indices("accelerometer", "x"):
+        if not run.sensors[i].ac_coupled:
+            channels[i] -= wave
+    return replace(run, channels=channels)
 
 
 def _quiet(run: GapRun, grid: Grid) -> _Quiet | None:

@@ -15,7 +15,7 @@ from daq_app.config.rig import Family
 from daq_app.gap.core import CannotDiagnose, FeatureSet
 from daq_app.gap.rocking_model.channel_faults import channel_block, suspects
 from daq_app.gap.rocking_model.conditions import Mark, conditions_of, marks_of, without_hum
-from daq_app.gap.rocking_model.floor_vibration import find_vibration
+from daq_app.gap.rocking_model.floor_vibration import Vibration, find_vibration, without_vibration
 from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rings import (
@@ -173,6 +173,7 @@ def completed(
     _add_rings(more, examined, bends, "bending", slow=False)
     _add_rings(more, examined, turns, "turning", slow=True)
     vibrations = find_vibration([e.run for e in examined], grids)
+    examined = [_on_still_floor(e, v) for e, v in zip(examined, vibrations, strict=True)]
     runs = []
     for row, entry, vibration, seen in zip(more, examined, vibrations, marks, strict=True):
         grid = entry.features.grid
@@ -189,6 +190,14 @@ def completed(
         features = replace(_beside_stairs(entry.features, seen), vibration=vibration)
         runs.append(features.with_blocks(row))
     return runs
+
+
+def _on_still_floor(entry: Examined, vibration: Vibration | None) -> Examined:
+    """The same without the floor's part in the accelerometers; what it does to the wall stays."""
+    if vibration is None or not vibration.found:
+        return entry
+    still = without_vibration(entry.run, entry.features.grid, vibration)
+    return examine(still, entry.features.reference)
 
 
 def _beside_stairs(run: RockingRun, marks: Sequence[Mark]) -> RockingRun:
