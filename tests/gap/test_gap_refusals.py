@@ -62,6 +62,11 @@ def test_a_sensor_that_disagrees_is_left_out_and_named(wall: GapRun) -> None:
     assert used[0].swings.peak_rad[1] == pytest.approx(prepare([wall])[0][0].swings.peak_rad[1], rel=2e-3)
 
 
+def test_runs_without_any_lvdt_are_refused_in_words(wall: GapRun) -> None:
+    with pytest.raises(CannotDiagnose, match="only 0 LVDTs are usable"):
+        prepare([wall.excluding([wall.sensors[i].id for i in wall.indices("lvdt")])])
+
+
 def test_no_run_is_refused() -> None:
     with pytest.raises(CannotDiagnose, match="no run"):
         prepare([])

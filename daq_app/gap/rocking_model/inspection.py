@@ -108,6 +108,8 @@ def choose_reference(inspected: Inspected) -> str:
     """The family that the motion is read from: the prompter one where LVDTs and wires differ in time."""
     if inspected.reference:
         return inspected.reference
+    if not inspected.runs[0].indices("lvdt"):
+        return ""  # what can be said without them, the examination says
     run = max(inspected.runs, key=lambda r: float(np.nanmax(np.abs(r.channels[r.indices("lvdt")[0]]))))
     try:
         first = examine(run).features
