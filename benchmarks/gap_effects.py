@@ -87,8 +87,6 @@ WHY: dict[str, str] = {
     "eccentric_mass": "See base_tilt.",
     "restitution_asymmetry-1": "The scatter of r itself: with the draws of seed 1, which are the same in all "
     "its cases, half the difference of the true r of the two sides is 0.0008 ± 0.0003 without any effect.",
-    "polarity@LV-B06-5": "Named and covered, but the gate finds the first rise times too scattered for "
-    "noise; the cause was not found.",
     "pivot_shift": "Both move the pivot inwards; what tells them apart, how the opening grows with θ², also "
     "follows from the height of the LVDTs' points above the joint, which is not known.",
     "rounded_edge": "See pivot_shift.",
