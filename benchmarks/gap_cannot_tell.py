@@ -10,7 +10,6 @@ One JSON per case and seed; those that exist are not done again.
 
 from __future__ import annotations
 
-import resource
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +21,7 @@ from benchmarks.cannot_tell_cases import CASES, Case
 from benchmarks.cannot_tell_measured import diagnose_with
 from benchmarks.cannot_tell_page import page
 from benchmarks.cannot_tell_wall import part_of, simulate
-from benchmarks.gap_study import Found, run_study
+from benchmarks.gap_study import Found, cpu_s, run_study
 from daq_app.gap.core import CannotDiagnose, Diagnosis, Options
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import diagnose_runs
@@ -32,7 +31,7 @@ FOLDER = Path("build/gap_cannot_tell")
 
 def study(name: str, seed: int, cores: int) -> Found:
     """Both diagnoses of one case; everything that the table needs."""
-    case, began = CASES[name], _cpu()
+    case, began = CASES[name], cpu_s()
     runs = simulate(case.truth, case.everything, seed)
     options = Options(workers=cores)
     little = part_of(runs, case.everything, case.little)
@@ -47,7 +46,7 @@ def study(name: str, seed: int, cores: int) -> Found:
         "added": case.added,
         "first": first,
         "second": second,
-        "cpu_s": _cpu() - began,
+        "cpu_s": cpu_s() - began,
     }
 
 
@@ -75,11 +74,6 @@ def _answer(ask: Callable[[], Diagnosis]) -> dict[str, Any]:
     }
 
 
-def _cpu() -> float:
-    usage = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(u.ru_utime + u.ru_stime for u in usage)
-
-
 def _say(found: Found) -> str:
     words = [
         f"{which}: {found[which]['decision']} {found[which]['top'][:3]}" for which in ("first", "second")
@@ -89,15 +83,7 @@ def _say(found: Found) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run what is missing, then write the page."""
-    return run_study(
-        __doc__ or "",
-        list(CASES),
-        lambda name, given: study(name, given.seed, given.cores),
-        _say,
-        page,
-        FOLDER,
-        arguments,
-    )
+    return run_study(__doc__ or "", list(CASES), study, _say, page, FOLDER, arguments)
 
 
 if __name__ == "__main__":

@@ -10,13 +10,12 @@ of the code (`build/gap_effects/results`); the study of the loop goes on from th
 from __future__ import annotations
 
 import json
-import resource
 import sys
 from pathlib import Path
 from typing import Any
 
 from benchmarks.gap_campaign import Effects, simulate
-from benchmarks.gap_study import Found, mark_of, run_study, state_now, states_in_words
+from benchmarks.gap_study import Found, cpu_s, mark_of, run_study, state_now, states_in_words
 from daq_app.gap.core import Options
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.study import diagnose_runs
@@ -116,7 +115,7 @@ def diagnosed(name: str, seed: int, cores: int) -> dict[str, Any]:
 def study(name: str, seed: int, cores: int) -> Found:
     """Diagnose one case; everything that the table needs."""
     effects = CASES[name]
-    before = _cpu()
+    before = cpu_s()
     result = diagnosed(name, seed, cores)
     truth = next(iter(effects), "")
     first = result["which"][0]
@@ -145,7 +144,7 @@ def study(name: str, seed: int, cores: int) -> Found:
         "passed": result["goodness"]["passed"],
         "top": [[r["effects"], r["log_evidence"] - first["log_evidence"]] for r in result["which"][:5]],
         "limits": result["limits"],
-        "cpu_s": _cpu() - before,
+        "cpu_s": cpu_s() - before,
     }
 
 
@@ -158,11 +157,6 @@ def _same(truth: str, found: list[str]) -> bool:
     """Whether the library says that no sensor of the rig tells the two apart."""
     alike = rocking_library().alike_to(truth) if truth else None
     return alike is not None and len(found) == 1 and found[0] in alike.names
-
-
-def _cpu() -> float:
-    usage = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(u.ru_utime + u.ru_stime for u in usage)
 
 
 def _strength(value: float, limit: float | None, estimate: dict[str, Any] | None) -> float | None:
@@ -267,15 +261,7 @@ def _say(found: Found) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run what is missing, then write the page."""
-    return run_study(
-        __doc__ or "",
-        list(CASES),
-        lambda name, given: study(name, given.seed, given.cores),
-        _say,
-        page,
-        FOLDER,
-        arguments,
-    )
+    return run_study(__doc__ or "", list(CASES), study, _say, page, FOLDER, arguments)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ r and the effects are the file's, only releases and sensor calibrations are free
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from collections.abc import Mapping
@@ -152,9 +151,9 @@ def page(found: list[Found]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _loop_or_refusal(name: str, given: argparse.Namespace) -> Found:
+def _loop_or_refusal(name: str, seed: int, cores: int) -> Found:
     try:
-        return loop(name, given.seed, given.cores)
+        return loop(name, seed, cores)
     except CannotDiagnose as refusal:
         return {"effect": name, "refusal": str(refusal)}
 

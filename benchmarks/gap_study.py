@@ -15,6 +15,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from benchmarks.code_state import CodeState, code_state
 
 Found = dict[str, Any]
@@ -39,13 +41,16 @@ def state_now() -> CodeState:
 def run_study(
     about: str,
     cases: Sequence[str],
-    do: Callable[[str, argparse.Namespace], Found],
+    do: Callable[[str, int, int], Found],
     say: Callable[[Found], str],
     page: Callable[[list[Found]], str],
     folder: Path,
     arguments: Sequence[str] | None = None,
 ) -> int:
-    """Do the cases whose JSON is not there yet, then write the page. Returns the exit code."""
+    """Do the cases whose JSON is not there yet, then write the page. Returns the exit code.
+
+    `do(name, seed, cores)` does one case.
+    """
     given = _arguments(about, cases, folder, arguments)
     state = state_now()
     given.out.mkdir(parents=True, exist_ok=True)
@@ -56,7 +61,11 @@ def run_study(
             continue
         if time.monotonic() - began > given.for_s:
             break
-        found = do(name, given) | {"seed": given.seed, "commit": state.commit, "code": state.code}
+        found = do(name, given.seed, given.cores) | {
+            "seed": given.seed,
+            "commit": state.commit,
+            "code": state.code,
+        }
         target.write_text(json.dumps(found, indent=1), encoding="utf-8")
         print(f"{name}, seed {given.seed}: {say(found)}", flush=True)
     if given.quiet:
@@ -68,6 +77,11 @@ def run_study(
     else:
         print(text)
     return 0
+
+
+def cpu_s() -> float:
+    """Processor time of this process and of those that it has waited for, s."""
+    return sum(psutil.Process().cpu_times()[:4])
 
 
 def _arguments(

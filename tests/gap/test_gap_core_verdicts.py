@@ -9,7 +9,7 @@ import pytest
 from toy_wave import LIBRARY, DecayModel, make_runs
 
 from daq_app.gap.core import CannotDiagnose, Effect, Library, Options, diagnose, fit
-from daq_app.gap.core.fit import glance
+from daq_app.gap.core.fit import glance, searches_from
 from daq_app.gap.core.parallel import Interrupted
 from daq_app.gap.core.parameters import signed
 
@@ -99,7 +99,6 @@ def test_twins_cannot_be_told_apart_and_the_measurement_is_named() -> None:
             merged["slope.k"] = merged.get("slope.k", 0.0) + merged.pop("twin.k", 0.0)
             return super().predict(run, merged)
 
-    from daq_app.gap.core import Confusion
 
     slope = Effect(
         "slope",
@@ -169,7 +168,8 @@ def test_a_glance_says_what_a_fit_says_of_hypotheses_that_matter(strength: dict[
     fitted, seen = {}, {}
     for effect in LIBRARY.values():
         fitted[effect.name] = fit(model, runs, (effect,), null.known(), null.sigmas, True, null.columns)
-        seen[effect.name] = glance(model, runs, (effect,), null.known(), null.sigmas, null.columns)
+        start = searches_from(model, runs, (effect,), null.known(), null.sigmas, null.columns)
+        seen[effect.name] = glance(start)
     best = max(found.log_evidence for found in fitted.values())
     for name, found in fitted.items():
         assert seen[name].log_evidence < best + 0.5, "a glance never promises what a fit does not keep"

@@ -13,7 +13,7 @@ def _run(folder: Path, *arguments: str) -> tuple[list[str], list[Found]]:
     done: list[str] = []
     rows: list[Found] = []
 
-    def do(name: str, given: object) -> Found:
+    def do(name: str, seed: int, cores: int) -> Found:
         done.append(name)
         return {"case": name}
 

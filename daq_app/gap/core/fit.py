@@ -118,7 +118,7 @@ def fit(
     return _finish(best, converged, len(followed), agreeing, exact=polish)
 
 
-def glance(
+def searches_from(
     model: Model,
     runs: Sequence[Run],
     effects: Sequence[Effect],
@@ -126,18 +126,26 @@ def glance(
     sigmas: Mapping[str, float],
     frozen: Columns,
     hint: Mapping[tuple[str, int | None], float] | None = None,
-) -> Fit:
+) -> list[Search]:
+    """Searches from every start of the effects; with a `hint` (unit coordinates of what is not in `known`)
+    from that and zero."""
+    problem = Problem(model, runs, effects)
+    base = problem.start(known)
+    start_sigma = np.array([math.log(sigmas.get(s.name, s.median)) for s in model.scatters])
+    starts = _starts(problem, base, known) if hint is None else [base]
+    if hint:
+        starts.append(problem.start({**hint, **known}))
+    return [Search(problem, u, start_sigma.copy(), frozen) for u in starts]
+
+
+def glance(searches: Sequence[Search]) -> Fit:
     """What a hypothesis is worth to within a few per cent of what it gains, for a tenth of a fit's cost.
 
     Every start is judged by one linear step of all unknowns; the one that promises most takes
     `_GLANCES` steps at the scatter as it was, and if it does not keep its promise the one that is best as
     it stands. `Fit.settled` says whether no other start promises more than where this ended.
-    With a `hint` (unit
-    coordinates of what is not in `known`) the starts are that and zero.
     """
-    searches = _glanced(model, runs, effects, known, sigmas, frozen, hint)
-    problem = searches[0].problem
-    nothing = np.zeros(len(problem), dtype=bool)
+    nothing = np.zeros(len(searches[0].problem), dtype=bool)
     promises = [search.promise(nothing) for search in searches]
     best = searches[int(np.argmin(promises))]
     safe = min(searches, key=lambda search: search.objective)
@@ -151,42 +159,14 @@ def glance(
     return found
 
 
-def promised(
-    model: Model,
-    runs: Sequence[Run],
-    effects: Sequence[Effect],
-    known: Mapping[tuple[str, int | None], float],
-    sigmas: Mapping[str, float],
-    frozen: Columns,
-    hint: Mapping[tuple[str, int | None], float] | None = None,
-) -> float:
-    """The lowest −log posterior (`Fit.objective`) that one linear step from any start of a glance promises.
+def promised(searches: Sequence[Search]) -> float:
+    """The lowest −log posterior (`Fit.objective`) that one linear step from any of the starts promises.
 
     From the columns of a fit without one of the effects this is the score test of that effect, in which
-    all other unknowns give way as far as they can. It costs a part of a glance. Arguments as of `glance`.
+    all other unknowns give way as far as they can. It costs a part of a glance.
     """
-    searches = _glanced(model, runs, effects, known, sigmas, frozen, hint)
     nothing = np.zeros(len(searches[0].problem), dtype=bool)
     return min(search.promise(nothing) - search.scatter_prior(search.log_sigma) for search in searches)
-
-
-def _glanced(
-    model: Model,
-    runs: Sequence[Run],
-    effects: Sequence[Effect],
-    known: Mapping[tuple[str, int | None], float],
-    sigmas: Mapping[str, float],
-    frozen: Columns,
-    hint: Mapping[tuple[str, int | None], float] | None,
-) -> list[Search]:
-    """Searches from the starts of a glance."""
-    problem = Problem(model, runs, effects)
-    base = problem.start(known)
-    start_sigma = np.array([math.log(sigmas.get(s.name, s.median)) for s in model.scatters])
-    starts = _starts(problem, base, known) if hint is None else [base]
-    if hint:
-        starts.append(problem.start({**hint, **known}))
-    return [Search(problem, u, start_sigma.copy(), frozen) for u in starts]
 
 
 def _polish(search: Search, linear: Columns) -> bool:

@@ -12,10 +12,11 @@ from typing import Any, TypeVar
 
 from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.features import Run
-from daq_app.gap.core.fit import Fit, fit, glance, promised
+from daq_app.gap.core.fit import Fit, fit, glance, promised, searches_from
 from daq_app.gap.core.held_out import HeldOutRun, score
 from daq_app.gap.core.model import Model
 from daq_app.gap.core.problem import Columns
+from daq_app.gap.core.search import Search
 
 T = TypeVar("T")
 
@@ -54,8 +55,11 @@ class GlanceTask:
     """Unit coordinates to start from besides zero, in place of the effects' own starts."""
 
     def run(self, model: Model, runs: Sequence[Run], frozen: Columns | None = None) -> Fit:
-        known = {**(frozen or {}), **self.columns}
-        return glance(model, runs, self.effects, self.known, self.sigmas, known, self.hint)
+        return glance(self.searches(model, runs, {**(frozen or {}), **self.columns}))
+
+    def searches(self, model: Model, runs: Sequence[Run], columns: Columns) -> list[Search]:
+        """From every start that is looked at."""
+        return searches_from(model, runs, self.effects, self.known, self.sigmas, columns, self.hint)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,10 +72,7 @@ class PromiseTask:
 
     def run(self, model: Model, runs: Sequence[Run], frozen: Columns | None = None) -> list[float]:
         columns = {**(frozen or {}), **self.columns}
-        return [
-            promised(model, runs, seen.effects, seen.known, seen.sigmas, columns, seen.hint)
-            for seen in self.glances
-        ]
+        return [promised(seen.searches(model, runs, columns)) for seen in self.glances]
 
 
 @dataclass(frozen=True, slots=True)
