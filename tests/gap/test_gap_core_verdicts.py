@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from toy_wave import LIBRARY, DecayModel, make_runs
 
-from daq_app.gap.core import CannotDiagnose, Effect, Library, Options, diagnose, fit
+from daq_app.gap.core import CannotDiagnose, Confusion, Effect, Library, Options, diagnose, fit
 from daq_app.gap.core.fit import glance, searches_from
 from daq_app.gap.core.parallel import Interrupted
 from daq_app.gap.core.parameters import signed
@@ -98,7 +98,6 @@ def test_twins_cannot_be_told_apart_and_the_measurement_is_named() -> None:
             merged = dict(values)
             merged["slope.k"] = merged.get("slope.k", 0.0) + merged.pop("twin.k", 0.0)
             return super().predict(run, merged)
-
 
     slope = Effect(
         "slope",
