@@ -57,9 +57,9 @@ def run_all(
 @contextmanager
 def process_pool(workers: int | None = None) -> Iterator[ProcessPoolExecutor]:
     """A pool whose jobs have one thread each; whatever ends it, no job that waits is begun."""
-    pool = ProcessPoolExecutor(workers, mp_context=_context(), initializer=_leave_interrupts)
+    pool = ProcessPoolExecutor(workers, mp_context=worker_context(), initializer=_leave_interrupts)
     try:
-        with _surroundings():
+        with worker_surroundings():
             yield pool
     except BaseException:
         pool.shutdown(cancel_futures=True)
@@ -76,11 +76,11 @@ def warm_up(*modules: str) -> None:
         from multiprocessing import forkserver
 
         forkserver.set_forkserver_preload(list(modules))
-        with _surroundings():
+        with worker_surroundings():
             forkserver.ensure_running()
 
 
-def _context() -> BaseContext:
+def worker_context() -> BaseContext:
     """Never forked from this process, which may hold threads (a window, a reader) that a fork would break."""
     return get_context("forkserver" if _FORK_SERVER else "spawn")
 
@@ -91,7 +91,7 @@ def _leave_interrupts() -> None:
 
 
 @contextmanager
-def _surroundings() -> Iterator[None]:
+def worker_surroundings() -> Iterator[None]:
     """Workers inherit these when they start, where the user has not set them otherwise."""
     before = {name: os.environ.get(name) for name in _SURROUNDINGS}
     for name, value in before.items():

@@ -67,6 +67,20 @@ def test_unknown_form_of_a_known_family_is_called_so() -> None:
     assert shape[3] - shape[1] > 0.02, "more r above an amplitude of a half than below"
 
 
+def test_a_form_that_comes_near_is_not_named_where_a_free_form_gains_on_top_of_it() -> None:
+    """The gate sees nothing and the free form alone is little better: a score test on top is sharper."""
+    runs = make_runs(2, scatter=0.002, step_h=0.0153)
+    near = diagnose(DecayModel(), runs, LIBRARY, FAST)
+    assert near.goodness.passed
+    assert (near.decision.verdict, near.decision.family) == ("none_of_these", "loss")
+    assert "slope comes near" in near.decision.sentence
+    without = diagnose(DecayModel(), runs, LIBRARY.without("free"), FAST)
+    assert without.decision.effects == ("slope",)
+    for seed in range(4):
+        true = diagnose(DecayModel(), make_runs(seed, scatter=0.002, slope_k=0.03), LIBRARY, FAST)
+        assert true.decision.effects == ("slope",), seed
+
+
 def test_a_small_rest_does_not_unmake_an_effect_that_explains_a_large_gap() -> None:
     """A second, small cause is a stated limit beside a large first one; a larger one is not."""
     singles = LIBRARY.without("free")

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from daq_app.gap.core.effects import Library
-from daq_app.gap.core.evidence import Answer, Priors, credible_set
+from scipy.stats import chi2
+
+from daq_app.gap.core.effects import Effect, Library
+from daq_app.gap.core.evidence import NULL, Answer, Priors, credible_set
 from daq_app.gap.core.fit import Fit
 from daq_app.gap.core.goodness import Goodness
 from daq_app.gap.core.result import Decision, Verdict
@@ -26,6 +28,9 @@ class Thresholds:
     probe_log_bayes: float = 6.0
     """Log evidence by which a probe must beat the best named hypothesis of its family to say that the
     family's form is unknown."""
+    form_share: float = 0.03
+    """Share of what the best hypothesis gains over none that a free form of its family must gain on top of
+    it: where an effect is strong, less than that is the limit of our model of it."""
     goodness_p: float = 1e-3
     goodness_tolerated: float = 0.35
     temperature: float = 1.0
@@ -40,6 +45,22 @@ class Thresholds:
     priors: Priors = field(default_factory=Priors)
 
 
+@dataclass(frozen=True, slots=True)
+class FreeForm:
+    """Score test of a probe on top of the best hypothesis."""
+
+    family: str
+    gain: float
+    """In log posterior."""
+    p_value: float
+    """That the named form is the right one, times the number of probes that were tried."""
+
+    @classmethod
+    def of(cls, probe: Effect, gain: float, tried: int) -> FreeForm:
+        """Twice the gain is χ² with the probe's number of coefficients where there is nothing to gain."""
+        return cls(probe.family, gain, min(tried * float(chi2.sf(2.0 * gain, len(probe.parameters))), 1.0))
+
+
 @dataclass(slots=True)
 class Material:
     """What the verdict is made from."""
@@ -51,6 +72,8 @@ class Material:
     probes: Mapping[tuple[str, ...], Fit]
     goodness: Mapping[tuple[str, ...], Goodness]
     """Of the null, the best hypothesis and the best probe at least."""
+    free_forms: Sequence[FreeForm]
+    """Of the families of the best hypothesis."""
     null_gap: float
     """Gap of the fit without any effect, in the noise and scatter units of the best hypothesis."""
     best_gap: float
@@ -115,7 +138,7 @@ def _unexplained(material: Material, thresholds: Thresholds) -> tuple[Decision, 
     leader = max(material.probes, key=lambda k: material.probes[k].log_evidence, default=None)
     margin = material.probes[leader].log_evidence - log_best if leader else float("-inf")
     if explained and margin < thresholds.probe_log_bayes:
-        return None
+        return _another_form(material, thresholds)
     if leader is not None and margin >= thresholds.probe_log_bayes:
         family = material.library[leader[-1]].family
         probe_good = material.goodness.get(leader)
@@ -125,8 +148,7 @@ def _unexplained(material: Material, thresholds: Thresholds) -> tuple[Decision, 
         )
         if probe_good is not None and not probe_good.passed:
             words += f" Even that leaves structure: {probe_good.worst}."
-        advice = f"Look at the shape of the {family} map; add an effect of that form to the library."
-        return Decision("none_of_these", (), family, words, 1.0 - best.probability), advice
+        return _of_family(family, words, best)
     words = (
         f"None of these: the best hypothesis ({material.fits[best.effects].name}) does not pass the "
         f"goodness-of-fit gate: {good.worst}."
@@ -135,6 +157,28 @@ def _unexplained(material: Material, thresholds: Thresholds) -> tuple[Decision, 
         Decision("none_of_these", (), "unknown", words, 0.0),
         f"Look where the remaining gap lies: {good.worst}.",
     )
+
+
+def _another_form(material: Material, thresholds: Thresholds) -> tuple[Decision, str] | None:
+    """The family of the best hypothesis in a form that the library does not have."""
+    best = material.answers[0]
+    if not best.effects or not material.free_forms:
+        return None
+    form = min(material.free_forms, key=lambda f: f.p_value)
+    explained = material.fits[NULL].objective - material.fits[best.effects].objective
+    if form.p_value >= thresholds.goodness_p or form.gain < thresholds.form_share * explained:
+        return None
+    words = (
+        f"None of the library's effects, but the family is {form.family}: "
+        f"{describe(best, material.library)} comes near, and a free form on top of it gains "
+        f"{form.gain:.0f} in log posterior (p = {form.p_value:.0e})."
+    )
+    return _of_family(form.family, words, best)
+
+
+def _of_family(family: str, words: str, best: Answer) -> tuple[Decision, str]:
+    advice = f"Look at the shape of the {family} map; add an effect of that form to the library."
+    return Decision("none_of_these", (), family, words, 1.0 - best.probability), advice
 
 
 def _forgiven(material: Material, thresholds: Thresholds, good: Goodness) -> bool:

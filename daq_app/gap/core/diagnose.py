@@ -92,6 +92,7 @@ class _Study(Hypotheses):
             self.fits,
             self.probes,
             self._goodness,
+            self.free_forms(best),
             null_gap=self._gap(found, self.fits[NULL].known()),
             best_gap=self.leftover(best),
             nominal_gap=self._gap(

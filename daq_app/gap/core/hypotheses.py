@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from daq_app.gap.core.decision import Thresholds
+from daq_app.gap.core.decision import FreeForm, Thresholds
 from daq_app.gap.core.effects import Library
 from daq_app.gap.core.evidence import NULL, Ranked, pair_candidates, rank
 from daq_app.gap.core.features import Run
@@ -229,6 +229,26 @@ class Hypotheses:
         ]
         promised = [value for part in self.workers.run(tasks, "second effects") for value in part]
         return [p for p, reached in zip(pairs, promised, strict=True) if start.objective - reached > PROMISE]
+
+    def free_forms(self, best: Hypothesis) -> list[FreeForm]:
+        """What each probe of the families of the best hypothesis gains on top of it, by a score test.
+
+        Another form of a family that is in the library (drag with the square of the speed) leaves little that
+        the gate sees, since the named form takes up most of it; what is left has the shape of that family.
+        """
+        start = self.fits[best]
+        families = {self.library[name].family for name in best}
+        probes = [probe for probe in self.library.probes if probe.family in families]
+        effects = effects_of(best, self.library)
+        tasks = [
+            PromiseTask((GlanceTask((*effects, probe), start.known(), start.sigmas, {}, {}),), start.columns)
+            for probe in probes
+        ]
+        promised = [part[0] for part in self.workers.run(tasks, "free forms")] if tasks else []
+        return [
+            FreeForm.of(probe, start.objective - reached, len(probes))
+            for probe, reached in zip(probes, promised, strict=True)
+        ]
 
     def _fit_likely(self, pairs: Sequence[Hypothesis]) -> None:
         if not pairs:

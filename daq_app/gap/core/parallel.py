@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from daq_app.campaign.workers import worker_context, worker_surroundings
 from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.features import Run
 from daq_app.gap.core.fit import Fit, fit, glance, promised, searches_from
@@ -100,27 +98,11 @@ def _work(task: Task) -> Any:
     return task.run(_STATE["model"], _STATE["runs"], _STATE["frozen"])
 
 
-@contextmanager
-def _single_threaded_children() -> Iterator[None]:
-    """Workers started inside use one BLAS thread each; otherwise n workers start n² threads."""
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
 class Workers:
     """A pool for one model and its runs; with ``count=1`` everything runs in this process.
 
-    Use as a context manager. Worker processes are spawned, which is the only way that is safe on
-    every platform and beside a window.
+    Use as a context manager. Worker processes are forked from one that is kept for it (`warm_up` has the
+    model imported there), or spawned where there is none: both are safe beside a window.
     """
 
     def __init__(
@@ -151,10 +133,10 @@ class Workers:
         if self._count == 1 or len(listed) < 2:
             return self._in_process(listed, text)
         if self._pool is None:
-            with _single_threaded_children():
+            with worker_surroundings():
                 self._pool = ProcessPoolExecutor(
                     self._count,
-                    mp_context=multiprocessing.get_context("spawn"),
+                    mp_context=worker_context(),
                     initializer=_prepare,
                     initargs=(self._model, self._runs, self.frozen),
                 )

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from daq_app.campaign.workers import warm_up
 from daq_app.gap.core import CannotDiagnose, Diagnosis, Library, Options, diagnose
 from daq_app.gap.core.result import Decision
 from daq_app.gap.rocking_model.conditions import Mark
@@ -118,6 +119,8 @@ def diagnose_runs(
 
     Raises `CannotDiagnose` with the reason in words, and `parallel.Interrupted` when stopped.
     """
+    if options is not None and options.workers > 1:
+        warm_up(RockingModel.__module__)  # while the features are worked out
     prepared, limits = prepare(runs)
     sides = {np.sign(run.swings.peak_rad[0]) for run in prepared}
     if len({run.level for run in prepared}) < 2:
