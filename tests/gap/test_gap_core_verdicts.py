@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from toy_wave import LIBRARY, DecayModel, make_runs
 
@@ -79,6 +80,20 @@ def test_a_form_that_comes_near_is_not_named_where_a_free_form_gains_on_top_of_i
     for seed in range(4):
         true = diagnose(DecayModel(), make_runs(seed, scatter=0.002, slope_k=0.03), LIBRARY, FAST)
         assert true.decision.effects == ("slope",), seed
+
+
+def test_an_effect_of_every_run_is_as_strong_as_all_runs_together_make_it() -> None:
+    """Six runs at four sd each cannot be chance; six at one sd each are."""
+    found = fit(DecayModel(), make_runs(0), (LIBRARY["kick"],))
+    own = [k for k, (key, _) in enumerate(found.keys) if key == "kick.j"]
+    assert len(own) == 6
+    for each, together in ((4.0, 8.77), (1.0, 0.80)):
+        found.u[own], found.covariance = each, np.eye(len(found.u))
+        assert found.strength("kick") == pytest.approx(together, abs=0.01)
+    found.u[own] = 50.0
+    assert found.strength("kick") == pytest.approx(50.0 * 6**0.5, rel=0.01), (
+        "where the chance is not a number"
+    )
 
 
 def test_a_small_rest_does_not_unmake_an_effect_that_explains_a_large_gap() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from benchmarks.gap_campaign import simulate
@@ -33,6 +35,17 @@ def test_a_wall_thrown_up_and_one_pushed_down_are_told_apart() -> None:
         value, low, high = local["initial_velocity.omega"]
         assert low < true < high
         assert value == pytest.approx(true, rel=0.15)
+
+
+def test_impacts_too_small_to_be_timed_are_counted_for_what_wears() -> None:
+    """Files do not say how many impacts the wall has had, and half-cycles under 2 mrad are not timed."""
+    runs = simulate({"crushing": {"loss": 0.02}}, 11, levels=(0.4, 0.2, 0.3))
+    true = [run.impacts_before for run in runs]
+    assert true[0] == 0.0 < true[1] < true[2]
+    prepared, _ = prepare([replace(run, impacts_before=0.0) for run in runs])
+    assert [run.impacts_before for run in prepared] == pytest.approx(true, rel=0.06)
+    result = fit(RockingModel(prepared[0].survey), prepared, (rocking_library()["crushing"],))
+    assert result.values["crushing.loss"][0] == pytest.approx(0.02, rel=0.06)
 
 
 def test_a_clean_or_a_slow_release_claims_no_speed() -> None:

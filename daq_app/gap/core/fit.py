@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import log_ndtr
+from scipy.stats import chi2
 
 from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.features import FloatArray, Run
@@ -70,9 +71,10 @@ class Fit:
         return dict(zip(self.keys, (float(v) for v in self.u), strict=True))
 
     def strength(self, effect: str, only: Collection[str] = ()) -> float:
-        """How many posterior sd the effect's parameters are from zero (Mahalanobis distance / √k).
+        """How many posterior sd the effect is from none.
 
-        With `only`, of the parameters with these keys.
+        Of several parameters, or one in every run: the number of sd at which a single one would be as
+        unlikely by chance as their Mahalanobis distance is. With `only`, of the parameters with these keys.
         """
         index = [
             i
@@ -81,7 +83,12 @@ class Fit:
         ]
         block = self.covariance[np.ix_(index, index)]
         u = self.u[index]
-        return math.sqrt(max(float(u @ np.linalg.solve(block, u)), 0.0) / max(len(index), 1))
+        square = max(float(u @ np.linalg.solve(block, u)), 0.0)
+        if len(index) == 1:
+            return math.sqrt(square)
+        chance = float(chi2.sf(square, len(index)))
+        # So far out that the chance is no longer a number, the distance itself is right to a per cent.
+        return math.sqrt(float(chi2.isf(chance, 1)) if chance > 0.0 else square)
 
 
 def fit(

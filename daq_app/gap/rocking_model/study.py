@@ -64,7 +64,7 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
             continue
         examined.append(entry)
         marks.append(seen)
-        impacts = entry.features.impacts_before + entry.features.swings.peak_s.size
+        impacts = entry.features.impacts_before + entry.features.swings.impacts
     if not examined:
         raise CannotDiagnose("None of the runs can be used.", " ".join(limits))
     examined, channels = without_suspects(examined, marks, reference)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.rotation import HOLD_S
+from sim_hardware.dynamics.parameters import REST_AMPLITUDE_RAD
 
 FRACTIONS = (0.85, 0.5, 0.15)
 """Rotations at which half-cycles are timed, as shares of the peak."""
@@ -19,6 +21,8 @@ RELEASE_FRACTIONS = (0.99, 0.96, 0.85, 0.5, 0.15)
 SMALLEST_RAD = 2e-3
 """Half-cycles with smaller peaks are not used."""
 MOST = 30
+_LAST = 9
+"""Peaks from which the fall from one to the next is taken, where it no longer depends on the amplitude."""
 _SMOOTH_HZ = 30.0
 _WINDOW_S = 0.015
 
@@ -47,6 +51,17 @@ class Swings:
     """How far the held rotation sways, rad: nobody holds five tonnes still."""
     hold_rate_sd: float
     """Speed of that sway, rad/s."""
+
+    @property
+    def impacts(self) -> float:
+        """Impacts of the run until the wall rests by the simulator's criterion.
+
+        Those too small to be timed are as many as it takes to come to rest in the ratio of the last peaks:
+        what wears counts them too, and from 2 mrad down to rest they are half of all.
+        """
+        last = np.log(np.abs(self.peak_rad[-_LAST:]))
+        fall = max(float(last[0] - last[-1]) / (last.size - 1), 1e-3)
+        return self.peak_rad.size - 1 + max(float(last[-1]) - math.log(REST_AMPLITUDE_RAD), 0.0) / fall
 
 
 def find_swings(theta: FloatArray, noise_rad: float, rate_hz: float, name: str) -> Swings:
