@@ -46,6 +46,8 @@ class DiagonalMetric:
     def __init__(self, sd: FloatArray, prediction: Prediction, own: str, rows: NDArray[np.intp]) -> None:
         self._variance = sd**2
         self._own, self._rows = own, rows
+        self._seen = prediction.loadings[own] if own else None
+        """The loading of the coupled rows' scatter as it was given first: mostly it stays the same array."""
         self._given = prediction.loadings[own][rows] if own else np.zeros(0)
         self._scale = self._given
         if rows.size:
@@ -60,7 +62,9 @@ class DiagonalMetric:
         self._log_scale = 2.0 * float(np.log(np.abs(self._scale)).sum())
 
     def suits(self, prediction: Prediction) -> bool:
-        return not self._own or np.array_equal(prediction.loadings[self._own][self._rows], self._given)
+        if not self._own or prediction.loadings[self._own] is self._seen:
+            return True
+        return np.array_equal(prediction.loadings[self._own][self._rows], self._given)
 
     def prepare(self, matrix: FloatArray) -> FloatArray:
         turned = matrix.copy()

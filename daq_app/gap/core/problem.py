@@ -63,6 +63,10 @@ class Problem:
             np.array([k for k, u in enumerate(self.unknowns) if u.run is None or u.run == i], dtype=np.intp)
             for i in range(len(self.runs))
         ]
+        self._asked = [
+            [(int(k), self.unknowns[k].key, self.unknowns[k].parameter.value) for k in columns]
+            for columns in self._columns
+        ]
 
     def __len__(self) -> int:
         return len(self.unknowns)
@@ -73,9 +77,8 @@ class Problem:
 
     def values(self, run: int, u: FloatArray) -> dict[str, float]:
         """What the model is asked with for one run."""
-        return {
-            self.unknowns[k].key: self.unknowns[k].parameter.value(float(u[k])) for k in self._columns[run]
-        }
+        coordinates = u.tolist()
+        return {key: value(coordinates[k]) for k, key, value in self._asked[run]}
 
     def columns_of(self, lines: Iterable[Linearised], linear_only: bool = False) -> Columns:
         """Columns of Jacobians for later use: all, or those of linear parameters, which never change."""
@@ -103,26 +106,31 @@ class Problem:
         good enough to walk by. `known` are columns taken from elsewhere, shape (n,) by (key, run).
         """
         here = prediction or self.predict(run, u)
+        values = self.values(run, u)
         jacobian = np.zeros((here.features.size, len(self)))
-        for k in self._columns[run]:
-            column = known.get((self.unknowns[k].key, run)) if known else None
-            jacobian[:, k] = self._slope(run, u, k, here, exact) if column is None else column
+        for k, key, _ in self._asked[run]:
+            column = known.get((key, run)) if known else None
+            jacobian[:, k] = self._slope(run, u, values, k, here, exact) if column is None else column
         return Linearised(self.runs[run].features.values - here.features, jacobian, here)
 
-    def _slope(self, run: int, u: FloatArray, k: int, here: Prediction, exact: bool) -> FloatArray:
+    def _slope(
+        self, run: int, u: FloatArray, values: Mapping[str, float], k: int, here: Prediction, exact: bool
+    ) -> FloatArray:
         ahead, behind = min(u[k] + STEP, self.high[k]), max(u[k] - STEP, self.low[k])
         if exact:
-            slope: FloatArray = (self._at(run, u, k, ahead) - self._at(run, u, k, behind)) / (ahead - behind)
+            first, second = self._at(run, values, k, ahead), self._at(run, values, k, behind)
+            slope: FloatArray = (first - second) / (ahead - behind)
         elif ahead > u[k]:
-            slope = (self._at(run, u, k, ahead) - here.features) / (ahead - u[k])
+            slope = (self._at(run, values, k, ahead) - here.features) / (ahead - u[k])
         else:
-            slope = (here.features - self._at(run, u, k, behind)) / (u[k] - behind)
+            slope = (here.features - self._at(run, values, k, behind)) / (u[k] - behind)
         return slope
 
-    def _at(self, run: int, u: FloatArray, k: int, value: float) -> FloatArray:
-        moved = u.copy()
-        moved[k] = value
-        return self.predict(run, moved).features
+    def _at(self, run: int, values: Mapping[str, float], k: int, coordinate: float) -> FloatArray:
+        """Features with one unknown moved to a coordinate."""
+        unknown = self.unknowns[k]
+        moved = {**values, unknown.key: unknown.parameter.value(float(coordinate))}
+        return self.model.predict(self.runs[run], moved).features
 
     def start(self, known: Mapping[tuple[str, int | None], float]) -> FloatArray:
         """A starting vector: `known` unit coordinates by (key, run), else 0, inside the bounds."""

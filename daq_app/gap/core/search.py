@@ -45,6 +45,8 @@ class Search:
         self.damping = 1e-3
         self._metrics: list[Metric | None] = [None] * len(problem.runs)
         self._prepared: list[FloatArray] = []
+        self._equations: dict[bytes, tuple[FloatArray, FloatArray, float]] = {}
+        """Normal equations of the last linearisation, by the scatter sizes."""
         self._moved = True
         """Whether the unknowns, or the columns to use, have changed since the last linearisation."""
         self.objective = self.value_at(u, self.predictions, log_sigma)
@@ -86,6 +88,7 @@ class Search:
         ]
         self.known = self.problem.columns_of(self.lines, linear_only=True) | self.known
         self._moved = False
+        self._equations = {}
         self._prepared = []
         for i, line in enumerate(self.lines):
             columns = np.column_stack([line.jacobian[:, self.problem.columns(i)], line.residual])
@@ -102,7 +105,17 @@ class Search:
         self._moved = True
 
     def normal_equations(self, log_sigma: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-        """Hessian (with priors), gradient of −log posterior, and log likelihood of the linearisation."""
+        """Hessian (with priors), gradient of −log posterior, and log likelihood of the linearisation.
+
+        A promise, the step after it and the evidence at the end ask for the same ones.
+        """
+        key = log_sigma.tobytes()
+        found = self._equations.get(key)
+        if found is None:
+            found = self._equations[key] = self._summed(log_sigma)
+        return found
+
+    def _summed(self, log_sigma: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         sigmas = self.sigmas(log_sigma)
         p = len(self.problem)
         hessian, gradient, log_like = np.eye(p), self.u.copy(), 0.0

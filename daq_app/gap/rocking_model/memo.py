@@ -38,6 +38,11 @@ class Watched(Mapping[str, float]):
         self.asked[str(key)] = None
         return key in self._values
 
+    def any_of(self, keys: Mapping[str, None]) -> bool:
+        """Whether any of the keys is there, all of them noted at once."""
+        self.asked.update(keys)
+        return not keys.keys().isdisjoint(self._values)
+
     def __iter__(self) -> Iterator[str]:
         self.listed = True
         return iter(self._values)
@@ -45,6 +50,11 @@ class Watched(Mapping[str, float]):
     def __len__(self) -> int:
         self.listed = True
         return len(self._values)
+
+
+def any_of(values: Mapping[str, float], keys: Mapping[str, None]) -> bool:
+    """Whether any of the keys has a value; of watched values, all of them count as asked for."""
+    return values.any_of(keys) if isinstance(values, Watched) else not keys.keys().isdisjoint(values)
 
 
 @dataclass(slots=True)

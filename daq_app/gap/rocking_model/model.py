@@ -12,6 +12,7 @@ from daq_app.gap.core import Parameter, Prediction, Run, Scatter
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import sensor_response as response
 from daq_app.gap.rocking_model.extra_response import with_measured_inputs
+from daq_app.gap.rocking_model.free_forms import free_times
 from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.records import Survey
 from daq_app.gap.rocking_model.repeatability import biases
@@ -148,25 +149,29 @@ class RockingModel:
     def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
         assert isinstance(run, RockingRun)
         values = with_measured_inputs(run, values)
-        n = len(run.features)
-        predicted = np.empty(n)
-        loading_r, loading_t, loading_s = np.zeros(n), np.zeros(n), np.zeros(n)
+        predicted = np.empty(len(run.features))
+        loading_r = np.zeros(len(run.features))
         count = len(run.places)
         predicted[:count], peaks, slopes = self._remembered(run, "swings", values, self._swings)
-        loading_t[:count] = 1.0
-        loading_0 = np.zeros(n)
-        loading_0[:count] = (run.places[:, 0] == 0) & (run.places[:, 2] == 0)
         last = count + run.peaks.size
         predicted[count:last] = peaks
         loading_r[count:last] = 1.0 / slopes
-        predicted[last:], loading_s[last:] = response.block_coefficients(run, values)
-        loadings = {
-            SCATTER_R: loading_r,
-            SCATTER_TIME: loading_t,
-            SCATTER_RELEASE: loading_0,
-            SCATTER_SENSOR: loading_s,
-        }
+        predicted[last:], units = response.block_coefficients(run, values)
+        loadings = {SCATTER_R: loading_r, **self._fixed_scatters(run, units)}
         return Prediction(predicted, loadings, run.block_loadings)
+
+    @staticmethod
+    def _fixed_scatters(run: RockingRun, units: FloatArray) -> dict[str, FloatArray]:
+        """Loadings that no parameter changes, worked out once per run; `units` are those of the blocks."""
+        if "loadings" not in run.cache:
+            times, releases, sensors = (np.zeros(len(run.features)) for _ in range(3))
+            count = len(run.places)
+            times[:count] = 1.0
+            releases[:count] = (run.places[:, 0] == 0) & (run.places[:, 2] == 0)
+            sensors[count + run.peaks.size :] = units
+            run.cache["loadings"] = {SCATTER_TIME: times, SCATTER_RELEASE: releases, SCATTER_SENSOR: sensors}
+        found: dict[str, FloatArray] = run.cache["loadings"]
+        return found
 
     @staticmethod
     def _remembered(
@@ -210,7 +215,7 @@ class RockingModel:
         across = run.across
         k = places[across, 0]
         times[across] += table[k, shooting.FALL_S] + pause[k] + table[k + 1, shooting.RISE_S]
-        times = times / clock + response.free_times(run, values)
+        times = times / clock + free_times(run, values)
         k = run.peaks
         before = k - 1
         r = restitution_of(run, values, speeds_out[before], np.sign(true[before]), before)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import extra_response as extra
-from daq_app.gap.rocking_model.memo import Memo
+from daq_app.gap.rocking_model.memo import Memo, any_of
 from daq_app.gap.rocking_model.repeatability import bias_names, repeatability
 from daq_app.gap.rocking_model.rotation import anchors_off
 from daq_app.gap.rocking_model.run_features import RockingRun
@@ -50,18 +49,21 @@ def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
     drift = values.get("drift@wire.rate", 0.0) / run.wire_height_m if name == "wire" else 0.0
     offset = values["zero"] + drift * (run.swings.peak_s - rest)
     levels = side[:, None] * run.swings.levels
-    slow = _second_order(values, name)
-    acceleration = -(values["p"] ** 2) * np.sin(values["alpha"] - np.abs(peaks)) * side
-    lost = np.where(np.arange(peaks.size) > 0, slow * acceleration, 0.0)
+    lost: FloatArray | float = 0.0
+    if slow := _second_order(values, name):
+        acceleration = -(values["p"] ** 2) * np.sin(values["alpha"] - np.abs(peaks)) * side
+        lost = np.where(np.arange(peaks.size) > 0, slow * acceleration, 0.0)
     true = (peaks - offset - _bent(run, values, peaks) - lost) / gain
     true[0] += side[0] * values["theta0"]
     behind = (levels - offset[:, None] - _bent(run, values, levels)) / gain[:, None]
     return true, np.abs(behind)
 
 
-def _bent(run: RockingRun, values: Mapping[str, float], theta: FloatArray) -> FloatArray:
+def _bent(run: RockingRun, values: Mapping[str, float], theta: FloatArray) -> FloatArray | float:
     """What wires out of line add to a rotation that is read from them."""
-    found = values.get(f"wire_cosine@{run.reference}.kappa", 0.0) * run.wire_bend_m * theta**2
+    found: FloatArray | float = 0.0
+    if bend := values.get(f"wire_cosine@{run.reference}.kappa", 0.0):
+        found = bend * run.wire_bend_m * theta**2
     if higher := values.get(f"wire_anchor@{run.reference}.height", 0.0):
         found = found + anchors_off(run.wires, theta, higher)[0]
     return found
@@ -84,57 +86,21 @@ def pause_at_impact(values: Mapping[str, float], speeds: FloatArray) -> FloatArr
     return pause
 
 
-def free_times(run: RockingRun, values: Mapping[str, float]) -> FloatArray:
-    """Free forms of the probes: time features as piecewise linear functions of the peak."""
-    total = np.zeros(len(run.places))
-    restoring, loss = "free_restoring.t0" in values, "free_dissipation.t0" in values
-    if not (restoring or loss):
-        return total
-    kind, low, share, direction = _free_basis(run)
-    if restoring:
-        knots = np.array([values[f"free_restoring.t{i}"] for i in range(9)])
-        first = knots[3 * kind + low]
-        total += first + (knots[3 * kind + low + 1] - first) * share
-    if loss:
-        knots = np.array([values[f"free_dissipation.t{i}"] for i in range(6)] + [0.0] * 3)
-        first = knots[3 * kind + low]
-        total += direction * (first + (knots[3 * kind + low + 1] - first) * share)
-    return total
-
-
-def _free_basis(run: RockingRun) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray, FloatArray]:
-    """Per time feature: part of the half-cycle (upper, lower, turning), knot, share, fall or rise."""
-    if "free basis" not in run.cache:
-        count = run.swings.levels.shape[1]
-        ka, a, kb, b = run.places.T
-        falls = (a < count) & (b < count)
-        turning = (ka != kb) | ((a >= count) & (b < count))
-        nearer = np.where(falls, b, a - count)
-        kind = np.where(turning, 2, np.clip(nearer, 1, 2) - 1)
-        size = np.abs(run.swings.peak_rad[ka]) / run.survey.alpha_rad
-        place = np.interp(size, (0.0, 0.15, 0.4), (0.0, 1.0, 2.0))
-        low = np.minimum(place.astype(int), 1)
-        direction = np.where(turning, 0.0, np.where(falls, 1.0, -1.0))
-        run.cache["free basis"] = (kind, low, place - low, direction)
-    found: tuple[NDArray[np.intp], NDArray[np.intp], FloatArray, FloatArray] = run.cache["free basis"]
-    return found
-
-
 def block_coefficients(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
     """Predicted coefficients of all blocks of a run, and the unit of their scatter, each (k,)."""
     if not run.blocks:
         return np.zeros(0), np.zeros(0)
     if "units" not in run.cache:
-        run.cache["units"] = [
-            np.array([repeatability(block, i) for i in range(len(block.names))]) for block in run.blocks
-        ]
-    units: list[FloatArray] = run.cache["units"]
+        units = [np.array([repeatability(block, i) for i in range(len(block.names))]) for block in run.blocks]
+        run.cache["units"] = units, np.concatenate(units)
+    whole: FloatArray
+    units, whole = run.cache["units"]
     memos: list[Memo] = run.cache.setdefault("memos", [Memo() for _ in run.blocks])
     predicted = [
         memo.of(values, partial(_coefficients, run, block, unit))
         for block, unit, memo in zip(run.blocks, units, memos, strict=True)
     ]
-    return np.concatenate(predicted), np.concatenate(units)
+    return np.concatenate(predicted), whole
 
 
 def _coefficients(run: RockingRun, block: Block, unit: FloatArray, values: Mapping[str, float]) -> FloatArray:
@@ -145,6 +111,12 @@ def _coefficients(run: RockingRun, block: Block, unit: FloatArray, values: Mappi
         free = [values.get(f"free_{block.family}.c{i}", 0.0) for i in range(unit.size)]
         coefficients = coefficients + 3.0 * unit * np.array(free)
     return coefficients
+
+
+@cache
+def _family_keys(family: str) -> dict[str, None]:
+    """Parameters that say which effects there are on a family."""
+    return dict.fromkeys(f"{name}@{family}.{parameter}" for name, parameter in _FAMILY_EFFECTS)
 
 
 def _family_difference(run: RockingRun, family: str, values: Mapping[str, float]) -> FloatArray | None:
@@ -162,6 +134,8 @@ def _family_difference(run: RockingRun, family: str, values: Mapping[str, float]
 
 def _added(run: RockingRun, family: str, values: Mapping[str, float], theta: FloatArray) -> FloatArray | None:
     """What a family's sensor effects add to the rotation `theta`; None for nothing."""
+    if not any_of(values, _family_keys(family)):
+        return None
     time_s = run.grid.time_s
     parts: list[FloatArray] = []
     for name, parameter in _FAMILY_EFFECTS:
@@ -187,7 +161,8 @@ def _added(run: RockingRun, family: str, values: Mapping[str, float], theta: Flo
                 parts.append(anchors_off(run.wires, theta, value)[0])
             case "wire_cosine":
                 parts.append(run.wire_bend_m * value * theta**2)
-    return np.sum(parts, axis=0) if parts else None
+    total: FloatArray = np.sum(parts, axis=0)
+    return total
 
 
 def _difference_of(

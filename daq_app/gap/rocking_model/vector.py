@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,14 @@ def acts_on(part: str, key: str, reference: str) -> bool:
     return "@" not in key or key.rpartition(".")[0].rpartition("@")[2] == reference
 
 
+@lru_cache(maxsize=1024)
+def _entries(names: tuple[str, ...]) -> tuple[tuple[tuple[str, int], ...], tuple[str, ...]]:
+    """Of the names of values: those with a place in the vector, and those that act on what is measured."""
+    moving = tuple((name, _INDEX[name]) for name in names if name in _INDEX)
+    own = ("zero", "theta0", "cal_wire", "face_a", "face_b")
+    return moving, tuple(name for name in names if name in own or "@" in name)
+
+
 def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> tuple[bytes, FloatArray, float]:
     """(key, vector, clock factor): the key names everything that the half-cycles depend on."""
     vector = np.zeros(par.N_PARAMETERS)
@@ -58,18 +66,14 @@ def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> tuple[bytes, 
     vector[par.REST_AMPLITUDE] = par.REST_AMPLITUDE_RAD
     vector[par.DURATION] = 1e9
     vector[par.IMPACTS_BEFORE] = run.impacts_before
-    for key, value in values.items():
-        index = _INDEX.get(key)
-        if index is not None:
-            name = key.rpartition(".")[0]
-            for other, default in _DEFAULTS[name]:
-                if vector[other] == 0.0:
-                    vector[other] = default
-            vector[index] = value
+    moving, measuring = _entries(tuple(values))
+    for key, index in moving:
+        for other, default in _DEFAULTS[key.rpartition(".")[0]]:
+            if vector[other] == 0.0:
+                vector[other] = default
+        vector[index] = values[key]
     vector[par.OMEGA0] += values["omega0"]
-    measured = [
-        v for k, v in values.items() if k in ("zero", "theta0", "cal_wire", "face_a", "face_b") or "@" in k
-    ]
+    measured = [values[key] for key in measuring]
     dynamic = vector.copy()
     dynamic[[par.RESTITUTION, par.R_SLOPE, par.R_ASYMMETRY, par.CRUSH_R]] = 0.0
     identity = dynamic.tobytes() + np.asarray(measured, dtype=float).tobytes()
