@@ -104,26 +104,34 @@ def _wiring_marks(wiring: Wiring, families: dict[str, Family]) -> list[Mark]:
     ]
 
 
-def choose_reference(inspected: Inspected) -> str:
-    """The family that the motion is read from: the prompter one where LVDTs and wires differ in time."""
+def choose_reference(inspected: Inspected) -> tuple[str, dict[int, Examined]]:
+    """The family that the motion is read from: the prompter one where LVDTs and wires differ in time.
+
+    With it what was examined that way on the way to it, by the place of the run.
+    """
     if inspected.reference:
-        return inspected.reference
+        return inspected.reference, {}
     if not inspected.runs[0].indices("lvdt"):
-        return ""  # what can be said without them, the examination says
-    run = max(inspected.runs, key=lambda r: float(np.nanmax(np.abs(r.channels[r.indices("lvdt")[0]]))))
+        return "", {}  # what can be said without them, the examination says
+    sizes = [float(np.nanmax(np.abs(r.channels[r.indices("lvdt")[0]]))) for r in inspected.runs]
+    place = sizes.index(max(sizes))
+    run = inspected.runs[place]
     try:
-        first = examine(run).features
-        lag = _coefficient(first, "wire", "lag")
-        if first.reference != "lvdt" or lag is None or abs(lag) < LATE_S:
-            return ""
-        second = examine(run, "wire").features
+        first = examine(run)
     except (CannotDiagnose, IndexError):
-        return ""
-    delays = [_coefficient(f, "impact timing", "delay") for f in (first, second)]
-    if delays[0] is None or delays[1] is None or second.reference != "wire":
-        return ""
+        return "", {}
+    lag = _coefficient(first.features, "wire", "lag")
+    if first.features.reference != "lvdt" or lag is None or abs(lag) < LATE_S:
+        return "", {place: first}
+    try:
+        second = examine(run, "wire")
+    except (CannotDiagnose, IndexError):
+        return "", {place: first}
+    delays = [_coefficient(f.features, "impact timing", "delay") for f in (first, second)]
+    if delays[0] is None or delays[1] is None or second.features.reference != "wire":
+        return "", {place: first}
     late = [abs(delay - MIDDLE_OF_IMPACT_S) for delay in delays if delay is not None]
-    return "wire" if late[1] < late[0] else ""
+    return ("wire", {place: second}) if late[1] < late[0] else ("", {place: first})
 
 
 def _coefficient(run: RockingRun, family: str, name: str) -> float | None:

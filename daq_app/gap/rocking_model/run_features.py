@@ -116,6 +116,11 @@ class Examined:
     joint: Rotation
     features: RockingRun
 
+    def after(self, impacts: float) -> Examined:
+        """The same of a run that so many impacts went before; no feature depends on them."""
+        features = replace(self.features, impacts_before=impacts)
+        return Examined(replace(self.run, impacts_before=impacts), self.joint, features)
+
 
 def extract(run: GapRun, reference: str = "") -> RockingRun:
     """Features of a run. Raises `CannotDiagnose` where it holds no rocking motion."""

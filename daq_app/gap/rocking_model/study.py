@@ -49,19 +49,20 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
     if not usable:
         raise CannotDiagnose("None of the runs can be used.", " ".join(limits))
     inspected = inspect(usable)
-    reference = choose_reference(inspected)
+    reference, known = choose_reference(inspected)
     examined: list[Examined] = []
     marks: list[Sequence[Mark]] = []
     impacts = 0.0
-    for run, seen in zip(inspected.runs, inspected.marks, strict=True):
+    for place, (run, seen) in enumerate(zip(inspected.runs, inspected.marks, strict=True)):
+        before = run.impacts_before or impacts
         try:
-            whole = run if run.impacts_before else replace(run, impacts_before=impacts)
-            entry = examine(whole, reference)
+            found = known.get(place) or examine(run, reference)
         except CannotDiagnose as problem:
             if len(runs) == 1:
                 raise
             limits.append(f"Left out. {problem}")
             continue
+        entry = found.after(before)
         examined.append(entry)
         marks.append(seen)
         impacts = entry.features.impacts_before + entry.features.swings.impacts
