@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.processes import quick_context
-from daq_app.acquisition import AcquisitionClient, read_session_file
-from daq_app.acquisition.messages import HealthMessage, Message, State, StateMessage
+from daq_app.acquisition import AcquisitionClient, AcquisitionUnreachable, read_session_file
+from daq_app.acquisition.messages import EventMessage, HealthMessage, Message, State, StateMessage
 from daq_app.acquisition.process import run_and_exit
-from sim_hardware.control import SimControl
+from sim_hardware.control import SimControl, SimControlError
 
 SPEED = 5
 """Slow enough that a busy machine keeps up: at this speed the buffer of 20 s lasts 4 s."""
 RESTITUTION = 0.75
 RATE_HZ = 4000
+_OVER = (State.SAVING, State.SAVED, State.FAILED)
 
 
 def quick_rig(configs: Path, folder: Path) -> Path:
@@ -50,34 +52,83 @@ class Running:
         self.client = AcquisitionClient(session.address, session.token, timeout_s=60.0)
         self.acknowledged = 0
         self.test_journal = ""
+        self.over: StateMessage | None = None
+        """How the recording of the test that was armed last has ended; None while it goes on."""
+        self._test = ""
+        self._options = options
+        self._health: HealthMessage | None = None
+        self._said: deque[str] = deque(maxlen=15)
 
-    def wait_for(self, right: Callable[[Message], bool], timeout_s: float = 200.0) -> Message:
+    def wait_for(
+        self, right: Callable[[Message], bool], timeout_s: float = 200.0, what: str = "the message"
+    ) -> Message:
         deadline = time.monotonic() + timeout_s
         while time.monotonic() < deadline:
             received = self.client.receive(0.2)
             if received is None:
                 assert self.process.exitcode is None, f"ended with {self.process.exitcode}"
                 continue
-            message = received.message
-            if isinstance(message, HealthMessage) and message.recording:
+            self._note(received.message)
+            if right(received.message):
+                return received.message
+        raise AssertionError(f"{what} was not heard within {timeout_s:g} s. {self.report()}")
+
+    def _note(self, message: Message) -> None:
+        if isinstance(message, HealthMessage):
+            self._health = message
+            if message.recording:
                 self.acknowledged = max(self.acknowledged, message.acknowledged_sample)
-            if right(message):
-                return message
-        raise AssertionError("not heard in time")
+        elif isinstance(message, StateMessage):
+            said = f"{message.state.value} ({message.text})"
+            if not self._said or self._said[-1] != said:
+                self._said.append(said)
+            if self._test and message.test == self._test and message.state in _OVER:
+                self.over = message
+        elif isinstance(message, EventMessage):
+            self._said.append(f"{message.kind}@{message.sample}: {message.text}")
+
+    def report(self) -> str:
+        """What an engineer asks first when something is not heard: who lives, and what was said last."""
+        lines = [f"Acquisition: exit code {self.process.exitcode}; acknowledged {self.acknowledged}"]
+        try:
+            about = self.client.request("hello", timeout_s=5.0).data
+            lines.append(f"it answers: {about['state']}")
+        except AcquisitionUnreachable as error:
+            lines.append(f"it does not answer: {error}")
+        lines.append(f"last health: {self._health}")
+        if "--connection" in self._options:
+            try:
+                with SimControl(self._options[self._options.index("--connection") + 1], 5.0) as control:
+                    lines.append(f"device server: {control.command('bench')} {control.command('faults')}")
+            except SimControlError as error:
+                lines.append(f"device server: {error}")
+        return "\n  ".join([*lines, "said last:", *self._said])
 
     def wait_for_state(self, *states: State) -> StateMessage:
-        message = self.wait_for(lambda m: isinstance(m, StateMessage) and m.state in states)
+        message = self.wait_for(
+            lambda m: isinstance(m, StateMessage) and m.state in states, what=f"the state {states}"
+        )
         assert isinstance(message, StateMessage)
         return message
 
+    def wait_for_safe_or_over(self, sample: int) -> None:
+        """Until that sample is on disk, or the recording has ended by itself because the wall rests."""
+        self.wait_for(
+            lambda m: self.acknowledged >= sample or self.over is not None, what=f"sample {sample} on disk"
+        )
+        rests = self.over is None or self.over.state is State.SAVED or "come to rest" in self.over.text
+        assert rests, f"the run ended before sample {sample}. {self.report()}"
+
     def wait_for_safe(self, sample: int) -> None:
         """Until that sample is on disk."""
-        self.wait_for(lambda m: self.acknowledged >= sample)
+        self.wait_for_safe_or_over(sample)
+        assert self.acknowledged >= sample, f"the run ended before sample {sample}. {self.report()}"
 
     def arm(self, test: str) -> None:
         self.wait_for_state(State.PREVIEWING)
         reply = self.client.request("arm", test=test, timeout_s=30.0)
         assert reply.ok, reply.text
+        self._test, self.over = test, None
         self.test_journal = str(reply.data["journal"])
 
     def kill(self) -> None:
