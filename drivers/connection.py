@@ -26,8 +26,10 @@ _CHANNEL_OPTIONS = [
     ("grpc.max_send_message_length", -1),
     # A server that comes back after 2 s should be found at once, not after a minute of back-off.
     ("grpc.initial_reconnect_backoff_ms", 100),
-    ("grpc.min_reconnect_backoff_ms", 100),
     ("grpc.max_reconnect_backoff_ms", 1000),
+    # Despite its name this is how long one attempt may take: names, TCP, TLS and the first HTTP/2 frames of a
+    # far or busy server. Every recovery makes a first attempt; one that is cut off too soon never succeeds.
+    ("grpc.min_reconnect_backoff_ms", 5000),
     # Two connections of one process must not share a socket: a fresh one is how we get rid of a dead one.
     ("grpc.use_local_subchannel_pool", 1),
 ]

@@ -25,7 +25,8 @@ _HOUSEKEEPING_S = 0.08
 """Backlog and overloads are asked for this often: two round trips a task, at each read at the real rate
 but not when reads come fast. The position is asked for at every read."""
 _REPLY_MARGIN_S = 2.0
-"""How much longer than the read's own time-out we wait for the server's reply."""
+"""How much longer than the read's own time-out we wait for the server's reply, and how long for that of the
+calls between two reads: one that never comes must be given up long before the device's buffer is full."""
 _CATCH_UP_READS = 10
 """Most read periods fetched in one call when samples have piled up."""
 _CLOSE_LIMIT_S = 2.0
@@ -137,6 +138,7 @@ class NidaqmxDriver:
 
     def _start_tasks(self) -> None:
         by_role = sorted(self._streams, key=lambda stream: stream.planned.role == "master")
+        self._connection.limit_calls_to()
         try:
             for stream in by_role:
                 stream.begin()
@@ -157,7 +159,7 @@ class NidaqmxDriver:
                 left = max(0.0, deadline - time.monotonic())
                 self._connection.limit_calls_to(left + _REPLY_MARGIN_S)
                 stream.fill(wanted, left)
-            self._connection.limit_calls_to()
+            self._connection.limit_calls_to(_REPLY_MARGIN_S)
             self._check_positions()
             self._housekeeping()
         except Exception as error:
@@ -311,6 +313,7 @@ class NidaqmxDriver:
         if self._backup_folder is None:
             return ()
         self._backup_stem = stem.partition("-from-")[0]
+        self._connection.limit_calls_to()
         paths = []
         try:
             for stream in self._streams:
@@ -327,6 +330,7 @@ class NidaqmxDriver:
         self._backup_stem = ""
         if self._backup_folder is None:
             return
+        self._connection.limit_calls_to()
         try:
             for stream in self._streams:
                 stream.task.in_stream.logging_pause = True
