@@ -117,9 +117,9 @@ class RockingModel:
             Parameter(
                 "mount_height",
                 0.0,
-                0.05,
+                self.survey.mount_tolerance_m,
                 "m",
-                meaning="height of the LVDTs' points above the joint",
+                meaning="error of the height of the LVDTs' points above the joint",
                 linear=True,
             ),
             Parameter("wire_even", 0.0, 5e-3, "1/rad", meaning="even part from wire anchors", linear=True),

@@ -60,6 +60,8 @@ class Survey:
     """Relative prior sd of α (the height of the centre of mass is hard to survey)."""
     p_tolerance: float = 0.02
     half_base_tolerance_m: float = 3e-3
+    mount_tolerance_m: float = 5e-3
+    """Prior sd of the height of the LVDTs' points: a tape tells it, and a bracket is no finer."""
 
     @classmethod
     def from_specimen(cls, specimen: Specimen) -> Survey:

@@ -95,6 +95,10 @@ def joint_rotation(run: GapRun) -> Rotation:
             break
         left_out.append(worst)
     theta = np.arcsin(np.clip(plane[1], -0.9, 0.9))
+    z = np.array([run.sensors[i].position_m[2] for i in used])
+    if z.any():
+        # A point above the joint sinks by z (1 − cos θ) as the wall turns.
+        plane = np.linalg.pinv(design) @ (values + np.outer(z, 1.0 - np.cos(theta)))
     return Rotation(
         theta,
         plane[0],
