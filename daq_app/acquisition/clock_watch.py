@@ -48,6 +48,8 @@ class ClockWatch:
         self._nominal_hz = rate_hz
         self._speed = speed
         self._expected = rate_hz * speed
+        self._nominal = True
+        """False once the device has been seen to take samples at another rate than it says."""
         self._told: set[str] = set()
         self.restart()
 
@@ -55,6 +57,8 @@ class ClockWatch:
         """Forget the readings, not what was told."""
         self._far: ClockReading | None = None
         self._near: ClockReading | None = None
+        self._middle: ClockReading | None = None
+        """Up to which the first second looked like another rate: the next one tells a rate from a leap."""
         self._bounds = (0.0, float("inf"))
         self._lag_s = (-float("inf"), float("inf"))
         self._sharpest_s = float("inf")
@@ -74,27 +78,49 @@ class ClockWatch:
             self._far = self._near = reading
             self._last_good = reading.samples
             return None
-        if _width(reading) < _width(self._far) and reading.before_s - self._far.after_s < _FIRST_S:
+        young = reading.before_s - self._far.after_s < _FIRST_S
+        if young and _width(reading) < _width(self._far) and self._is_in_step(self._far, reading):
             self._far = self._near = reading  # a sharper reading to count from
             return None
-        news = self._judge_rate(reading) or self._judge_jump(self._near, reading)
+        if "rate" not in self._told:
+            return self._judge_rate(self._far, reading)
+        news = self._judge_jump(self._near, reading)
         if news is None and self._deficit is None:
-            news = self._judge_drift(self._far, reading)
+            if self._nominal:
+                news = self._judge_drift(self._far, reading)
+            elif not young:  # nobody knows what this clock should be: the longer it is seen, the better
+                low, high = _rate_bounds(self._far, reading)
+                self._expected = 0.5 * (low + high)
             if reading.before_s - self._near.after_s > _NEAR_S:
                 self._near = reading
         return news
 
-    def _judge_rate(self, reading: ClockReading) -> ClockNews | None:
-        """Nobody's oscillator is off by 2 %: an external clock, a wrong setting, a device that runs fast."""
-        assert self._far is not None
-        low, high = _rate_bounds(self._far, reading)
-        if "rate" in self._told or reading.before_s - self._far.after_s < _FIRST_S:
+    def _judge_rate(self, far: ClockReading, reading: ClockReading) -> ClockNews | None:
+        """Nobody's oscillator is off by 2 %: an external clock, a wrong setting, a device that runs fast.
+
+        A clock that only stood still, or a computer that did, looks like that for one second, not for two.
+        """
+        since = self._middle or far
+        if reading.before_s - since.after_s < _FIRST_S:
+            if self._middle is None and self._is_in_step(far, reading):
+                self._last_good = reading.samples
+            return None
+        low, high = _rate_bounds(since, reading)
+        if high > (1 - _WRONG_SHARE) * self._expected and low < (1 + _WRONG_SHARE) * self._expected:
+            self._told.add("rate")
+            return None
+        if self._middle is None:
+            self._middle = reading
+            return None
+        before = _rate_bounds(far, self._middle)
+        if high < (1 - _WRONG_SHARE) * before[0] or low > (1 + _WRONG_SHARE) * before[1]:
+            self._far = self._near = self._middle  # two seconds that differ: the next one decides
+            self._middle = reading
             return None
         self._told.add("rate")
-        if high > (1 - _WRONG_SHARE) * self._expected and low < (1 + _WRONG_SHARE) * self._expected:
-            return None
         seen = 0.5 * (low + high)
-        self._expected = seen
+        self._nominal, self._expected = False, seen
+        self._far = self._near = reading
         return ClockNews(
             "rate",
             reading.samples,
@@ -103,6 +129,11 @@ class ClockWatch:
             "sample clock (a simulated device that runs faster: say so with --speed)",
             seen,
         )
+
+    def _is_in_step(self, near: ClockReading, reading: ClockReading) -> bool:
+        taken_s = (reading.samples - near.samples) / self._expected
+        least, most = reading.before_s - near.after_s, reading.after_s - near.before_s
+        return least - _JUMP_S <= taken_s <= most + _JUMP_S
 
     def _judge_jump(self, near: ClockReading, reading: ClockReading) -> ClockNews | None:
         elapsed_least = reading.before_s - near.after_s

@@ -71,6 +71,32 @@ def test_a_device_that_stood_still_is_told_with_the_time_and_the_place() -> None
     assert news.sample == pytest.approx(20.0 * RATE_HZ, abs=RATE_HZ)
 
 
+@pytest.mark.parametrize("at_s", [0.35, 0.75, 1.05, 1.55, 2.05])
+def test_a_standstill_in_the_first_seconds_is_no_other_rate(at_s: float) -> None:
+    (news,) = told(ClockWatch(RATE_HZ), shifted(readings(40.0), at_s, theirs=1.5))
+    assert news.name == "stood_still"
+    assert news.value == pytest.approx(1.5, abs=0.06)
+    assert news.sample == pytest.approx(at_s * RATE_HZ, abs=0.4 * RATE_HZ)
+    (news,) = told(ClockWatch(RATE_HZ), shifted(readings(40.0), at_s, ours=3.0))
+    assert news.name == "asleep" and news.value == pytest.approx(3.0, abs=0.06)
+
+
+@pytest.mark.parametrize("at_s", [0.35, 1.05, 1.55])
+@pytest.mark.parametrize("expected_hz", [2000.0, 5000.0])
+def test_another_rate_is_told_once_and_rightly_though_the_clock_stood_still(
+    expected_hz: float, at_s: float
+) -> None:
+    news = told(ClockWatch(expected_hz), shifted(readings(40.0), at_s, theirs=1.5))
+    assert [entry.name for entry in news].count("rate") == 1
+    assert news[0].name == "rate" and news[0].value == pytest.approx(4000.0, rel=0.01)
+    assert len(news) <= 2
+
+
+def test_a_device_that_runs_faster_than_it_says_is_told_once() -> None:
+    (news,) = told(ClockWatch(RATE_HZ / 5), readings(60.0))
+    assert news.name == "rate" and news.value == pytest.approx(4000.0, rel=0.01)
+
+
 def test_samples_that_only_come_late_are_no_standstill() -> None:
     def late(entries: Iterator[ClockReading]) -> Iterator[ClockReading]:
         for entry in entries:
