@@ -10,6 +10,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from benchmarks.byte_code import surroundings
 from benchmarks.figure import Figure
 
 _ROOT = Path(__file__).parents[1]
@@ -68,15 +69,13 @@ def _all_cores_over_one() -> float:
 
 
 def _seconds(command: str, runs: Path, code: Path) -> float:
-    """Whole command, with byte code of every module kept in `code`: so it is wherever a program has been
-    started before, but not where the surroundings forbid to write it."""
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    """Whole command, with byte code of every module kept in `code`."""
     started = time.perf_counter()
     subprocess.run(
         [sys.executable, "-m", "daq_app.cli", "campaign", command, str(runs)],
         check=True,
         capture_output=True,
         cwd=_ROOT,
-        env=environment | {"PYTHONPYCACHEPREFIX": str(code)},
+        env=surroundings(code),
     )
     return time.perf_counter() - started

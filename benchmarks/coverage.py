@@ -37,9 +37,9 @@ from daq_app.campaign.statistics import random_effects_mean
 from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.campaign.summary import MethodResult, TestSummary
 from daq_app.campaign.tables import METHODS, RestitutionRow, table_4_1
-from daq_app.campaign.workers import process_pool
 from daq_app.config import Scaling, load_rig
 from daq_app.rocking import AnalysisOptions, TestAnalysis, TestRecord, analyse_record
+from daq_app.workers import process_pool
 
 PLAN: Final = Path(__file__).parents[1] / "configs" / "campaigns" / "costa.toml"
 TEST_SCATTER: Final = 0.005

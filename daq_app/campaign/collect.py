@@ -16,13 +16,13 @@ from daq_app.campaign.recorded import orphans, test_of, unreadable, verdicts_of
 from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.campaign.summary import MethodResult, TestSummary
 from daq_app.campaign.verdicts import OperatorVerdict
-from daq_app.campaign.workers import run_all
 from daq_app.config import Rig
 from daq_app.rocking.analysis import AnalysisOptions, analyse_record
 from daq_app.rocking.record import TestRecord
 from daq_app.rocking.results import Series, TestAnalysis
 from daq_app.runfile import Run, RunFileError, open_run
 from daq_app.runfile.folder import RUN_SUFFIX, find_runs
+from daq_app.workers import run_all
 
 _KEYS = {"CRT": "crt", "EAV": "eav"}
 _SHOWN_RATE_HZ = 200.0

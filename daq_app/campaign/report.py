@@ -17,7 +17,7 @@ from daq_app.campaign.collect import Failure
 from daq_app.campaign.number_words import interval, number, signed
 from daq_app.campaign.status import CampaignStatus
 from daq_app.campaign.summary import TestSummary
-from daq_app.campaign.workers import process_pool
+from daq_app.workers import process_pool
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,11 +23,11 @@ import psutil
 from daq_app.acquisition.offline import Readings, record_offline
 from daq_app.acquisition.tare import NotSteady
 from daq_app.campaign.plan import Campaign
-from daq_app.campaign.workers import run_all
 from daq_app.config import ConfigError, Problem, Rig, TaskPlan, load_rig, plan_tasks
 from daq_app.runfile import RunFileError
 from daq_app.runfile.durable import replace_durably
 from daq_app.runfile.folder import RUN_SUFFIX
+from daq_app.workers import run_all
 from sim_hardware.direct import synthesise_test
 
 TRUTH_FILE: Final = "truth.json"

@@ -15,9 +15,9 @@ from rich.console import Console
 from rich.table import Table
 
 from daq_app.campaign.status import CampaignStatus
-from daq_app.campaign.workers import warm_up
 from daq_app.cli.campaign_progress import DEFAULT_PLAN, open_plan, progress_bar
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
+from daq_app.workers import warm_up
 
 if TYPE_CHECKING:
     from daq_app.campaign.summary import TestSummary

@@ -71,6 +71,11 @@ def diagnose(
     Exit code 0 when an effect, a pair, parameters or nothing missing was found; 1 when the answer is
     that it cannot be told, none of these, or below detection; 2 for input that cannot be diagnosed.
     """
+    from daq_app.workers import warm_up
+
+    workers = cores or os.cpu_count() or 1
+    if workers > 1:
+        warm_up("daq_app.gap.rocking_model.model")  # while this process imports and reads the files
     from daq_app.gap.core import Options
     from daq_app.gap.core.parallel import Interrupted
     from daq_app.gap.report import write_report
@@ -91,9 +96,7 @@ def diagnose(
             def show(done: int, total: int, text: str) -> None:
                 progress.update(bar, description=text, completed=done, total=total)
 
-            options = Options(
-                always_pairs=pairs, hold_out=hold_out, workers=cores or os.cpu_count() or 1, progress=show
-            )
+            options = Options(always_pairs=pairs, hold_out=hold_out, workers=workers, progress=show)
             try:
                 result = diagnose_runs(loaded, options)
             except (KeyboardInterrupt, Interrupted):

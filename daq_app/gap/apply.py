@@ -39,24 +39,43 @@ def effects_found(result: dict[str, Any]) -> dict[str, dict[str, float]]:
         name, _, parameter = str(estimate["name"]).rpartition(".")
         if (name, parameter) in FORMS_ONLY:
             continue
+        if name == "polarity" or name.startswith("swap"):
+            effects |= _wired(name, result)
+            continue
         effects.setdefault(name, {})[parameter] = _possible(name, parameter, float(estimate["value"]))
     return effects
 
 
+def _wired(effect: str, result: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """Reversed channels, or any exchange of plugs as exchanges of two, one after the other."""
+    wiring = result.get("notes", {}).get("wiring", {})
+    turned, exchanged = wiring.get("reversed", ()), wiring.get("exchanged", {})
+    if effect == "polarity" and turned:
+        return {f"polarity@{'+'.join(turned)}": {"on": 1.0}}
+    if effect == "polarity" or not exchanged:
+        raise CannotDiagnose(
+            f"The result does not say which channels {effect} means.",
+            "Diagnose the runs again with this version.",
+        )
+    plugged = {terminal: terminal for terminal in exchanged}
+    steps = {}
+    for terminal, sensor in exchanged.items():
+        other = next(t for t, s in plugged.items() if s == sensor)
+        if other != terminal:
+            plugged[terminal], plugged[other] = plugged[other], plugged[terminal]
+            steps[f"swap@{terminal}+{other}"] = {"places": 1.0}
+    return steps
+
+
 def _possible(effect: str, parameter: str, value: float) -> float:
     """A value as the simulator takes it: within what has a meaning, whole where it counts something."""
-    if effect == "polarity" or effect.partition("@")[0] == "swap":
-        raise CannotDiagnose(
-            f"{effect} is wiring of single channels; the simulator has no effect that means the same.",
-            "Put the plugs right; the limits of the report say which.",
-        )
     try:
         spec = find_effect(effect, (*MOTION_EFFECTS, *SENSOR_EFFECTS)).parameter(parameter)
     except ValueError as problem:
         raise CannotDiagnose(
             f"The simulator cannot switch on {effect}.{parameter}: {problem}.", "Apply it by hand."
         ) from None
-    if parameter in ("on", "places"):
+    if parameter == "on":
         value = float(round(value))
     return min(max(value, spec.minimum), spec.maximum)
 

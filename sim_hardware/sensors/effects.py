@@ -235,8 +235,16 @@ class Wiring:
 
 
 def targets(key: str, channels: Sequence[Channel]) -> NDArray[np.int64]:
-    """Indices of the channels that an effect's key means; `ValueError` in words if there are none."""
+    """Indices of the channels that an effect's key means; `ValueError` in words if there are none.
+
+    ``swap@WP-2+WP-5`` means both, in the order of the rig file.
+    """
     _, target = split_target(key)
+    chosen = {i for part in target.split("+") for i in _meant(key, part, channels)}
+    return np.array(sorted(chosen), dtype=np.int64)
+
+
+def _meant(key: str, target: str, channels: Sequence[Channel]) -> list[int]:
     chosen = [
         i
         for i, channel in enumerate(channels)
@@ -249,7 +257,7 @@ def targets(key: str, channels: Sequence[Channel]) -> NDArray[np.int64]:
             f"effect {key!r}: no channel, family, module or terminal of the rig is called {target!r}; "
             f"families are {', '.join(la.FAMILY_CODE)}, channels {channels[0].id} … {channels[-1].id}"
         )
-    return np.array(chosen, dtype=np.int64)
+    return chosen
 
 
 def apply_sensor_effects(

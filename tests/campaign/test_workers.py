@@ -7,8 +7,8 @@ import pickle
 
 import pytest
 
-from daq_app.campaign.workers import run_all
 from daq_app.runfile.errors import JournalDiskFull
+from daq_app.workers import run_all
 
 
 def _negative(number: int) -> tuple[int, str]:

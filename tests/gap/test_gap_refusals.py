@@ -121,7 +121,7 @@ def test_apply_takes_only_what_the_simulator_has(tmp_path: Path) -> None:
     out = tmp_path / "rig.toml"
     apply_result(_result(found), RIG, out)
     assert load_rig(out).simulation.effects == {"compliance": {"phi": 1e-3}, "polarity@LV-A06": {"on": 1.0}}
-    with pytest.raises(CannotDiagnose, match="Put the plugs right"):
+    with pytest.raises(CannotDiagnose, match="does not say which channels"):
         apply_result(_result({"swap@wire.places": 1.0}), RIG, out)
     with pytest.raises(CannotDiagnose, match="cannot switch on"):
         apply_result(_result({"unheard_of.k": 1.0}), RIG, out)

@@ -7,7 +7,6 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from daq_app.campaign.workers import worker_context, worker_surroundings
 from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.features import Run
 from daq_app.gap.core.fit import Fit, fit, glance, promised, searches_from
@@ -15,6 +14,7 @@ from daq_app.gap.core.held_out import HeldOutRun, score
 from daq_app.gap.core.model import Model
 from daq_app.gap.core.problem import Columns
 from daq_app.gap.core.search import Search
+from daq_app.workers import worker_context, worker_surroundings
 
 T = TypeVar("T")
 

@@ -50,6 +50,7 @@ class Inspected:
     marks: list[list[Mark]]
     reference: str
     """``wire`` where the LVDTs are not fit to read the motion from, else empty."""
+    wiring: Wiring
 
 
 def inspect(runs: Sequence[GapRun]) -> Inspected:
@@ -79,7 +80,7 @@ def inspect(runs: Sequence[GapRun]) -> Inspected:
     clean = [run.excluding(clipped) for run in clean]
     marks = [[*row, *_wiring_marks(wiring, families)] for row in marks]
     coarse_lvdts = any(m.key == "quantisation@lvdt" and m.value > 0 for row in marks for m in row)
-    return Inspected(clean, marks, "wire" if coarse_lvdts else "")
+    return Inspected(clean, marks, "wire" if coarse_lvdts else "", wiring)
 
 
 def _spoils(mark: Mark, families: dict[str, Family]) -> bool:
@@ -166,7 +167,10 @@ def _steps(marks: Sequence[Sequence[Mark]]) -> dict[str, float]:
 
 
 def completed(
-    examined: Sequence[Examined], marks: Sequence[Sequence[Mark]], channels: dict[str, Family]
+    examined: Sequence[Examined],
+    marks: Sequence[Sequence[Mark]],
+    channels: dict[str, Family],
+    wiring: Wiring,
 ) -> list[RockingRun]:
     """Features of all runs with the blocks of what was inspected over all of them."""
     grids = [e.features.grid for e in examined]
@@ -197,7 +201,7 @@ def completed(
             )
             row.append(scalar_block("floor", entries, grid))
         row.append(_mark_block(seen, entry))
-        features = replace(_beside_stairs(entry.features, seen), vibration=vibration)
+        features = replace(_beside_stairs(entry.features, seen), vibration=vibration, wiring=wiring)
         runs.append(features.with_blocks(row))
     return runs
 

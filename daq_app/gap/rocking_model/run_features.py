@@ -26,6 +26,7 @@ from daq_app.gap.rocking_model.rotation import (
     wires_of,
 )
 from daq_app.gap.rocking_model.sensor_blocks import Block, blocks_of
+from daq_app.gap.rocking_model.wiring import Wiring
 
 _SMALLEST_LOADING = 1e-3
 
@@ -63,6 +64,8 @@ class RockingRun:
     vibration: Vibration | None = None
     wires: tuple[WireInverse, ...] = ()
     """All wires whose geometry is known."""
+    wiring: Wiring = field(default_factory=Wiring)
+    """What was put right in all runs before anything was read from them."""
     cache: dict[Any, Any] = field(default_factory=dict, compare=False)
 
     def rotation_alone(self) -> RockingRun:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from daq_app.campaign.workers import warm_up
 from daq_app.gap.core import CannotDiagnose, Diagnosis, Library, Options, diagnose
 from daq_app.gap.core.result import Decision
 from daq_app.gap.rocking_model.conditions import Mark
@@ -25,6 +24,7 @@ from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.model import RockingModel, UnscatteredModel
 from daq_app.gap.rocking_model.records import GapRun, check_consistent
 from daq_app.gap.rocking_model.run_features import Examined, RockingRun, examine
+from daq_app.workers import warm_up
 
 FAR_FROM_SURVEY = 4.0
 """Prior sd by which α, p or the base may differ from the survey before the rig file is doubted."""
@@ -72,7 +72,7 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
     for entry in examined:
         limits += entry.features.notes
     limits += _stated(marks, channels)
-    return completed(examined, marks, channels), limits
+    return completed(examined, marks, channels, inspected.wiring), limits
 
 
 def _stated(marks: Sequence[Sequence[Mark]], channels: Mapping[str, str]) -> list[str]:
@@ -145,6 +145,8 @@ def diagnose_runs(
         library = library.without(*(name for name in library if name not in only))
         limits.append(f"Only {', '.join(sorted(only))} were considered.")
     result = diagnose(model, prepared, library, options, limits)
+    wiring = prepared[0].wiring
+    result.notes["wiring"] = {"reversed": list(wiring.reversed_ids), "exchanged": dict(wiring.exchanged)}
     return _doubt_the_survey(result)
 
 

@@ -1,4 +1,4 @@
-"""Many tests on all cores: one process per core, progress, and a clean stop."""
+"""Work on all cores: one process per core, progress, and a clean stop."""
 
 from __future__ import annotations
 
