@@ -126,7 +126,7 @@ def figures() -> list[Figure]:
             "s",
             1,
             aim=30.0,
-            note=f"{cores} cores, features and start of processes included; {result.decision.verdict}: {named}",
+            note=f"{cores} cores, features and start of all included; {result.decision.verdict}: {named}",
         ),
         Figure("the same once more, processes there", statistics.median(times[1:]), "s", _DIAGNOSES - 1),
         Figure(
