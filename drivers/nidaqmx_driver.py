@@ -30,6 +30,7 @@ calls between two reads: one that never comes must be given up long before the d
 _CATCH_UP_READS = 10
 """Most read periods fetched in one call when samples have piled up."""
 _CLOSE_LIMIT_S = 2.0
+_MOST_DOUBLINGS = 4
 
 
 class _OutOfStepError(DriverError):
@@ -70,6 +71,8 @@ class NidaqmxDriver:
         self._line = ClockLine(1.0)
         self._last_housekeeping = 0.0
         self._buffer_samples = 0
+        self._in_vain = 0
+        """Recoveries since the last read that succeeded, at each of which samples had been overwritten."""
         self._rate_hz = 0.0
         self._backup_stem = ""
 
@@ -168,6 +171,7 @@ class NidaqmxDriver:
             raise translate(error, doing="reading", partial=partial) from error
         block = self._block(wanted)
         assert block is not None
+        self._in_vain = 0
         return block
 
     def _read_size(self, plan: TaskPlan, asked: int | None) -> int:
@@ -262,8 +266,10 @@ class NidaqmxDriver:
 
     def _go_on_in_the_buffer(self, plan: TaskPlan) -> str:
         """Read on where reading stood, or at the oldest sample there is; says so where some are gone."""
-        # The oldest samples are being overwritten while we ask for them: leave a margin.
-        margin = max(2 * plan.read_samples, self._buffer_samples // 20)
+        # The oldest samples are being overwritten while we ask for them: leave a margin, and a larger one
+        # each time that it was too small, since this computer or the way to the device is slow.
+        margin = max(2 * plan.read_samples, self._buffer_samples // 20) << self._in_vain
+        margin = min(margin, self._buffer_samples // 2)
         oldest = max(stream.total_acquired() for stream in self._streams) - self._buffer_samples + margin
         position = max(self._next_sample - self._origin, oldest)
         for stream in self._streams:
@@ -273,6 +279,7 @@ class NidaqmxDriver:
         self._last_housekeeping = time.monotonic()
         if not overwritten:
             return ""
+        self._in_vain = min(self._in_vain + 1, _MOST_DOUBLINGS)
         kept_s = self._buffer_samples / self._rate_hz
         return f"The device's buffer holds {kept_s:.0f} s: older samples had been overwritten"
 

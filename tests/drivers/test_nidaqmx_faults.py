@@ -118,6 +118,32 @@ def test_overwritten_samples_are_a_gap_of_the_right_length(laboratory: Laborator
     driver.close()
 
 
+def test_a_computer_too_slow_for_the_margin_gives_up_more_and_reads_on(laboratory: Laboratories) -> None:
+    """Were the margin always the same, a recovery that takes longer than it would be followed by another."""
+    lab = laboratory()
+    driver = started(lab)
+    blocks, _ = read_through(driver, lab, 2000)
+    lab.let_time_pass(lab.rig.acquisition.buffer_s + 3.0)
+    for _ in range(4):
+        assert "overwritten" in driver.recover()
+        lab.let_time_pass(2.5)
+        try:
+            blocks.append(driver.read(1.0))
+            break
+        except DriverError as error:
+            assert error.code == -200279
+    after = blocks[-1]
+    assert lost(blocks) <= (3.0 + 4 * 2.5 + 0.5 * lab.rig.acquisition.buffer_s) * 4000
+    more, errors = read_through(driver, lab, after.first_sample + 18 * 4000)
+    assert not errors and more[0].first_sample == after.first_sample + after.n_samples
+    # Once reading goes on, a loss costs no more than the small margin again.
+    lab.let_time_pass(lab.rig.acquisition.buffer_s + 3.0)
+    driver.recover()
+    end = more[-1].first_sample + more[-1].n_samples
+    assert 3.0 * 4000 <= driver.read(1.0).first_sample - end <= (3.0 + 2.0) * 4000
+    driver.close()
+
+
 def test_samples_overwritten_while_the_way_was_cut_are_told_as_such(laboratory: Laboratories) -> None:
     """The first error after a sleep is often a call that took too long; the loss has another cause."""
     lab = laboratory()

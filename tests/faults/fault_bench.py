@@ -242,6 +242,8 @@ class RunFacts:
     reasons: list[str]
     end: int
     first: int
+    account: str = field(default="", repr=False)
+    """What the run itself says of gaps, driver, clock and machine: shown where a test fails."""
 
 
 def look_at(
@@ -268,9 +270,13 @@ def look_at(
         quality = run.derived.results.get("quality") if run.derived is not None else None
         quality = quality or {"verdict": "none", "reasons": []}
         first, end = run.first_sample, run.first_sample + run.n_samples
+        gaps = [f"gap {gap.first_sample}+{gap.n_samples}: {gap.reason}" for gap in run.gaps]
+        kinds = ("driver", "clock", "alarm", "disk", "recorder", "end")
+        said = [f"{event.kind}@{event.sample}: {event.text}" for event in run.events if event.kind in kinds]
+        account = "\n  ".join([f"{path.name}, {first} to {end}:", *gaps, *said])
     if rig is not None:
         marks = check_marked(path, rig, lag, SPEED, clock_ppm=clock_ppm)
-        assert marks.unexplained == 0, marks
-        assert not one_device or all(leap.explained for leap in marks.leaps), marks.leaps
-    assert missing == report.lost_samples, "samples lost and the table of gaps are the same count"
-    return RunFacts(missing, report.lost_samples, quality["verdict"], quality["reasons"], end, first)
+        assert marks.unexplained == 0, f"{marks}\n{account}"
+        assert not one_device or all(leap.explained for leap in marks.leaps), f"{marks.leaps}\n{account}"
+    assert missing == report.lost_samples, f"samples lost and the table of gaps differ\n{account}"
+    return RunFacts(missing, report.lost_samples, quality["verdict"], quality["reasons"], end, first, account)

@@ -61,7 +61,7 @@ def test_the_disk_is_full_in_mid_run(shared: Acquisition, rig: Rig, row: Row) ->
     shared.told("takes data again")
     shared.record(2000)
     facts = look_at(shared.stop().run_path, rig)
-    assert facts.lost == 0
+    assert facts.lost == 0, facts.account
     row("disk full in mid-run", told, facts)
 
 
@@ -72,7 +72,7 @@ def test_space_that_runs_out_is_told_before_it_is_gone(shared: Acquisition, rig:
     told = shared.told("MB are free")
     shared.sabotage()
     facts = look_at(shared.stop().run_path, rig)
-    assert facts.lost == 0
+    assert facts.lost == 0, facts.account
     row("disk nearly full in mid-run", told, facts)
 
 
@@ -85,7 +85,7 @@ def test_a_flush_that_takes_two_seconds(shared: Acquisition, rig: Rig, row: Row)
     shared.sabotage()
     shared.record(8000)
     facts = look_at(shared.stop().run_path, rig)
-    assert facts.lost == 0
+    assert facts.lost == 0, facts.account
     row("disk slow: a flush takes 2 s", told, facts)
 
 
@@ -101,7 +101,7 @@ def test_the_file_system_becomes_read_only(shared: Acquisition, rig: Rig, row: R
     shared.sabotage()
     assert Path(saved.run_path).parent == shared.spare and Path(saved.run_path).stem == journal.stem
     facts = look_at(saved.run_path, rig)
-    assert facts.lost == 0
+    assert facts.lost == 0, facts.account
     with open_run(saved.run_path) as run:
         assert any(event.kind == "armed" for event in run.events), "one run, from the arming on"
     row("file system read-only", told, facts)
@@ -135,7 +135,7 @@ def test_the_machine_is_asleep(shared: Acquisition, rig: Rig, row: Row, asleep_s
     shared.record(8000)
     facts = look_at(shared.stop().run_path, rig)
     if within_buffer:
-        assert facts.lost == 0
+        assert facts.lost == 0, facts.account
     else:
         assert (asleep_s * SPEED - 20.0) * 4000 <= facts.lost <= (asleep_s * SPEED - 20.0 + 20.0) * 4000
     row(f"machine asleep for {asleep_s * SPEED:g} s of a 20 s buffer", told, facts)
@@ -153,7 +153,7 @@ def test_memory_that_runs_short(shared: Acquisition, rig: Rig, row: Row) -> None
     shared.told("Samples are written again")
     shared.record(2000)
     facts = look_at(shared.stop().run_path, rig)
-    assert facts.lost == 0
+    assert facts.lost == 0, facts.account
     row("memory short, then full", told, facts)
 
 
@@ -195,7 +195,7 @@ def test_the_folder_is_deleted_under_the_run(start: Start, rig: Rig, row: Row) -
     saved = lab.stop()
     assert Path(saved.run_path) == lab.spare / f"{journal.stem}.h5"
     facts = look_at(saved.run_path, rig)
-    assert facts.lost == 0
+    assert facts.lost == 0, facts.account
     row("folder deleted under the run", told, facts)
     assert lab.end() == 0
 

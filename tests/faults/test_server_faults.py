@@ -65,7 +65,7 @@ def test_a_read_times_out(shared: Acquisition, bench: SimControl, rig: Rig, row:
     assert "tried again" in told.text
     shared.record(2000)
     facts = look_at(shared.stop().run_path, rig)
-    assert facts.lost == 0
+    assert facts.lost == 0, facts.account
     row("a read times out (−200284)", told, facts)
 
 
@@ -78,7 +78,7 @@ def test_a_reply_cut_short(shared: Acquisition, bench: SimControl, rig: Rig, row
     assert "asked" in told.text
     shared.record(2000)
     facts = look_at(shared.stop().run_path, rig)
-    assert facts.lost == 0
+    assert facts.lost == 0, facts.account
     row(f"a reply cut short ({part})", told, facts)
 
 
@@ -89,7 +89,7 @@ def test_replies_out_of_order(shared: Acquisition, bench: SimControl, rig: Rig, 
     told = shared.told("The device stands at sample")
     shared.record(4000)
     facts = look_at(shared.stop().run_path, rig)
-    assert facts.lost == 0
+    assert facts.lost == 0, facts.account
     row("replies out of order", told, facts)
 
 
@@ -115,7 +115,7 @@ def test_a_stalled_device(shared: Acquisition, bench: SimControl, rig: Rig, row:
     shared.told("The sample clock stood still")
     shared.record(2000)
     facts = look_at(shared.stop().run_path, rig)
-    assert facts.lost == 0
+    assert facts.lost == 0, facts.account
     assert facts.verdict == "bad" and any("every later time is too small" in text for text in facts.reasons)
     row(f"stalled device, {1.6 * SPEED:g} s without samples", told, facts)
 
@@ -131,7 +131,7 @@ def test_the_chassis_off_the_network(
     if for_s < 1.0:
         shared.record(4000)
         facts = look_at(shared.stop().run_path, rig)
-        assert facts.lost == 0
+        assert facts.lost == 0, facts.account
         row(fault, None, facts, "nothing: the samples come 0.2 s later")
         return
     told = shared.told("does not answer any more")
@@ -257,7 +257,7 @@ def test_a_clock_that_is_50_ppm_off(drifting: Drifting, rig: Rig, row: Row) -> N
     lab.arm()
     lab.record(24_000)  # more than the 20 000 in which such a clock gains a sample
     facts = look_at(lab.stop().run_path, rig, clock_ppm=50.0)
-    assert facts.lost == 0
+    assert facts.lost == 0, facts.account
     said = next(text for text in facts.reasons if "runs fast by at least" in text)
     assert 20 <= float(said.partition("at least ")[2].partition(" ppm")[0]) <= 50, said
     row("sample clock 50 ppm fast", told, facts)
