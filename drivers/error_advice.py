@@ -201,6 +201,14 @@ _AWAY_STATUS: Final = (
 """These say nothing about the task that was asked for."""
 
 
+_GARBLED_STATUS: Final = ("INTERNAL", "DATA_LOSS", "UNKNOWN")
+
+
+def is_garbled(error: ni_errors.Error) -> bool:
+    """Whether `error` may be a reply that was damaged on its way rather than an answer about the task."""
+    return isinstance(error, ni_errors.RpcError) and getattr(error.rpc_code, "name", "") in _GARBLED_STATUS
+
+
 def has_ended(error: ni_errors.Error) -> bool:
     """Whether `error`, met while looking at a running task, means that the task has ended for good."""
     if isinstance(error, ni_errors.RpcError):

@@ -15,7 +15,7 @@ from daq_app.config.plan import TaskPlan
 from drivers.clock_line import ClockLine
 from drivers.connection import Connection
 from drivers.devices import Inspection, check_devices
-from drivers.error_advice import has_ended, translate
+from drivers.error_advice import has_ended, is_garbled, translate
 from drivers.ledger import TaskLedger
 from drivers.protocol import Block, ClockReading, DeviceInfo, DriverError, Opened
 from drivers.stream import TaskStream
@@ -73,6 +73,8 @@ class NidaqmxDriver:
         self._buffer_samples = 0
         self._in_vain = 0
         """Recoveries since the last read that succeeded, at each of which samples had been overwritten."""
+        self._garbled = False
+        """Whether the last recovery met a reply that could not be understood."""
         self._rate_hz = 0.0
         self._backup_stem = ""
 
@@ -259,9 +261,12 @@ class NidaqmxDriver:
                 if stream.task.is_task_done():
                     return False
         except ni_errors.Error as error:
-            if has_ended(error):
+            # Tasks that still hold samples must not be cleared for one damaged reply; two are an answer.
+            self._garbled, garbled_before = is_garbled(error), self._garbled
+            if has_ended(error) and (garbled_before or not self._garbled):
                 return False
             raise
+        self._garbled = False
         return bool(self._streams)
 
     def _go_on_in_the_buffer(self, plan: TaskPlan) -> str:

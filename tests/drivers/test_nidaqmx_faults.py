@@ -285,16 +285,6 @@ def test_a_device_that_comes_back_at_another_rate_is_no_continuation(laboratory:
     driver.close()
 
 
-def test_no_server_at_all(laboratory: Laboratories) -> None:
-    lab = laboratory()
-    lab.stop()
-    driver = open_driver(lab.connection)
-    with pytest.raises(DriverError) as caught:
-        driver.open(lab.plan)
-    assert "cannot be reached" in str(caught.value)
-    driver.close()
-
-
 def test_without_ni_daqmx_the_local_connection_says_what_to_install(laboratory: Laboratories) -> None:
     lab = laboratory()
     driver = open_driver("local")

@@ -1,4 +1,4 @@
-"""A way to the device server that is slow to open: the driver must find it again all the same."""
+"""The way to the device server: slow to open, silent, garbled or not there."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import grpc
+import nidaqmx
 import pytest
+from nidaqmx import errors as ni_errors
 
-from drivers import open_driver
+from drivers import Driver, DriverError, open_driver
 from drivers.stream import TaskStream
 
 SLOW_S = 0.4
@@ -74,11 +77,16 @@ def door(lab: Any) -> Iterator[SlowDoor]:
     made.close()
 
 
-def test_a_connection_that_opens_slowly_is_waited_for(lab: Any, door: SlowDoor) -> None:
-    """Each recovery makes a new connection: were each given up after 0.1 s, none would ever succeed."""
-    driver = open_driver(door.address)
+def started(connection: str, lab: Any) -> Driver:
+    driver = open_driver(connection)
     driver.open(lab.plan)
     driver.start()
+    return driver
+
+
+def test_a_connection_that_opens_slowly_is_waited_for(lab: Any, door: SlowDoor) -> None:
+    """Each recovery makes a new connection: were each given up after 0.1 s, none would ever succeed."""
+    driver = started(door.address, lab)
     before = driver.read(1.0)
     door.slow_s = SLOW_S
     assert driver.recover() == "", "the first attempt succeeds, and no sample is lost"
@@ -89,9 +97,7 @@ def test_a_connection_that_opens_slowly_is_waited_for(lab: Any, door: SlowDoor) 
 
 def test_hardware_behind_a_slow_connection_opens(lab: Any, door: SlowDoor) -> None:
     door.slow_s = SLOW_S
-    driver = open_driver(door.address)
-    driver.open(lab.plan)
-    driver.start()
+    driver = started(door.address, lab)
     assert driver.read(1.0).first_sample == 0
     driver.close()
 
@@ -100,9 +106,7 @@ def test_no_call_between_two_reads_may_wait_for_half_a_buffer(
     lab: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A reply that never comes must be given up while the device still holds what was sampled meanwhile."""
-    driver: Any = open_driver(lab.connection)
-    driver.open(lab.plan)
-    driver.start()
+    driver: Any = started(lab.connection, lab)
     allowed_s: list[float] = []
     position = TaskStream.device_position
 
@@ -113,4 +117,41 @@ def test_no_call_between_two_reads_may_wait_for_half_a_buffer(
     monkeypatch.setattr(TaskStream, "device_position", looked_at)
     driver.read(1.0)
     assert allowed_s and max(allowed_s) <= 0.15 * lab.rig.acquisition.buffer_s
+    driver.close()
+
+
+@pytest.mark.parametrize("times", [1, 9])
+def test_one_damaged_reply_while_recovering_does_not_clear_tasks_that_still_run(
+    lab: Any, monkeypatch: pytest.MonkeyPatch, times: int
+) -> None:
+    driver = started(lab.connection, lab)
+    before = driver.read(1.0)
+    lab.let_time_pass(5.0)  # in the device's buffer: lost if the tasks are started again
+    asked = nidaqmx.Task.is_task_done
+    damaged = iter(range(times))
+
+    def is_task_done(task: nidaqmx.Task) -> bool:
+        if next(damaged, None) is not None:
+            raise ni_errors.RpcError(grpc.StatusCode.INTERNAL, "Exception deserializing response!")
+        return bool(asked(task))
+
+    monkeypatch.setattr(nidaqmx.Task, "is_task_done", is_task_done)
+    with pytest.raises(DriverError, match="could not be understood") as caught:
+        driver.recover()
+    assert caught.value.recoverable
+    remark = driver.recover()
+    if times == 1:
+        assert remark == ""
+        assert driver.read(1.0).first_sample == before.first_sample + before.n_samples
+    else:
+        assert "started again" in remark, "a server that never gives a sensible answer has lost the tasks"
+    driver.close()
+
+
+def test_no_server_at_all(lab: Any) -> None:
+    lab.stop()
+    driver = open_driver(lab.connection)
+    with pytest.raises(DriverError) as caught:
+        driver.open(lab.plan)
+    assert "cannot be reached" in str(caught.value)
     driver.close()
