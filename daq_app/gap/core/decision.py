@@ -28,6 +28,9 @@ class Thresholds:
     probe_log_bayes: float = 6.0
     """Log evidence by which a probe must beat the best named hypothesis of its family to say that the
     family's form is unknown."""
+    form_p: float = 0.01
+    """Chance below which a free form of its family gains on top of the best hypothesis. It is one question,
+    asked once; the gate asks hundreds."""
     form_share: float = 0.03
     """Share of what the best hypothesis gains over none that a free form of its family must gain on top of
     it: where an effect is strong, less than that is the limit of our model of it."""
@@ -166,7 +169,7 @@ def _another_form(material: Material, thresholds: Thresholds) -> tuple[Decision,
         return None
     form = min(material.free_forms, key=lambda f: f.p_value)
     explained = material.fits[NULL].objective - material.fits[best.effects].objective
-    if form.p_value >= thresholds.goodness_p or form.gain < thresholds.form_share * explained:
+    if form.p_value >= thresholds.form_p or form.gain < thresholds.form_share * explained:
         return None
     words = (
         f"None of the library's effects, but the family is {form.family}: "

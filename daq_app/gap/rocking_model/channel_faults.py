@@ -38,8 +38,9 @@ CALIBRATION = 3e-3
 """Relative tolerance of one channel's calibration."""
 _SOUND = 0.5
 """Standard deviation of what a sound channel is off by, in those tolerances."""
-SUSPECT = 4.0
-"""Tolerances by which a channel must be off to be looked at on its own."""
+SUSPECT: dict[Family, float] = {"lvdt": 4.0, "wire": 2.0, "accelerometer": 4.0}
+"""Tolerances by which a channel must be off to be looked at on its own. Each wire is told from few others, so
+its tolerance is wide already."""
 STRUCTURE = 0.5
 """Excess of the logarithm of what remains over noise from which a channel is suspect for it alone."""
 STRUCTURE_SD = 0.2
@@ -108,15 +109,16 @@ def suspects(
             continue
         some = usable[:: max(len(usable) // SCREENED, 1)][:SCREENED]
         sizes = _sizes(some, family, ())
-        order = [name for name in sorted(sizes, key=lambda name: -sizes[name]) if sizes[name] > 0.5 * SUSPECT]
+        bar = SUSPECT[family]
+        order = [name for name in sorted(sizes, key=lambda name: -sizes[name]) if sizes[name] > 0.5 * bar]
         # A bad channel spoils the prediction of the others: right is one without which all agree. Of few
         # sensors at few heights two may do, of which one asks for a base that moves with the wall.
         agreed: list[tuple[float, float, str]] = []
         for name in order[:3]:
             rest = _sizes(usable, family, (name,))
             own = rest.pop(name)
-            agree = max(SUSPECT, 0.4 * own)
-            if own > SUSPECT and max(rest.values()) < agree:
+            agree = max(bar, 0.4 * own)
+            if own > bar and max(rest.values()) < agree:
                 doubt = max(rest.values()) if family == "lvdt" else _base_moves(usable, name)
                 agreed.append((doubt, agree, name))
         if agreed:
@@ -150,7 +152,7 @@ def _sizes(data: Sequence[_Family], family: Family, without: tuple[str, ...]) ->
             size = float(np.abs(found.values / sd).max())
             if family in RINGING:
                 usual = found.remains
-            rows.setdefault(name, []).append(max(size, SUSPECT * (found.remains - usual) / STRUCTURE))
+            rows.setdefault(name, []).append(max(size, SUSPECT[family] * (found.remains - usual) / STRUCTURE))
     return {name: float(np.median(values)) for name, values in rows.items()}
 
 
