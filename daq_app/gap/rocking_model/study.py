@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from daq_app.gap.core import CannotDiagnose, Diagnosis, Library, Options, diagnose
-from daq_app.gap.core.result import Decision
+from daq_app.gap.core.result import Decision, Verdict
 from daq_app.gap.rocking_model.conditions import Mark
 from daq_app.gap.rocking_model.extra_response import MARKS
 from daq_app.gap.rocking_model.inspection import (
@@ -164,7 +164,10 @@ def model_and_library(prepared: Sequence[RockingRun]) -> tuple[RockingModel, Lib
 
 
 def _doubt_the_survey(result: Diagnosis) -> Diagnosis:
-    """With α, p or b far from the survey the rig file is more likely wrong than physics missing."""
+    """With α, p or b far from the survey the rig file is more likely wrong than physics missing.
+
+    Where not even other numbers make the runs fit, the answer stays that none of these explains them.
+    """
     far = [
         p
         for p in result.parameters
@@ -175,6 +178,8 @@ def _doubt_the_survey(result: Diagnosis) -> Diagnosis:
         return result
     words = ", ".join(f"{p.name} = {p.value:.4g} {p.unit} (rig file {p.prior_mean:.4g})" for p in far)
     sentence = f"The runs do not fit the specimen of the rig file: {words}. {result.decision.sentence}"
-    decision = Decision("cannot_tell", result.decision.effects, result.decision.family, sentence, 0.0)
+    old = result.decision
+    verdict: Verdict = "none_of_these" if old.verdict == "none_of_these" else "cannot_tell"
+    decision = Decision(verdict, old.effects, old.family, sentence, 0.0)
     advice = "Check that the rig file is that of this specimen, and survey its weight, height and base again."
     return replace(result, decision=decision, next_measurement=advice)
