@@ -86,9 +86,6 @@ WHY: dict[str, str] = {
     "eccentric_mass": "See base_tilt.",
     "restitution_asymmetry-1": "The scatter of r itself: with the draws of seed 1, which are the same in all "
     "its cases, half the difference of the true r of the two sides is 0.0008 ± 0.0003 without any effect.",
-    "pivot_shift": "Both move the pivot inwards; what tells them apart, how the opening grows with θ², also "
-    "follows from the height of the LVDTs' points above the joint, which is not known.",
-    "rounded_edge": "See pivot_shift.",
     "lag@lvdt": "A delay of some milliseconds and a filter of that delay differ only in how they round the "
     "impacts.",
     "lag@wire": "See lag@lvdt; a resonance at 20 Hz delays like them.",
