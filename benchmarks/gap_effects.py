@@ -86,8 +86,8 @@ WHY: dict[str, str] = {
     "eccentric_mass": "See base_tilt.",
     "restitution_asymmetry-1": "The scatter of r itself: with the draws of seed 1, which are the same in all "
     "its cases, half the difference of the true r of the two sides is 0.0008 ± 0.0003 without any effect.",
-    "restitution_wear-5": "About half of it is the scatter of r itself: over the 128 larger impacts of seed 5, r "
-    "falls by 0.0012 ± 0.0006 of itself per hundred without any effect.",
+    "restitution_wear-5": "About half of it is the scatter of r itself: over the 128 larger impacts of seed "
+    "5, r falls by 0.0012 ± 0.0006 of itself per hundred without any effect.",
     "lag@lvdt": "A delay of some milliseconds and a filter of that delay differ only in how they round the "
     "impacts.",
     "lag@wire": "See lag@lvdt; a resonance at 20 Hz delays like them.",
