@@ -19,8 +19,8 @@ _WHY: Final = {
     "bounce": "The generator's hop lasts as long at every speed, the library's longer the faster the wall "
     "comes: in all that is read of it, it is the library's dwell (gap-method.md, *What cannot be "
     "separated*). The second mark on the accelerometers, which the library names, is not read.",
-    "pivot_shift": "Measured while the heights of the LVDTs' points were free to 50 mm. Since they are the rig "
-    "file's to 5 mm, this and the rounded edge are named at the first (gap-effects.md).",
+    "pivot_shift": "Measured while the heights of the LVDTs' points were free to 50 mm. Since they are the "
+    "rig file's to 5 mm, this and the rounded edge are named at the first (gap-effects.md).",
     "filter_delay@wire": "The step rules the delay out, as it is said to; a wire that swings on its spring "
     "(at 5 to 6 %) changes a step too, and stays. Seed 1 was first run with a step that only that filter was "
     "thought to change: there the filter was resolved, and lag@wire was left with wire_inertia@wire (8 %).",
