@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -15,6 +16,8 @@ from sim_hardware.daqmx_server.bench import Bench
 from sim_hardware.daqmx_server.clock import SteppedClock
 from sim_hardware.daqmx_server.inventory import Inventory
 from sim_hardware.daqmx_server.server import DaqmxServer
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 
 class KnownVolts:

@@ -6,73 +6,43 @@ its place, and a relay that speaks TLS stands before the simulated device server
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import socket
 import ssl
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import trustme
+from relay import Relay
 
 from drivers import DriverError, open_driver
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the stand-in for NI's tool is a script")
 
 
-class TlsRelay:
-    """Takes TLS connections on a port of its own and passes on what they say."""
+class TlsRelay(Relay):
+    """Takes TLS connections."""
 
     def __init__(self, port: int, authority: trustme.CA) -> None:
-        self._behind = port
         self._context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         authority.issue_cert("localhost").configure_cert(self._context)
         authority.configure_trust(self._context)
         self._context.verify_mode = ssl.CERT_REQUIRED  # both sides show who they are
         self._context.set_alpn_protocols(["h2"])
-        self._listening = socket.create_server(("127.0.0.1", 0))
-        self.port = self._listening.getsockname()[1]
         self.handshakes = 0
-        self._open: list[socket.socket] = [self._listening]
-        self._thread = threading.Thread(target=self._accept, daemon=True)
-        self._thread.start()
+        super().__init__(port)
 
-    def _accept(self) -> None:
-        while True:
-            try:
-                plain, _ = self._listening.accept()
-            except OSError:
-                return
-            try:
-                front = self._context.wrap_socket(plain, server_side=True)
-            except OSError:
-                plain.close()
-                continue
-            self.handshakes += 1
-            back = socket.create_connection(("127.0.0.1", self._behind))
-            self._open += [front, back]
-            for source, target in ((front, back), (back, front)):
-                threading.Thread(target=self._pass_on, args=(source, target), daemon=True).start()
-
-    @staticmethod
-    def _pass_on(source: socket.socket, target: socket.socket) -> None:
-        with contextlib.suppress(OSError):
-            while data := source.recv(65536):
-                target.sendall(data)
-        with contextlib.suppress(OSError):
-            target.shutdown(socket.SHUT_RDWR)
-
-    def close(self) -> None:
-        for each in self._open:
-            with contextlib.suppress(OSError):
-                each.shutdown(socket.SHUT_RDWR)
-            each.close()
-        self._thread.join()
+    def let_in(self, plain: socket.socket) -> socket.socket | None:
+        try:
+            front = self._context.wrap_socket(plain, server_side=True)
+        except OSError:
+            return None
+        self.handshakes += 1
+        return front
 
 
 @pytest.fixture

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import socket
-import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -12,6 +10,7 @@ import grpc
 import nidaqmx
 import pytest
 from nidaqmx import errors as ni_errors
+from relay import Relay
 
 from drivers import Driver, DriverError, open_driver
 from drivers.stream import TaskStream
@@ -20,49 +19,13 @@ SLOW_S = 0.4
 """Names, TCP and TLS over a distance, or a computer with too much to do."""
 
 
-class SlowDoor:
-    """Passes on what is said; a connection waits before its first byte is."""
+class SlowDoor(Relay):
+    """A connection waits before its first byte is passed on."""
 
-    def __init__(self, port: int) -> None:
-        self._behind = port
-        self.slow_s = 0.0
-        self._closing = threading.Event()
-        self._listening = socket.create_server(("127.0.0.1", 0))
-        self.address = f"grpc://127.0.0.1:{self._listening.getsockname()[1]}"
-        self._open: list[socket.socket] = [self._listening]
-        self._thread = threading.Thread(target=self._accept, daemon=True)
-        self._thread.start()
+    slow_s = 0.0
 
-    def _accept(self) -> None:
-        with contextlib.suppress(OSError):  # closed
-            while True:
-                front, _ = self._listening.accept()
-                self._open.append(front)
-                threading.Thread(target=self._open_slowly, args=(front,), daemon=True).start()
-
-    def _open_slowly(self, front: socket.socket) -> None:
-        if self._closing.wait(self.slow_s):  # this is the fault itself
-            return
-        back = socket.create_connection(("127.0.0.1", self._behind))
-        self._open.append(back)
-        threading.Thread(target=self._pass_on, args=(back, front), daemon=True).start()
-        self._pass_on(front, back)
-
-    @staticmethod
-    def _pass_on(source: socket.socket, target: socket.socket) -> None:
-        with contextlib.suppress(OSError):
-            while data := source.recv(65536):
-                target.sendall(data)
-        with contextlib.suppress(OSError):
-            target.shutdown(socket.SHUT_RDWR)
-
-    def close(self) -> None:
-        self._closing.set()
-        for each in self._open:
-            with contextlib.suppress(OSError):
-                each.shutdown(socket.SHUT_RDWR)
-            each.close()
-        self._thread.join()
+    def let_in(self, plain: socket.socket) -> socket.socket | None:
+        return None if self.closing.wait(self.slow_s) else plain  # waiting is the fault itself
 
 
 @pytest.fixture
@@ -86,7 +49,7 @@ def started(connection: str, lab: Any) -> Driver:
 
 def test_a_connection_that_opens_slowly_is_waited_for(lab: Any, door: SlowDoor) -> None:
     """Each recovery makes a new connection: were each given up after 0.1 s, none would ever succeed."""
-    driver = started(door.address, lab)
+    driver = started(f"grpc://127.0.0.1:{door.port}", lab)
     before = driver.read(1.0)
     door.slow_s = SLOW_S
     assert driver.recover() == "", "the first attempt succeeds, and no sample is lost"
@@ -97,7 +60,7 @@ def test_a_connection_that_opens_slowly_is_waited_for(lab: Any, door: SlowDoor) 
 
 def test_hardware_behind_a_slow_connection_opens(lab: Any, door: SlowDoor) -> None:
     door.slow_s = SLOW_S
-    driver = started(door.address, lab)
+    driver = started(f"grpc://127.0.0.1:{door.port}", lab)
     assert driver.read(1.0).first_sample == 0
     driver.close()
 

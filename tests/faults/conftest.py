@@ -13,7 +13,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from fault_bench import SPEED, Acquisition, RunFacts, Told
+from fault_bench import SPEED, Acquisition, Row, RunFacts, Start, Told
 
 from benchmarks.processes import free_the_hardware
 from daq_app.acquisition.simulated import SimulatedServer
@@ -60,9 +60,6 @@ def bench(server: SimulatedServer) -> Iterator[SimControl]:
         control.command("clear_faults")
 
 
-Start = Callable[..., Acquisition]
-
-
 @pytest.fixture
 def start(rig_file: Path, rig: Rig, server: SimulatedServer, tmp_path: Path) -> Iterator[Start]:
     """Start an acquisition of the test's own on the module's server."""
@@ -91,9 +88,6 @@ def shared(
     yield made
     if made.process.exitcode is None:
         assert made.end() == 0
-
-
-Row = Callable[..., None]
 
 
 @pytest.fixture

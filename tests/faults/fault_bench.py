@@ -280,3 +280,9 @@ def look_at(
         assert not one_device or all(leap.explained for leap in marks.leaps), f"{marks.leaps}\n{account}"
     assert missing == report.lost_samples, f"samples lost and the table of gaps differ\n{account}"
     return RunFacts(missing, report.lost_samples, quality["verdict"], quality["reasons"], end, first, account)
+
+
+Start = Callable[..., Acquisition]
+"""Starts an acquisition of the test's own."""
+Row = Callable[..., None]
+"""Puts a line into the table of the faults."""

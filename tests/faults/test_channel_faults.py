@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from conftest import Row
-from fault_bench import Acquisition, another_process, look_at
+from fault_bench import Acquisition, Row, another_process, look_at
 from saboteur import view_for_ever
 
 from daq_app.acquisition import AcquisitionClient

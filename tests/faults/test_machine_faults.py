@@ -10,8 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import Row, Start
-from fault_bench import SPEED, Acquisition, look_at
+from fault_bench import SPEED, Acquisition, Row, Start, look_at
 
 from benchmarks.processes import free_the_hardware
 from daq_app.acquisition import AcquisitionDied, AcquisitionProcess

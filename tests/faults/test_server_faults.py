@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Row, Start
-from fault_bench import SPEED, Acquisition, look_at
+from fault_bench import SPEED, Acquisition, Row, Start, look_at
 from nptdms import TdmsFile
 
 from daq_app.acquisition.messages import HealthMessage, State
