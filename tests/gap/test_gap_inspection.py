@@ -13,6 +13,7 @@ from daq_app.gap.rocking_model.inspection import found_channels, found_marks
 from daq_app.gap.rocking_model.model import RockingModel
 from daq_app.gap.rocking_model.rings import ring_columns
 from daq_app.gap.rocking_model.run_features import RockingRun
+from daq_app.gap.rocking_model.saturation import saturated
 from daq_app.gap.rocking_model.sensor_blocks import Block, first_order
 from daq_app.gap.rocking_model.sensor_response import block_coefficients
 from daq_app.gap.rocking_model.study import model_and_library, prepare
@@ -167,6 +168,15 @@ def test_a_limit_is_found_where_the_other_side_travels_further_from_a_zero_that_
     centred = raw - raw[-400:].mean()
     runs[0].channels[place] = np.minimum(np.where(centred < 0, other_way * centred, centred) + 0.02, 0.17)
     assert set(found_marks(prepare(runs)[0])) == {"saturation@WP-4"}
+
+
+@pytest.mark.parametrize("fault", [{"lag@lvdt": {"tau": 0.049}}, {"slow_response@wire": {"tau": 0.047}}])
+def test_a_family_that_comes_late_does_not_make_the_other_stop_short(
+    fault: dict[str, dict[str, float]],
+) -> None:
+    """Held against a rotation that has not begun to fall, a channel seems to stand still at its top."""
+    _, marks = saturated(simulate(fault, (0.4,)))
+    assert [mark.value for mark in marks[0]] == [0.0, 0.0]
 
 
 def test_one_channel_with_another_gain_is_examined_on_its_own() -> None:

@@ -22,6 +22,8 @@ LIMIT_SD = 0.01
 """Relative error of a limit."""
 _GOES_ON = 1.025
 """How much further the rotation must go on than the channel."""
+MOST_LATE = round(0.08 * GRID_HZ)
+"""Samples of the grid by which one family may be late against the other."""
 
 
 def saturated(
@@ -37,12 +39,13 @@ def saturated(
     for family, other in _OTHER.items():
         ids = [runs[0].sensors[i].id for i in runs[0].indices(family)]
         roughness = [_roughness(run, other, steps.get(other, 0.0)) for run in runs]
+        timed = [_in_step(a, b) for a, b in zip(rotations[family], rotations[other], strict=True)]
         cells = [
             [
                 (0.0, 0.0) if family in steps or name in steps else _limit(run, name, rotation, rough)
                 for name in ids
             ]
-            for run, rotation, rough in zip(runs, rotations[other], roughness, strict=True)
+            for run, rotation, rough in zip(runs, timed, roughness, strict=True)
         ]
         table = np.array(cells).reshape(len(runs), len(ids), 2)
         # A limit is one in all runs: what a channel has gone beyond in another run was none.
@@ -103,6 +106,25 @@ def _rotation(run: GapRun, family: Family) -> FloatArray | None:
         return None
     middle = np.median(faces[0], axis=0) - np.median(faces[1], axis=0)
     return np.asarray(middle / (2.0 * run.survey.half_base_m), dtype=float)
+
+
+def _in_step(mine: FloatArray | None, other: FloatArray | None) -> FloatArray | None:
+    """The other family's rotation, as late as this family shows it.
+
+    Beside a rotation that comes sooner a late channel seems to stand still at the top while the wall
+    moves on. Where the delay is largest, the correlation of the rates is: a flat top does not move it.
+    """
+    if mine is None or other is None:
+        return other
+    rates = np.gradient(mine), np.gradient(other)
+    shifts = np.arange(-MOST_LATE, MOST_LATE + 1)
+    inner = slice(MOST_LATE, mine.size - MOST_LATE)
+    alike = [float(rates[0][inner] @ np.roll(rates[1], k)[inner]) for k in shifts]
+    k = min(max(int(np.argmax(alike)), 1), shifts.size - 2)
+    bend = alike[k - 1] - 2.0 * alike[k] + alike[k + 1]
+    late = float(shifts[k]) + (0.5 * (alike[k - 1] - alike[k + 1]) / bend if bend < 0.0 else 0.0)
+    place = np.arange(other.size, dtype=float)
+    return np.asarray(np.interp(place - late, place, other))
 
 
 def _roughness(run: GapRun, family: Family, step: float) -> float:
