@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 from toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
 
-from daq_app.gap.core import Parameter, Prediction, fit
+from daq_app.gap.core import Parameter, Prediction, Run, fit
 from daq_app.gap.core.features import independent_fraction
 from daq_app.gap.core.likelihood import Covariance, log_density
 from daq_app.gap.core.parameters import between, positive
@@ -106,3 +107,23 @@ def test_parameters_know_their_coordinates() -> None:
     with pytest.raises(ValueError, match="positive"):
         Parameter("t", 1.0, -1.0)
     assert math.isinf(Parameter("m", 3.0, 0.5).unit_bounds[1])
+
+
+def test_a_fit_beside_the_place_where_the_model_diverges_ends_in_numbers() -> None:
+    """Features are no numbers just beyond the optimum: the slope there must not spoil the rest."""
+
+    class Edge(DecayModel):
+        def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
+            made = super().predict(run, values)
+            broken = made.features.copy()
+            if values["D"] > 1.0:
+                broken[-1] = math.nan
+            return Prediction(broken, made.loadings)
+
+    runs = make_runs(2)
+    start = {("D", None): 0.0}
+    found = fit(Edge(), runs, (), start)
+    assert math.isfinite(found.log_evidence)
+    assert all(math.isfinite(size) for size in found.sigmas.values())
+    assert np.isfinite(found.u).all()
+    assert found.values["D"][0] <= 1.0

@@ -124,7 +124,8 @@ class Problem:
             slope = (self._at(run, values, k, ahead) - here.features) / (ahead - u[k])
         else:
             slope = (here.features - self._at(run, values, k, behind)) / (u[k] - behind)
-        return slope
+        # Beside the place where the model diverges there is no slope to follow; value_at keeps off it.
+        return np.where(np.isfinite(slope), slope, 0.0)
 
     def _at(self, run: int, values: Mapping[str, float], k: int, coordinate: float) -> FloatArray:
         """Features with one unknown moved to a coordinate."""

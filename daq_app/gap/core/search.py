@@ -175,9 +175,10 @@ class Search:
         """−log Laplace marginal of the scatter sizes at the current linearisation."""
         hessian, _, log_like = self.normal_equations(log_sigma)
         sign, log_det = np.linalg.slogdet(hessian)
-        if sign <= 0:
+        if not sign > 0:
             return math.inf
-        return -log_like + 0.5 * float(self.u @ self.u) + 0.5 * float(log_det) + self.scatter_prior(log_sigma)
+        value = -log_like + 0.5 * float(self.u @ self.u) + 0.5 * float(log_det)
+        return value + self.scatter_prior(log_sigma) if math.isfinite(value) else math.inf
 
     def update_scatter(self) -> None:
         """A few damped Newton steps in the logarithms, each coordinate with its own curvature.
@@ -185,7 +186,7 @@ class Search:
         The sizes hardly interact (each has its own features), so the diagonal of the curvature is enough.
         """
         here = self.marginal(self.log_sigma)
-        for _ in range(4 if self.scatters else 0):
+        for _ in range(4 if self.scatters and math.isfinite(here) else 0):
             slope, curvature = self.scatter_slopes(here)
             move = np.where(curvature > 0.05, -slope / np.maximum(curvature, 0.05), -np.sign(slope))
             trial = np.clip(self.log_sigma + np.clip(move, -1.0, 1.0), *self._scatter_bounds())
@@ -194,7 +195,7 @@ class Search:
                 trial = 0.5 * (trial + self.log_sigma)
                 value = self.marginal(trial)
             moved = float(np.abs(trial - self.log_sigma).max())
-            if value > here:
+            if not value <= here:
                 break
             self.log_sigma, here = trial, value
             if moved < 0.02:

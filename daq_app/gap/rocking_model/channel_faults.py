@@ -1,4 +1,4 @@
-"""One channel that disagrees with its own family: which, and in what (gain, lag, curvature, drift).
+"""Channels that disagree with their own family: which, and a lone one in what (gain, lag, curvature, drift).
 
 Each channel is predicted from the others of its family by geometry alone, so that whatever the wall or
 the whole family does cancels. What is left is regressed on a few shapes.
@@ -38,9 +38,11 @@ CALIBRATION = 3e-3
 """Relative tolerance of one channel's calibration."""
 _SOUND = 0.5
 """Standard deviation of what a sound channel is off by, in those tolerances."""
-SUSPECT: dict[Family, float] = {"lvdt": 4.0, "wire": 2.0, "accelerometer": 4.0}
+SUSPECT: dict[Family, float] = {"lvdt": 4.0, "wire": 2.0, "accelerometer": 3.0}
 """Tolerances by which a channel must be off to be looked at on its own. Each wire is told from few others, so
 its tolerance is wide already."""
+CROWDED: tuple[Family, ...] = ("lvdt", "accelerometer")
+"""Families in which several channels may be wrong and the others still say so."""
 STRUCTURE = 0.5
 """Excess of the logarithm of what remains over noise from which a channel is suspect for it alone."""
 STRUCTURE_SD = 0.2
@@ -93,14 +95,30 @@ class _Family:
     repeats: int = 1
 
 
+@dataclass(frozen=True, slots=True)
+class Suspects:
+    """Channels that disagree with their family."""
+
+    single: dict[Family, str]
+    """The one channel without which all others of its family agree."""
+    several: dict[Family, tuple[str, ...]]
+    """Channels of one family, two or more, without which the others agree."""
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """All of them."""
+        return (*self.single.values(), *(name for names in self.several.values() for name in names))
+
+
 def suspects(
     runs: Sequence[GapRun], grids: Sequence[Grid], steps: Mapping[str, float] = MappingProxyType({})
-) -> dict[Family, str]:
-    """The one channel of each family that disagrees with all others, where the others agree.
+) -> Suspects:
+    """The channels of each family that disagree with all others, where the others agree.
 
     `steps` are those of the families, m, whose readings go in steps.
     """
-    found: dict[Family, str] = {}
+    single: dict[Family, str] = {}
+    several: dict[Family, tuple[str, ...]] = {}
     for family in TOLERANCE:
         step = steps.get(family, 0.0)
         data = [_family(run, grid, family, step) for run, grid in zip(runs, grids, strict=True)]
@@ -109,24 +127,57 @@ def suspects(
             continue
         some = usable[:: max(len(usable) // SCREENED, 1)][:SCREENED]
         sizes = _sizes(some, family, ())
-        bar = SUSPECT[family]
-        order = [name for name in sorted(sizes, key=lambda name: -sizes[name]) if sizes[name] > 0.5 * bar]
-        # A bad channel spoils the prediction of the others: right is one without which all agree. Of few
-        # sensors at few heights two may do, of which one asks for a base that moves with the wall.
-        agreed: list[tuple[float, float, str]] = []
-        for name in order[:3]:
-            rest = _sizes(usable, family, (name,))
-            own = rest.pop(name)
-            agree = max(bar, 0.4 * own)
-            if own > bar and max(rest.values()) < agree:
-                doubt = max(rest.values()) if family == "lvdt" else _base_moves(usable, name)
-                agreed.append((doubt, agree, name))
-        if agreed:
-            _, agree, name = min(agreed)
-            # Curvature is the one fault of a whole family that does not cancel between its channels.
-            if max(_sizes([_straightened(d) for d in usable], family, ()).values()) > agree:
-                found[family] = name
-    return found
+        order = [n for n in sorted(sizes, key=lambda n: -sizes[n]) if sizes[n] > 0.5 * SUSPECT[family]]
+        if not order:
+            continue
+        together = _together(usable, family)
+        alone = None if together else _alone(usable, family, order[:3])
+        if together:
+            several[family] = together
+        elif alone is not None:
+            single[family] = alone
+    return Suspects(single, several)
+
+
+def _alone(usable: Sequence[_Family], family: Family, order: Sequence[str]) -> str | None:
+    """The one channel without which the others agree, if there is one."""
+    bar = SUSPECT[family]
+    # A bad channel spoils the prediction of the others: right is one without which all agree. Of few
+    # sensors at few heights two may do, of which one asks for a base that moves with the wall.
+    agreed: list[tuple[float, float, str]] = []
+    for name in order:
+        rest = _sizes(usable, family, (name,))
+        own = rest.pop(name)
+        agree = max(bar, 0.4 * own)
+        if own > bar and max(rest.values()) < agree:
+            doubt = max(rest.values()) if family == "lvdt" else _base_moves(usable, name)
+            agreed.append((doubt, agree, name))
+    if not agreed:
+        return None
+    _, agree, name = min(agreed)
+    # Curvature is the one fault of a whole family that does not cancel between its channels.
+    bent = max(_sizes([_straightened(d) for d in usable], family, ()).values()) <= agree
+    return None if bent else name
+
+
+def _together(usable: Sequence[_Family], family: Family) -> tuple[str, ...]:
+    """Two or more channels, of many at most a quarter, without which the others agree.
+
+    The worst is taken out, then the worst of the others, and so on. It needs a family in which many
+    predict each one: five wires at four heights do not say which two of them are wrong.
+    """
+    if family not in CROWDED:
+        return ()
+    bar, found = SUSPECT[family], list[str]()
+    for _ in range(max(len(usable[0].ids) // 4, 2) + 1):
+        sizes = _sizes(usable, family, tuple(found))
+        rest = {name: size for name, size in sizes.items() if name not in found}
+        worst = max(rest, key=lambda name: rest[name])
+        if rest[worst] <= bar:
+            clear = all(0.4 * sizes[name] > min(rest[worst], bar) for name in found)
+            return tuple(sorted(found)) if len(found) > 1 and clear else ()
+        found.append(worst)
+    return ()
 
 
 def _base_moves(data: Sequence[_Family], without: str) -> float:

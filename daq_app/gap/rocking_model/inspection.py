@@ -13,6 +13,7 @@ import numpy as np
 
 from daq_app.config.rig import Family
 from daq_app.gap.core import CannotDiagnose, FeatureSet
+from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.channel_faults import channel_block, suspects
 from daq_app.gap.rocking_model.conditions import Mark, conditions_of, marks_of, without_hum
 from daq_app.gap.rocking_model.floor_vibration import Vibration, find_vibration, without_vibration
@@ -28,6 +29,7 @@ from daq_app.gap.rocking_model.rings import (
 )
 from daq_app.gap.rocking_model.run_features import Examined, RockingRun, examine, scalar_block
 from daq_app.gap.rocking_model.saturation import saturated
+from daq_app.gap.rocking_model.second_axis import second_axis
 from daq_app.gap.rocking_model.sensor_blocks import Block
 from daq_app.gap.rocking_model.wiring import Wiring, mend
 
@@ -144,17 +146,44 @@ def _coefficient(run: RockingRun, family: str, name: str) -> float | None:
 
 def without_suspects(
     examined: Sequence[Examined], marks: Sequence[Sequence[Mark]], reference: str
-) -> tuple[list[Examined], dict[str, Family]]:
-    """The runs with the channel of each family that disagrees with it taken out, and these channels."""
-    found = suspects([e.run for e in examined], [e.features.grid for e in examined], _steps(marks))
-    if not found:
-        return list(examined), {}
-    again = []
+) -> tuple[list[Examined], dict[str, Family], list[list[Mark]]]:
+    """The runs less the channels that disagree with their family; single ones; marks with the several.
+
+    What a single one shows, an effect may explain. Several of one family have no one cause that the
+    library knows: that they disagree is a finding that nothing explains, and not a reason to forget them.
+    """
+    grids = [e.features.grid for e in examined]
+    found = suspects([e.run for e in examined], grids, _steps(marks))
+    again = list(examined)
+    if found.ids:
+        again = []
+        for entry in examined:
+            run = replace(entry.run.excluding(found.ids), impacts_before=entry.features.impacts_before)
+            again.append(examine(run, reference))
+    odd = dict(found.several)
+    gross = _left_out(again)
+    if gross:
+        odd["lvdt"] = tuple(sorted({*odd.get("lvdt", ()), *gross}))
+    more = [
+        Mark(f"disagreement@{family}", f"{', '.join(names)} disagree", "1", float(len(names)), _COUNT_SD)
+        for family, names in odd.items()
+    ]
+    turned = second_axis([e.run for e in again], [e.features.grid for e in again])
+    rows = [[*row, *more, *own] for row, own in zip(marks, turned, strict=True)]
+    return again, {name: family for family, name in found.single.items()}, rows
+
+
+def _left_out(examined: Sequence[Examined]) -> set[str]:
+    """LVDTs that read and that the plane of the joint was made without, in half of the runs or more."""
+    seen: list[str] = []
     for entry in examined:
-        run = entry.run.excluding(found.values())
-        fresh = examine(replace(run, impacts_before=entry.features.impacts_before), reference)
-        again.append(fresh)
-    return again, {name: family for family, name in found.items()}
+        whole = {s.id for s, row in zip(entry.run.sensors, entry.run.channels, strict=True) if _reads(row)}
+        seen += [name for name in entry.joint.left_out if name in whole]
+    return {name for name in seen if 2 * seen.count(name) >= len(examined)}
+
+
+def _reads(values: FloatArray) -> bool:
+    return bool(np.all(np.isfinite(values)))
 
 
 def _steps(marks: Sequence[Sequence[Mark]]) -> dict[str, float]:

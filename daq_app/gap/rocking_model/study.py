@@ -68,11 +68,11 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
         impacts = entry.features.impacts_before + entry.features.swings.impacts
     if not examined:
         raise CannotDiagnose("None of the runs can be used.", " ".join(limits))
-    examined, channels = without_suspects(examined, marks, reference)
+    examined, channels, findings = without_suspects(examined, marks, reference)
     for entry in examined:
         limits += entry.features.notes
-    limits += _stated(marks, channels)
-    return completed(examined, marks, channels, inspected.wiring), limits
+    limits += _stated(findings, channels)
+    return completed(examined, findings, channels, inspected.wiring), limits
 
 
 def _stated(marks: Sequence[Sequence[Mark]], channels: Mapping[str, str]) -> list[str]:

@@ -1,0 +1,61 @@
+"""Channels that disagree and that no effect of the library explains are findings, not channels to forget."""
+
+from __future__ import annotations
+
+import pytest
+from simulated_wall import simulate
+
+from daq_app.gap.rocking_model.inspection import found_channels, found_marks
+from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.study import diagnose_runs, model_and_library, prepare
+
+LEVEL = (-0.35,)
+
+
+def _scaled(factors: dict[str, float], levels: tuple[float, ...] = LEVEL) -> list[GapRun]:
+    runs = simulate({}, levels)
+    place = {sensor.id: i for i, sensor in enumerate(runs[0].sensors)}
+    for run in runs:
+        for name, factor in factors.items():
+            run.channels[place[name]] *= factor
+    return runs
+
+
+@pytest.mark.parametrize(
+    "factors",
+    [
+        {"LV-A03": 1.09, "LV-B07": 1.09, "LV-B08": 1.09},
+        {"LV-A03": 1.025, "LV-B07": 0.97},
+        {"AC-3": 1.06, "AC-5": 1.08},
+    ],
+)
+def test_several_channels_of_one_family_that_disagree_are_named_together(factors: dict[str, float]) -> None:
+    prepared, limits = prepare(_scaled(factors))
+    family = "lvdt" if "LV-A03" in factors else "accelerometer"
+    assert found_channels(prepared) == {}
+    assert found_marks(prepared) == {f"disagreement@{family}": family}
+    assert any(all(name in words for name in factors) for words in limits)
+    joint_of_others = next(b for b in prepared[0].blocks if b.family == "wire")
+    assert abs(joint_of_others.values[joint_of_others.names.index("gain")]) < 5e-3
+    _, library = model_and_library(prepared)
+    assert not any(name.startswith("disagreement") for name in library), "nothing may explain it"
+
+
+def test_a_second_axis_that_follows_the_rotation_is_marked() -> None:
+    runs = simulate({}, LEVEL)
+    place = {sensor.id: i for i, sensor in enumerate(runs[0].sensors)}
+    for run in runs:
+        run.channels[place["TL-1Y"]] += 0.08 * run.channels[place["TL-1X"]]
+        run.channels[place["TL-2Y"]] += 0.01 * run.channels[place["TL-2X"]]
+    prepared, limits = prepare(runs)
+    assert found_marks(prepared) == {"crossed@TL-1Y": "tiltmeter"}
+    assert any("TL-1Y" in words for words in limits)
+
+
+def test_nothing_missing_is_not_said_over_channels_that_disagree() -> None:
+    levels = (0.25, -0.35, 0.45)
+    result = diagnose_runs(
+        _scaled({"LV-A03": 1.09, "LV-B07": 1.09, "LV-B08": 1.09}, levels), only=("viscous",)
+    )
+    assert result.decision.verdict == "none_of_these"
+    assert "disagree" in result.decision.sentence
