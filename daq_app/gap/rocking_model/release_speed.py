@@ -17,6 +17,8 @@ BEFORE_S, AFTER_S = 0.06, 0.10
 SEARCHED_S = 0.05
 _STEPS = 41
 _WORK_HZ = 1000.0
+_PROFILED = 401
+_SPEEDS_RAD_S = np.linspace(-0.08, 0.08, 321)
 TOLERANCE_RAD_S = 1e-3
 """What the form of the very first motion (a cable that gives way, a slow sensor) may feign."""
 
@@ -46,18 +48,31 @@ def release_speed(
         starts = starts[best] + np.linspace(-width, width, 9, dtype=np.float64)
         lost = [_fit(seen, time_s, start, survey.p_rad_s)[0] for start in starts]
         best = int(np.argmin(lost))
-    left, found, design = _fit(seen, time_s, float(starts[best]), survey.p_rad_s)
-    # The instant is an unknown like the others: its column is the derivative of the whole motion.
-    late = _design(time_s, float(starts[best]) + 1e-4, survey.p_rad_s)
-    slopes = np.column_stack([design, (late - design) @ found / 1e-4])
-    scale = np.sqrt(np.mean(slopes**2, axis=0)) + 1e-300
-    inverse = np.linalg.pinv((slopes / scale).T @ (slopes / scale), rcond=1e-10) / np.outer(scale, scale)
+    left, found, _ = _fit(seen, time_s, float(starts[best]), survey.p_rad_s)
     variance = max(left / max(count - 4, 1), noise_rad**2 / step)
+    speed, told = _moments(seen, time_s, survey.p_rad_s, variance)
     # Thrown up the wall rises v²/2a above its hold; what the hold sways by is as good as that.
     swayed = 2.0 * swings.hold_sd * abs(found[2]) / max(abs(found[1]), 1e-6)
-    return float(found[1]), float(
-        np.linalg.norm([np.sqrt(variance * inverse[1, 1]), swayed, TOLERANCE_RAD_S])
-    )
+    return speed, float(np.linalg.norm([told, swayed, TOLERANCE_RAD_S]))
+
+
+def _moments(seen: FloatArray, time_s: FloatArray, p: float, variance: float) -> tuple[float, float]:
+    """Mean and sd of the speed under its likelihood, every other unknown at its best.
+
+    What is seen is how far the motion turns above the hold, v²/2a, which says little of a small v and
+    nothing of its sign: the curvature at the best speed would promise far too much.
+    """
+    lost = np.full(_SPEEDS_RAD_S.size, np.inf)
+    for start in np.linspace(-SEARCHED_S, SEARCHED_S, _PROFILED, dtype=np.float64):
+        # The speed's column comes last: what the others leave is a parabola in the speed.
+        basis, triangle = np.linalg.qr(_design(time_s, float(start), p)[:, [0, 2, 1]])
+        along = basis.T @ seen
+        rest = float(seen @ seen - along @ along)
+        lost = np.minimum(lost, rest + (along[2] - triangle[2, 2] * _SPEEDS_RAD_S) ** 2)
+    weights = np.exp(-0.5 * (lost - lost.min()) / variance)
+    weights /= weights.sum()
+    mean = float(weights @ _SPEEDS_RAD_S)
+    return mean, float(np.sqrt(weights @ (_SPEEDS_RAD_S - mean) ** 2))
 
 
 def _design(time_s: FloatArray, start_s: float, p: float) -> FloatArray:

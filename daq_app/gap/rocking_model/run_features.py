@@ -275,18 +275,22 @@ def _wire_heights(run: GapRun) -> tuple[float, float, float]:
 
 
 def _from_peak_error(swings: sw.Swings, survey: Survey, ka: int, a: int, kb: int, b: int) -> float:
-    """What the error of a measured peak does to the time over the top of it, s.
+    """What the error of a measured peak does to the time between two crossings of its half-cycle, s.
 
-    Near the top |θ| = φ − ½ c t², so the time between two crossings of a level h below the peak,
-    2 √(2h/c), changes by 2/√(2 h c) per rad of the peak.
+    Near the top |θ| = φ − ½ c t², so a level h below the peak is passed √(2h/c) from it, and that changes
+    by 1/√(2 h c) per rad of the peak. Over the top both sides add up; in the fall or the rise the level
+    near the peak changes more than the lower one. The held rotation is an unknown of the fit itself.
     """
     count = swings.levels.shape[1]
-    if ka != kb or not a >= count > b:
+    if ka != kb or ka == 0:
         return 0.0
     peak = abs(float(swings.peak_rad[ka]))
     curvature = survey.p_rad_s**2 * max(np.sin(survey.alpha_rad - peak), 0.01)
-    below = max(peak - float(swings.levels[ka, b]), 1e-6)
-    return float(2.0 * swings.peak_sd[ka] / np.sqrt(2.0 * below * curvature))
+    below = peak - np.array([float(swings.levels[ka, place % count]) for place in (a, b)])
+    each = 1.0 / np.sqrt(2.0 * np.maximum(below, 1e-6) * curvature)
+    over_the_top = a >= count > b
+    changed = each.sum() if over_the_top else abs(each[1] - each[0])
+    return float(swings.peak_sd[ka] * changed)
 
 
 def _block_loadings(blocks: tuple[Block, ...], first: int, n: int) -> FloatArray:

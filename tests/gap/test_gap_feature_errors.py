@@ -1,0 +1,70 @@
+"""What features are said to be off by is what they are off by."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from simulated_wall import simulate
+
+from daq_app.gap.rocking_model.model import RockingModel
+from daq_app.gap.rocking_model.release_speed import release_speed
+from daq_app.gap.rocking_model.run_features import RockingRun, extract
+
+P, RATE_HZ, NOISE_RAD = 2.85, 4000.0, 2.5e-5
+
+
+@pytest.fixture(scope="module")
+def run() -> RockingRun:
+    return extract(simulate({}, (0.25,))[0])
+
+
+@pytest.mark.parametrize("observable", ["fall time 1", "rise time 1", "time over the top"])
+def test_the_error_of_a_measured_peak_is_in_every_time_that_hangs_on_it(
+    run: RockingRun, observable: str
+) -> None:
+    """Times are predicted from the measured peak: one that is off moves the crossings below it."""
+    model, swings = RockingModel(run.survey), run.swings
+    values = {p.name: p.mean for p in model.nuisance}
+    values |= {p.name: p.mean for p in model.local_nuisance(run)}
+    off = replace(swings, peak_rad=swings.peak_rad + np.sign(swings.peak_rad) * swings.peak_sd)
+    moved = np.abs(
+        model.predict(replace(run, swings=off, cache={}), values).features
+        - model.predict(replace(run, cache={}), values).features
+    )
+    count = swings.levels.shape[1]
+    checked = 0
+    for i, label in enumerate(run.features.labels[: len(run.places)]):
+        if label.observable != observable:
+            continue
+        own = 0.0
+        for k, place in (run.places[i, :2], run.places[i, 2:]):
+            sds = swings.fall_sd[k] if place < count else swings.rise_sd[k]
+            own += float(sds[place % count]) ** 2
+        beyond = np.sqrt(run.features.sd[i] ** 2 - own)
+        assert beyond == pytest.approx(moved[i], rel=0.35)
+        checked += 1
+    assert checked > 5
+
+
+@pytest.mark.parametrize("true", [0.0, 5e-3, -5e-3])
+def test_the_speed_at_the_release_is_as_sure_as_it_is_said_to_be(true: float) -> None:
+    """Small speeds show in v²/2a alone; the curvature at the best one promised three times too much."""
+    rng = np.random.default_rng(1)
+    held = 0.06
+    pull = P**2 * np.sin(0.157 - held)
+    time_s = np.arange(int(2.4 * RATE_HZ)) / RATE_HZ - 2.0
+    since = P * np.maximum(time_s, 0.0)
+    theta = held + true * np.sinh(since) / P - pull * (np.cosh(since) - 1.0) / P**2
+    survey = cast(Any, SimpleNamespace(p_rad_s=P))
+    off = []
+    for _ in range(24):
+        swings = SimpleNamespace(release_s=2.0 + 2e-3 * rng.normal(), peak_rad=np.array([held]), hold_sd=0.0)
+        seen = theta + NOISE_RAD * rng.standard_normal(theta.size)
+        found = release_speed(seen, NOISE_RAD, cast(Any, swings), survey, RATE_HZ)
+        assert found is not None
+        off.append((found[0] - true) / found[1])
+    assert 0.1 < np.sqrt(np.mean(np.square(off))) < 1.2
