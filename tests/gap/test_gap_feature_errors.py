@@ -50,21 +50,20 @@ def test_the_error_of_a_measured_peak_is_in_every_time_that_hangs_on_it(
     assert checked > 5
 
 
-@pytest.mark.parametrize("true", [0.0, 5e-3, -5e-3])
-def test_the_speed_at_the_release_is_as_sure_as_it_is_said_to_be(true: float) -> None:
-    """Small speeds show in v²/2a alone; the curvature at the best one promised three times too much."""
-    rng = np.random.default_rng(1)
-    held = 0.06
+def test_no_speed_at_the_release_is_as_likely_as_it_is_said_to_be() -> None:
+    """Small speeds show in v²/2a alone: the curvature at the best one makes none look unlikely too often."""
+    rng = np.random.default_rng(0)
+    held = 0.03
     pull = P**2 * np.sin(0.157 - held)
     time_s = np.arange(int(2.4 * RATE_HZ)) / RATE_HZ - 2.0
-    since = P * np.maximum(time_s, 0.0)
-    theta = held + true * np.sinh(since) / P - pull * (np.cosh(since) - 1.0) / P**2
+    theta = held - pull * (np.cosh(P * np.maximum(time_s, 0.0)) - 1.0) / P**2
     survey = cast(Any, SimpleNamespace(p_rad_s=P))
     off = []
-    for _ in range(24):
+    for _ in range(40):
         swings = SimpleNamespace(release_s=2.0 + 2e-3 * rng.normal(), peak_rad=np.array([held]), hold_sd=0.0)
         seen = theta + NOISE_RAD * rng.standard_normal(theta.size)
         found = release_speed(seen, NOISE_RAD, cast(Any, swings), survey, RATE_HZ)
         assert found is not None
-        off.append((found[0] - true) / found[1])
-    assert 0.1 < np.sqrt(np.mean(np.square(off))) < 1.2
+        off.append(found[0] / found[1])
+    assert 0.7 < np.sqrt(np.mean(np.square(off))) < 1.15
+    assert np.abs(off).max() < 3.0

@@ -50,17 +50,18 @@ def release_speed(
         best = int(np.argmin(lost))
     left, found, _ = _fit(seen, time_s, float(starts[best]), survey.p_rad_s)
     variance = max(left / max(count - 4, 1), noise_rad**2 / step)
-    speed, told = _moments(seen, time_s, survey.p_rad_s, variance)
+    told = _told(seen, time_s, survey.p_rad_s, float(found[1]), variance)
     # Thrown up the wall rises v²/2a above its hold; what the hold sways by is as good as that.
     swayed = 2.0 * swings.hold_sd * abs(found[2]) / max(abs(found[1]), 1e-6)
-    return speed, float(np.linalg.norm([told, swayed, TOLERANCE_RAD_S]))
+    return float(found[1]), float(np.linalg.norm([told, swayed, TOLERANCE_RAD_S]))
 
 
-def _moments(seen: FloatArray, time_s: FloatArray, p: float, variance: float) -> tuple[float, float]:
-    """Mean and sd of the speed under its likelihood, every other unknown at its best.
+def _told(seen: FloatArray, time_s: FloatArray, p: float, speed: float, variance: float) -> float:
+    """Sd of the speed, from its likelihood with every other unknown at its best.
 
-    What is seen is how far the motion turns above the hold, v²/2a, which says little of a small v and
-    nothing of its sign: the curvature at the best speed would promise far too much.
+    What is seen is how far the motion turns above the hold, v²/2a, which says little of a small v and of
+    its sign: the curvature at the best speed would promise too much. The sd is that at which no speed
+    at all is as unlikely as it is; where it is likely, how far off others are that are not.
     """
     lost = np.full(_SPEEDS_RAD_S.size, np.inf)
     for start in np.linspace(-SEARCHED_S, SEARCHED_S, _PROFILED, dtype=np.float64):
@@ -69,10 +70,12 @@ def _moments(seen: FloatArray, time_s: FloatArray, p: float, variance: float) ->
         along = basis.T @ seen
         rest = float(seen @ seen - along @ along)
         lost = np.minimum(lost, rest + (along[2] - triangle[2, 2] * _SPEEDS_RAD_S) ** 2)
-    weights = np.exp(-0.5 * (lost - lost.min()) / variance)
-    weights /= weights.sum()
-    mean = float(weights @ _SPEEDS_RAD_S)
-    return mean, float(np.sqrt(weights @ (_SPEEDS_RAD_S - mean) ** 2))
+    squares = (lost - lost.min()) / variance
+    against_none = float(squares[_SPEEDS_RAD_S.size // 2])
+    if against_none > 1.0:
+        return abs(speed) / float(np.sqrt(against_none))
+    apart = np.abs(_SPEEDS_RAD_S - speed)
+    return float(np.min(apart, where=squares >= 1.0, initial=apart.max()))
 
 
 def _design(time_s: FloatArray, start_s: float, p: float) -> FloatArray:
