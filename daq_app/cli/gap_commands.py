@@ -184,7 +184,7 @@ def effects(
     table = Table("effect", "family", "adds", "parameters", "confusable with", "source")
     for e in chosen:
         table.add_row(
-            e.name if e.kind == "effect" else f"{e.name} (probe)",
+            e.name if e.kind == "effect" else f"{e.name} ({e.kind})",
             e.family,
             e.equation,
             ", ".join(f"{p.name} ({p.unit})" if p.unit else p.name for p in e.parameters),

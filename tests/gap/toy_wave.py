@@ -78,7 +78,7 @@ LIBRARY = Library(
 
 
 def make_runs(seed: int, count: int = 6, scatter: float = 0.004, **effects: float) -> list[PlainRun]:
-    """Runs at three levels; `effects` as ``slope_k=0.03``, ``step_h=…`` (a form outside the library)."""
+    """Runs at three levels; `effects` as ``slope_k=0.03``, ``step_h=…``, ``bend_c=…`` (no effects)."""
     rng = np.random.default_rng(seed)
     r_true, d_true = 0.9 + 0.01 * rng.normal(), 1.0 + 0.02 * rng.normal()
     sd = np.concatenate([np.full(PEAKS, 1e-4), np.full(PEAKS, 1e-3)])
@@ -88,6 +88,7 @@ def make_runs(seed: int, count: int = 6, scatter: float = 0.004, **effects: floa
         peaks = [a]
         for _ in range(PEAKS - 1):
             r = r_true + effects.get("slope_k", 0.0) * (a - 0.5) + effects.get("step_h", 0.0) * (a > 0.5)
+            r += effects.get("bend_c", 0.0) * (a - 0.5) ** 2
             a = a * r + a * scatter * rng.normal()
             peaks.append(a)
         true = np.array(peaks)

@@ -28,8 +28,8 @@ class Thresholds:
     probe_log_bayes: float = 6.0
     """Log evidence by which a probe must beat the best named hypothesis of its family to say that the
     family's form is unknown."""
-    form_p: float = 0.01
-    """Chance below which a free form of its family gains on top of the best hypothesis. It is one question,
+    form_p: float = 0.005
+    """Chance below which free forms of its family gain on top of the best hypothesis. It is one question,
     asked once; the gate asks hundreds."""
     form_share: float = 0.03
     """Share of what the best hypothesis gains over none that a free form of its family must gain on top of
@@ -50,18 +50,31 @@ class Thresholds:
 
 @dataclass(frozen=True, slots=True)
 class FreeForm:
-    """Score test of a probe on top of the best hypothesis."""
+    """Score test of a probe or a departure on top of the best hypothesis."""
 
     family: str
+    equation: str
     gain: float
     """In log posterior."""
     p_value: float
-    """That the named form is the right one, times the number of probes that were tried."""
+    """Of a gain as large by chance, where the named form is the right one."""
 
     @classmethod
-    def of(cls, probe: Effect, gain: float, tried: int) -> FreeForm:
-        """Twice the gain is χ² with the probe's number of coefficients where there is nothing to gain."""
-        return cls(probe.family, gain, min(tried * float(chi2.sf(2.0 * gain, len(probe.parameters))), 1.0))
+    def of(cls, form: Effect, gain: float, determined: float) -> FreeForm:
+        """Twice the gain is χ² where there is nothing to gain, with as many degrees of freedom as the runs
+        determine coefficients of the form: r at five speeds includes r itself and its slope, which the model
+        or the named form have already. What is determined in part makes the chance a little too large."""
+        chance = float(chi2.sf(2.0 * gain, determined)) if gain > 0.0 and determined > 0.0 else 1.0
+        return cls(form.family, form.equation, gain, chance)
+
+
+def together(forms: Sequence[FreeForm]) -> float:
+    """Chance of all forms together: the harmonic mean of theirs (Wilson, PNAS 116, 2019).
+
+    A departure and a free form of the same family ask nearly the same, so that Bonferroni's correction would
+    count one question several times; the harmonic mean holds where they ask nearly the same.
+    """
+    return len(forms) / sum(1.0 / max(form.p_value, 1e-300) for form in forms)
 
 
 @dataclass(slots=True)
@@ -76,7 +89,7 @@ class Material:
     goodness: Mapping[tuple[str, ...], Goodness]
     """Of the null, the best hypothesis and the best probe at least."""
     free_forms: Sequence[FreeForm]
-    """Of the families of the best hypothesis."""
+    """Of the families and forms of the best hypothesis."""
     null_gap: float
     """Gap of the fit without any effect, in the noise and scatter units of the best hypothesis."""
     best_gap: float
@@ -168,13 +181,14 @@ def _another_form(material: Material, thresholds: Thresholds) -> tuple[Decision,
     if not best.effects or not material.free_forms:
         return None
     form = min(material.free_forms, key=lambda f: f.p_value)
+    chance = together(material.free_forms)
     explained = material.fits[NULL].objective - material.fits[best.effects].objective
-    if form.p_value >= thresholds.form_p or form.gain < thresholds.form_share * explained:
+    if chance >= thresholds.form_p or form.gain < thresholds.form_share * explained:
         return None
     words = (
         f"None of the library's effects, but the family is {form.family}: "
-        f"{describe(best, material.library)} comes near, and a free form on top of it gains "
-        f"{form.gain:.0f} in log posterior (p = {form.p_value:.0e})."
+        f"{describe(best, material.library)} comes near, and a freer form on top of it ({form.equation}) "
+        f"gains {form.gain:.0f} in log posterior (p = {chance:.0e} over {len(material.free_forms)} tried)."
     )
     return _of_family(form.family, words, best)
 

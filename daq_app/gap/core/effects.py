@@ -34,8 +34,11 @@ class Effect:
     signature: str = ""
     """How it shows."""
     confusable_with: tuple[Confusion, ...] = ()
-    kind: Literal["effect", "probe"] = "effect"
-    """A probe is a non-parametric form of its family: it can name the family, never the effect."""
+    kind: Literal["effect", "probe", "departure"] = "effect"
+    """A probe is a non-parametric form of its family: it can name the family, never the effect. A departure
+    is the first step away from the forms of some effects, only ever tested on top of one of them."""
+    of: tuple[str, ...] = ()
+    """Of a departure: the effects whose forms it departs from."""
     null_value: Mapping[str, float] = field(default_factory=dict)
     """Parameter values at which the effect vanishes; 0 for each that is not listed."""
     unsteady: tuple[str, ...] = ()
@@ -82,6 +85,9 @@ class Library(Mapping[str, Effect]):
             unknown = [c.effect for c in effect.confusable_with if c.effect not in self._effects]
             if unknown:
                 raise ValueError(f"effect {effect.name} is said to be confusable with unknown {unknown}")
+            strangers = [name for name in effect.of if name not in self._effects]
+            if strangers or bool(effect.of) != (effect.kind == "departure"):
+                raise ValueError(f"effect {effect.name} ({effect.kind}) departs from {list(effect.of)}")
         self.alike = tuple(alike)
         self._alike: dict[str, Alike] = {}
         for group in self.alike:
@@ -101,12 +107,17 @@ class Library(Mapping[str, Effect]):
 
     @property
     def named(self) -> tuple[Effect, ...]:
-        """Effects proper, without probes."""
+        """Effects proper, without probes and departures."""
         return tuple(e for e in self._effects.values() if e.kind == "effect")
 
     @property
     def probes(self) -> tuple[Effect, ...]:
         return tuple(e for e in self._effects.values() if e.kind == "probe")
+
+    def departures(self, effects: Iterable[str]) -> tuple[Effect, ...]:
+        """Those from the form of any of some effects."""
+        named = set(effects)
+        return tuple(e for e in self._effects.values() if named.intersection(e.of))
 
     @property
     def families(self) -> tuple[str, ...]:
@@ -117,10 +128,11 @@ class Library(Mapping[str, Effect]):
         """The library less some effects (and less the confusions that point at them)."""
         kept = []
         for effect in self._effects.values():
-            if effect.name in names:
+            of = tuple(name for name in effect.of if name not in names)
+            if effect.name in names or (effect.of and not of):
                 continue
             confusions = tuple(c for c in effect.confusable_with if c.effect not in names)
-            kept.append(replace(effect, confusable_with=confusions))
+            kept.append(replace(effect, confusable_with=confusions, of=of))
         groups = ((group, tuple(n for n in group.names if n not in names)) for group in self.alike)
         alike = [Alike(left, group.reason, group.measure) for group, left in groups if len(left) > 1]
         return Library(kept, alike)

@@ -176,6 +176,24 @@ def promised(searches: Sequence[Search]) -> float:
     return min(search.promise(nothing) - search.scatter_prior(search.log_sigma) for search in searches)
 
 
+@dataclass(frozen=True, slots=True)
+class Score:
+    """Score test of a form on top of a fit."""
+
+    gain: float
+    """In log posterior."""
+    determined: float
+    """How many coefficients of the form the runs determine besides what the fit has already."""
+
+
+def on_top(search: Search, form: str) -> Score:
+    """What a form (an effect of the search) gains on top of the search's other effects, whose priors do not
+    count here."""
+    effects = np.array([unknown.effect for unknown in search.problem.unknowns])
+    asked = effects == form
+    return Score(*search.score(asked, (effects != "") & ~asked))
+
+
 def _polish(search: Search, linear: Columns) -> bool:
     """Follow a search to its end: fresh columns, many steps with these, until fresh ones gain nothing."""
     nothing = np.zeros(len(search.problem), dtype=bool)

@@ -15,7 +15,7 @@ from daq_app.gap.core.features import Run
 from daq_app.gap.core.fit import Fit, effects_of
 from daq_app.gap.core.goodness import Goodness, check
 from daq_app.gap.core.model import Model
-from daq_app.gap.core.parallel import FitTask, GlanceTask, PromiseTask, Workers
+from daq_app.gap.core.parallel import FitTask, GlanceTask, OnTopTask, PromiseTask, Workers
 
 Hypothesis = tuple[str, ...]
 POLISHED = 6
@@ -231,24 +231,25 @@ class Hypotheses:
         return [p for p, reached in zip(pairs, promised, strict=True) if start.objective - reached > PROMISE]
 
     def free_forms(self, best: Hypothesis) -> list[FreeForm]:
-        """What each probe of the families of the best hypothesis gains on top of it, by a score test.
+        """What each probe of the families of the best hypothesis, and each departure from the forms of its
+        effects, gains on top of it, by a score test.
 
         Another form of a family that is in the library (drag with the square of the speed) leaves little that
-        the gate sees, since the named form takes up most of it; what is left has the shape of that family.
+        the gate sees, since the named form takes up most of it; what is left has the shape of that family. A
+        probe can have any shape, which dilutes a small difference; a departure has one, which most others
+        share to some degree.
         """
         start = self.fits[best]
         families = {self.library[name].family for name in best}
         probes = [probe for probe in self.library.probes if probe.family in families]
+        forms = [*probes, *self.library.departures(best)]
         effects = effects_of(best, self.library)
         tasks = [
-            PromiseTask((GlanceTask((*effects, probe), start.known(), start.sigmas, {}, {}),), start.columns)
-            for probe in probes
+            OnTopTask(GlanceTask((*effects, form), start.known(), start.sigmas, {}, {}), start.columns)
+            for form in forms
         ]
-        promised = [part[0] for part in self.workers.run(tasks, "free forms")] if tasks else []
-        return [
-            FreeForm.of(probe, start.objective - reached, len(probes))
-            for probe, reached in zip(probes, promised, strict=True)
-        ]
+        scores = self.workers.run(tasks, "free forms") if tasks else []
+        return [FreeForm.of(form, s.gain, s.determined) for form, s in zip(forms, scores, strict=True)]
 
     def _fit_likely(self, pairs: Sequence[Hypothesis]) -> None:
         if not pairs:

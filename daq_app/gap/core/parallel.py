@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.features import Run
-from daq_app.gap.core.fit import Fit, fit, glance, promised, searches_from
+from daq_app.gap.core.fit import Fit, Score, fit, glance, on_top, promised, searches_from
 from daq_app.gap.core.held_out import HeldOutRun, score
 from daq_app.gap.core.model import Model
 from daq_app.gap.core.problem import Columns
@@ -74,6 +74,18 @@ class PromiseTask:
 
 
 @dataclass(frozen=True, slots=True)
+class OnTopTask:
+    """What a form gains on top of a fit, whose columns are known."""
+
+    form: GlanceTask
+    columns: Columns
+
+    def run(self, model: Model, runs: Sequence[Run], frozen: Columns | None = None) -> Score:
+        first, *_ = self.form.searches(model, runs, {**(frozen or {}), **self.columns})
+        return on_top(first, self.form.effects[-1].name)
+
+
+@dataclass(frozen=True, slots=True)
 class ScoreTask:
     """Predict every run from the others under one hypothesis."""
 
@@ -85,7 +97,7 @@ class ScoreTask:
         return score(model, runs, self.effects, self.whole, self.by)
 
 
-Task = FitTask | GlanceTask | PromiseTask | ScoreTask
+Task = FitTask | GlanceTask | PromiseTask | OnTopTask | ScoreTask
 _STATE: dict[str, Any] = {}
 """In a worker process: the model and runs, sent once instead of with every task."""
 

@@ -21,6 +21,8 @@ SCATTER_STEP = 0.05
 """Step of the differences in the logarithm of a scatter size."""
 TOLERANCE = 1e-3
 """A change of the log posterior below this ends a search."""
+FLAT = 1.0 - 1e-4
+"""Share of the information of a prior that is taken away where data alone have to speak."""
 _LOG_2PI = math.log(2 * math.pi)
 
 
@@ -144,6 +146,26 @@ class Search:
         free = self._free(gradient) & np.asarray(~held)
         downhill = float(gradient[free] @ np.linalg.solve(hessian[np.ix_(free, free)], gradient[free]))
         return self.objective - 0.5 * downhill
+
+    def score(self, asked: NDArray[np.bool_], named: NDArray[np.bool_]) -> tuple[float, float]:
+        """What the `asked` unknowns (a mask) gain in log posterior on top of the others by one linear step,
+        and how many of them the data determine (1 − posterior over prior variance, summed).
+
+        The `named` unknowns give way as far as the data let them: a prior that would rather have their effect
+        weaker is no evidence for another form of it.
+        """
+        self.linearise_if_moved()
+        hessian, gradient, _ = self.normal_equations(self.log_sigma)
+        others = self._free(gradient) & ~asked
+        hessian, gradient = hessian - np.diag(np.where(named, FLAT, 0.0)), gradient - FLAT * named * self.u
+        both = np.linalg.solve(hessian[np.ix_(others, others)], hessian[np.ix_(others, asked)])
+        own = hessian[np.ix_(asked, asked)] - hessian[np.ix_(asked, others)] @ both
+        slope = np.zeros_like(gradient)
+        slope[asked] = gradient[asked] - both.T @ gradient[others]
+        free = self._free(slope)[asked]
+        variance = np.linalg.inv(own[np.ix_(free, free)])
+        left = slope[asked][free]
+        return 0.5 * float(left @ variance @ left), float(np.sum(1.0 - np.diag(variance)))
 
     def step(self) -> float:
         """One accepted Levenberg–Marquardt step; returns the gain (0 when none was found)."""

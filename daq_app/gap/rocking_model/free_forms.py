@@ -1,4 +1,4 @@
-"""Free forms of the probes for restoring and loss: what no named effect says of the times of the swings."""
+"""Free forms for restoring and loss: what no named effect says of the swings."""
 
 from __future__ import annotations
 
@@ -9,6 +9,12 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.run_features import RockingRun
+from daq_app.gap.rocking_model.vector import half_cycle_table
+from sim_hardware.dynamics import parameters as par
+
+_MIDDLE = 0.1
+"""Peak, as a share of α, whose damping a growth with the amplitude leaves as it is."""
+_ZETA_STEP = 1e-4
 
 
 def free_times(run: RockingRun, values: Mapping[str, float]) -> FloatArray:
@@ -44,4 +50,29 @@ def _free_basis(run: RockingRun) -> tuple[NDArray[np.intp], NDArray[np.intp], Fl
         direction = np.where(turning, 0.0, np.where(falls, 1.0, -1.0))
         run.cache["free basis"] = (kind, low, place - low, direction)
     found: tuple[NDArray[np.intp], NDArray[np.intp], FloatArray, FloatArray] = run.cache["free basis"]
+    return found
+
+
+def with_uneven_loss(
+    run: RockingRun,
+    values: Mapping[str, float],
+    vector: FloatArray,
+    true: FloatArray,
+    levels: FloatArray,
+    table: FloatArray,
+) -> FloatArray:
+    """The table of half-cycles, (n, 5 + 2F), with an equivalent damping of each half-cycle's own.
+
+    To first order, which is all that a score test asks. What such a loss takes from a half-cycle shows in its
+    times and in the speeds at its ends, so in r as well.
+    """
+    growth, side = values.get("loss_growth.zeta", 0.0), values.get("loss_side.zeta", 0.0)
+    if growth == 0.0 and side == 0.0:
+        return table
+    own = growth * np.log(np.abs(true) / (_MIDDLE * run.survey.alpha_rad)) + side * np.sign(true)
+    ahead, behind = vector.copy(), vector.copy()
+    ahead[par.ZETA] += _ZETA_STEP
+    behind[par.ZETA] -= _ZETA_STEP
+    more, less = (half_cycle_table(run, v, true, levels) for v in (ahead, behind))
+    found: FloatArray = table + own[:, None] * (more - less) / (2.0 * _ZETA_STEP)
     return found

@@ -8,7 +8,7 @@ from dataclasses import replace
 from daq_app.gap.core import Alike, Confusion, Effect, Library, Parameter
 from daq_app.gap.core.parameters import between, positive, signed
 from daq_app.gap.rocking_model.model import SCATTER_RELEASE
-from daq_app.gap.rocking_model.vector import PROBE_SPEEDS
+from daq_app.gap.rocking_model.probes import departures, probes
 from sim_hardware.dynamics.effects import MOTION_EFFECTS
 from sim_hardware.dynamics.spec import EffectSpec
 from sim_hardware.dynamics.spec import Parameter as SpecParameter
@@ -207,48 +207,6 @@ def _sensor_effects(known: set[str]) -> Iterable[Effect]:
     )
 
 
-def _probes() -> Iterable[Effect]:
-    knots = tuple(signed(f"k{i}", 0.04, "1", f"change of r at {v} rad/s") for i, v in enumerate(PROBE_SPEEDS))
-    more = (signed("side", 0.02, "1", "left against right"), signed("order", 0.02, "1", "per ten impacts"))
-    yield Effect(
-        "free_restitution",
-        "restitution",
-        knots + more,
-        "r = r₀ + f(v) + s·side + c·n, f piecewise linear",
-        "non-parametric",
-        kind="probe",
-    )
-    places = [
-        f"{part} at {size} α" for part in ("upper part", "lower part", "turning") for size in (0, 0.15, 0.4)
-    ]
-    yield Effect(
-        "free_restoring",
-        "interface",
-        tuple(signed(f"t{i}", 0.01, "s", text, linear=True) for i, text in enumerate(places)),
-        "half-cycle times + f(peak), the same up and down",
-        "non-parametric",
-        kind="probe",
-    )
-    yield Effect(
-        "free_dissipation",
-        "dissipation",
-        tuple(signed(f"t{i}", 0.005, "s", text, linear=True) for i, text in enumerate(places[:6])),
-        "times of the fall + f(peak), of the rise − f(peak)",
-        "non-parametric",
-        kind="probe",
-    )
-    for family, count in (("wire", 5), ("accelerometer", 2), ("joint", 5), ("base", 2), ("tiltmeter", 3)):
-        kind = {"joint": "interface", "base": "contact"}.get(family, "sensor")
-        yield Effect(
-            f"free_{family}",
-            kind,
-            tuple(signed(f"c{i}", 40.0, "1", f"coefficient {i}", linear=True) for i in range(count)),
-            f"every coefficient of the {family} family is free",
-            "non-parametric",
-            kind="probe",
-        )
-
-
 _ALIKE = (
     # Not dwell and bounce: a hop lasts longer the faster the wall comes, which several levels show.
     Alike(
@@ -278,7 +236,7 @@ def _alike(names: Collection[str]) -> Iterable[Alike]:
 def rocking_library(
     channels: Mapping[str, str] | None = None, marks: Mapping[str, str] | None = None
 ) -> Library:
-    """All effects and probes.
+    """All effects, probes and departures.
 
     `channels` are those that disagree with their family and `marks` the conditions found in these runs
     (``hum@LV-A03``), each with its family: their effects are added, under the name of the channel.
@@ -296,5 +254,5 @@ def rocking_library(
         } | {"saturation@lvdt": "lvdt", "saturation@wire": "wire", "polarity": "", "swap": ""}
     conditions = [mark_effect(mark, family) for mark, family in marks.items()]
     motion = (_motion_effect(spec, known) for spec in specs)
-    effects = [*motion, *_sensor_effects(known), *single, *conditions, *_probes()]
+    effects = [*motion, *_sensor_effects(known), *single, *conditions, *probes(), *departures()]
     return Library(effects, _alike({effect.name for effect in effects}))

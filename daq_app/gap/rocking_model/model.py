@@ -12,12 +12,12 @@ from daq_app.gap.core import Parameter, Prediction, Run, Scatter
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import sensor_response as response
 from daq_app.gap.rocking_model.extra_response import with_measured_inputs
-from daq_app.gap.rocking_model.free_forms import free_times
+from daq_app.gap.rocking_model.free_forms import free_times, with_uneven_loss
 from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.records import Survey
 from daq_app.gap.rocking_model.repeatability import biases
 from daq_app.gap.rocking_model.run_features import RockingRun
-from daq_app.gap.rocking_model.vector import acts_on, kernel_vector, restitution_of
+from daq_app.gap.rocking_model.vector import acts_on, half_cycle_table, kernel_vector, restitution_of
 from sim_hardware.dynamics import shooting
 
 SCATTER_R = "scatter of r"
@@ -203,6 +203,7 @@ class RockingModel:
         key, vector, clock = kernel_vector(run, values)
         true, levels = response.true_rotations(run, values)
         table = self._half_cycles(run, vector, true, levels, key)
+        table = with_uneven_loss(run, values, vector, true, levels, table)
         count = levels.shape[1]
         first = shooting.FIRST_CROSSING
         speeds_out, speeds_in = table[:, shooting.SPEED_OUT], table[:, shooting.SPEED_IN]
@@ -238,9 +239,7 @@ class RockingModel:
         if run.cache.get("key") == key:
             known: FloatArray = run.cache["table"]
             return known
-        table = np.empty((true.size, shooting.FIRST_CROSSING + 2 * levels.shape[1]))
-        side = 1.0 if run.swings.peak_rad[0] > 0 else -1.0
-        shooting.half_cycles(vector, run.swings.peak_s, true, levels, side, True, table)
+        table = half_cycle_table(run, vector, true, levels)
         run.cache["key"], run.cache["table"] = key, table
         return table
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.run_features import RockingRun
 from sim_hardware.dynamics import parameters as par
+from sim_hardware.dynamics import shooting
 from sim_hardware.dynamics.effects import MOTION_EFFECTS
 
 TOLERANCE = 1e-10
@@ -25,6 +26,9 @@ _DEFAULTS = {
 }
 PROBE_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45)
 """Knots of the free r(v), rad/s."""
+_MIDDLE_SPEED = 0.36
+"""Share of p α: the mean speed of the impacts of a run. About it a curvature of r(v) has neither value nor
+slope, so that the priors of r and of its slope say nothing of it."""
 
 
 _BLOCKS_ONLY = frozenset(
@@ -32,7 +36,13 @@ _BLOCKS_ONLY = frozenset(
 ) | {"mount_height", "wire_even"}
 _STILL = ("bias_", "flexible_wall.", "yaw.", "twist.", "sliding.")
 """Effects that do not move the rotation of the joint."""
-_SWINGS_ONLY = frozenset(("p", "r", "theta0", "omega0", "viscous.zeta", "coulomb.mu"))
+_SWINGS_ONLY = frozenset(("p", "r", "theta0", "omega0", "viscous.zeta", "coulomb.mu")) | {
+    "slope_power.c",
+    "slope_square.c",
+    "loss_power.mu",
+    "loss_growth.zeta",
+    "loss_side.zeta",
+}
 
 
 @cache
@@ -73,11 +83,28 @@ def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> tuple[bytes, 
                 vector[other] = default
         vector[index] = values[key]
     vector[par.OMEGA0] += values["omega0"]
+    vector[par.COULOMB] += values.get("loss_power.mu", 0.0)
     measured = [values[key] for key in measuring]
     dynamic = vector.copy()
     dynamic[[par.RESTITUTION, par.R_SLOPE, par.R_ASYMMETRY, par.CRUSH_R]] = 0.0
     identity = dynamic.tobytes() + np.asarray(measured, dtype=float).tobytes()
     return identity, vector, 1.0 + values.get("clock.error", 0.0)
+
+
+def half_cycle_table(run: RockingRun, vector: FloatArray, true: FloatArray, levels: FloatArray) -> FloatArray:
+    """The simulator's half-cycles from the peaks `true` (n,), rad, timed at `levels` (n, F): (n, 5 + 2F)."""
+    table = np.empty((true.size, shooting.FIRST_CROSSING + 2 * levels.shape[1]))
+    side = 1.0 if run.swings.peak_rad[0] > 0 else -1.0
+    shooting.half_cycles(vector, run.swings.peak_s, true, levels, side, True, table)
+    return table
+
+
+def _curvature(run: RockingRun, values: Mapping[str, float], speeds: FloatArray) -> FloatArray:
+    """What the departures from a straight r(v) add."""
+    power, square = values.get("slope_power.c", 0.0), values.get("slope_square.c", 0.0)
+    middle = _MIDDLE_SPEED * run.survey.p_rad_s * run.survey.alpha_rad
+    off = speeds - middle
+    return power * (speeds * np.log(np.maximum(speeds, 1e-6) / middle) - off) + square * off**2
 
 
 def restitution_of(
@@ -87,8 +114,9 @@ def restitution_of(
     sides: FloatArray,
     impacts: NDArray[np.intp],
 ) -> FloatArray:
-    """r of each impact, as the simulator's impact rule has it, plus the free form of the probe."""
+    """r of each impact, as the simulator's impact rule has it, plus free forms."""
     r = values["r"] + values.get("restitution_slope.k", 0.0) * (speeds - 0.2)
+    r = r + _curvature(run, values, speeds)
     r = r + sides * values.get("restitution_asymmetry.d", 0.0)
     if "free_restitution.k0" in values:
         knots = [values[f"free_restitution.k{i}"] for i in range(len(PROBE_SPEEDS))]

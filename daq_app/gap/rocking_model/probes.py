@@ -1,0 +1,82 @@
+"""Forms beyond the named ones: free forms of whole families, and first steps away from one effect."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from daq_app.gap.core import Effect, Parameter
+from daq_app.gap.core.parameters import signed
+from daq_app.gap.rocking_model.vector import PROBE_SPEEDS
+
+
+def probes() -> Iterable[Effect]:
+    """One free form or more for each family that has one."""
+    knots = tuple(signed(f"k{i}", 0.04, "1", f"change of r at {v} rad/s") for i, v in enumerate(PROBE_SPEEDS))
+    more = (signed("side", 0.02, "1", "left against right"), signed("order", 0.02, "1", "per ten impacts"))
+    yield Effect(
+        "free_restitution",
+        "restitution",
+        knots + more,
+        "r = r₀ + f(v) + s·side + c·n, f piecewise linear",
+        "non-parametric",
+        kind="probe",
+    )
+    places = [
+        f"{part} at {size} α" for part in ("upper part", "lower part", "turning") for size in (0, 0.15, 0.4)
+    ]
+    yield Effect(
+        "free_restoring",
+        "interface",
+        tuple(signed(f"t{i}", 0.01, "s", text, linear=True) for i, text in enumerate(places)),
+        "half-cycle times + f(peak), the same up and down",
+        "non-parametric",
+        kind="probe",
+    )
+    yield Effect(
+        "free_dissipation",
+        "dissipation",
+        tuple(signed(f"t{i}", 0.005, "s", text, linear=True) for i, text in enumerate(places[:6])),
+        "times of the fall + f(peak), of the rise − f(peak)",
+        "non-parametric",
+        kind="probe",
+    )
+    for family, count in (("wire", 5), ("accelerometer", 2), ("joint", 5), ("base", 2), ("tiltmeter", 3)):
+        kind = {"joint": "interface", "base": "contact"}.get(family, "sensor")
+        yield Effect(
+            f"free_{family}",
+            kind,
+            tuple(signed(f"c{i}", 40.0, "1", f"coefficient {i}", linear=True) for i in range(count)),
+            f"every coefficient of the {family} family is free",
+            "non-parametric",
+            kind="probe",
+        )
+
+
+_LAWS = ("restitution_slope",)
+_LOSSES = ("viscous", "coulomb")
+
+
+def departures() -> Iterable[Effect]:
+    """First steps away from the form of an effect, one coefficient each.
+
+    A law with a power of the speed, v^n, differs from one that is linear in it by (n − 1) v ln v at first, a
+    curved one by the square; a damping that is not one number is asked as decrements show it, by amplitude
+    and by side. Priors are wide: on top of an effect only the direction counts.
+    """
+    yield _departure("slope_power", "restitution", _LAWS, signed("c", 0.6, "1"), "r = r₀ + k v + c v ln v")
+    square = signed("c", 1.0, "s²/rad²")
+    yield _departure("slope_square", "restitution", _LAWS, square, "r = r₀ + k v + c (v − 0.2 rad/s)²")
+    # Between viscous and Coulomb the library has the pair; a steeper law is neither with a positive share.
+    steeper = replace(signed("mu", 0.02, "1"), high=0.0)
+    yield _departure(
+        "loss_power", "dissipation", ("viscous",), steeper, "loss steeper than ω: viscous less a Coulomb part"
+    )
+    growth, side = signed("zeta", 0.02, "1"), signed("zeta", 0.02, "1")
+    yield _departure("loss_growth", "dissipation", _LOSSES, growth, "loss + damping that grows as ln φ")
+    yield _departure("loss_side", "dissipation", _LOSSES, side, "loss + damping of either side's own, ± ζ")
+
+
+def _departure(name: str, family: str, of: tuple[str, ...], one: Parameter, equation: str) -> Effect:
+    shape = replace(one, starts=(0.0,))
+    return Effect(name, family, (shape,), equation, "first order", kind="departure", of=of)

@@ -1,0 +1,92 @@
+"""Departures from the form of a named effect: tested on top of it, never in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pytest
+from toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
+
+from daq_app.gap.core import Effect, Library, Options, Prediction, Run, diagnose, fit
+from daq_app.gap.core.decision import FreeForm, together
+from daq_app.gap.core.fit import on_top, searches_from
+from daq_app.gap.core.parameters import signed
+
+BEND = Effect("bend", "loss", (signed("c", 2.0),), "r + c (a − ½)²", "test", kind="departure", of=("slope",))
+AGAIN = Effect(
+    "again", "loss", (signed("k", 0.1),), "slope once more", "test", kind="departure", of=("slope",)
+)
+
+
+class BendingModel(DecayModel):
+    """The toy with the departure, and with the slope a second time under another name."""
+
+    def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
+        slope = values.get("slope.k", 0.0) + values.get("again.k", 0.0)
+        found = super().predict(run, {**values, "slope.k": slope})
+        before = run.features.values[: PEAKS - 1]
+        found.features[1:PEAKS] += values.get("bend.c", 0.0) * (before - 0.5) ** 2 * before
+        return found
+
+
+def test_a_departure_sees_what_is_too_little_for_a_free_form_of_five_coefficients() -> None:
+    """Of runs whose r is bent: the straight form is named without it, and not where it is true."""
+    model, library = BendingModel(), Library([*LIBRARY.values(), BEND])
+    runs = make_runs(3, scatter=0.002, slope_k=0.03, bend_c=0.03)
+    near = diagnose(model, runs, library, Options())
+    assert (near.decision.verdict, near.decision.family) == ("none_of_these", "loss")
+    assert "slope comes near" in near.decision.sentence
+    assert not {"bend"} & {name for hypothesis in near.which for name in hypothesis.effects}
+    assert diagnose(model, runs, LIBRARY, Options()).decision.effects == ("slope",)
+    for seed in range(4):
+        true = diagnose(model, make_runs(seed, scatter=0.002, slope_k=0.03), library, Options())
+        assert true.decision.effects == ("slope",), seed
+
+
+def test_the_named_effect_once_more_gains_nothing_however_unlikely_its_strength_is() -> None:
+    """A prior that would have the slope weaker must not speak for another form: three sd from none, and the
+    same again beside it would halve what that costs."""
+    model, runs = BendingModel(), make_runs(1, slope_k=0.15)
+    found = fit(model, runs, (LIBRARY["slope"],))
+    assert found.u[found.keys.index(("slope.k", None))] > 2.5
+    effects = (LIBRARY["slope"], AGAIN)
+    search, *_ = searches_from(model, runs, effects, found.known(), found.sigmas, found.columns, {})
+    again = on_top(search, "again")
+    assert again.gain < 0.01
+    assert again.determined < 0.01
+
+
+def test_a_coefficient_that_may_only_be_negative_gains_nothing_where_it_would_be_positive() -> None:
+    runs = make_runs(1, slope_k=0.05)
+    found = fit(DecayModel(), runs)
+    gains = []
+    for low, high in ((-1.0, 0.0), (0.0, 1.0)):
+        one = signed("k", 0.1)
+        object.__setattr__(one, "low", low)
+        object.__setattr__(one, "high", high)
+        form = Effect("slope", "loss", (one,), "one-sided", "test")
+        search, *_ = searches_from(
+            DecayModel(), runs, (form,), found.known(), found.sigmas, found.columns, {}
+        )
+        gains.append(on_top(search, "slope").gain)
+    assert gains[0] == 0.0
+    assert gains[1] > 5.0
+
+
+def test_asking_the_same_twice_costs_nothing() -> None:
+    form = FreeForm.of(BEND, 4.0, 1.0)
+    assert form.p_value == pytest.approx(0.004678, rel=1e-3), "χ² of 8 with one degree of freedom"
+    assert together([form, form]) == pytest.approx(form.p_value)
+    none = FreeForm.of(BEND, 0.0, 1.0)
+    assert together([form, none]) == pytest.approx(2 * form.p_value, rel=0.01)
+
+
+def test_a_library_knows_what_its_departures_depart_from() -> None:
+    library = Library([*LIBRARY.values(), BEND])
+    assert library.departures(("slope", "kick")) == (BEND,)
+    assert not library.departures(("kick",))
+    assert BEND not in library.named
+    assert BEND not in library.probes
+    assert "bend" not in library.without("slope"), "it goes with the effect"
+    with pytest.raises(ValueError, match="departs from"):
+        Library([BEND])
