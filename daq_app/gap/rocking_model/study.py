@@ -138,7 +138,7 @@ def diagnose_runs(
     if "scatter" in without:
         model = UnscatteredModel(model.survey, model.channels)
     if "probes" in without:
-        library = library.without(*(probe.name for probe in library.probes))
+        library = library.without(*(e.name for e in library.values() if e.kind != "effect"))
     if "multistart" in without:
         options = replace(options or Options(), multistart=False)
     if only:
