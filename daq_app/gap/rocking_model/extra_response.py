@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -113,26 +113,71 @@ def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
     return found
 
 
+def transfer(rate: complex, family: str, values: Mapping[str, float]) -> complex:
+    """What a family's sensors make of exp(rate · t): the Laplace transform of their response."""
+    found = 1.0 + 0.0j
+    if tau := values.get(f"lag@{family}.tau", 0.0):
+        found *= np.exp(-rate * tau)
+    if tau := values.get(f"slow_response@{family}.tau", 0.0):
+        found /= 1.0 + rate * tau
+    if tau := values.get(f"filter_delay@{family}.tau", 0.0):
+        found *= 3.0 / ((rate * tau) ** 2 + 3.0 * rate * tau + 3.0)
+    if frequency := values.get(f"wire_inertia@{family}.frequency", 0.0):
+        natural, zeta = 2.0 * np.pi * frequency, values.get(f"wire_inertia@{family}.zeta", 0.2)
+        found *= natural**2 / (rate**2 + 2.0 * zeta * natural * rate + natural**2)
+    return complex(found)
+
+
+def delay(family: str, values: Mapping[str, float]) -> float:
+    """By how much a family's sensors are late, s."""
+    late = sum(
+        values.get(f"{effect}@{family}.tau", 0.0) for effect in ("lag", "slow_response", "filter_delay")
+    )
+    if frequency := values.get(f"wire_inertia@{family}.frequency", 0.0):
+        late += values.get(f"wire_inertia@{family}.zeta", 0.2) / (np.pi * frequency)
+    return late
+
+
+def _ring_coefficients(
+    run: RockingRun, block: Block, motion: Mapping[str, complex], values: Mapping[str, float]
+) -> list[complex]:
+    """Per coefficient of the block, the ring-down in its family's readings: the imaginary part of
+    c exp(rate · t) has the sine Re c and the cosine Im c. `motion` is c of the wall itself, by family.
+    The impacts are where the reference shows them, as late as it is.
+    """
+    frequency, zeta, _ = block.ring
+    natural = 2.0 * np.pi * frequency
+    rate = natural * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
+    seen = {}
+    for family, own in motion.items():
+        undone = block.undone_s if family == "accelerometer" else 0.0
+        early = np.exp(rate * (undone + delay(run.reference, values)))
+        twice = -((1.0 - 2.0 * zeta**2) + 2j * zeta) if family == "accelerometer" else 1.0
+        seen[family] = own * twice * transfer(rate, family, values) * early if own else 0.0j
+    return [seen.get(name.partition(" in ")[2].removesuffix("s"), 0.0j) for name in block.names]
+
+
+def _put(block: Block, seen: Sequence[complex], frequency: float, zeta: float) -> FloatArray:
+    """The coefficients of a ring-down as numbers, with those of the oscillator."""
+    own = {"frequency": frequency, "damping": zeta}
+    found: FloatArray = np.array(
+        [
+            own.get(name, c.real if name.startswith("sine") else c.imag)
+            for name, c in zip(block.names, seen, strict=True)
+        ]
+    )
+    return found * _faded(block, zeta)
+
+
 def bending(
     run: RockingRun, block: Block, values: Mapping[str, float], wires: FloatArray | None
 ) -> FloatArray:
     """Ring-down of a cantilever mode, and what effects on the wires look like in the same columns."""
     frequency, zeta, rate = block.ring
     gain = values.get("flexible_wall.gain", 0.0) * np.sinc(frequency / rate)
-    found = np.zeros(len(block.names))
-    for k, name in enumerate(block.names):
-        match name:
-            case "sine in wires":
-                found[k] = gain
-            case "sine in accelerometers":
-                found[k] = -gain * (1.0 - 2.0 * zeta**2)
-            case "cosine in accelerometers":
-                found[k] = -2.0 * gain * zeta
-            case "frequency":
-                found[k] = values.get("flexible_wall.frequency", block.values[k])
-            case "damping":
-                found[k] = values.get("flexible_wall.zeta", block.values[k])
-    found = found * _faded(block, values.get("flexible_wall.zeta", zeta))
+    seen = _ring_coefficients(run, block, {"wire": gain, "accelerometer": gain}, values)
+    own = (values.get("flexible_wall.frequency", frequency), values.get("flexible_wall.zeta", zeta))
+    found = _put(block, seen, *own)
     return found if wires is None else found + _in_wires(block, wires)
 
 
@@ -141,25 +186,16 @@ def turning(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
     frequency, zeta, rate = block.ring
     size = np.sinc(frequency / rate) / (2.0 * np.pi * frequency)
     yaw, twist = size * values.get("yaw.kick", 0.0), size * values.get("twist.kick", 0.0)
-    levers = dict(zip(block.names, (*block.levers, 0.0, 0.0), strict=True))
+    levers = {n.partition(" in ")[2]: v for n, v in zip(block.names, block.levers, strict=False)}
+    motion = {
+        "wire": levers.get("wires", 0.0) * twist - yaw,
+        "lvdt": twist,
+        "accelerometer": levers.get("accelerometers", 0.0) * twist - yaw,
+    }
+    seen = _ring_coefficients(run, block, motion, values)
     other = "yaw" if "yaw.kick" in values else "twist"
-    found = np.zeros(len(block.names))
-    for k, name in enumerate(block.names):
-        lever = levers[name]
-        match name:
-            case "sine in wires":
-                found[k] = lever * twist - yaw
-            case "sine in lvdts":
-                found[k] = twist
-            case "sine in accelerometers":
-                found[k] = (yaw - lever * twist) * (1.0 - 2.0 * zeta**2)
-            case "cosine in accelerometers":
-                found[k] = 2.0 * zeta * (yaw - lever * twist)
-            case "frequency":
-                found[k] = values.get(f"{other}.frequency", block.values[k])
-            case "damping":
-                found[k] = values.get(f"{other}.zeta", block.values[k])
-    return found * _faded(block, values.get(f"{other}.zeta", zeta))
+    own = (values.get(f"{other}.frequency", frequency), values.get(f"{other}.zeta", zeta))
+    return _put(block, seen, *own)
 
 
 def _faded(block: Block, zeta: float) -> FloatArray:

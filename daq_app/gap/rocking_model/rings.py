@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
 from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rotation import Rotation, wall_rotation, zeroed
@@ -25,6 +26,8 @@ DAMPING = (0.01, 0.04)
 FINE_DAMPING = (0.007, 0.012, 0.02, 0.032, 0.05, 0.08)
 DISPLACEMENT_MASK_S = 0.012
 ACCELERATION_MASK_S = 0.035
+LATE_S = 5e-3
+"""Delay of a family from which what an impact leaves in it is looked for that much later."""
 _DEGREE = 4
 REPEATABILITY = 0.07
 """Relative repeatability of a ring-down in one run: kicks differ from impact to impact. It is no free
@@ -40,6 +43,8 @@ class Signal:
     pick: NDArray[np.bool_]
     lever: float
     """What a rotation error δ of the family makes of this signal, m: for effects on its sensors."""
+    undone_s: float = 0.0
+    """Delay that was undone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,15 +69,14 @@ def bend_signals(run: GapRun, joint: Rotation, grid: Grid, height_m: float) -> l
         beyond = beyond - heights[:, None] * grid.theta
         lever = float(shape @ heights / (shape @ shape))
         values = shape @ beyond / (shape @ shape)
-        found.append(Signal("wire", values, _between(grid, DISPLACEMENT_MASK_S), lever))
+        found.append(Signal("wire", values, _between_late(grid, beyond, heights), lever))
     chosen = _accelerometers(run)
     if len(chosen) >= 3:
         z = np.array([run.sensors[i].position_m[2] for i in chosen])
         shape = (z / height_m) ** 2
-        measured = np.array([coarse(zeroed(run, i), run.rate_hz) for i in chosen])
-        beyond = measured - z[:, None] * grid.alpha + 9.81 * np.sin(grid.theta)
+        beyond, pick, undone = _accelerations(run, grid, chosen)
         values = shape @ beyond / (shape @ shape)
-        found.append(Signal("accelerometer", values, _between(grid, ACCELERATION_MASK_S), 0.0))
+        found.append(Signal("accelerometer", values, pick, 0.0, undone))
     return found
 
 
@@ -85,17 +89,14 @@ def turn_signals(run: GapRun, joint: Rotation, grid: Grid) -> list[Signal]:
         beyond = np.array([z * coarse(r, run.rate_hz) for z, r in zip(heights, rows, strict=True)])
         beyond = beyond - heights[:, None] * grid.theta
         lever = float(y @ (heights * y) / (y @ y))
-        found.append(Signal("wire", y @ beyond / (y @ y), _between(grid, DISPLACEMENT_MASK_S), lever))
+        found.append(Signal("wire", y @ beyond / (y @ y), _between_late(grid, beyond, heights), lever))
     chosen = _accelerometers(run)
     y = np.array([run.sensors[i].position_m[1] for i in chosen])
     if len(chosen) >= 3 and float(np.ptp(y)) > 0.2:
         z = np.array([run.sensors[i].position_m[2] for i in chosen])
-        measured = np.array([coarse(zeroed(run, i), run.rate_hz) for i in chosen])
-        beyond = measured - z[:, None] * grid.alpha + 9.81 * np.sin(grid.theta)
+        beyond, pick, undone = _accelerations(run, grid, chosen)
         lever = float(y @ (z * y) / (y @ y))
-        found.append(
-            Signal("accelerometer", y @ beyond / (y @ y), _between(grid, ACCELERATION_MASK_S), lever)
-        )
+        found.append(Signal("accelerometer", y @ beyond / (y @ y), pick, lever, undone))
     if len(joint.used) >= 8:
         pick = _between(grid, DISPLACEMENT_MASK_S) & grid.valid
         found.append(Signal("lvdt", coarse(joint.twist, run.rate_hz), pick, 0.0))
@@ -108,6 +109,36 @@ def _accelerometers(run: GapRun) -> list[int]:
         for i in run.indices("accelerometer", "x")
         if np.all(np.isfinite(run.channels[i])) and not run.sensors[i].ac_coupled
     ]
+
+
+def _accelerations(
+    run: GapRun, grid: Grid, chosen: Sequence[int]
+) -> tuple[FloatArray, NDArray[np.bool_], float]:
+    """(n, m) accelerations beyond those of a rigid wall, in step with it, samples to use, delay undone in s.
+
+    Of late accelerometers the shock of an impact would lie beyond the samples that are left out for it.
+    """
+    seen = acceleration_delay(run, grid)
+    late = seen[0] - MIDDLE_OF_IMPACT_S if seen is not None else 0.0
+    late = late if abs(late) > LATE_S else 0.0
+    early = round(late * run.rate_hz)
+    z = np.array([run.sensors[i].position_m[2] for i in chosen])
+    rows = [zeroed(run, i) for i in chosen]
+    places = np.clip(np.arange(rows[0].size) + early, 0, rows[0].size - 1)
+    measured = np.array([coarse(row[places], run.rate_hz) for row in rows])
+    beyond = measured - z[:, None] * grid.alpha + 9.81 * np.sin(grid.theta)
+    return beyond, _between(grid, ACCELERATION_MASK_S + abs(late)), early / run.rate_hz
+
+
+def _between_late(grid: Grid, beyond: FloatArray, heights: FloatArray) -> NDArray[np.bool_]:
+    """Samples to use of wires, (n, m) beyond a rigid wall: the corner of an impact lasts twice their delay.
+
+    What a slow sensor makes of a corner depends on the form of its response, which nobody knows so well.
+    """
+    pick = (grid.time_s > 0.0) & (grid.time_s < grid.rest_s)
+    speed = grid.omega[pick]
+    late = -float(heights @ (beyond[:, pick] @ speed)) / float(heights @ heights) / float(speed @ speed)
+    return _between(grid, DISPLACEMENT_MASK_S + (2.0 * abs(late) if abs(late) > LATE_S else 0.0))
 
 
 def _between(grid: Grid, mask_s: float) -> NDArray[np.bool_]:
@@ -321,6 +352,7 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
         ring=(ring.frequency_hz, ring.zeta, GRID_HZ),
         levers=tuple(levers),
         fading=tuple(fading),
+        undone_s=next((s.undone_s for s in signals if s.family == "accelerometer"), 0.0),
     )
 
 

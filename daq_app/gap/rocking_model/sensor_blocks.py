@@ -58,6 +58,8 @@ class Block:
     single channel: the relative error of its prediction."""
     fading: tuple[float, ...] = ()
     """Of a ring-down: change of each coefficient of unit size per ln of the damping ratio."""
+    undone_s: float = 0.0
+    """Of a ring-down: delay of the accelerometers that was undone before they were looked at."""
     tags: Mapping[str, str] = field(default_factory=dict)
     """Sensor family behind a channel or a mark."""
 

@@ -11,7 +11,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import extra_response as extra
 from daq_app.gap.rocking_model.memo import Memo, any_of
 from daq_app.gap.rocking_model.repeatability import bias_names, repeatability
-from daq_app.gap.rocking_model.rotation import anchors_off
+from daq_app.gap.rocking_model.rotation import anchors_off, pivots_off
 from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.sensor_blocks import (
     Block,
@@ -219,7 +219,7 @@ def _wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatAr
         found = found + values["sliding.c"] / run.wire_height_m * _unit(
             run, block, "slip", partial(slip_shape, run.grid)
         )
-    found = found + _travel(run, block, values) / run.wire_height_m
+    found = found + _travel(run, block, values, of_base=False)
     series = _difference_of(run, "wire", "lvdt", values)
     return found if series is None else found + block.coefficients(series)
 
@@ -261,12 +261,7 @@ def _accelerometer(run: RockingRun, block: Block, values: Mapping[str, float]) -
 
 def _impact_timing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     """Accelerometers against the reference rotation: their own delay less that of the reference."""
-    delays = ("lag", "slow_response", "filter_delay")
-    late = sum(values.get(f"{effect}@accelerometer.tau", 0.0) for effect in delays)
-    late -= sum(values.get(f"{effect}@{run.reference}.tau", 0.0) for effect in delays)
-    if f"wire_inertia@{run.reference}.frequency" in values:
-        zeta = values.get(f"wire_inertia@{run.reference}.zeta", 0.2)
-        late -= 2.0 * zeta / (2.0 * np.pi * values[f"wire_inertia@{run.reference}.frequency"])
+    late = extra.delay("accelerometer", values) - extra.delay(run.reference, values)
     return np.array([values["onset"] + late])
 
 
@@ -281,19 +276,22 @@ def _edges(run: RockingRun, values: Mapping[str, float]) -> tuple[float, float]:
     return inwards, values.get("alpha_asymmetry.delta", 0.0) * tall / np.cos(alpha) ** 2
 
 
-def _travel(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
-    """Displacement of the base along x because its pivots are not where the survey has them: Δu (1 − cos θ).
+def _travel(run: RockingRun, block: Block, values: Mapping[str, float], of_base: bool) -> FloatArray:
+    """What pivots that are not where the survey has them make of the wires' rotation (rad) or base (m).
 
-    It grows and falls with the swings as a slip does; left out, a shifted pivot looks like some sliding.
+    The base travels along x by Δu (1 − cos θ), and the whole wall rises by Δu sin|θ|, which a wire of
+    three metres sees in its second order: together they look like some sliding, or like a gain.
     """
     theta = run.grid.theta
     inwards, apart = _edges(run, values)
-    found = inwards * _unit(run, block, "travel", lambda: np.sign(theta) * (1.0 - np.cos(theta)))
-    found = found + apart * _unit(run, block, "lopsided travel", lambda: 1.0 - np.cos(theta))
+    if "pivots" not in run.cache:
+        run.cache["pivots"] = pivots_off(run.wires, theta)
+    each: FloatArray = run.cache["pivots"][of_base]
+    found = inwards * _unit(run, block, "travel", lambda: each)
+    found = found + apart * _unit(run, block, "lopsided travel", lambda: side_of(theta) * each)
     if "winkler.theta_c" in values:
         root = np.sqrt(values["winkler.theta_c"] / np.maximum(np.abs(theta), values["winkler.theta_c"]))
-        moved = -2.0 * values["half_base"] * root * np.sign(theta) * (1.0 - np.cos(theta))
-        found = found + block.coefficients(moved)
+        found = found + block.coefficients(-2.0 * values["half_base"] * root * each)
     return found
 
 
@@ -333,7 +331,7 @@ def _base(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatAr
     total: FloatArray = found + values.get("sliding.c", 0.0) * _unit(
         run, block, "slip", partial(slip_shape, run.grid)
     )
-    total = total + _travel(run, block, values)
+    total = total + _travel(run, block, values, of_base=True)
     if "wire_cosine@wire.kappa" in values:
         bend = values["wire_cosine@wire.kappa"] * run.base_bend_m2
         total = total + bend * _unit(run, block, "square", lambda: run.grid.theta**2)

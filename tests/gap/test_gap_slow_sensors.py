@@ -1,0 +1,74 @@
+"""Ring-downs as slow sensors show them: through their response, and clear of the impacts that come late."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from simulated_wall import simulate
+
+from daq_app.gap.rocking_model.extra_response import transfer
+from daq_app.gap.rocking_model.model import RockingModel
+from daq_app.gap.rocking_model.run_features import RockingRun
+from daq_app.gap.rocking_model.sensor_blocks import Block, first_order
+from daq_app.gap.rocking_model.sensor_response import block_coefficients
+from daq_app.gap.rocking_model.study import prepare
+
+_BOTH = ("wires", "accelerometers")
+Effects = dict[str, dict[str, float]]
+
+
+def _bending(effects: Effects) -> tuple[Block, np.ndarray, dict[str, tuple[float, float]]]:
+    """(block, what the effects themselves predict, (off, sd) by coefficient) of one run."""
+    (run,), _ = prepare(simulate(effects, (0.35,)))
+    block = next(b for b in run.blocks if b.family == "bending")
+    values = {p.name: p.mean for p in RockingModel(run.survey).nuisance}
+    values |= {p.name: p.mean for p in RockingModel(run.survey).local_nuisance(run)}
+    values |= {f"{name}.{key}": v for name, given in effects.items() for key, v in given.items()}
+    first = sum(len(b.names) for b in run.blocks[: _place(run)])
+    predicted = block_coefficients(run, values)[0][first : first + len(block.names)]
+    off = {
+        name: (float(block.values[k] - predicted[k]), float(block.covariance[k, k]) ** 0.5)
+        for k, name in enumerate(block.names)
+        if " in " in name
+    }
+    return block, predicted, off
+
+
+def _place(run: RockingRun) -> int:
+    return [b.family for b in run.blocks].index("bending")
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"lag@accelerometer": {"tau": 0.05}},
+        {"slow_response@wire": {"tau": 0.04}},
+    ],
+)
+def test_late_sensors_do_not_make_the_wall_ring(effects: Effects) -> None:
+    """The shock of an impact came beyond the samples that are left out for it."""
+    _, _, off = _bending(effects)
+    assert max(abs(value) / sd for value, sd in off.values()) < 3.0
+
+
+def test_a_wall_that_rings_is_seen_through_the_response_of_its_wires() -> None:
+    effects = {
+        "flexible_wall": {"gain": 0.18, "frequency": 30.0, "zeta": 0.045},
+        "wire_inertia@wire": {"frequency": 20.0, "zeta": 0.4},
+    }
+    block, predicted, off = _bending(effects)
+    assert max(abs(value) for value, _ in off.values()) < 0.4 * 0.18
+    seen = [
+        np.hypot(*(predicted[block.names.index(f"{w} in {f}")] for w in ("sine", "cosine"))) for f in _BOTH
+    ]
+    assert seen[0] < 0.7 * seen[1], "its wires hardly follow at 30 Hz"
+
+
+def test_the_transfer_of_a_response_is_what_it_does_to_a_wave() -> None:
+    rate = 2j * np.pi * 3.0
+    t = np.arange(4000) / 200.0
+    shown = first_order(np.exp(rate * t).imag, 0.03)
+    wanted = (transfer(rate, "wire", {"slow_response@wire.tau": 0.03}) * np.exp(rate * t)).imag
+    assert shown[2000:] == pytest.approx(wanted[2000:], abs=5e-3)
+    late = transfer(rate, "lvdt", {"lag@lvdt.tau": 0.01, "lag@wire.tau": 0.5})
+    assert late == pytest.approx(np.exp(-rate * 0.01))
