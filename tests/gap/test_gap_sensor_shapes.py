@@ -10,6 +10,7 @@ from simulated_wall import simulate
 
 from daq_app.gap.rocking_model.extra_response import bessel
 from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
+from daq_app.gap.rocking_model.rotation import pivots_off, wire_reading, wires_of
 from daq_app.gap.rocking_model.run_features import examine, extract
 from daq_app.gap.rocking_model.sensor_blocks import UPRIGHT_RAD, moment_shape, side_of, slip_shape
 
@@ -76,3 +77,27 @@ def test_impacts_do_not_reach_the_accelerometers_gain_of_inertia() -> None:
         knocked.channels[chosen, k - 4 : k + 5] += 40.0 * np.sign(jump)
     after = next(b for b in extract(knocked).blocks if b.family == "accelerometer")
     assert after.values == pytest.approx(before.values, abs=1e-4)
+
+
+def test_wires_see_a_shifted_pivot_as_they_are_strung() -> None:
+    """More than the travel of the base: the face with the wires rises by as much as its edge is away, and the
+    slope that a wire has by then shows where the pivot is. On the other side the face itself is the edge."""
+    run = simulate({}, (0.35,))[0]
+    wires, half, shift = wires_of(run), run.survey.half_base_m, 0.03
+    theta = np.array([-0.08, -0.04, 0.02, 0.08])
+    turned, moved = pivots_off(wires, theta)
+    z = np.array([wire.sensor.position_m[2] for wire in wires])
+    rows, base = [], []
+    for wire in wires:
+        assert wire.sensor.anchor_m is not None
+        shorter = wire_reading(theta, wire.sensor.position_m, wire.sensor.anchor_m, half, shift)
+        rows.append(wire.rotation(shorter))
+        base.append(shorter - wire.shortening(theta))
+    mean = np.average(np.array(rows), axis=0, weights=z**2) - theta
+    np.testing.assert_allclose(-shift * turned, mean, rtol=0.03, atol=1e-7)
+    line = np.polynomial.Polynomial.fit
+    ends = [line(z, column, 1).convert().coef[0] for column in np.array(base).T]
+    np.testing.assert_allclose(-shift * moved, ends, rtol=0.03, atol=1e-7)
+    travel = 1.0 - np.cos(theta)
+    assert abs(moved[0]) > 1.2 * travel[0] or abs(moved[0]) < 0.8 * travel[0]
+    assert moved[-1] == pytest.approx(travel[-1], rel=0.02)

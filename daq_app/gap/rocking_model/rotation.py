@@ -191,10 +191,34 @@ def anchors_off(
     wires: Sequence[WireInverse], theta: FloatArray, higher: float
 ) -> tuple[FloatArray, FloatArray]:
     """(rad, m): what higher anchors add to the wires' mean rotation (weights z²) and to the base."""
+    return _seen_as(wires, theta, [wire.shortening(theta, higher) for wire in wires])
+
+
+_FURTHER_M = 1e-3
+
+
+def pivots_off(wires: Sequence[WireInverse], theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(rad/m, m/m): what pivots further from the middle add to the wires' mean rotation and to the base.
+
+    To first order: the wall moves along x by 1 − cos θ and rises by sin|θ| for each metre.
+    """
+    seen = [
+        wire_reading(theta, wire.sensor.position_m, wire.sensor.anchor_m, wire.half_base + _FURTHER_M)
+        for wire in wires
+        if wire.sensor.anchor_m is not None
+    ]
+    turned, moved = _seen_as(wires, theta, seen)
+    return turned / _FURTHER_M, moved / _FURTHER_M
+
+
+def _seen_as(
+    wires: Sequence[WireInverse], theta: FloatArray, shortenings: Sequence[FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """(rad, m): what wires shorter by `shortenings` show beyond `theta`: mean rotation (weights z²), base."""
     z = np.array([wire.sensor.position_m[2] for wire in wires])
-    longer = np.array([wire.shortening(theta, higher) for wire in wires])
-    turned = np.array([w.rotation(s) - theta for w, s in zip(wires, longer, strict=True)])
-    moved = longer - np.array([wire.shortening(theta) for wire in wires])
+    pairs = list(zip(wires, shortenings, strict=True))
+    turned = np.array([wire.rotation(s) - theta for wire, s in pairs])
+    moved = np.array([s - wire.shortening(theta) for wire, s in pairs])
     at_base = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
     return np.tensordot(z**2 / np.sum(z**2), turned, 1), np.tensordot(at_base, moved, 1)
 

@@ -279,8 +279,8 @@ def _edges(run: RockingRun, values: Mapping[str, float]) -> tuple[float, float]:
 def _travel(run: RockingRun, block: Block, values: Mapping[str, float], of_base: bool) -> FloatArray:
     """What pivots that are not where the survey has them make of the wires' rotation (rad) or base (m).
 
-    The base travels along x by Δu (1 − cos θ), and the whole wall rises by Δu sin|θ|, which a wire of
-    three metres sees in its second order: together they look like some sliding, or like a gain.
+    The base travels along x by Δu (1 − cos θ), and the wall rises by Δu sin|θ|, which a wire shows as far
+    as it slopes by then: left out, a shifted pivot looks like some sliding and a gain of the wires.
     """
     theta = run.grid.theta
     inwards, apart = _edges(run, values)
