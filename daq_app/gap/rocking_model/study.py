@@ -87,8 +87,12 @@ def _stated(marks: Sequence[Sequence[Mark]], channels: Mapping[str, str]) -> lis
             if mark.value > 0.0:
                 seen.setdefault(mark.key, []).append(mark)
     for key, found in seen.items():
+        if key.startswith("disagreement@"):
+            words.append(f"{found[0].observable} with their family: left out, and nothing explains it.")
+            continue
         middle = float(np.median([m.value for m in found]))
-        words.append(f"{key}: {found[0].observable} {middle:.3g} {found[0].unit} in {len(found)} runs.")
+        unit = "" if found[0].unit == "1" else f" {found[0].unit}"
+        words.append(f"{key}: {found[0].observable} {middle:.3g}{unit} in {len(found)} runs.")
     return words
 
 
