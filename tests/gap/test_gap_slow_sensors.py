@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter1d
 from simulated_wall import simulate
 
+from daq_app.gap.rocking_model.conditions import inspect_channel
 from daq_app.gap.rocking_model.extra_response import transfer
 from daq_app.gap.rocking_model.model import RockingModel
 from daq_app.gap.rocking_model.run_features import RockingRun
@@ -62,6 +64,43 @@ def test_a_wall_that_rings_is_seen_through_the_response_of_its_wires() -> None:
         np.hypot(*(predicted[block.names.index(f"{w} in {f}")] for w in ("sine", "cosine"))) for f in _BOTH
     ]
     assert seen[0] < 0.7 * seen[1], "its wires hardly follow at 30 Hz"
+
+
+def test_a_base_that_takes_milliseconds_to_turn_is_no_wall_that_rings() -> None:
+    runs = simulate({}, (0.25, 0.35, -0.35))
+    for run in runs:
+        height = {i: run.sensors[i].position_m[2] for i in run.indices("wire")}
+        faces = [i for i in run.indices("lvdt") if run.sensors[i].position_m[0] > 0]
+        others = [i for i in run.indices("lvdt") if run.sensors[i].position_m[0] < 0]
+        side = np.sign(run.channels[others].mean(axis=0) - run.channels[faces].mean(axis=0))
+        for i, z in height.items():
+            run.channels[i] += 2e-3 * z * first_order(side, 3e-3, run.rate_hz)
+    prepared, _ = prepare(runs)
+    for name in ("sine in wires", "cosine in wires"):
+        sizes = []
+        for run in prepared:
+            block = next(b for b in run.blocks if b.family == "bending")
+            k = block.names.index(name)
+            sizes.append(block.values[k] / block.covariance[k, k] ** 0.5)
+        assert np.sum(np.square(sizes)) < 12.0
+
+
+def test_hum_is_told_from_what_impacts_have_of_its_frequency() -> None:
+    """Each knock has its own share of 50 Hz, which taken for hum would ring around all of them."""
+    (run,) = simulate({}, (0.3,))
+    index = run.indices("accelerometer", "x")[0]
+    size = np.abs(run.channels[index])
+    knocks = np.flatnonzero((size > 3.0) & (size == maximum_filter1d(size, 400)))
+    knocks = knocks[knocks < size.size - round(run.rate_hz)]
+    assert knocks.size > 4
+    time_s = np.arange(size.size) / run.rate_hz
+    for k in knocks:
+        run.channels[index, k : k + 200] += 60.0 * np.exp(-np.arange(200) / 24.0)
+    hum = 0.4 * np.sin(2.0 * np.pi * 50.0 * time_s + 1.0)
+    run.channels[index] += hum
+    wave = inspect_channel(run, index).hum_wave
+    assert wave is not None
+    assert np.abs(wave - hum).max() < 0.04
 
 
 def test_the_transfer_of_a_response_is_what_it_does_to_a_wave() -> None:

@@ -17,6 +17,10 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.records import GapRun
 
 MAINS_HZ = 50.0
+LOUD = 4.0
+"""Size beyond that of noise and hum together from which a sample belongs to an impact …"""
+AROUND_S = 0.03
+"""… and so do those around it."""
 FEWEST_STEPS = 0.004
 """Share of samples at which a reading in stairs goes on by a step."""
 SMALLEST_STEP = 5e-4
@@ -98,11 +102,16 @@ def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray |
         return 0.0, float(sd), None
     # Over the whole record the frequency is sharp enough for the phase to hold.
     high = values - sosfiltfilt(butter(2, 25.0, fs=rate_hz, output="sos"), values)
+    # An impact has some of every frequency: its own share, taken for hum, would ring around every impact.
+    loud = np.abs(high) > LOUD * float(np.hypot(noise, amplitude))
+    calm = np.convolve(loud, np.ones(2 * round(AROUND_S * rate_hz) + 1), "same") < 0.5
+    calm = calm if calm.sum() > count else np.ones_like(calm)
     frequencies = np.linspace(MAINS_HZ - 0.6, MAINS_HZ + 0.6, 25)
-    power = [float(np.abs(np.sum(high * np.exp(-2j * np.pi * f * t)))) for f in frequencies]
+    quiet = np.where(calm, high, 0.0)
+    power = [float(np.abs(np.sum(quiet * np.exp(-2j * np.pi * f * t)))) for f in frequencies]
     best = float(frequencies[int(np.argmax(power))])
     whole = _wave_columns(t, best)[:, :2]
-    wave = whole @ np.linalg.lstsq(whole, high, rcond=None)[0]
+    wave = whole @ np.linalg.lstsq(whole[calm], high[calm], rcond=None)[0]
     # A little hum is on every long cable. It is taken out, but it is nothing to be explained.
     shown = amplitude if amplitude > USUAL_HUM * noise else 0.0
     return shown, float(sd), np.asarray(wave, dtype=float)

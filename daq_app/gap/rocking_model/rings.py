@@ -24,7 +24,8 @@ BEND_HZ = np.geomspace(7.0, 42.0, 36)
 TURN_HZ = np.geomspace(1.5, 14.0, 40)
 DAMPING = (0.01, 0.04)
 FINE_DAMPING = (0.007, 0.012, 0.02, 0.032, 0.05, 0.08)
-DISPLACEMENT_MASK_S = 0.012
+DISPLACEMENT_MASK_S = 0.02
+"""A base that gives way takes milliseconds to turn after an impact: a quick decay, but no ring-down."""
 ACCELERATION_MASK_S = 0.035
 LATE_S = 5e-3
 """Delay of a family from which what an impact leaves in it is looked for that much later."""
