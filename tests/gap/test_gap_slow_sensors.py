@@ -103,6 +103,30 @@ def test_hum_is_told_from_what_impacts_have_of_its_frequency() -> None:
     assert np.abs(wave - hum).max() < 0.04
 
 
+def test_accelerometers_of_unequal_calibration_do_not_make_a_wall_that_bends_turn() -> None:
+    """One that shows 2 % more has that much more of every bending, which looks like yaw of the same frequency."""
+    bends = {"flexible_wall": {"gain": 0.5, "frequency": 12.0, "zeta": 0.03}}
+    runs = simulate(bends, (0.3,))
+    uneven = simulate(bends, (0.3,))
+    chosen = [i for i in runs[0].indices("accelerometer", "x") if runs[0].sensors[i].position_m[1] > 0]
+    uneven[0].channels[chosen[-1]] *= 1.02
+    first, second = (
+        next(b for b in prepare(r)[0][0].blocks if b.family == "turning") for r in (runs, uneven)
+    )
+    k = first.names.index("sine in accelerometers")
+    feigned = second.values[k] - first.values[k]
+    assert second.unequal is not None
+    assert second.unequal.shape == second.values.shape
+    # 0.02 of one of eight is 0.02/(0.003 √8) sd of all together at most; a high one has most of it.
+    assert 0.5 < abs(feigned / second.unequal[k]) < 0.02 / 3e-3
+    (run,) = prepare(uneven)[0]
+    model = RockingModel(run.survey)
+    values = {p.name: p.mean for p in (*model.nuisance, *model.local_nuisance(run))}
+    name = next(p.name for p in model.nuisance if "turning" in p.name and "unequal" in p.name)
+    change = np.subtract(*(block_coefficients(run, {**values, name: v})[0] for v in (1.0, 0.0)))
+    assert np.abs(change).max() == pytest.approx(np.abs(second.unequal).max())
+
+
 def test_the_transfer_of_a_response_is_what_it_does_to_a_wave() -> None:
     rate = 2j * np.pi * 3.0
     t = np.arange(4000) / 200.0

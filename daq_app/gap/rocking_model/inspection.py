@@ -19,14 +19,8 @@ from daq_app.gap.rocking_model.conditions import Mark, conditions_of, marks_of, 
 from daq_app.gap.rocking_model.floor_vibration import Vibration, find_vibration, without_vibration
 from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.rings import (
-    Signal,
-    bend_signals,
-    ring_block,
-    scan,
-    turn_signals,
-    with_repeatability,
-)
+from daq_app.gap.rocking_model.ring_signals import Signal, bend_signals, turn_signals
+from daq_app.gap.rocking_model.rings import ring_block, scan, with_repeatability
 from daq_app.gap.rocking_model.run_features import Examined, RockingRun, examine, scalar_block
 from daq_app.gap.rocking_model.saturation import saturated
 from daq_app.gap.rocking_model.second_axis import second_axis

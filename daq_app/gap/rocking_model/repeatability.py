@@ -92,4 +92,14 @@ def biases() -> tuple[Parameter, ...]:
         )
         for (family, coefficient), size in SIZES.items()
         if size.bias > 0.0
+    ) + tuple(
+        Parameter(
+            unequal_name(family), 0.0, 1.0, "1", meaning=f"{family} from unequal accelerometers", linear=True
+        )
+        for family in ("bending", "turning")
     )
+
+
+def unequal_name(family: str) -> str:
+    """The parameter that says what unequal calibrations feign of a ring-down, in sd."""
+    return f"{BIAS}{family}_unequal"

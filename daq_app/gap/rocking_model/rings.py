@@ -14,38 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
-from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
-from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
-from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.rotation import Rotation, wall_rotation, zeroed
+from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid
+from daq_app.gap.rocking_model.ring_signals import Signal
 from daq_app.gap.rocking_model.sensor_blocks import Block
 
 BEND_HZ = np.geomspace(7.0, 42.0, 36)
 TURN_HZ = np.geomspace(1.5, 14.0, 40)
 DAMPING = (0.01, 0.04)
 FINE_DAMPING = (0.007, 0.012, 0.02, 0.032, 0.05, 0.08)
-DISPLACEMENT_MASK_S = 0.02
-"""A base that gives way takes milliseconds to turn after an impact: a quick decay, but no ring-down."""
-ACCELERATION_MASK_S = 0.035
-LATE_S = 5e-3
-"""Delay of a family from which what an impact leaves in it is looked for that much later."""
 _DEGREE = 4
 REPEATABILITY = 0.07
 """Relative repeatability of a ring-down in one run: kicks differ from impact to impact. It is no free
 scatter, which would grow until an effect that nobody named hides in it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Signal:
-    """One signal in which a ring-down may show, on the grid, shape (m,)."""
-
-    family: str
-    values: FloatArray
-    pick: NDArray[np.bool_]
-    lever: float
-    """What a rotation error δ of the family makes of this signal, m: for effects on its sensors."""
-    undone_s: float = 0.0
-    """Delay that was undone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,98 +38,6 @@ class Ring:
     frequency_sd: float
     zeta_sd: float
     """Relative."""
-
-
-def bend_signals(run: GapRun, joint: Rotation, grid: Grid, height_m: float) -> list[Signal]:
-    """Bending of the wall as wires and accelerometers show it, in metres (m/s²) of its top."""
-    found = []
-    rows, heights, _ = wall_rotation(run)
-    if len(rows) >= 3:
-        shape = (heights / height_m) ** 2
-        beyond = np.array([z * coarse(r, run.rate_hz) for z, r in zip(heights, rows, strict=True)])
-        beyond = beyond - heights[:, None] * grid.theta
-        lever = float(shape @ heights / (shape @ shape))
-        values = shape @ beyond / (shape @ shape)
-        found.append(Signal("wire", values, _between_late(grid, beyond, heights), lever))
-    chosen = _accelerometers(run)
-    if len(chosen) >= 3:
-        z = np.array([run.sensors[i].position_m[2] for i in chosen])
-        shape = (z / height_m) ** 2
-        beyond, pick, undone = _accelerations(run, grid, chosen)
-        values = shape @ beyond / (shape @ shape)
-        found.append(Signal("accelerometer", values, pick, 0.0, undone))
-    return found
-
-
-def turn_signals(run: GapRun, joint: Rotation, grid: Grid) -> list[Signal]:
-    """Slope along the length of what wires, accelerometers (per metre) and the joint show."""
-    found = []
-    rows, heights, names = wall_rotation(run)
-    y = np.array([next(s.position_m[1] for s in run.sensors if s.id == name) for name in names])
-    if len(rows) >= 3 and float(np.ptp(y)) > 0.2:
-        beyond = np.array([z * coarse(r, run.rate_hz) for z, r in zip(heights, rows, strict=True)])
-        beyond = beyond - heights[:, None] * grid.theta
-        lever = float(y @ (heights * y) / (y @ y))
-        found.append(Signal("wire", y @ beyond / (y @ y), _between_late(grid, beyond, heights), lever))
-    chosen = _accelerometers(run)
-    y = np.array([run.sensors[i].position_m[1] for i in chosen])
-    if len(chosen) >= 3 and float(np.ptp(y)) > 0.2:
-        z = np.array([run.sensors[i].position_m[2] for i in chosen])
-        beyond, pick, undone = _accelerations(run, grid, chosen)
-        lever = float(y @ (z * y) / (y @ y))
-        found.append(Signal("accelerometer", y @ beyond / (y @ y), pick, lever, undone))
-    if len(joint.used) >= 8:
-        pick = _between(grid, DISPLACEMENT_MASK_S) & grid.valid
-        found.append(Signal("lvdt", coarse(joint.twist, run.rate_hz), pick, 0.0))
-    return found
-
-
-def _accelerometers(run: GapRun) -> list[int]:
-    return [
-        i
-        for i in run.indices("accelerometer", "x")
-        if np.all(np.isfinite(run.channels[i])) and not run.sensors[i].ac_coupled
-    ]
-
-
-def _accelerations(
-    run: GapRun, grid: Grid, chosen: Sequence[int]
-) -> tuple[FloatArray, NDArray[np.bool_], float]:
-    """(n, m) accelerations beyond those of a rigid wall, in step with it, samples to use, delay undone in s.
-
-    Of late accelerometers the shock of an impact would lie beyond the samples that are left out for it.
-    """
-    seen = acceleration_delay(run, grid)
-    late = seen[0] - MIDDLE_OF_IMPACT_S if seen is not None else 0.0
-    late = late if abs(late) > LATE_S else 0.0
-    early = round(late * run.rate_hz)
-    z = np.array([run.sensors[i].position_m[2] for i in chosen])
-    rows = [zeroed(run, i) for i in chosen]
-    places = np.clip(np.arange(rows[0].size) + early, 0, rows[0].size - 1)
-    measured = np.array([coarse(row[places], run.rate_hz) for row in rows])
-    beyond = measured - z[:, None] * grid.alpha + 9.81 * np.sin(grid.theta)
-    return beyond, _between(grid, ACCELERATION_MASK_S + abs(late)), early / run.rate_hz
-
-
-def _between_late(grid: Grid, beyond: FloatArray, heights: FloatArray) -> NDArray[np.bool_]:
-    """Samples to use of wires, (n, m) beyond a rigid wall: the corner of an impact lasts twice their delay.
-
-    What a slow sensor makes of a corner depends on the form of its response, which nobody knows so well.
-    """
-    pick = (grid.time_s > 0.0) & (grid.time_s < grid.rest_s)
-    speed = grid.omega[pick]
-    late = -float(heights @ (beyond[:, pick] @ speed)) / float(heights @ heights) / float(speed @ speed)
-    return _between(grid, DISPLACEMENT_MASK_S + (2.0 * abs(late) if abs(late) > LATE_S else 0.0))
-
-
-def _between(grid: Grid, mask_s: float) -> NDArray[np.bool_]:
-    """Samples between impacts, from the first impact until the swings end."""
-    if grid.impact_s.size < 2:
-        return np.zeros(grid.time_s.size, dtype=bool)
-    after = grid.time_s[:, None] - grid.impact_s[None, :]
-    near = np.any((after > -0.5 * mask_s - 0.005) & (after < mask_s), axis=1)
-    inside = (grid.time_s > grid.impact_s[0]) & (grid.time_s < grid.impact_s[-1])
-    return np.asarray(inside & ~near)
 
 
 def ring_columns(grid: Grid, frequency_hz: float, zeta: float) -> FloatArray:
@@ -302,7 +190,7 @@ def _colour(
 
 def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, slow: bool) -> Block | None:
     """Coefficients of sine and cosine of every signal at the common oscillator; accelerations over ω²."""
-    names, units, values, variances, rows, levers, fading = [], [], [], [], [], [], []
+    names, units, values, variances, rows, levers, fading, unequal = [], [], [], [], [], [], [], []
     waves = ring_columns(grid, ring.frequency_hz, ring.zeta)
     natural = 2.0 * np.pi * ring.frequency_hz
     for signal in signals:
@@ -334,6 +222,7 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
             variances.append(variance[k] / scale**2)
             rows.append(full[k] / scale)
             levers.append(signal.lever)
+            unequal.append(0.0 if signal.unequal is None else float(rows[-1] @ signal.unequal))
     if not names:
         return None
     names += ["frequency", "damping"]
@@ -353,6 +242,7 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
         ring=(ring.frequency_hz, ring.zeta, GRID_HZ),
         levers=tuple(levers),
         fading=tuple(fading),
+        unequal=np.array([*unequal, 0.0, 0.0]),
         undone_s=next((s.undone_s for s in signals if s.family == "accelerometer"), 0.0),
     )
 

@@ -60,6 +60,8 @@ class Block:
     """Of a ring-down: change of each coefficient of unit size per ln of the damping ratio."""
     undone_s: float = 0.0
     """Of a ring-down: delay of the accelerometers that was undone before they were looked at."""
+    unequal: FloatArray | None = None
+    """Of a ring-down, (k,): what calibrations that differ by one sd add to each coefficient in all runs."""
     tags: Mapping[str, str] = field(default_factory=dict)
     """Sensor family behind a channel or a mark."""
 

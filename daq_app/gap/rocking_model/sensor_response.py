@@ -10,7 +10,7 @@ import numpy as np
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import extra_response as extra
 from daq_app.gap.rocking_model.memo import Memo, any_of
-from daq_app.gap.rocking_model.repeatability import bias_names, repeatability
+from daq_app.gap.rocking_model.repeatability import bias_names, repeatability, unequal_name
 from daq_app.gap.rocking_model.rotation import anchors_off, pivots_off
 from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.sensor_blocks import (
@@ -107,6 +107,8 @@ def _coefficients(run: RockingRun, block: Block, unit: FloatArray, values: Mappi
     coefficients = _PREDICT[block.rule](run, block, values)
     for i, name in bias_names(block.family, block.names):
         coefficients[i] += values.get(name, 0.0)
+    if block.unequal is not None:
+        coefficients = coefficients + values.get(unequal_name(block.family), 0.0) * block.unequal
     if f"free_{block.family}.c0" in values:
         free = [values.get(f"free_{block.family}.c{i}", 0.0) for i in range(unit.size)]
         coefficients = coefficients + 3.0 * unit * np.array(free)
