@@ -103,8 +103,27 @@ def test_hum_is_told_from_what_impacts_have_of_its_frequency() -> None:
     assert np.abs(wave - hum).max() < 0.04
 
 
+def test_what_remains_of_one_wire_has_its_share_of_a_wall_that_turns() -> None:
+    """The other wires stand elsewhere, so the ring-down does not cancel as the rotation does."""
+    effects = {
+        "yaw": {"kick": 0.16, "frequency": 2.4, "zeta": 0.035},
+        "gain@WP-5": {"error": 0.06},
+    }
+    (run,), _ = prepare(simulate(effects, (0.35,)))
+    place = [b.family for b in run.blocks].index("WP-5")
+    block = run.blocks[place]
+    last = sum(len(b.names) for b in run.blocks[: place + 1]) - 1
+    model = RockingModel(run.survey)
+    values = {p.name: p.mean for p in (*model.nuisance, *model.local_nuisance(run))}
+    gain = {"gain@WP-5.error": 0.06}
+    kick = {f"yaw.{key}": value for key, value in effects["yaw"].items()}
+    still, turning = (block_coefficients(run, {**values, **v})[0][last] for v in (gain, {**gain, **kick}))
+    assert block.values[-1] > still + 0.5
+    assert turning == pytest.approx(block.values[-1], abs=0.3)
+
+
 def test_accelerometers_of_unequal_calibration_do_not_make_a_wall_that_bends_turn() -> None:
-    """One that shows 2 % more has that much more of every bending, which looks like yaw of the same frequency."""
+    """One that shows 2 % more has that much more of every bending, as yaw of that frequency."""
     bends = {"flexible_wall": {"gain": 0.5, "frequency": 12.0, "zeta": 0.03}}
     runs = simulate(bends, (0.3,))
     uneven = simulate(bends, (0.3,))

@@ -10,7 +10,9 @@ from scipy.signal import cont2discrete, lfilter
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion_grid import GRID_HZ
-from daq_app.gap.rocking_model.rotation import TAIL_S
+from daq_app.gap.rocking_model.records import Sensor
+from daq_app.gap.rocking_model.rings import ring_columns
+from daq_app.gap.rocking_model.rotation import TAIL_S, WireInverse
 from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.sensor_blocks import Block, first_order
 
@@ -99,11 +101,14 @@ def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
             series = responded(true, effect, given) - true
         total = series if total is None else total + series
     found = np.zeros(len(block.names))
-    if total is not None:
+    ringing = _ringing(run, block, values)
+    if total is not None or ringing is not None:
+        total = np.zeros_like(true) if total is None else total
         if block.wire is not None:
             # The zero of every channel is its rest at the end of the record.
             total = total - total[-round(TAIL_S * GRID_HZ) :].mean()
             total = block.wire.sensor.position_m[2] * block.wire.rotation(true + total) - block.expected
+        total = total if ringing is None else total + ringing
         seen = total[block.pick]
         found[:-1] = block.projection @ seen
         left = seen - block.design @ (block.design.T @ seen)
@@ -111,6 +116,48 @@ def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
     for k, shape in enumerate(block.names[: len(block.levers)]):
         found[k] += values.get(f"cal_{block.family}_{shape}", 0.0)
     return found
+
+
+_RINGS = (("bending", "flexible_wall.gain"), ("turning", "yaw.kick"), ("turning", "twist.kick"))
+
+
+def _ringing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray | None:
+    """What a wall that rings moves one wire by, beyond what the others make of it, m; None for nothing.
+
+    They stand at other heights and on other sides, so it does not cancel as a rotation does.
+    """
+    if block.wire is None:
+        return None
+    parts = []
+    for family, key in _RINGS:
+        ring = next((b for b in run.blocks if b.family == family), None)
+        size = values.get(key, 0.0)
+        if ring is None or size == 0.0:
+            continue
+        if (block.family, key) not in run.cache:
+            run.cache[block.family, key] = _ringing_of_one(run, block.wire, ring, key)
+        parts.append(size * run.cache[block.family, key])
+    return np.asarray(np.sum(parts, axis=0)) if parts else None
+
+
+def _ringing_of_one(run: RockingRun, wire: WireInverse, ring: Block, key: str) -> FloatArray:
+    """The same for a strength of one, at the frequency and damping that the runs show."""
+    frequency, zeta, rate = ring.ring
+    wave = np.sinc(frequency / rate) * ring_columns(run.grid, frequency, zeta)[:, 0]
+
+    def moved(sensor: Sensor) -> float:
+        _, y, z = sensor.position_m
+        if key.startswith("flexible_wall"):
+            return float((z / run.survey.height_m) ** 2)
+        return (y * z if key.startswith("twist") else -y) / (2.0 * np.pi * frequency)
+
+    others = [w.sensor for w in run.wires if w.sensor.id != wire.sensor.id]
+    heights = np.array([sensor.position_m[2] for sensor in others])
+    weights = np.array([1.0, wire.sensor.position_m[2]]) @ np.linalg.pinv(
+        np.column_stack([np.ones_like(heights), heights])
+    )
+    beyond = moved(wire.sensor) - float(weights @ np.array([moved(sensor) for sensor in others]))
+    return np.asarray(beyond * wave)
 
 
 def transfer(rate: complex, family: str, values: Mapping[str, float]) -> complex:
