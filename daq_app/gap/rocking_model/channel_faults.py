@@ -326,7 +326,9 @@ def _lvdts(run: GapRun, pick: NDArray[np.bool_]) -> _Family | None:
     if len(chosen) < 8:
         return None
     place = np.array([run.sensors[i].position_m for i in chosen])
-    design = np.column_stack([np.ones(len(chosen)), -place[:, 0], -place[:, 0] * place[:, 1]])
+    # A face's calibrations that differ along its length look like a twist, of that face alone.
+    twist = -place[:, :1] * place[:, 1:2] * np.column_stack([place[:, 0] < 0, place[:, 0] > 0])
+    design = np.column_stack([np.ones(len(chosen)), -place[:, 0], twist])
     signals = np.array([coarse(zeroed(run, i), run.rate_hz) for i in chosen])
     return _Family(tuple(run.sensors[i].id for i in chosen), signals, design, pick)
 
