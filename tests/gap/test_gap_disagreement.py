@@ -58,4 +58,4 @@ def test_nothing_missing_is_not_said_over_channels_that_disagree() -> None:
         _scaled({"LV-A03": 1.09, "LV-B07": 1.09, "LV-B08": 1.09}, levels), only=("viscous",)
     )
     assert result.decision.verdict == "none_of_these"
-    assert "disagree" in result.decision.sentence
+    assert "disagreement (LV-A03, LV-B07, LV-B08) of lvdt" in result.decision.sentence

@@ -16,6 +16,7 @@ from daq_app.gap.core import CannotDiagnose, FeatureSet
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.channel_faults import channel_block, suspects
 from daq_app.gap.rocking_model.conditions import Mark, conditions_of, marks_of, without_hum
+from daq_app.gap.rocking_model.extra_response import MARKS
 from daq_app.gap.rocking_model.floor_vibration import Vibration, find_vibration, without_vibration
 from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.records import GapRun
@@ -159,7 +160,9 @@ def without_suspects(
     if gross:
         odd["lvdt"] = tuple(sorted({*odd.get("lvdt", ()), *gross}))
     more = [
-        Mark(f"disagreement@{family}", f"{', '.join(names)} disagree", "1", float(len(names)), _COUNT_SD)
+        Mark(
+            f"disagreement@{family}", f"disagreement ({', '.join(names)})", "1", float(len(names)), _COUNT_SD
+        )
         for family, names in odd.items()
     ]
     turned = second_axis([e.run for e in again], [e.features.grid for e in again])
@@ -263,7 +266,11 @@ def _mark_block(marks: Sequence[Mark], entry: Examined) -> Block:
         entry.features.grid,
         kind="conditions",
     )
-    return replace(block, tags={m.key: families.get(m.key.partition("@")[2], "") for m in marks})
+    # What no effect explains is spoken of in words: there is no effect whose name says it.
+    said = {
+        m.key: (m.key.partition("@")[2], m.observable) for m in marks if m.key.partition("@")[0] not in MARKS
+    }
+    return replace(block, said=said, tags={m.key: families.get(m.key.partition("@")[2], "") for m in marks})
 
 
 def _add_rings(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.channel_faults import CALIBRATION
 from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
 from daq_app.gap.rocking_model.motion_grid import Grid, coarse
 from daq_app.gap.rocking_model.records import GapRun
@@ -17,8 +18,6 @@ from daq_app.gap.rocking_model.rotation import Rotation, wall_rotation, zeroed
 DISPLACEMENT_MASK_S = 0.02
 """A base that gives way takes milliseconds to turn after an impact: a quick decay, but no ring-down."""
 ACCELERATION_MASK_S = 0.035
-CALIBRATION = 3e-3
-"""Relative tolerance of one accelerometer's calibration."""
 LATE_S = 5e-3
 """Delay of a family from which what an impact leaves in it is looked for that much later."""
 

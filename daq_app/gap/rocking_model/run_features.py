@@ -88,7 +88,8 @@ class RockingRun:
                 values.append(float(value))
                 sds.append(share * float(np.sqrt(variance)) + 1e-15)
                 size = float(abs(self.swings.peak_rad[0]))
-                labels.append(Label(block.family, "run", name, unit, size, 0.5))
+                channel, observable = block.said.get(name, (block.family, name))
+                labels.append(Label(channel, "run", observable, unit, size, 0.5))
         first = len(self.places) + self.peaks.size
         loadings = _block_loadings(blocks, first, len(values))
         features = FeatureSet(np.array(values), np.array(sds), tuple(labels))

@@ -64,6 +64,8 @@ class Block:
     """Of a ring-down, (k,): what calibrations that differ by one sd add to each coefficient in all runs."""
     tags: Mapping[str, str] = field(default_factory=dict)
     """Sensor family behind a channel or a mark."""
+    said: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """(channel, observable) under which a coefficient is spoken of, where not the block's and its name."""
 
     @property
     def independent(self) -> bool:

@@ -88,7 +88,8 @@ def _stated(marks: Sequence[Sequence[Mark]], channels: Mapping[str, str]) -> lis
                 seen.setdefault(mark.key, []).append(mark)
     for key, found in seen.items():
         if key.startswith("disagreement@"):
-            words.append(f"{found[0].observable} with their family: left out, and nothing explains it.")
+            family = key.partition("@")[2]
+            words.append(f"{found[0].observable} of {family} channels: left out, and nothing explains it.")
             continue
         middle = float(np.median([m.value for m in found]))
         unit = "" if found[0].unit == "1" else f" {found[0].unit}"
