@@ -195,7 +195,9 @@ class Recorder(threading.Thread):
             try:
                 if isinstance(item, End):
                     self._close(item)
-                    self._waiting.popleft()
+                    # Blocks that came in behind the end belong to no run, and must not begin the next one.
+                    self._waiting.clear()
+                    self.status.waiting_bytes = 0
                     return
                 self._append(self._journal, item)
             except JournalDiskFull as error:

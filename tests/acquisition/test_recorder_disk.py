@@ -165,6 +165,33 @@ def test_blocks_are_in_the_journal_before_anybody_else_sees_them(bench: Callable
     assert (grown[1:] > 100 * N_CHANNELS * 8).all()
 
 
+def test_blocks_right_behind_the_end_of_a_run_do_not_begin_the_next_one(
+    bench: Callable[..., Bench], disk: Disk
+) -> None:
+    """A reader that catches up puts blocks behind the end before it is written; between runs they pass by."""
+    lab = bench()
+    first = lab.begin()
+    disk.full = True
+    lab.blocks(0, 5)
+    lab.until(lambda: lab.heard("error", "full"))
+    lab.recorder.inbox.put(End("complete", 500, "done"))
+    lab.blocks(5, 3)
+    lab.until(lambda: sum(isinstance(item, Arrived) for item in lab.forwarded) == 8)
+    disk.full = False
+    lab.until(lambda: bool(lab.handed))
+    lab.blocks(8, 4)
+    lab.until(lambda: sum(isinstance(item, Arrived) for item in lab.forwarded) == 12)
+    assert lab.recorder.status.waiting_bytes == 0
+    second = lab.begin("next")
+    lab.blocks(12, 5)
+    lab.end()
+    lab.until(lambda: len(lab.handed) == 2)
+    assert sorted(contents(first)) == list(range(500))
+    assert sorted(contents(second)) == list(range(1200, 1700))
+    with read_journal(second) as opened:
+        assert not opened.gaps
+
+
 def test_a_full_disk_costs_nothing_once_there_is_room_again(bench: Callable[..., Bench], disk: Disk) -> None:
     lab = bench()
     journal = lab.begin()
