@@ -195,9 +195,6 @@ class Recorder(threading.Thread):
             try:
                 if isinstance(item, End):
                     self._close(item)
-                    # Blocks that came in behind the end belong to no run, and must not begin the next one.
-                    self._waiting.clear()
-                    self.status.waiting_bytes = 0
                     return
                 self._append(self._journal, item)
             except JournalDiskFull as error:
@@ -276,7 +273,10 @@ class Recorder(threading.Thread):
 
     def _release(self, recorded: Recorded | None) -> None:
         self._journal = None
+        # Blocks that came in behind the end belong to no run, and must not begin the next one.
+        self._waiting.clear()
         self._unsafe.clear()
+        self.status.waiting_bytes = 0
         self.status.recording = False
         self.status.journal = None
         if recorded is not None:
@@ -343,8 +343,6 @@ class Recorder(threading.Thread):
             return
         journal.abandon()
         lost = sum(item.block.n_samples for item in self._waiting if isinstance(item, Arrived))
-        self._waiting.clear()
-        self.status.waiting_bytes = 0
         self.status.lost_samples += lost
         end = End("failed", self.status.sample, f"Recording failed: {why}. {lost} samples could not be kept")
         self._release(Recorded(journal.path, journal.header, end))
