@@ -35,8 +35,8 @@ def test_several_channels_of_one_family_that_disagree_are_named_together(factors
     assert found_channels(prepared) == {}
     assert found_marks(prepared) == {f"disagreement@{family}": family}
     assert any(all(name in words for name in factors) for words in limits)
-    joint_of_others = next(b for b in prepared[0].blocks if b.family == "wire")
-    assert abs(joint_of_others.values[joint_of_others.names.index("gain")]) < 5e-3
+    wires = next(b for b in prepared[0].blocks if b.family == "wire")
+    assert abs(wires.values[wires.names.index("gain")]) < 5e-3
     _, library = model_and_library(prepared)
     assert not any(name.startswith("disagreement") for name in library), "nothing may explain it"
 
@@ -52,8 +52,8 @@ def test_a_second_axis_that_follows_the_rotation_is_marked() -> None:
     assert any("TL-1Y" in words for words in limits)
 
 
-def test_nothing_missing_is_not_said_over_channels_that_disagree() -> None:
-    levels = (0.25, -0.35, 0.45)
+@pytest.mark.parametrize("levels", [(-0.35,), (0.25, -0.35), (0.25, -0.35, 0.45)])
+def test_nothing_missing_is_not_said_over_channels_that_disagree(levels: tuple[float, ...]) -> None:
     result = diagnose_runs(
         _scaled({"LV-A03": 1.09, "LV-B07": 1.09, "LV-B08": 1.09}, levels), only=("viscous",)
     )

@@ -67,9 +67,7 @@ def check(
     """
     groups = _gather(fit, runs)
     fraction = min(run.features.independent_fraction for run in runs)
-    tests = [
-        _test(key, z, basis, places, fraction) for key, (z, basis, places) in groups.items() if z.size >= 3
-    ]
+    tests = [_test(key, z, basis, places, fraction) for key, (z, basis, places) in groups.items()]
     excessive = tuple(s.name for s in scatters if fit.sigmas[s.name] > s.high)
     count = 3 * max(len(tests), 1)
     p_min, worst, worst_size, passed = 1.0, "", 0.0, not excessive

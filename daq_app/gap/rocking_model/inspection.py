@@ -208,7 +208,7 @@ def completed(
             block = channel_block(entry.run, entry.features.grid, family, name, steps.get(family, 0.0))
             if block is not None:
                 row.append(block)
-    bends = [bend_signals(e.run, e.joint, e.features.grid, height) for e in examined]
+    bends = [bend_signals(e.run, e.features.grid, height) for e in examined]
     turns = [turn_signals(e.run, e.joint, e.features.grid) for e in examined]
     _add_rings(more, examined, bends, "bending", slow=False)
     _add_rings(more, examined, turns, "turning", slow=True)

@@ -37,7 +37,7 @@ class Signal:
     """What calibrations that differ by one sd make of it, (m,)."""
 
 
-def bend_signals(run: GapRun, joint: Rotation, grid: Grid, height_m: float) -> list[Signal]:
+def bend_signals(run: GapRun, grid: Grid, height_m: float) -> list[Signal]:
     """Bending of the wall as wires and accelerometers show it, in metres (m/s²) of its top."""
     found = []
     rows, heights, _ = wall_rotation(run)

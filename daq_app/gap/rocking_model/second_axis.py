@@ -24,20 +24,19 @@ def second_axis(runs: Sequence[GapRun], grids: Sequence[Grid]) -> list[list[Mark
 
     No effect explains them: another signal gets into that channel, or the instrument is badly mounted.
     """
-    names = [runs[0].sensors[i].id for i in runs[0].indices("tiltmeter", "y")] if runs else []
     marks: list[list[Mark]] = [[] for _ in runs]
-    for name in names:
-        shares = [_share(run, grid, name) for run, grid in zip(runs, grids, strict=True)]
+    for place in runs[0].indices("tiltmeter", "y"):
+        shares = [_share(run, grid, place) for run, grid in zip(runs, grids, strict=True)]
         if abs(float(np.median(shares))) <= TURNED:
             continue
+        key = f"crossed@{runs[0].sensors[place].id}"
         for row, share in zip(marks, shares, strict=True):
-            row.append(Mark(f"crossed@{name}", "share of the rotation", "1", abs(share), _MOUNT_SD))
+            row.append(Mark(key, "share of the rotation", "1", abs(share), _MOUNT_SD))
     return marks
 
 
-def _share(run: GapRun, grid: Grid, name: str) -> float:
+def _share(run: GapRun, grid: Grid, place: int) -> float:
     """Share of the rotation, as the sensor's own response shows it, in the second axis."""
-    place = next(i for i, sensor in enumerate(run.sensors) if sensor.id == name)
     values = zeroed(run, place)
     if not np.all(np.isfinite(values)):
         return 0.0
