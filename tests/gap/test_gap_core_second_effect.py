@@ -12,9 +12,10 @@ from toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
 
 from daq_app.gap.core import Effect, Library, Options, Parameter, Prediction, diagnose, fit
 from daq_app.gap.core.decision import Thresholds
+from daq_app.gap.core.evidence import strength
 from daq_app.gap.core.hypotheses import Hypotheses
 from daq_app.gap.core.parallel import Workers
-from daq_app.gap.core.parameters import positive, signed
+from daq_app.gap.core.parameters import between, positive, signed
 
 
 class Line:
@@ -109,6 +110,26 @@ def test_a_second_effect_of_four_sd_is_a_stated_limit_and_no_pair() -> None:
     assert result.decision.verdict == "effect"
     assert result.decision.effects == ("shift",)
     assert any("Perhaps shift + slope" in limit for limit in result.limits)
+
+
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_the_form_of_an_effect_is_not_its_strength(scale: str) -> None:
+    """A force that falls half evenly is no weaker a release: the form's prior has its centre there."""
+    own = between("s", 0.005, 0.2, "s") if scale == "log" else LIBRARY["shift"].parameters[0]
+    form = Parameter("even", 0.5, 0.4, "1", 0.0, 1.0)
+    shift = replace(LIBRARY["shift"], parameters=(own, form))
+    library = Library([LIBRARY["slope"], shift])
+    result = diagnose(DecayModel(), make_runs(4, slope_k=0.02, shift_s=0.05), library, Options())
+    assert result.decision.verdict == "pair"
+    assert set(result.which[0].effects) == {"slope", "shift"}
+
+
+def test_an_effect_that_knows_no_zero_is_as_strong_as_its_value_is_known() -> None:
+    shift = replace(LIBRARY["shift"], parameters=(between("s", 0.005, 0.2, "s"),))
+    found = fit(DecayModel(), make_runs(0, shift_s=0.05), (shift,))
+    value, low, high = found.values["shift.s"]
+    assert strength(found, shift) == pytest.approx(value / ((high - low) / 3.92), rel=0.05)
+    assert strength(found, shift) > 5.0
 
 
 def test_on_its_way_a_strength_may_still_be_too_weak_to_count() -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from scipy.stats import chi2
 
 from daq_app.gap.core.effects import Effect, Library
-from daq_app.gap.core.evidence import NULL, Answer, Priors, credible_set
+from daq_app.gap.core.evidence import NULL, Answer, Priors, credible_set, strength
 from daq_app.gap.core.fit import Fit
 from daq_app.gap.core.goodness import Goodness
 from daq_app.gap.core.result import Decision, Verdict
@@ -108,12 +108,12 @@ def decide(material: Material, thresholds: Thresholds) -> tuple[Decision, str]:
         return _null(material, thresholds)
     fit = material.fits[best.effects]
     words = describe(best, library)
-    strength = min(fit.strength(name) for name in best.effects)
+    weakest = min(strength(fit, library[name]) for name in best.effects)
     null = next((a.probability for a in material.answers if not a.effects), 0.0)
     others = tuple(r.effects for r in best.alternatives[1:])
-    if strength < thresholds.minimum_strength and null > 1e-3:
+    if weakest < thresholds.minimum_strength and null > 1e-3:
         sentence = (
-            f"{words} fits best, but at {strength:.1f} posterior sd it is below detection "
+            f"{words} fits best, but at {weakest:.1f} posterior sd it is below detection "
             f"(nothing missing: {100 * null:.0f} %)."
         )
         advice = f"Repeat at the highest level: {library[best.effects[0]].name} needs a stronger signal."

@@ -10,7 +10,7 @@ import numpy as np
 
 from daq_app.gap.core.decision import FreeForm, Thresholds
 from daq_app.gap.core.effects import Library
-from daq_app.gap.core.evidence import NULL, Ranked, pair_candidates, rank
+from daq_app.gap.core.evidence import NULL, Ranked, pair_candidates, rank, strength
 from daq_app.gap.core.features import Run
 from daq_app.gap.core.fit import Fit, effects_of
 from daq_app.gap.core.goodness import Goodness, check
@@ -260,14 +260,8 @@ class Hypotheses:
         self.fits.update(zip(pairs, found, strict=True))
 
     def _strength(self, effects: Hypothesis) -> float:
-        """Of the weakest effect, in posterior sd from none; only scales that know no zero do not count."""
-        found = self.fits[effects]
-        sizes = []
-        for name in effects:
-            keys = [self.library[name].key(p) for p in self.library[name].parameters if p.scale == "linear"]
-            if keys:
-                sizes.append(found.strength(name, keys))
-        return min(sizes, default=math.inf)
+        """Of the weakest effect, in posterior sd from none."""
+        return min((strength(self.fits[effects], self.library[name]) for name in effects), default=math.inf)
 
     def ranked(self) -> list[Ranked]:
         """All hypotheses but pairs of which one effect is too weak to be there beside the other."""
