@@ -16,7 +16,7 @@ from daq_app.gap.blind.confusion import confusion
 from daq_app.gap.blind.judge import Judged, judge
 from daq_app.gap.blind.layout import SEAL_FILE
 from daq_app.gap.blind.mix import category_of
-from daq_app.gap.blind.names import COMPARABLE, accepted_names, base_name, class_of
+from daq_app.gap.blind.names import COMPARABLE, accepted_names, base_name, class_of, comparable
 from daq_app.gap.blind.report import write_markdown, write_report
 from daq_app.gap.blind.runner import Outcome, save_outcome
 from daq_app.gap.blind.score import Row, Score, score_folder, table
@@ -85,7 +85,7 @@ def perfect(label: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
             "high": (1.01 + width) * value,
         }
         for e in label["effects"]
-        for key, value in e["parameters"].items()
+        for key, value in ((k, comparable(e["name"], v)) for k, v in e["parameters"].items())
     ]
     return claim(names, 0.97, effect_parameters=parameters)
 
@@ -195,6 +195,23 @@ def test_forms_that_no_sensor_tells_apart_are_one_answer() -> None:
     wires = [{"effects": [f"lag@WP-{k}"], "family": "sensor", "probability": 0.5} for k in (1, 2)]
     other = judge(tilt, Outcome("c", "t", "", 1.0, {"which": wires, "set95": wires, "decision": "effect"}))
     assert (other.set_size, other.claimed) == (2, 0.5)
+
+
+@pytest.mark.parametrize(("tau_s", "covered"), [(0.04, True), (0.08, False)])
+def test_a_slow_release_is_compared_by_the_mean_time_of_its_force(tau_s: float, covered: bool) -> None:
+    """A force that has fallen evenly to nothing after 80 ms acts for 40 ms in the mean."""
+    effect = {"name": "slow_release", "family": "release", "accept": ["slow_release"]}
+    label = {
+        "case": "case_0001",
+        "category": "single",
+        "effects": [effect | {"parameters": {"tau_s": 0.08}}],
+        "detectability": [50.0],
+    }
+    found = {"name": "slow_release.tau", "value": tau_s, "low": 0.95 * tau_s, "high": 1.05 * tau_s}
+    answer = claim(["slow_release"], 0.97, "effect", effect_parameters=[found])
+    judged = judge(label, Outcome("case_0001", "test", "", 1.0, answer))
+    assert judged.parameter_covered is covered
+    assert judged.parameter_error == pytest.approx(0.0 if covered else 1.0)
 
 
 def test_what_the_diagnosis_calls_alike_the_scorer_does_too() -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from daq_app.gap.blind.names import COMPARABLE, base_name, class_of, families_of
+from daq_app.gap.blind.names import COMPARABLE, base_name, class_of, comparable, families_of
 from daq_app.gap.blind.runner import Outcome
 
 DECISIONS: Final = (
@@ -196,7 +196,7 @@ def _parameter(label: dict[str, Any], result: dict[str, Any], decision: str) -> 
     if label["category"] != "single" or decision != "effect" or effects[0]["name"] not in COMPARABLE:
         return math.nan, None
     wanted = COMPARABLE[effects[0]["name"]]
-    truth = float(next(iter(effects[0]["parameters"].values())))
+    truth = comparable(effects[0]["name"], float(next(iter(effects[0]["parameters"].values()))))
     for estimate in [*(result.get("effect_parameters") or []), *(result.get("parameters") or [])]:
         effect, dot, parameter = str(estimate.get("name", "")).rpartition(".")
         if parameter != wanted or (dot and base_name(effect) != effects[0]["name"]):

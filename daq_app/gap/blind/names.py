@@ -65,7 +65,15 @@ COMPARABLE: Final[dict[str, str]] = {
     "wire_inertia": "frequency",
     "clock": "error",
 }
-"""Effects whose strength means the same number in the generator and in a result, and its name there."""
+"""Effects whose strength can be compared between the generator and a result, and its name there."""
+_OF_THE_LABEL: Final[dict[str, float]] = {"slow_release": 0.5}
+"""Where the two count differently: what a result's number is of the label's. The world's force falls evenly
+until τ; a result's τ is the mean time of the force, whatever its form, and that of an even one is half."""
+
+
+def comparable(effect: str, label_value: float) -> float:
+    """The strength in a label as a result counts it."""
+    return label_value * _OF_THE_LABEL.get(effect, 1.0)
 
 
 def base_name(name: str) -> str:
