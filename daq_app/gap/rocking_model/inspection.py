@@ -209,7 +209,7 @@ def completed(
             if block is not None:
                 row.append(block)
     bends = [bend_signals(e.run, e.features.grid, height) for e in examined]
-    turns = [turn_signals(e.run, e.joint, e.features.grid) for e in examined]
+    turns = [turn_signals(e.run, e.joint, e.features.grid, height) for e in examined]
     _add_rings(more, examined, bends, "bending", slow=False)
     _add_rings(more, examined, turns, "turning", slow=True)
     vibrations = find_vibration([e.run for e in examined], grids)

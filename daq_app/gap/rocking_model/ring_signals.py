@@ -14,6 +14,7 @@ from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S, accelera
 from daq_app.gap.rocking_model.motion_grid import Grid, coarse
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rotation import Rotation, wall_rotation, zeroed
+from daq_app.gap.rocking_model.sensor_blocks import Shares
 
 DISPLACEMENT_MASK_S = 0.02
 """A base that gives way takes milliseconds to turn after an impact: a quick decay, but no ring-down."""
@@ -29,8 +30,7 @@ class Signal:
     family: str
     values: FloatArray
     pick: NDArray[np.bool_]
-    lever: float
-    """What a rotation error δ of the family makes of this signal, m: for effects on its sensors."""
+    shares: Shares
     undone_s: float = 0.0
     """Delay that was undone."""
     unequal: FloatArray | None = None
@@ -40,42 +40,59 @@ class Signal:
 def bend_signals(run: GapRun, grid: Grid, height_m: float) -> list[Signal]:
     """Bending of the wall as wires and accelerometers show it, in metres (m/s²) of its top."""
     found = []
-    rows, heights, _ = wall_rotation(run)
+    rows, heights, names = wall_rotation(run)
     if len(rows) >= 3:
         shape = (heights / height_m) ** 2
         beyond = np.array([z * coarse(r, run.rate_hz) for z, r in zip(heights, rows, strict=True)])
         beyond = beyond - heights[:, None] * grid.theta
-        lever = float(shape @ heights / (shape @ shape))
-        values = shape @ beyond / (shape @ shape)
-        found.append(Signal("wire", values, _between_late(grid, beyond, heights), lever))
+        weights = shape / (shape @ shape)
+        shares = _shares(weights, _along(run, names), heights, height_m)
+        found.append(Signal("wire", weights @ beyond, _between_late(grid, beyond, heights), shares))
     chosen = _accelerometers(run)
     if len(chosen) >= 3:
         z = np.array([run.sensors[i].position_m[2] for i in chosen])
         shape = (z / height_m) ** 2
-        seen = _accelerations(run, grid, chosen)
-        found.append(_of_accelerometers(seen, shape, z, 0.0))
+        y = np.array([run.sensors[i].position_m[1] for i in chosen])
+        shares = _shares(shape / (shape @ shape), y, z, height_m)
+        found.append(_of_accelerometers(_accelerations(run, grid, chosen), shape, z, shares))
     return found
 
 
-def turn_signals(run: GapRun, joint: Rotation, grid: Grid) -> list[Signal]:
+def _along(run: GapRun, names: Sequence[str]) -> FloatArray:
+    """Places along the length of channels by name, m."""
+    return np.array([next(s.position_m[1] for s in run.sensors if s.id == name) for name in names])
+
+
+def _shares(weights: FloatArray, y: FloatArray, z: FloatArray, height_m: float) -> Shares:
+    """What a weighted sum of channels at (y, z), each (n,), shows of each motion along x."""
+    return Shares(
+        rotation=float(weights @ z),
+        bend=float(weights @ (z / height_m) ** 2),
+        yaw=-float(weights @ y),
+        twist=float(weights @ (y * z)),
+    )
+
+
+def turn_signals(run: GapRun, joint: Rotation, grid: Grid, height_m: float) -> list[Signal]:
     """Slope along the length of what wires, accelerometers (per metre) and the joint show."""
     found = []
     rows, heights, names = wall_rotation(run)
-    y = np.array([next(s.position_m[1] for s in run.sensors if s.id == name) for name in names])
+    y = _along(run, names)
     if len(rows) >= 3 and float(np.ptp(y)) > 0.2:
         beyond = np.array([z * coarse(r, run.rate_hz) for z, r in zip(heights, rows, strict=True)])
         beyond = beyond - heights[:, None] * grid.theta
-        lever = float(y @ (heights * y) / (y @ y))
-        found.append(Signal("wire", y @ beyond / (y @ y), _between_late(grid, beyond, heights), lever))
+        weights = y / (y @ y)
+        shares = _shares(weights, y, heights, height_m)
+        found.append(Signal("wire", weights @ beyond, _between_late(grid, beyond, heights), shares))
     chosen = _accelerometers(run)
     y = np.array([run.sensors[i].position_m[1] for i in chosen])
     if len(chosen) >= 3 and float(np.ptp(y)) > 0.2:
         z = np.array([run.sensors[i].position_m[2] for i in chosen])
-        lever = float(y @ (z * y) / (y @ y))
-        found.append(_of_accelerometers(_accelerations(run, grid, chosen), y, z, lever))
+        shares = _shares(y / (y @ y), y, z, height_m)
+        found.append(_of_accelerometers(_accelerations(run, grid, chosen), y, z, shares))
     if len(joint.used) >= 8:
         pick = _between(grid, DISPLACEMENT_MASK_S) & grid.valid
-        found.append(Signal("lvdt", coarse(joint.twist, run.rate_hz), pick, 0.0))
+        found.append(Signal("lvdt", coarse(joint.twist, run.rate_hz), pick, Shares(twist=1.0)))
     return found
 
 
@@ -97,11 +114,11 @@ class _Accelerations:
     undone_s: float
 
 
-def _of_accelerometers(seen: _Accelerations, shape: FloatArray, z: FloatArray, lever: float) -> Signal:
+def _of_accelerometers(seen: _Accelerations, shape: FloatArray, z: FloatArray, shares: Shares) -> Signal:
     """The share of a shape over the accelerometers; unequal calibrations have some of every motion's."""
     size = shape @ shape
     unequal = CALIBRATION * float(np.linalg.norm(shape * z) / size) * seen.mean
-    return Signal("accelerometer", shape @ seen.beyond / size, seen.pick, lever, seen.undone_s, unequal)
+    return Signal("accelerometer", shape @ seen.beyond / size, seen.pick, shares, seen.undone_s, unequal)
 
 
 def _accelerations(run: GapRun, grid: Grid, chosen: Sequence[int]) -> _Accelerations:

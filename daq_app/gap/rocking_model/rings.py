@@ -190,7 +190,7 @@ def _colour(
 
 def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, slow: bool) -> Block | None:
     """Coefficients of sine and cosine of every signal at the common oscillator; accelerations over ω²."""
-    names, units, values, variances, rows, levers, fading, unequal = [], [], [], [], [], [], [], []
+    names, units, values, variances, rows, shares, fading, unequal = [], [], [], [], [], [], [], []
     waves = ring_columns(grid, ring.frequency_hz, ring.zeta)
     natural = 2.0 * np.pi * ring.frequency_hz
     for signal in signals:
@@ -221,7 +221,7 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
             values.append(found[k] / scale)
             variances.append(variance[k] / scale**2)
             rows.append(full[k] / scale)
-            levers.append(signal.lever)
+            shares.append(signal.shares)
             unequal.append(0.0 if signal.unequal is None else float(rows[-1] @ signal.unequal))
     if not names:
         return None
@@ -240,7 +240,7 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
         np.ones(grid.time_s.size, dtype=bool),
         kind=name,
         ring=(ring.frequency_hz, ring.zeta, GRID_HZ),
-        levers=tuple(levers),
+        shares=tuple(shares),
         fading=tuple(fading),
         unequal=np.array([*unequal, 0.0, 0.0]),
         undone_s=next((s.undone_s for s in signals if s.family == "accelerometer"), 0.0),

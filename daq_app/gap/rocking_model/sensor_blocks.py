@@ -27,6 +27,24 @@ OTHER_WIRES = 2e-3
 
 
 @dataclass(frozen=True, slots=True)
+class Shares:
+    """What a signal put together from several channels shows of each way in which they can move.
+
+    Of bending or turning the sensors that are left may show more than one, where they no longer stand
+    evenly on both sides of the middle.
+    """
+
+    rotation: float = 0.0
+    """Of an error of the family's rotation, m (m/s² of the angular acceleration)."""
+    bend: float = 0.0
+    """Of the bending at the top of the wall; 1/m in signals of turning."""
+    yaw: float = 0.0
+    """Of the angle about the vertical, m; 1 or none in signals of turning."""
+    twist: float = 0.0
+    """Of the rotation's slope along the length, m²; m in signals of turning."""
+
+
+@dataclass(frozen=True, slots=True)
 class Block:
     """Coefficients of one family in one run, with the regression that made them.
 
@@ -54,8 +72,9 @@ class Block:
     ring: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Of a ring-down: frequency in Hz, damping ratio, rate of the grid in Hz."""
     levers: tuple[float, ...] = ()
-    """Of a ring-down: what a rotation error of the family makes of each coefficient's signal, m. Of a
-    single channel: the relative error of its prediction."""
+    """Of a single channel: the relative error of its prediction."""
+    shares: tuple[Shares, ...] = ()
+    """Of a ring-down: what the signal of each coefficient shows."""
     fading: tuple[float, ...] = ()
     """Of a ring-down: change of each coefficient of unit size per ln of the damping ratio."""
     undone_s: float = 0.0

@@ -355,7 +355,9 @@ def _bending(run: RockingRun, block: Block, values: Mapping[str, float]) -> Floa
 
 
 def _turning(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
-    return extra.turning(run, block, values)
+    # Evenly placed wires show nothing of an error of their rotation in what turns.
+    uneven = run.reference != "wire" and extra.shows_rotation(block)
+    return extra.turning(run, block, values, _difference_of(run, "wire", "lvdt", values) if uneven else None)
 
 
 _PREDICT = {
