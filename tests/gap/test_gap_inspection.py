@@ -188,6 +188,12 @@ def test_one_channel_with_another_gain_is_examined_on_its_own() -> None:
     assert any(parameter.name == "cal_WP-2_gain" for parameter in model.nuisance)
 
 
+def test_one_slow_lvdt_is_examined_on_its_own_before_it_shifts_the_times_of_impacts() -> None:
+    runs = _prepared({"slow_response@LV-B09": {"tau": 8e-4}})
+    assert found_channels(runs) == {"LV-B09": "lvdt"}
+    assert _value(runs[0], "LV-B09", "lag") == pytest.approx(8e-4, abs=1.5e-4)
+
+
 def test_ring_down_and_floor_are_seen_at_their_frequency() -> None:
     runs = _prepared(
         {
