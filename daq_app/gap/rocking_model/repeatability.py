@@ -39,6 +39,7 @@ SIZES: dict[tuple[str, str], Size] = {
     ("accelerometer", "gain of gravity"): Size(1e-2),
     ("accelerometer", "gain of inertia"): Size(1e-3, 1e-3, "1"),
     ("impact timing", "delay"): Size(1e-4),
+    ("swing timing", "delay"): Size(1e-4, 2e-4, "s"),
     ("base", "slip per speed"): Size(5e-5, 1e-4, "m s/rad"),
     ("base", "follows rotation"): Size(3e-4),
     ("joint", "pivot"): Size(3e-4),

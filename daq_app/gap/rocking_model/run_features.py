@@ -26,6 +26,7 @@ from daq_app.gap.rocking_model.rotation import (
     wires_of,
 )
 from daq_app.gap.rocking_model.sensor_blocks import Block, blocks_of
+from daq_app.gap.rocking_model.swing_timing import swing_delay
 from daq_app.gap.rocking_model.wiring import Wiring
 
 _SMALLEST_LOADING = 1e-3
@@ -141,6 +142,9 @@ def examine(run: GapRun, reference: str = "") -> Examined:
     late = acceleration_delay(run, grid)
     if late is not None:
         blocks = (*blocks, scalar_block("impact timing", (("delay", "s", late[0], late[1]),), grid))
+    between = swing_delay(run, grid, None if late is None else late[0])
+    if between is not None:
+        blocks = (*blocks, scalar_block("swing timing", (("delay", "s", between[0], between[1]),), grid))
     let_go = release_speed(theta, noise, swings, run.survey, run.rate_hz)
     if let_go is not None:
         entry = ("speed away from upright", "rad/s", let_go[0], let_go[1] ** 2)

@@ -267,6 +267,11 @@ def _impact_timing(run: RockingRun, block: Block, values: Mapping[str, float]) -
     return np.array([values["onset"] + late])
 
 
+def _swing_timing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """The same between impacts, whose form does not matter there."""
+    return np.array([extra.delay("accelerometer", values) - extra.delay(run.reference, values)])
+
+
 def _edges(run: RockingRun, values: Mapping[str, float]) -> tuple[float, float]:
     """(distance of the pivots from the middle beyond the survey's, half its difference right to left), m."""
     half, alpha = values["half_base"], values["alpha"]
@@ -365,6 +370,7 @@ _PREDICT = {
     "tiltmeter": _tiltmeter,
     "accelerometer": _accelerometer,
     "impact timing": _impact_timing,
+    "swing timing": _swing_timing,
     "channel": extra.channel,
     "bending": _bending,
     "turning": _turning,
