@@ -21,21 +21,30 @@ from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rotation import WireInverse, wall_rotation, zeroed
 from daq_app.gap.rocking_model.sensor_blocks import Block
 
-SHAPES = ("gain", "lag", "curvature", "drift")
-_UNITS: dict[Family, tuple[str, str, str, str]] = {
+_SHAPES = ("gain", "lag", "curvature", "drift")
+SHAPES: dict[Family, tuple[str, ...]] = {
+    "lvdt": _SHAPES,
+    "wire": (*_SHAPES, "side"),
+    "accelerometer": _SHAPES,
+}
+"""Of wires also half the difference in gain between the two sides: the wall lifts on one side only, and a
+wire whose anchor is not as high as the rig file says slopes and sees it. A joint opens at one face at a time:
+LVDTs have no other side."""
+_UNITS: dict[Family, tuple[str, ...]] = {
     "lvdt": ("1", "s", "1/m", "m/s"),
-    "wire": ("1", "s", "1/m", "m/s"),
+    "wire": ("1", "s", "1/m", "m/s", "1"),
     "accelerometer": ("1", "s", "s²/m", "m/s³"),
 }
-TOLERANCE: dict[Family, tuple[float, float, float, float]] = {
+TOLERANCE: dict[Family, tuple[float, ...]] = {
     "lvdt": (3.2e-3, 1e-4, 0.06, 4e-6),
-    "wire": (3.2e-3, 3e-4, 0.02, 1.2e-5),
+    "wire": (3.2e-3, 3e-4, 0.02, 1.2e-5, 5e-4),
     "accelerometer": (8e-3, 2e-3, 2e-3, 1.5e-3),
 }
 """What healthy channels differ by: calibration, and how well the others predict them. Accelerometers also
 by the place's own ringing, which a hop of the wall carries beyond the mask. An LVDT's lag is as good as what
 its family may be late by: a twelfth of it is in the time across every impact, to one side up and to the other
-down, and those times repeat to some hundredths of a millisecond."""
+down, and those times repeat to some hundredths of a millisecond. The side of wires is an anchor known to
+5 mm."""
 CALIBRATION = 3e-3
 """Relative tolerance of one channel's calibration."""
 _SOUND = 0.5
@@ -69,11 +78,13 @@ class Others:
     """Rms of what the steps of these readings make of the difference; 0 where they have none."""
     repeats: int = 1
     """Half-cycles, in each of which the same steps come back."""
+    sided: bool = False
+    """Whether its side is among the shapes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """Coefficients of one channel in one run, as `SHAPES`, with covariance, and what remains over noise."""
+    """Coefficients of one channel in one run (`SHAPES`), with covariance, and what remains over noise."""
 
     values: FloatArray
     covariance: FloatArray
@@ -95,6 +106,7 @@ class _Family:
     pick: NDArray[np.bool_]
     step: float = 0.0
     repeats: int = 1
+    sided: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,14 +242,14 @@ def channel_block(run: GapRun, grid: Grid, family: Family, name: str, step: floa
     beside = _beside(data, name, (name,))
     found = deviation(beside)
     usual = float(np.median([deviation(_beside(data, n, (name,))).remains for n in data.ids if n != name]))
-    k = len(SHAPES)
+    k = len(SHAPES[family])
     covariance = np.zeros((k + 1, k + 1))
     covariance[:k, :k] = found.covariance
     covariance[k, k] = STRUCTURE_SD**2
     remains = 0.0 if family in RINGING else max(found.remains - usual, 0.0)
     return Block(
         name,
-        (*SHAPES, "what remains"),
+        (*SHAPES[family], "what remains"),
         (*_UNITS[family], "1"),
         np.append(found.values, remains),
         covariance,
@@ -267,6 +279,7 @@ def deviation(beside: Others) -> Deviation:
             -np.gradient(e, 1.0 / GRID_HZ),
             e**2,
             np.arange(e.size) / GRID_HZ,
+            *([np.abs(e)] if beside.sided else []),
             np.ones_like(e),
         ]
     )[beside.pick]
@@ -282,7 +295,7 @@ def deviation(beside: Others) -> Deviation:
     noise = float(np.hypot(noise, beside.rough))
     if beside.rough > 0.0:
         variance *= max(beside.repeats, 1)
-    kept = slice(0, len(SHAPES))
+    kept = slice(0, columns.shape[1] - 1)
     covariance = variance / fraction * (inverse @ inverse.T)[kept, kept]
     return Deviation(
         (inverse @ difference)[kept],
@@ -304,7 +317,7 @@ def _beside(data: _Family, name: str, without: tuple[str, ...]) -> Others:
     own = float(np.sqrt(np.mean(expected**2))) + 1e-300
     spread = float(np.sqrt(1.0 + np.sum((weights * sizes / own) ** 2)))
     rough = data.step / np.sqrt(12.0) * float(np.sqrt(1.0 + np.sum(weights**2)))
-    return Others(data.signals[place], expected, data.pick, spread, rough, data.repeats)
+    return Others(data.signals[place], expected, data.pick, spread, rough, data.repeats, data.sided)
 
 
 def _family(
@@ -320,7 +333,7 @@ def _family(
             found = _wires(whole, moving)
         case "accelerometer":
             found = _accelerometers(whole, moving & ~grid.near_impact)
-    return found and replace(found, step=step, repeats=grid.impact_s.size)
+    return found and replace(found, step=step, repeats=grid.impact_s.size, sided="side" in SHAPES[family])
 
 
 def _lvdts(run: GapRun, pick: NDArray[np.bool_]) -> _Family | None:
