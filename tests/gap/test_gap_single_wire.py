@@ -46,3 +46,9 @@ def test_of_two_wires_that_may_be_wrong_it_is_the_one_without_which_the_base_sta
     """Five wires at four heights leave one check: a gain of WP-1 or of WP-2 may explain the same."""
     gains = {"gain@WP-1": {"error": 0.013}, "gain@WP-2": {"error": -0.027}}
     assert found_channels(prepare(simulate(gains, LEVEL))[0]) == {"WP-2": "wire"}
+
+
+def test_a_sag_of_the_lowest_wire_is_not_taken_for_one_of_all() -> None:
+    """Among wires at four heights both bend the lowest against the others; one of all leaves more."""
+    runs = simulate({"wire_cosine@WP-1": {"kappa": -0.17}}, LEVEL)
+    assert found_channels(prepare(runs)[0]) == {"WP-1": "wire"}

@@ -169,9 +169,21 @@ def _alone(usable: Sequence[_Family], family: Family, order: Sequence[str]) -> s
     if not agreed:
         return None
     _, agree, name = min(agreed)
-    # Curvature is the one fault of a whole family that does not cancel between its channels.
-    bent = max(_sizes([_straightened(d) for d in usable], family, ()).values()) <= agree
-    return None if bent else name
+    return None if _all_bent(usable, family, name, agree) else name
+
+
+def _all_bent(usable: Sequence[_Family], family: Family, name: str, agree: float) -> bool:
+    """Whether one curvature of all channels explains their disagreement, and better than one faulty channel.
+
+    It is the one fault of a whole family that does not cancel between its channels; of few channels one that
+    is bent looks much like it, but leaves some in the others.
+    """
+    straight = [_straightened(d) for d in usable]
+    if max(_sizes(straight, family, ()).values()) > agree:
+        return False
+    left = _sizes(usable, family, (name,), "curvature")
+    del left[name]
+    return max(_sizes(straight, family, (), "curvature").values()) < max(left.values())
 
 
 def _together(usable: Sequence[_Family], family: Family) -> tuple[str, ...]:
@@ -204,8 +216,10 @@ def _base_moves(data: Sequence[_Family], without: str) -> float:
     return float(np.sqrt(total))
 
 
-def _sizes(data: Sequence[_Family], family: Family, without: tuple[str, ...]) -> dict[str, float]:
-    """How far off each channel is, in tolerances: the middle of all runs."""
+def _sizes(
+    data: Sequence[_Family], family: Family, without: tuple[str, ...], shape: str = ""
+) -> dict[str, float]:
+    """How far off each channel is, in tolerances: the middle of all runs; in one shape, or in any."""
     rows: dict[str, list[float]] = {}
     for entry in data:
         beside = {name: _beside(entry, name, without) for name in entry.ids}
@@ -214,7 +228,11 @@ def _sizes(data: Sequence[_Family], family: Family, without: tuple[str, ...]) ->
         for name, found in table.items():
             tolerance = np.array(TOLERANCE[family]) * beside[name].spread
             sd = np.hypot(tolerance, np.sqrt(np.diag(found.covariance)))
-            size = float(np.abs(found.values / sd).max())
+            sizes = np.abs(found.values / sd)
+            if shape:
+                rows.setdefault(name, []).append(float(sizes[SHAPES[family].index(shape)]))
+                continue
+            size = float(sizes.max())
             if family in RINGING:
                 usual = found.remains
             rows.setdefault(name, []).append(max(size, SUSPECT[family] * (found.remains - usual) / STRUCTURE))
@@ -224,8 +242,11 @@ def _sizes(data: Sequence[_Family], family: Family, without: tuple[str, ...]) ->
 def _straightened(data: _Family) -> _Family:
     """The family less the error κ u² that, with one κ for all channels, explains most of its disagreement."""
     apart = np.eye(len(data.ids)) - data.design @ np.linalg.pinv(data.design)
-    # A zero that is off or drifts is no curvature, though u² would take up most of it on one face.
-    steady = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, data.pick.size)[data.pick], 2))[0]
+    # A zero that is off or drifts is no curvature, though u² would take up most of it on one face; nor are
+    # unequal gains, of which a wall that is let go from one side leaves u² some.
+    moved = data.signals.mean(axis=0)[data.pick]
+    still = np.vander(np.linspace(-1.0, 1.0, data.pick.size)[data.pick], 2)
+    steady = np.linalg.qr(np.column_stack([still, moved / max(float(np.abs(moved).max()), 1e-300)]))[0]
     seen, bent = (
         rows - (rows @ steady) @ steady.T
         for rows in ((apart @ data.signals)[:, data.pick], (apart @ data.signals**2)[:, data.pick])
