@@ -81,11 +81,7 @@ def without_vibration(run: GapRun, grid: Grid, found: Vibration) -> GapRun:
 
 
 def _quiet(run: GapRun, grid: Grid) -> _Quiet | None:
-    chosen = [
-        i
-        for i in run.indices("accelerometer", "x")
-        if np.all(np.isfinite(run.channels[i])) and not run.sensors[i].ac_coupled
-    ]
+    chosen = run.steady_accelerometers("x")
     if not chosen:
         return None
     measured = np.mean([coarse(zeroed(run, i), run.rate_hz) for i in chosen], axis=0)

@@ -25,11 +25,7 @@ def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
     What is compared are averages over 5 ms of z θ̈ − g sin θ with the jump of θ̇ at every impact: any
     linear response of the accelerometers shifts its centroid by its delay. None without enough impacts.
     """
-    chosen = [
-        i
-        for i in run.indices("accelerometer", "x")
-        if np.all(np.isfinite(run.channels[i])) and not run.sensors[i].ac_coupled
-    ]
+    chosen = run.steady_accelerometers("x")
     if not chosen or grid.impact_s.size < 3:
         return None
     height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))

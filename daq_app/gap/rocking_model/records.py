@@ -105,6 +105,14 @@ class GapRun:
             and sensor.id not in self.excluded
         ]
 
+    def steady_accelerometers(self, axis: str) -> list[int]:
+        """Places of the accelerometers along an axis that read, and read down to standstill."""
+        return [
+            i
+            for i in self.indices("accelerometer", axis)
+            if np.all(np.isfinite(self.channels[i])) and not self.sensors[i].ac_coupled
+        ]
+
     def at_clock(self) -> GapRun:
         """The run with all channels at the instants of the sample clock."""
         if not self.time_offset_s.size or not np.any(self.time_offset_s):

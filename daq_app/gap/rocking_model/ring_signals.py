@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.channel_faults import CALIBRATION
+from daq_app.gap.rocking_model.channel_shapes import CALIBRATION
 from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
 from daq_app.gap.rocking_model.motion_grid import Grid, coarse
 from daq_app.gap.rocking_model.records import GapRun
@@ -48,13 +48,13 @@ def bend_signals(run: GapRun, grid: Grid, height_m: float) -> list[Signal]:
         weights = shape / (shape @ shape)
         shares = _shares(weights, _along(run, names), heights, height_m)
         found.append(Signal("wire", weights @ beyond, _between_late(grid, beyond, heights), shares))
-    chosen = _accelerometers(run)
+    chosen = run.steady_accelerometers("x")
     if len(chosen) >= 3:
         z = np.array([run.sensors[i].position_m[2] for i in chosen])
         shape = (z / height_m) ** 2
         y = np.array([run.sensors[i].position_m[1] for i in chosen])
         shares = _shares(shape / (shape @ shape), y, z, height_m)
-        found.append(_of_accelerometers(_accelerations(run, grid, chosen), shape, z, shares))
+        found.append(_of_accelerometers(accelerations(run, grid, chosen), shape, z, shares))
     return found
 
 
@@ -84,29 +84,24 @@ def turn_signals(run: GapRun, joint: Rotation, grid: Grid, height_m: float) -> l
         weights = y / (y @ y)
         shares = _shares(weights, y, heights, height_m)
         found.append(Signal("wire", weights @ beyond, _between_late(grid, beyond, heights), shares))
-    chosen = _accelerometers(run)
+    chosen = run.steady_accelerometers("x")
     y = np.array([run.sensors[i].position_m[1] for i in chosen])
     if len(chosen) >= 3 and float(np.ptp(y)) > 0.2:
         z = np.array([run.sensors[i].position_m[2] for i in chosen])
         shares = _shares(y / (y @ y), y, z, height_m)
-        found.append(_of_accelerometers(_accelerations(run, grid, chosen), y, z, shares))
+        found.append(_of_accelerometers(accelerations(run, grid, chosen), y, z, shares))
     if len(joint.used) >= 8:
         pick = _between(grid, DISPLACEMENT_MASK_S) & grid.valid
         found.append(Signal("lvdt", coarse(joint.twist, run.rate_hz), pick, Shares(twist=1.0)))
     return found
 
 
-def _accelerometers(run: GapRun) -> list[int]:
-    return [
-        i
-        for i in run.indices("accelerometer", "x")
-        if np.all(np.isfinite(run.channels[i])) and not run.sensors[i].ac_coupled
-    ]
-
-
 @dataclass(frozen=True, slots=True)
-class _Accelerations:
-    """`beyond`: (n, m) beyond those of a rigid wall. `mean`: (m,) per metre of height, as measured."""
+class Accelerations:
+    """`beyond`: (n, m) beyond those of a rigid wall; `pick`: (m,) the samples between impacts to be used.
+
+    `mean`: (m,) per metre of height, as measured.
+    """
 
     beyond: FloatArray
     mean: FloatArray
@@ -114,15 +109,15 @@ class _Accelerations:
     undone_s: float
 
 
-def _of_accelerometers(seen: _Accelerations, shape: FloatArray, z: FloatArray, shares: Shares) -> Signal:
+def _of_accelerometers(seen: Accelerations, shape: FloatArray, z: FloatArray, shares: Shares) -> Signal:
     """The share of a shape over the accelerometers; unequal calibrations have some of every motion's."""
     size = shape @ shape
     unequal = CALIBRATION * float(np.linalg.norm(shape * z) / size) * seen.mean
     return Signal("accelerometer", shape @ seen.beyond / size, seen.pick, shares, seen.undone_s, unequal)
 
 
-def _accelerations(run: GapRun, grid: Grid, chosen: Sequence[int]) -> _Accelerations:
-    """Accelerations put in step with the rotation.
+def accelerations(run: GapRun, grid: Grid, chosen: Sequence[int]) -> Accelerations:
+    """What accelerometers (their places) show beyond a rigid wall, put in step with the rotation.
 
     Of late accelerometers the shock of an impact would lie beyond the samples that are left out for it.
     """
@@ -136,7 +131,7 @@ def _accelerations(run: GapRun, grid: Grid, chosen: Sequence[int]) -> _Accelerat
     measured = np.array([coarse(row[places], run.rate_hz) for row in rows])
     beyond = measured - z[:, None] * grid.alpha + 9.81 * np.sin(grid.theta)
     pick = _between(grid, ACCELERATION_MASK_S + abs(late))
-    return _Accelerations(beyond, z @ measured / (z @ z), pick, early / run.rate_hz)
+    return Accelerations(beyond, z @ measured / (z @ z), pick, early / run.rate_hz)
 
 
 def _between_late(grid: Grid, beyond: FloatArray, heights: FloatArray) -> NDArray[np.bool_]:

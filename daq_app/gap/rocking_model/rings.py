@@ -63,7 +63,7 @@ def ring_table(grid: Grid, frequencies_hz: FloatArray, zetas: FloatArray) -> Flo
     return table
 
 
-def _cleaner(grid: Grid, pick: NDArray[np.bool_], slow: bool) -> list[tuple[NDArray[np.intp], FloatArray]]:
+def cleaner(grid: Grid, pick: NDArray[np.bool_], slow: bool) -> list[tuple[NDArray[np.intp], FloatArray]]:
     """Bases to be removed from a signal: smooth curves between impacts, or the rotation for slow turns."""
     places = np.flatnonzero(pick)
     if slow:
@@ -148,7 +148,7 @@ def _score(
             if waves is None:
                 both = np.meshgrid(frequencies, damping, indexing="ij")
                 waves = ring_table(grid, both[0].ravel(), both[1].ravel())
-            cleaned = _clean(np.column_stack([signal.values, waves]), _cleaner(grid, signal.pick, slow))
+            cleaned = _clean(np.column_stack([signal.values, waves]), cleaner(grid, signal.pick, slow))
             if len(cleaned) >= 60:
                 score += _gains(cleaned[:, 0], cleaned[:, 1:]).reshape(score.shape)
     return score
@@ -194,7 +194,7 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
     waves = ring_columns(grid, ring.frequency_hz, ring.zeta)
     natural = 2.0 * np.pi * ring.frequency_hz
     for signal in signals:
-        bases = _cleaner(grid, signal.pick, slow)
+        bases = cleaner(grid, signal.pick, slow)
         both = _clean(np.column_stack([signal.values, waves]), bases)
         if len(both) < 60:
             continue

@@ -255,11 +255,7 @@ def _tilt_block(run: GapRun, grid: Grid, pick: NDArray[np.bool_]) -> Block | Non
 
 
 def _acceleration_block(run: GapRun, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:
-    chosen = [
-        i
-        for i in run.indices("accelerometer", "x")
-        if np.all(np.isfinite(run.channels[i])) and not run.sensors[i].ac_coupled
-    ]
+    chosen = run.steady_accelerometers("x")
     if not chosen:
         return None
     # Means over 5 ms and no filter: one that rings carries an impact past the samples left out around it.

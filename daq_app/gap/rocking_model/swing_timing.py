@@ -30,11 +30,7 @@ def swing_delay(run: GapRun, grid: Grid, of_impacts_s: float | None) -> tuple[fl
     away. Calibrations, the pivot and a base that gives way do the same on the way up and on the way down; a
     delay changes sign at every peak. How an impact looks does not enter, and no second derivative either.
     """
-    chosen = [
-        i
-        for i in run.indices("accelerometer", "x")
-        if np.all(np.isfinite(run.channels[i])) and not run.sensors[i].ac_coupled
-    ]
+    chosen = run.steady_accelerometers("x")
     if not grid.impact_s.size or not chosen:
         return None
     late = 0.0 if of_impacts_s is None else of_impacts_s - MIDDLE_OF_IMPACT_S
