@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from simulated_wall import simulate
 
@@ -50,6 +51,30 @@ def test_a_second_axis_that_follows_the_rotation_is_marked() -> None:
     prepared, limits = prepare(runs)
     assert found_marks(prepared) == {"crossed@TL-1Y": "tiltmeter"}
     assert any("TL-1Y" in words for words in limits)
+
+
+def _shaken(amplitude_m_s2: float, effects: dict[str, dict[str, float]]) -> list[GapRun]:
+    """A floor that shakes at 11 Hz for a second, and the rigid wall on it: θ̈ = −(p²/g) cos α a."""
+    runs = simulate(effects, (-0.35, 0.3))
+    for run in runs[:1]:
+        t = np.arange(run.channels.shape[1]) / run.rate_hz
+        floor = amplitude_m_s2 * np.exp(-(((t - 4.0) / 0.5) ** 2)) * np.sin(2 * np.pi * 11.0 * t)
+        follows = run.survey.p_rad_s**2 / 9.81 * np.cos(run.survey.alpha_rad)
+        for i in run.indices("accelerometer", "x"):
+            run.channels[i] += (1.0 - follows * run.sensors[i].position_m[2]) * floor
+    return runs
+
+
+def test_a_burst_of_shaking_is_found_in_the_run_that_has_it() -> None:
+    prepared, limits = prepare(_shaken(0.1, {}))
+    marks = [found_marks([run]) for run in prepared]
+    assert marks == [{"shaking@floor": ""}, {}]
+    assert any("burst of shaking" in words and words.endswith("in 1 runs.") for words in limits)
+
+
+def test_a_wall_that_bends_strongly_is_no_floor_that_shakes() -> None:
+    bends = {"flexible_wall": {"frequency": 11.0, "zeta": 0.03, "gain": 0.01}}
+    assert found_marks(prepare(_shaken(0.0, bends))[0]) == {}
 
 
 @pytest.mark.parametrize("levels", [(-0.35,), (0.25, -0.35), (0.25, -0.35, 0.45)])

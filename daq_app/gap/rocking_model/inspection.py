@@ -17,15 +17,17 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.channel_faults import channel_block, suspects
 from daq_app.gap.rocking_model.conditions import Mark, conditions_of, marks_of, without_hum
 from daq_app.gap.rocking_model.extra_response import MARKS
+from daq_app.gap.rocking_model.floor_bursts import floor_bursts
 from daq_app.gap.rocking_model.floor_vibration import Vibration, find_vibration, without_vibration
 from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.ring_signals import Signal, bend_signals, turn_signals
-from daq_app.gap.rocking_model.rings import ring_block, scan, with_repeatability
+from daq_app.gap.rocking_model.rings import Ring, ring_block, scan, with_repeatability
 from daq_app.gap.rocking_model.run_features import Examined, RockingRun, examine, scalar_block
 from daq_app.gap.rocking_model.saturation import saturated
 from daq_app.gap.rocking_model.second_axis import second_axis
 from daq_app.gap.rocking_model.sensor_blocks import Block
+from daq_app.gap.rocking_model.vertical import odd_vertical, vertical_block
 from daq_app.gap.rocking_model.wiring import Wiring, mend
 
 LATE_S = 2.5e-3
@@ -148,7 +150,8 @@ def without_suspects(
     library knows: that they disagree is a finding that nothing explains, and not a reason to forget them.
     """
     grids = [e.features.grid for e in examined]
-    found = suspects([e.run for e in examined], grids, _steps(marks))
+    runs = [e.run for e in examined]
+    found = suspects(runs, grids, _steps(marks)).beside("accelerometer", odd_vertical(runs, grids))
     again = list(examined)
     if found.ids:
         again = []
@@ -197,23 +200,36 @@ def completed(
     marks: Sequence[Sequence[Mark]],
     channels: dict[str, Family],
     wiring: Wiring,
-) -> list[RockingRun]:
-    """Features of all runs with the blocks of what was inspected over all of them."""
+) -> tuple[list[RockingRun], list[list[Mark]]]:
+    """Features of all runs with the blocks of what was inspected over all of them, and the marks of the last.
+
+    Those are of the floor, which is looked at once its even vibration is out of the accelerometers.
+    """
     grids = [e.features.grid for e in examined]
     height = examined[0].features.survey.height_m
     more: list[list[Block]] = [[] for _ in examined]
     steps = _steps(marks)
     for row, entry in zip(more, examined, strict=True):
         for name, family in channels.items():
-            block = channel_block(entry.run, entry.features.grid, family, name, steps.get(family, 0.0))
+            grid = entry.features.grid
+            block = channel_block(entry.run, grid, family, name, steps.get(family, 0.0))
+            if block is None and family == "accelerometer":
+                block = vertical_block(entry.run, grid, name)
             if block is not None:
                 row.append(block)
     bends = [bend_signals(e.run, e.features.grid, height) for e in examined]
     turns = [turn_signals(e.run, e.joint, e.features.grid, height) for e in examined]
-    _add_rings(more, examined, bends, "bending", slow=False)
+    bending = _add_rings(more, examined, bends, "bending", slow=False)
     _add_rings(more, examined, turns, "turning", slow=True)
     vibrations = find_vibration([e.run for e in examined], grids)
     examined = [_on_still_floor(e, v) for e, v in zip(examined, vibrations, strict=True)]
+    bursts = floor_bursts(
+        [e.run for e in examined],
+        [e.features.grid for e in examined],
+        examined[0].features.survey,
+        bending,
+    )
+    marks = [[*row, *own] for row, own in zip(marks, bursts, strict=True)]
     runs = []
     for row, entry, vibration, seen in zip(more, examined, vibrations, marks, strict=True):
         grid = entry.features.grid
@@ -229,7 +245,7 @@ def completed(
         row.append(_mark_block(seen, entry))
         features = replace(_beside_stairs(entry.features, seen), vibration=vibration, wiring=wiring)
         runs.append(features.with_blocks(row))
-    return runs
+    return runs, bursts
 
 
 def _on_still_floor(entry: Examined, vibration: Vibration | None) -> Examined:
@@ -280,11 +296,12 @@ def _add_rings(
     name: str,
     *,
     slow: bool,
-) -> None:
+) -> Ring | None:
+    """Blocks of the ring-down that fits best; that oscillator."""
     grids = [e.features.grid for e in examined]
     ring = scan(grids, signals, slow=slow)
     if ring is None:
-        return
+        return None
     found: list[Block] = []
     rows: list[list[Block]] = []
     for row, entry, listed in zip(more, examined, signals, strict=True):
@@ -294,6 +311,7 @@ def _add_rings(
             rows.append(row)
     for row, block in zip(rows, with_repeatability(found), strict=True):
         row.append(block)
+    return ring
 
 
 def found_channels(runs: Sequence[RockingRun]) -> dict[str, str]:

@@ -71,8 +71,9 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
     examined, channels, findings = without_suspects(examined, marks, reference)
     for entry in examined:
         limits += entry.features.notes
-    limits += _stated(findings, channels)
-    return completed(examined, findings, channels, inspected.wiring), limits
+    whole, bursts = completed(examined, findings, channels, inspected.wiring)
+    limits += _stated([[*row, *more] for row, more in zip(findings, bursts, strict=True)], channels)
+    return whole, limits
 
 
 def _stated(marks: Sequence[Sequence[Mark]], channels: Mapping[str, str]) -> list[str]:
