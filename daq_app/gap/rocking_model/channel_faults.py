@@ -45,7 +45,7 @@ class Suspects:
         """All of them."""
         return (*self.single.values(), *(name for names in self.several.values() for name in names))
 
-    def beside(self, family: Family, name: str | None) -> Suspects:
+    def plus(self, family: Family, name: str | None) -> Suspects:
         """These with one more of a family; two of a family have no one cause."""
         if name is None:
             return self

@@ -17,11 +17,10 @@ from scipy.optimize import nnls
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.conditions import Mark
 from daq_app.gap.rocking_model.motion_grid import Grid
-from daq_app.gap.rocking_model.records import GapRun, Survey
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
 from daq_app.gap.rocking_model.ring_signals import accelerations
 from daq_app.gap.rocking_model.rings import Ring, cleaner, ring_columns
 
-GRAVITY_M_S2 = 9.81
 LOUD = 4.0
 """Power over the usual one, averaged over a second, from which the floor shook: twice the amplitude."""
 WINDOW_S = 0.5

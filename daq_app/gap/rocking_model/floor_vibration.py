@@ -15,7 +15,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
-from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 from daq_app.gap.rocking_model.rotation import zeroed
 
 FREQUENCIES_HZ = np.arange(0.4, 6.0, 0.02)
@@ -109,7 +109,7 @@ def _sway(rotation: FloatArray, part: NDArray[np.bool_], height: float) -> list[
         low_pass = butter(3, 8.0, fs=GRID_HZ, output="sos")
         theta = sosfiltfilt(low_pass, rotation[part] - rotation[part].mean())
         twice = np.gradient(np.gradient(theta, 1 / GRID_HZ), 1 / GRID_HZ)
-        found[:, part] = -9.81 * theta, height * twice, np.gradient(height * twice, 1 / GRID_HZ)
+        found[:, part] = -GRAVITY_M_S2 * theta, height * twice, np.gradient(height * twice, 1 / GRID_HZ)
     return list(found)
 
 

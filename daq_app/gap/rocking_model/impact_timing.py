@@ -6,7 +6,7 @@ import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
-from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 from daq_app.gap.rocking_model.rotation import zeroed
 
 MOST = 14
@@ -34,7 +34,7 @@ def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
     if len(windows) < 3:
         return None
     fine = np.arange(grid.speed.size) / run.rate_hz + grid.time_s[0] - 0.5 / GRID_HZ
-    gravity = np.interp(fine, grid.time_s, 9.81 * np.sin(grid.theta))
+    gravity = np.interp(fine, grid.time_s, GRAVITY_M_S2 * np.sin(grid.theta))
     velocity = height * grid.speed - np.cumsum(gravity) / run.rate_hz
 
     def misfit(delay: float) -> FloatArray:

@@ -151,7 +151,7 @@ def without_suspects(
     """
     grids = [e.features.grid for e in examined]
     runs = [e.run for e in examined]
-    found = suspects(runs, grids, _steps(marks)).beside("accelerometer", odd_vertical(runs, grids))
+    found = suspects(runs, grids, _steps(marks)).plus("accelerometer", odd_vertical(runs, grids))
     again = list(examined)
     if found.ids:
         again = []

@@ -15,6 +15,8 @@ from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.runfile import open_run
 
+GRAVITY_M_S2 = 9.81
+"""As in the weights of Table 3.1, whose masses are weight / 9.81."""
 Vector3 = tuple[float, float, float]
 
 

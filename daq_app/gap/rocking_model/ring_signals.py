@@ -12,8 +12,8 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.channel_shapes import CALIBRATION
 from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
 from daq_app.gap.rocking_model.motion_grid import Grid, coarse
-from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.rotation import Rotation, wall_rotation, zeroed
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
+from daq_app.gap.rocking_model.rotation import Rotation, sooner, wall_rotation, zeroed
 from daq_app.gap.rocking_model.sensor_blocks import Shares
 
 DISPLACEMENT_MASK_S = 0.02
@@ -126,10 +126,8 @@ def accelerations(run: GapRun, grid: Grid, chosen: Sequence[int]) -> Acceleratio
     late = late if abs(late) > LATE_S else 0.0
     early = round(late * run.rate_hz)
     z = np.array([run.sensors[i].position_m[2] for i in chosen])
-    rows = [zeroed(run, i) for i in chosen]
-    places = np.clip(np.arange(rows[0].size) + early, 0, rows[0].size - 1)
-    measured = np.array([coarse(row[places], run.rate_hz) for row in rows])
-    beyond = measured - z[:, None] * grid.alpha + 9.81 * np.sin(grid.theta)
+    measured = np.array([coarse(sooner(zeroed(run, i), early), run.rate_hz) for i in chosen])
+    beyond = measured - z[:, None] * grid.alpha + GRAVITY_M_S2 * np.sin(grid.theta)
     pick = _between(grid, ACCELERATION_MASK_S + abs(late))
     return Accelerations(beyond, z @ measured / (z @ z), pick, early / run.rate_hz)
 

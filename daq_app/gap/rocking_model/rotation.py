@@ -49,6 +49,12 @@ def zeroed(run: GapRun, index: int) -> FloatArray:
     return values - float(np.nanmean(tail))
 
 
+def sooner(values: FloatArray, samples: int) -> FloatArray:
+    """A record (n,) as if it came `samples` sooner; its ends are held."""
+    found: FloatArray = values[np.clip(np.arange(values.size) + samples, 0, values.size - 1)]
+    return found
+
+
 def sample_noise(values: FloatArray, rate_hz: float) -> float:
     """Rms noise of one sample, as averages over the timing windows see it, from the rest at the end.
 

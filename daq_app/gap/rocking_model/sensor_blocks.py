@@ -16,7 +16,7 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
-from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 from daq_app.gap.rocking_model.rotation import Rotation, WireInverse, wall_rotation, wire_reading, zeroed
 from daq_app.gap.rocking_model.swings import Swings
 
@@ -183,7 +183,7 @@ def blocks_of(
     held = calm & (np.abs(grid.raw - middle) < 0.01 * abs(middle))
     # A wall that sways in the hand accelerates more than its gravity differs from the model's.
     mean_error = 3.0 * swings.hold_rate_sd / max(float(held.sum()) / GRID_HZ, 0.05)
-    held &= mean_error < 0.005 * 9.81 * abs(middle)
+    held &= mean_error < 0.005 * GRAVITY_M_S2 * abs(middle)
     rocking = (grid.time_s > -0.2) & (grid.time_s < swings.rest_s - swings.release_s + 0.2)
     pick = rocking & grid.valid
     last = grid.impact_s[-1] if grid.impact_s.size else 0.0
@@ -263,7 +263,7 @@ def _acceleration_block(run: GapRun, grid: Grid, pick: NDArray[np.bool_]) -> Blo
     height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))
     x = float(np.mean([run.sensors[i].position_m[0] for i in chosen]))
     arm = x - np.sign(grid.theta) * run.survey.half_base_m
-    gravity, inertia = -9.81 * np.sin(grid.theta), height * grid.alpha
+    gravity, inertia = -GRAVITY_M_S2 * np.sin(grid.theta), height * grid.alpha
     expected = gravity + inertia - grid.omega**2 * arm
     columns = {
         "zero": (np.ones_like(expected), "m/s²"),

@@ -10,6 +10,7 @@ import numpy as np
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model import extra_response as extra
 from daq_app.gap.rocking_model.memo import Memo, any_of
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2
 from daq_app.gap.rocking_model.repeatability import bias_names, repeatability, unequal_name
 from daq_app.gap.rocking_model.rotation import anchors_off, pivots_off
 from daq_app.gap.rocking_model.run_features import RockingRun
@@ -258,7 +259,7 @@ def _accelerometer(run: RockingRun, block: Block, values: Mapping[str, float]) -
     gains = {"gain of gravity": ratio - 1.0, "gain of inertia": ratio / clock**2 - 1.0}
     found = np.array([gains.get(name, 0.0) for name in block.names])
     # The base turns slowly: of its rotation the accelerometers show gravity alone, as in the simulator.
-    return found - 9.81 * _base_rotation(run, block, values) if "compliance.phi" in values else found
+    return found - GRAVITY_M_S2 * _base_rotation(run, block, values) if "compliance.phi" in values else found
 
 
 def _impact_timing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:

@@ -94,7 +94,8 @@ def _stated(marks: Sequence[Sequence[Mark]], channels: Mapping[str, str]) -> lis
             continue
         middle = float(np.median([m.value for m in found]))
         unit = "" if found[0].unit == "1" else f" {found[0].unit}"
-        words.append(f"{key}: {found[0].observable} {middle:.3g}{unit} in {len(found)} runs.")
+        count = "1 run" if len(found) == 1 else f"{len(found)} runs"
+        words.append(f"{key}: {found[0].observable} {middle:.3g}{unit} in {count}.")
     return words
 
 

@@ -7,8 +7,8 @@ import numpy as np
 from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.motion_grid import Grid, coarse
-from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.rotation import zeroed
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
+from daq_app.gap.rocking_model.rotation import sooner, zeroed
 
 LATE_S = 2.5e-3
 """Delay, as the impacts show it, from which the record is put in step before it is looked at closer."""
@@ -19,7 +19,6 @@ SPREAD_M = 0.5
 _SOUND = 3.0
 """Standard deviations by which the delay may change without one accelerometer."""
 _ROUNDS = 3
-_G_M_S2 = 9.81
 
 
 def swing_delay(run: GapRun, grid: Grid, of_impacts_s: float | None) -> tuple[float, float] | None:
@@ -46,7 +45,7 @@ def swing_delay(run: GapRun, grid: Grid, of_impacts_s: float | None) -> tuple[fl
 
 def _in_step(run: GapRun, grid: Grid, chosen: list[int], early: int) -> tuple[float, float] | None:
     """(delay, variance) from records that are taken `early` samples sooner."""
-    rows = np.array([coarse(_sooner(zeroed(run, i), early), run.rate_hz) for i in chosen])
+    rows = np.array([coarse(sooner(zeroed(run, i), early), run.rate_hz) for i in chosen])
     places = np.array([run.sensors[i].position_m for i in chosen])
     whole = _at_the_foot(run, grid, rows, places)
     if whole is None:
@@ -63,11 +62,6 @@ def _in_step(run: GapRun, grid: Grid, chosen: list[int], early: int) -> tuple[fl
     return undone + delay, variance + (FORM_ERROR * undone) ** 2
 
 
-def _sooner(row: FloatArray, samples: int) -> FloatArray:
-    found: FloatArray = row[np.clip(np.arange(row.size) + samples, 0, row.size - 1)]
-    return found
-
-
 def _at_the_foot(run: GapRun, grid: Grid, rows: FloatArray, places: FloatArray) -> tuple[float, float] | None:
     """(delay, variance) of what accelerometers, (k, m) at (k, 3), show when extrapolated to the foot."""
     z = places[:, 2]
@@ -75,11 +69,11 @@ def _at_the_foot(run: GapRun, grid: Grid, rows: FloatArray, places: FloatArray) 
         return None
     weights = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
     arm = float(weights @ places[:, 0]) - np.sign(grid.theta) * run.survey.half_base_m
-    gravity = -_G_M_S2 * np.sin(grid.theta)
+    gravity = -GRAVITY_M_S2 * np.sin(grid.theta)
     difference = weights @ rows - (gravity - grid.omega**2 * arm)
     pick = (grid.time_s > 0.05) & (grid.time_s < grid.impact_s[-1]) & ~grid.near_impact & grid.valid
     # Unequal calibrations leave some of the inertia.
-    columns = [np.ones_like(gravity), gravity, grid.alpha, _G_M_S2 * np.cos(grid.theta) * grid.omega]
+    columns = [np.ones_like(gravity), gravity, grid.alpha, GRAVITY_M_S2 * np.cos(grid.theta) * grid.omega]
     design = np.column_stack(columns)[pick]
     if len(design) < 20 * len(columns):
         return None

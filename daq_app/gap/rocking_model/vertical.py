@@ -15,10 +15,9 @@ from daq_app.gap.rocking_model.channel_families import smoothed
 from daq_app.gap.rocking_model.channel_faults import SUSPECT
 from daq_app.gap.rocking_model.channel_shapes import TOLERANCE, Others, block_of, deviation
 from daq_app.gap.rocking_model.motion_grid import Grid
-from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 from daq_app.gap.rocking_model.sensor_blocks import Block
 
-GRAVITY_M_S2 = 9.81
 _SOUND_SHARE = 0.4
 """Share of the worst one's size that the others may show: what the wall does differently (an edge that is not
 where the survey has it) is in all of them."""

@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 from daq_app.gap.rocking_model.rotation import zeroed
 from daq_app.gap.rocking_model.sensor_blocks import first_order
 
@@ -204,7 +204,7 @@ def _expected(run: GapRun, i: int, theta: FloatArray, acceleration: FloatArray) 
             toward = 1.0 if sensor.anchor_m is None or sensor.anchor_m[0] > x else -1.0
             return toward * z * theta
         case "accelerometer" if sensor.axis == "x" and not sensor.ac_coupled:
-            return z * acceleration - 9.81 * theta
+            return z * acceleration - GRAVITY_M_S2 * theta
         case "accelerometer" if sensor.axis == "z" and not sensor.ac_coupled:
             return -acceleration * (x - half * np.sign(theta))
         case "tiltmeter" if sensor.axis == "x":
