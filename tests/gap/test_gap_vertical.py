@@ -37,6 +37,8 @@ def test_a_gain_of_one_accelerometer_along_z_is_named() -> None:
     [
         ({}, {}),
         (dict.fromkeys(ALL, 1.06), {}),
+        # As if the wall stood on other edges than those of the survey.
+        ({"AC-7": 1.06, "AC-8": 1.06}, {}),
         ({}, {"pivot_shift": {"a": 0.03}}),
     ],
 )
