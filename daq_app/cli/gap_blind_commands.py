@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.console import Console
@@ -28,6 +28,9 @@ _LabelsOption = Annotated[
 _WithoutOption = Annotated[
     str,
     typer.Option(help="Part of the method to leave out: scatter, channels, probes or multistart."),
+]
+_EngineOption = Annotated[
+    Literal["events", "contact"], typer.Option(help="What moves the wall: events or contact.")
 ]
 _WorkersOption = Annotated[int, typer.Option(min=0, help="Processes; 0 takes one for each core.")]
 
@@ -51,15 +54,16 @@ def register(app: typer.Typer) -> None:
 
 @contextmanager
 def _refusals() -> Iterator[None]:
-    """Broken seals, missing diagnosers and schedulers are told in one paragraph."""
+    """Broken seals, missing diagnosers, schedulers and engines are told in one paragraph."""
     from daq_app.gap.blind.diagnosers import DiagnoserError
     from daq_app.gap.blind.scheduler import SchedulerMissing
     from daq_app.gap.blind.seal import SealBroken
+    from daq_app.gap.blind.world.contact_motion import EngineMissing
 
     with reported():
         try:
             yield
-        except (DiagnoserError, SchedulerMissing, ValueError) as error:
+        except (DiagnoserError, EngineMissing, SchedulerMissing, ValueError) as error:
             print_paragraph("Error", str(error))
             raise typer.Exit(EXIT_BAD_INPUT) from None
         except SealBroken as error:
@@ -74,9 +78,14 @@ def make(
     labels: _LabelsOption = None,
     rig: Annotated[list[Path] | None, typer.Option(help="Rig files; the cases take turns.")] = None,
     runs: Annotated[int, typer.Option(min=1, max=36, help="Runs in each case.")] = 6,
+    engine: _EngineOption = "events",
     workers: _WorkersOption = 0,
 ) -> None:
-    """Simulate release tests with hidden effects, and seal their labels. An interrupted making goes on."""
+    """Simulate release tests with hidden effects, and seal their labels. An interrupted making goes on.
+
+    With --engine contact a contact engine (extra `contact`) moves the wall, and effects are hidden that are
+    born where wall and floor touch.
+    """
     from daq_app.gap.blind.make import Order, check_apart, make_cases
 
     with _refusals():
@@ -86,7 +95,7 @@ def make(
         for file in files:
             load_rig(file)
         texts = tuple(file.read_text(encoding="utf-8") for file in files)
-        order = Order(seed, out, kept, texts, runs)
+        order = Order(seed, out, kept, texts, runs, engine)
         with _progress("making", cases) as advance:
             before = sum((out / f"case_{k + 1:04d}" / "seal.json").exists() for k in range(cases))
             advance(before)

@@ -17,7 +17,6 @@ from daq_app.gap.blind.world.campaign import PlannedRun, World, draw_world
 from daq_app.gap.blind.world.catalogue import ENTRIES, Drawn, draw
 from daq_app.gap.blind.world.chain import Place, quiet_signals
 from daq_app.gap.blind.world.faults import ELECTRONICS
-from daq_app.gap.blind.world.scene import stage
 from daq_app.gap.blind.world.wall import Wall
 
 THETA0 = 0.05
@@ -41,9 +40,9 @@ def world_with(rig: Rig, *effects: Drawn) -> World:
 
 def signals(world: World) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(time, quiet SI signals) of the run."""
-    motion, mechanics = world.motion(0, 40)
+    course = world.course(0, 40)
     time = np.arange(-0.5, 3.0, 1.0 / RATE_HZ)
-    scene = stage(mechanics, motion, world.mechanical, time)
+    scene = course.scene(time)
     rng = np.random.default_rng(1)
     return time, quiet_signals(world.rig, scene, world.faults, rng, Place(600.0, THETA0))
 
@@ -93,7 +92,7 @@ def test_an_accelerometer_feels_height_times_angular_acceleration(rig: Rig) -> N
     world = world_with(rig)
     time, found = signals(world)
     falling = (time > 0.02) & (time < 0.2)
-    theta, omega, theta_dd = world.motion(0, 40)[0].sample(time)
+    theta, omega, theta_dd = world.course(0, 40).motion.sample(time)
     x, _, z = rig.channel("AC-4").position_m
     arm = x - rig.specimen.base_width_m / 2.0
     expected = theta_dd * z - omega**2 * arm - 9.80665 * np.sin(theta)
@@ -118,8 +117,8 @@ def test_a_strong_effect_changes_what_it_should(rig: Rig, name: str) -> None:
     _, plain = signals(world_with(rig))
     _, found = signals(world)
     if name == "sudden_crack":
-        motion, _ = world.motion(1, 40)
-        assert motion.impacts[-1].time != pytest.approx(world.motion(0, 40)[0].impacts[-1].time, abs=1e-4)
+        first, second = (world.course(k, 40).motion.impacts[-1].time for k in (0, 1))
+        assert second != pytest.approx(first, abs=1e-4)
         return
     noise = np.array([c.noise_si for c in rig.channels])
     changed = np.abs(found - plain).max(axis=1) > noise

@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 from daq_app.gap.blind.world.campaign import PlannedRun, World
 from daq_app.gap.blind.world.catalogue import Drawn
 from daq_app.gap.blind.world.chain import CALIBRATION_TOLERANCE, Place, quiet_signals
+from daq_app.gap.blind.world.course import Course
 from daq_app.gap.blind.world.faults import ELECTRONICS, Bench
-from daq_app.gap.blind.world.mechanics import build
-from daq_app.gap.blind.world.motion import Motion
-from daq_app.gap.blind.world.scene import stage
+from daq_app.gap.blind.world.motion import Followed
 from daq_app.gap.blind.world.wall import Wall
 
 FloatArray = NDArray[np.float64]
@@ -47,10 +46,10 @@ def detectability(world: World, effect: Drawn) -> float:
     )
     square = 0.0
     for index in range(len(alone.runs)):
-        before = (0, 30 * (len(world.runs) - 1))[index]
-        square += _in_channels(alone, index, before)
+        course = alone.course(index, (0, 30 * (len(world.runs) - 1))[index])
+        square += _in_channels(alone, alone.runs[index], course)
         if not effect.targets:
-            square += _in_swings(alone.motion(index, before)[0], world.wall)
+            square += _in_swings(course.motion, world.wall)
     return math.sqrt(square * len(world.runs) / len(alone.runs))
 
 
@@ -73,7 +72,7 @@ def block_swing(theta: float, alpha: float, p: float) -> tuple[float, float]:
     return time, speed
 
 
-def _in_swings(motion: Motion, wall: Wall) -> float:
+def _in_swings(motion: Followed, wall: Wall) -> float:
     """Squared distance of a motion from any rigid block's in local features: α, p and r are free."""
     values, sds, columns = _features(motion, wall)
     if values.size <= columns.shape[1]:
@@ -83,7 +82,7 @@ def _in_swings(motion: Motion, wall: Wall) -> float:
     return float(left @ left)
 
 
-def _features(motion: Motion, wall: Wall) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _features(motion: Followed, wall: Wall) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Departures from the rigid block (n,), their standard deviations, and the (n, 3) slopes in α, p, r."""
     crossings = [impact for impact in motion.impacts if impact.restitution > 0.0]
     turning = list(motion.peaks)
@@ -122,19 +121,19 @@ def _block_with_slopes(peak: float, wall: Wall) -> tuple[float, float, tuple[flo
     return time, speed, slopes
 
 
-def _in_channels(alone: World, index: int, before: int) -> float:
+def _in_channels(alone: World, run: PlannedRun, course: Course) -> float:
     """Squared distance of the channels with and without the effect, for one and the same motion."""
-    run = alone.runs[index]
-    motion, mechanics = alone.motion(index, before)
-    plain = build(alone.wall, {}, motion.release)
-    time_s = np.arange(-0.5, motion.rest_s + 0.5, 1.0 / _RATE_HZ)
+    time_s = np.arange(-0.5, course.motion.rest_s + 0.5, 1.0 / _RATE_HZ)
     place = Place(run.campaign_s + 600.0, abs(run.theta0))
     rng = np.random.default_rng(0)
-    scene = stage(mechanics, motion, alone.mechanical, time_s)
+    scene = course.scene(time_s)
     with_effect = quiet_signals(alone.rig, scene, alone.faults, rng, place)
-    without = quiet_signals(alone.rig, stage(plain, motion, {}, time_s), (), rng, place)
+    plain = scene if alone.faults else course.plain(time_s)
+    without = quiet_signals(alone.rig, plain, (), rng, place)
     total = 0.0
     for row, channel in enumerate(alone.rig.channels):
+        if plain.pivot_dd is not scene.pivot_dd and channel.family == "accelerometer":
+            continue  # pulses of impacts that take their time are not those of the plain twin
         bench = Bench(channel, scene, _RATE_HZ, place.campaign_s, place.largest_rad, rng)
         noise = channel.noise_si * rng.standard_normal(time_s.size)
         signal = with_effect[row] + noise

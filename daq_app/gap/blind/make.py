@@ -19,6 +19,8 @@ from daq_app.gap.blind.mix import case_generator, category_of, draw_effects
 from daq_app.gap.blind.names import accepted_names
 from daq_app.gap.blind.seal import seal_case
 from daq_app.gap.blind.world.campaign import MadeRun, World, draw_world
+from daq_app.gap.blind.world.contact_motion import require_engine
+from daq_app.gap.blind.world.course import Engine
 
 _EPOCH_UTC_NS: Final = 1_767_225_600 * 10**9
 """2026-01-01: campaigns start within the hundred days after it."""
@@ -34,6 +36,7 @@ class Order:
     rig_texts: tuple[str, ...]
     """Rig files, letter by letter; the cases take turns."""
     n_runs: int = 6
+    engine: Engine = "events"
 
 
 def case_name(index: int) -> str:
@@ -45,8 +48,11 @@ def make_cases(order: Order, indices: Sequence[int], workers: int) -> Iterator[s
     """Make the cases that are not there yet, on `workers` processes; yields names as they are done.
 
     A case that is sealed already is left alone, so that an interrupted making goes on where it stopped.
+    Raises `ValueError` for labels within reach, `EngineMissing` where a contact engine is wanted.
     """
     check_apart(order.out, order.labels)
+    if order.engine == "contact":
+        require_engine()
     todo = [index for index in indices if not (order.out / case_name(index) / SEAL_FILE).exists()]
     if workers <= 1:
         for index in todo:
@@ -85,8 +91,8 @@ def draw_case(order: Order, index: int) -> tuple[World, str, np.random.Generator
     rig_text = order.rig_texts[index % len(order.rig_texts)]
     rig: Rig = parse_rig(rig_text, "rig file of the blind check")
     rng = case_generator(order.seed, index)
-    effects = draw_effects(order.seed, index, rig, rng)
-    return draw_world(rig, effects, order.n_runs, rng), rig_text, rng
+    effects = draw_effects(order.seed, index, rig, rng, order.engine)
+    return draw_world(rig, effects, order.n_runs, rng, order.engine), rig_text, rng
 
 
 def _label(name: str, seed: int, category: str, world: World, made: Sequence[MadeRun]) -> dict[str, Any]:
@@ -95,6 +101,7 @@ def _label(name: str, seed: int, category: str, world: World, made: Sequence[Mad
         "case": name,
         "seed": seed,
         "category": category,
+        "engine": world.engine,
         "effects": [
             {**asdict(e), "targets": list(e.targets), "accept": list(accepted_names(e.name))}
             for e in world.effects

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from daq_app.config import Rig, plan_tasks
 from daq_app.gap.blind.world.catalogue import Drawn
 from daq_app.gap.blind.world.chain import Calibration, Place, draw_calibration, readings
+from daq_app.gap.blind.world.course import Course, Engine, follow
 from daq_app.gap.blind.world.faults import Fault
-from daq_app.gap.blind.world.mechanics import Mechanics, Release, build
-from daq_app.gap.blind.world.motion import Motion, integrate
-from daq_app.gap.blind.world.scene import stage
+from daq_app.gap.blind.world.mechanics import Release
+from daq_app.gap.blind.world.motion import Followed
 from daq_app.gap.blind.world.wall import Wall, draw_wall
 
 LEVELS: Final = {"L1": 0.15, "L2": 0.25, "L3": 0.35, "L4": 0.40}
@@ -45,7 +45,7 @@ class MadeRun:
     plan: PlannedRun
     readings: NDArray[np.float64]
     """(channels, n), unit of each channel's reading."""
-    motion: Motion
+    motion: Followed
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +57,7 @@ class World:
     calibration: Calibration
     effects: tuple[Drawn, ...]
     runs: tuple[PlannedRun, ...]
+    engine: Engine = "events"
 
     @property
     def mechanical(self) -> dict[str, dict[str, float]]:
@@ -75,19 +76,20 @@ class World:
         largest = max(abs(run.theta0) for run in self.runs)
         impacts = 0
         for index, run in enumerate(self.runs):
-            motion, mechanics = self.motion(index, impacts)
+            course = self.course(index, impacts)
+            motion = course.motion
             # A clock that runs wrong takes sample k at k/(rate·clock), and the file says k/rate.
             n = round((run.hold_s + motion.rest_s + _AFTER_REST_S) * rate_hz)
             time_s = np.arange(n) / (rate_hz * clock) - run.hold_s
-            scene = stage(mechanics, motion, self.mechanical, time_s)
+            scene = course.scene(time_s)
             rng = np.random.default_rng([run.seed, 2])
             place = Place(run.campaign_s, largest)
             values = readings(self.rig, scene, self.faults, self.calibration, skew, rng, place)
             impacts += len(motion.impacts)
             yield MadeRun(run, values, motion)
 
-    def motion(self, index: int, impacts_before: int = 0) -> tuple[Motion, Mechanics]:
-        """One run's motion, and the mechanics that made it."""
+    def course(self, index: int, impacts_before: int = 0) -> Course:
+        """One run: how the wall moves and what its sensors see of that."""
         run = self.runs[index]
         omega0 = run.omega0
         if "initial_velocity" in self.mechanical:
@@ -95,11 +97,12 @@ class World:
             push = np.random.default_rng([run.seed, 3]).uniform(0.6, 1.4)
             omega0 += run.side * push * self.mechanical["initial_velocity"]["omega_rad_s"]
         release = Release(run.theta0, omega0, run.hold_s, run.seed, index, impacts_before)
-        mechanics = build(self.wall, self.mechanical, release)
-        return integrate(mechanics, release), mechanics
+        return follow(self.engine, self.wall, self.mechanical, release)
 
 
-def draw_world(rig: Rig, effects: Sequence[Drawn], n_runs: int, rng: np.random.Generator) -> World:
+def draw_world(
+    rig: Rig, effects: Sequence[Drawn], n_runs: int, rng: np.random.Generator, engine: Engine = "events"
+) -> World:
     """A wall, its sensors and its campaign around the given effects."""
     wall = draw_wall(rig.specimen, rng)
     calibration = draw_calibration(rig, rng)
@@ -128,4 +131,4 @@ def draw_world(rig: Rig, effects: Sequence[Drawn], n_runs: int, rng: np.random.G
             )
         )
         started += _BETWEEN_RUNS_S * math.exp(0.3 * rng.standard_normal())
-    return World(rig, wall, calibration, tuple(effects), tuple(runs))
+    return World(rig, wall, calibration, tuple(effects), tuple(runs), engine)

@@ -122,7 +122,8 @@ def _any(rig: Rig, rng: np.random.Generator) -> tuple[str, ...]:
     return tuple(ids[int(i)] for i in sorted(rng.choice(len(ids), 3, replace=False)))
 
 
-def _uniform(**ranges: tuple[float, float]) -> Others:
+def uniform(**ranges: tuple[float, float]) -> Others:
+    """Other parameters of an effect, each drawn evenly from its range."""
     return lambda rng: {name: float(rng.uniform(*limits)) for name, limits in ranges.items()}
 
 
@@ -149,7 +150,7 @@ _LIBRARY: Final = (
         "gain",
         0.05,
         0.6,
-        others=_uniform(frequency_hz=(9.0, 35.0), zeta=(0.01, 0.05)),
+        others=uniform(frequency_hz=(9.0, 35.0), zeta=(0.01, 0.05)),
     ),
     Entry("compliance", "structure", "library", "phi_rad", 1e-4, 3e-3),
     Entry(
@@ -160,13 +161,13 @@ _LIBRARY: Final = (
         0.03,
         0.5,
         True,
-        _uniform(frequency_hz=(2.0, 8.0), zeta=(0.01, 0.05)),
+        uniform(frequency_hz=(2.0, 8.0), zeta=(0.01, 0.05)),
     ),
-    Entry("residual_cable", "release", "library", "k", 0.005, 0.2, others=_uniform(slack=(0.2, 0.7))),
+    Entry("residual_cable", "release", "library", "k", 0.005, 0.2, others=uniform(slack=(0.2, 0.7))),
     Entry("initial_velocity", "release", "library", "omega_rad_s", 3e-3, 3e-2, True),
     Entry("slow_release", "release", "library", "tau_s", 0.02, 0.4),
     Entry(
-        "ambient", "ambient", "library", "amplitude_m_s2", 5e-3, 0.1, others=_uniform(frequency_hz=(0.5, 4.0))
+        "ambient", "ambient", "library", "amplitude_m_s2", 5e-3, 0.1, others=uniform(frequency_hz=(0.5, 4.0))
     ),
     Entry(
         "gain",
@@ -192,7 +193,7 @@ _LIBRARY: Final = (
         "share",
         0.01,
         0.2,
-        others=_uniform(duration_s=(0.02, 0.3)),
+        others=uniform(duration_s=(0.02, 0.3)),
         targets=_one("lvdt", "wire"),
     ),
     Entry("quantisation", "sensor", "library", "times_noise", 4.0, 40.0, targets=_one_or_all("lvdt", "wire")),
@@ -205,7 +206,7 @@ _LIBRARY: Final = (
         "frequency_hz",
         6.0,
         30.0,
-        others=_uniform(zeta=(0.05, 0.4)),
+        others=uniform(zeta=(0.05, 0.4)),
         targets=_of("wire"),
     ),
     Entry(
@@ -233,12 +234,12 @@ _OUTSIDE: Final = (
         0.01,
         0.06,
         True,
-        _uniform(speed_rad_s=(0.1, 0.3)),
+        uniform(speed_rad_s=(0.1, 0.3)),
     ),
     Entry("restitution_memory", "restitution", "near", "drop", 0.02, 0.15),
     Entry("cubic_joint", "interface", "near", "theta_j_rad", 1e-3, 8e-3),
     Entry(
-        "hysteretic_joint", "interface", "near", "share", 0.02, 0.2, others=_uniform(theta_h_rad=(1e-3, 8e-3))
+        "hysteretic_joint", "interface", "near", "share", 0.02, 0.2, others=uniform(theta_h_rad=(1e-3, 8e-3))
     ),
     Entry("sudden_crack", "interface", "near", "loss", 0.01, 0.05),
     Entry("cubic_gain", "sensor", "near", "share", 0.03, 0.3, True, targets=_of("lvdt", "wire")),
@@ -250,7 +251,7 @@ _OUTSIDE: Final = (
         "size_si",
         0.01,
         0.1,
-        others=_uniform(frequency_hz=(8.0, 60.0)),
+        others=uniform(frequency_hz=(8.0, 60.0)),
         targets=_one("lvdt", "wire"),
     ),
     Entry(
@@ -261,7 +262,7 @@ _OUTSIDE: Final = (
         0.01,
         0.06,
         True,
-        _uniform(warm_up_s=(300.0, 1500.0)),
+        uniform(warm_up_s=(300.0, 1500.0)),
         _of("lvdt", "wire"),
     ),
     Entry("crosstalk", "sensor", "far", "share", 0.02, 0.15, targets=_any),
@@ -272,7 +273,7 @@ _OUTSIDE: Final = (
         "times_noise",
         15.0,
         80.0,
-        others=_uniform(per_second=(0.5, 5.0)),
+        others=uniform(per_second=(0.5, 5.0)),
         targets=_any,
     ),
     Entry(
@@ -282,9 +283,9 @@ _OUTSIDE: Final = (
         "amplitude_m_s2",
         0.1,
         0.8,
-        others=_uniform(frequency_hz=(6.0, 15.0)),
+        others=uniform(frequency_hz=(6.0, 15.0)),
     ),
-    Entry("rope_snag", "release", "far", "strength", 0.05, 0.5, others=_uniform(at_s=(0.6, 2.0))),
+    Entry("rope_snag", "release", "far", "strength", 0.05, 0.5, others=uniform(at_s=(0.6, 2.0))),
 )
 
 ENTRIES: Final[dict[str, Entry]] = {entry.name: entry for entry in _LIBRARY + _OUTSIDE}

@@ -71,6 +71,10 @@ def specific_force(channel: Channel, scene: Scene) -> FloatArray:
         value = value + scene.ground * np.cos(scene.lean) - y * scene.yaw_dd
         value = value + (max(z, 0.0) / scene.height) ** _BEND_EXPONENT * scene.bend_dd
         lever = z
+    if scene.pivot_dd is not None:
+        along, up = scene.pivot_dd
+        turn, cosine = np.sin(scene.lean), np.cos(scene.lean)
+        value = value + (along * turn + up * cosine if channel.axis == "z" else along * cosine - up * turn)
     return value + _shocks(channel, scene, lever)
 
 
@@ -91,14 +95,16 @@ def first_order(signal: FloatArray, constant_s: float, step_s: float) -> FloatAr
 
 
 def _shocks(channel: Channel, scene: Scene, lever: float) -> FloatArray:
-    """At an impact: the velocity jump as a half-sine of 2 ms, and local ringing of the masonry."""
+    """At an impact: the velocity jump as a half-sine of 2 ms (unless it is in the motion already), and local
+    ringing of the masonry."""
     value = np.zeros_like(scene.time_s)
     frequency = 140.0 + 37.0 * (sum(map(ord, channel.id)) % 7)
     for start, jump in zip(scene.impact_times, scene.impact_jumps, strict=True):
         low, high = np.searchsorted(scene.time_s, [start, start + 8.0 * _RING_DECAY_S])
         t = scene.time_s[low:high] - start
         step = lever * jump
-        pulse = np.where(t < _PULSE_S, np.sin(math.pi * t / _PULSE_S), 0.0)
+        jumps = scene.pivot_dd is None
+        pulse = np.where(jumps & (t < _PULSE_S), np.sin(math.pi * t / _PULSE_S), 0.0)
         ring = np.exp(-t / _RING_DECAY_S) * np.sin(2.0 * math.pi * frequency * t)
         value[low:high] += step * math.pi / (2.0 * _PULSE_S) * pulse + 300.0 * step * ring
     return value

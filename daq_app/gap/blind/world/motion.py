@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ FloatArray = NDArray[np.float64]
 
 REST_RAD = 4e-5
 """A swing smaller than this is rest: half of what an LVDT's noise amounts to."""
-_LONGEST_S = 40.0
+LONGEST_S = 40.0
 _RTOL, _ATOL = 1e-8, 1e-11
 _DERIVATIVE_STEP_S = 2e-5
 
@@ -44,6 +45,24 @@ class ImpactRecord:
     after: float
     side: int
     restitution: float
+
+
+class Followed(Protocol):
+    """A motion that was followed to rest, however; times in seconds after the release."""
+
+    @property
+    def release(self) -> Release: ...
+
+    @property
+    def impacts(self) -> tuple[ImpactRecord, ...]: ...
+
+    @property
+    def peaks(self) -> tuple[tuple[float, float], ...]: ...
+
+    @property
+    def rest_s(self) -> float: ...
+
+    def sample(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +104,7 @@ def integrate(mechanics: Mechanics, release: Release) -> Motion:
     side = 1 if theta > 0 else -1
     mechanics.impacts_done = 0
     inward = omega * side <= 0.0
-    while t < _LONGEST_S:
+    while t < LONGEST_S:
         piece, t, theta, omega, reached = _half_swing(mechanics, t, theta, omega, side, inward)
         pieces.append(piece)
         if not reached:

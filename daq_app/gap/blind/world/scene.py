@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from daq_app.gap.blind.world.joint import Parameters
 from daq_app.gap.blind.world.mechanics import Effects, Mechanics, ground_acceleration
-from daq_app.gap.blind.world.motion import Motion
+from daq_app.gap.blind.world.motion import Followed
 
 FloatArray = NDArray[np.float64]
 
@@ -44,9 +44,12 @@ class Scene:
     impact_jumps: FloatArray
     """Change of ω at each impact."""
     height: float
+    pivot_dd: tuple[FloatArray, FloatArray] | None = None
+    """(x, z) acceleration of the turning point where impacts are resolved in time, so that `theta_dd` has
+    their pulses; None where the turning point rests and an impact is a jump of ω."""
 
 
-def stage(mechanics: Mechanics, motion: Motion, effects: Effects, time_s: FloatArray) -> Scene:
+def stage(mechanics: Mechanics, motion: Followed, effects: Effects, time_s: FloatArray) -> Scene:
     """Evaluate a run at rising times."""
     theta, omega, theta_dd = motion.sample(time_s)
     sign = np.sign(theta)
@@ -93,7 +96,7 @@ def _base_rotation(
     return settled
 
 
-def _slip(mechanics: Mechanics, motion: Motion, time_s: FloatArray) -> FloatArray:
+def _slip(mechanics: Mechanics, motion: Followed, time_s: FloatArray) -> FloatArray:
     """Displacement of the base: a step c·ω at every impact."""
     slip = np.zeros_like(time_s)
     if mechanics.slip_s:

@@ -1,0 +1,37 @@
+"""Effects that a case of the contact engine can hide: what wall and floor are where they touch.
+
+Of the library are those whose table entry is a shape or a place, which the engine is given as such. Where
+the table has a formula for what contact does (a slip c ω, an impact on a Winkler bed that takes r), friction
+and a bed as an engine knows them are other forms: these are outside.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from daq_app.gap.blind.world.catalogue import ENTRIES, LIBRARY, Entry, uniform
+
+_LIBRARY: Final = (
+    ENTRIES["pivot_shift"],
+    ENTRIES["rounded_edge"],
+    ENTRIES["crushing"],
+    ENTRIES["alpha_asymmetry"],
+    ENTRIES["base_tilt"],
+    ENTRIES["eccentric_mass"],
+)
+_OUTSIDE: Final = (
+    Entry("one_round_edge", "interface", "near", "rho_m", 0.008, 0.06),
+    Entry("stepped_edge", "interface", "near", "height_m", 4e-4, 4e-3, others=uniform(width_m=(0.02, 0.08))),
+    Entry("damped_bed", "interface", "near", "theta_c_rad", 1e-4, 9e-4),
+    Entry("slippery_base", "contact", "near", "friction_share", 0.99, 0.9),
+    Entry("slippery_edge", "contact", "near", "friction_share", 0.99, 0.9),
+)
+_ON_SENSORS: Final = tuple(entry for entry in (ENTRIES[name] for name in LIBRARY) if entry.on_sensors)
+
+CONTACT_ENTRIES: Final[dict[str, Entry]] = {
+    entry.name: entry for entry in (*_LIBRARY, *_OUTSIDE, *_ON_SENSORS)
+}
+CONTACT_LIBRARY: Final = tuple(entry.name for entry in _LIBRARY)
+CONTACT_OUTSIDE: Final = tuple(entry.name for entry in _OUTSIDE)
+BESIDE_CONTACT: Final = tuple(entry.name for entry in _ON_SENSORS)
+"""Faults of sensors: what a contact-born effect makes a pair with."""

@@ -1,0 +1,61 @@
+"""How a run of a case comes about: by event integration or by a contact engine, one interface for both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.blind.world.contact_motion import rock
+from daq_app.gap.blind.world.contact_scene import contact_stage
+from daq_app.gap.blind.world.mechanics import Effects, Release, build
+from daq_app.gap.blind.world.motion import Followed, integrate
+from daq_app.gap.blind.world.scene import Scene, stage
+from daq_app.gap.blind.world.wall import Wall
+
+FloatArray = NDArray[np.float64]
+Engine = Literal["events", "contact"]
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """One run: the motion, and what the sensors see of it."""
+
+    motion: Followed
+    scene: Callable[[FloatArray], Scene]
+    """At rising times (n,), s after the release."""
+    plain: Callable[[FloatArray], Scene]
+    """The same motion of a rigid block on sharp edges with nothing hidden."""
+
+
+def follow(engine: Engine, wall: Wall, effects: Effects, release: Release) -> Course:
+    """Let one run happen. Raises `EngineMissing` where the contact engine is not installed."""
+    return _FOLLOW[engine](wall, effects, release)
+
+
+def _by_events(wall: Wall, effects: Effects, release: Release) -> Course:
+    mechanics = build(wall, effects, release)
+    motion = integrate(mechanics, release)
+    return Course(
+        motion,
+        lambda time_s: stage(mechanics, motion, effects, time_s),
+        lambda time_s: stage(build(wall, {}, release), motion, {}, time_s),
+    )
+
+
+def _by_contact(wall: Wall, effects: Effects, release: Release) -> Course:
+    motion = rock(wall, effects, release)
+    return Course(
+        motion,
+        lambda time_s: contact_stage(motion, wall, time_s),
+        lambda time_s: stage(build(wall, {}, release), motion, {}, time_s),
+    )
+
+
+_FOLLOW: Final[dict[Engine, Callable[[Wall, Effects, Release], Course]]] = {
+    "events": _by_events,
+    "contact": _by_contact,
+}
