@@ -131,7 +131,7 @@ def test_sensors_see_the_same_rocking_from_either_world(rig: Rig, wall: Wall) ->
     mine, theirs = (quiet_signals(rig, scene, (), rng, place) for scene in scenes)
     for row, channel in enumerate(rig.channels):
         moving = abs(theirs[row]).max()
-        limit = 3.0 * channel.noise_si + 2e-3 * moving
+        limit = 0.05 * channel.noise_si + 1e-3 * moving
         quiet = (time < -0.01) | (time > 0.05)  # the hold lets go
         assert np.abs(mine[row] - theirs[row])[quiet].max() < limit, channel.id
 
