@@ -151,6 +151,20 @@ def test_steps_of_all_wires_are_no_fault_of_one() -> None:
     assert found_channels(runs) == {}
 
 
+def test_an_lvdt_that_steps_out_of_time_with_its_face_is_no_fault() -> None:
+    """From a common zero all of a face step together and leave nothing; another gain steps elsewhere."""
+    step = 9e-4
+    runs = simulate({}, ONE)
+    for run in runs:
+        for i in run.indices("lvdt"):
+            gain = 1.009 if run.sensors[i].id == "LV-B06" else 1.0
+            zero = run.channels[i, -600:].mean()
+            run.channels[i] = np.round(gain * (run.channels[i] - zero) / step) * step
+    prepared = prepare(runs)[0]
+    assert set(found_marks(prepared)) == {"quantisation@lvdt"}
+    assert found_channels(prepared) == {}
+
+
 def test_a_family_that_stops_short_of_its_range_is_found_and_the_motion_read_elsewhere() -> None:
     runs = _prepared({"saturation@lvdt": {"limit": 0.04}})
     assert set(found_marks(runs)) == {"saturation@lvdt"}

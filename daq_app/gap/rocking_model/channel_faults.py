@@ -14,7 +14,14 @@ import numpy as np
 
 from daq_app.config.rig import Family
 from daq_app.gap.rocking_model.channel_families import ChannelFamily, beside, channel_family
-from daq_app.gap.rocking_model.channel_shapes import RINGING, SHAPES, TOLERANCE, block_of, deviation
+from daq_app.gap.rocking_model.channel_shapes import (
+    RINGING,
+    SHAPES,
+    TOLERANCE,
+    block_of,
+    deviation,
+    usual_remains,
+)
 from daq_app.gap.rocking_model.motion_grid import Grid
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rotation import WireInverse
@@ -156,7 +163,7 @@ def _sizes(
     for entry in data:
         rows_beside = {name: beside(entry, name, without) for name in entry.ids}
         table = {name: deviation(other) for name, other in rows_beside.items()}
-        usual = float(np.median([found.remains for found in table.values()]))
+        usual = usual_remains([found.remains for found in table.values()])
         for name, found in table.items():
             tolerance = np.array(TOLERANCE[family]) * rows_beside[name].spread
             sd = np.hypot(tolerance, np.sqrt(np.diag(found.covariance)))
@@ -193,7 +200,7 @@ def channel_block(run: GapRun, grid: Grid, family: Family, name: str, step: floa
     if data is None or name not in data.ids:
         return None
     own = beside(data, name, (name,))
-    usual = float(np.median([deviation(beside(data, n, (name,))).remains for n in data.ids if n != name]))
+    usual = usual_remains([deviation(beside(data, n, (name,))).remains for n in data.ids if n != name])
     return block_of(name, family, own, usual, _wire(run, name) if family == "wire" else None)
 
 

@@ -5,6 +5,7 @@ The same for every family, whoever predicts it: what is left over is regressed o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,6 +118,15 @@ def deviation(beside: Others) -> Deviation:
     )
 
 
+def usual_remains(of_channels: Sequence[float]) -> float:
+    """What remains (`Deviation`) of a sound channel: the middle of all, and no less than its noise.
+
+    Readings that go in steps from the same zero step together, and nearly nothing remains of them. One whose
+    calibration is another steps at other places; what its own steps make is noise that it is allowed.
+    """
+    return max(float(np.median(of_channels)), 0.0)
+
+
 def block_of(
     name: str, family: Family, beside: Others, usual: float, wire: WireInverse | None = None
 ) -> Block:
@@ -138,7 +148,7 @@ def block_of(
         kind="channel",
         expected=beside.expected,
         design=found.design,
-        noise=found.noise * float(np.exp(max(usual, 0.0))),
+        noise=found.noise * float(np.exp(usual)),
         wire=wire,
         tags={name: family},
         levers=(CALIBRATION * beside.spread, *(_SOUND * beside.spread * t for t in TOLERANCE[family][1:])),

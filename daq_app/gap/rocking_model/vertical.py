@@ -13,7 +13,7 @@ import numpy as np
 
 from daq_app.gap.rocking_model.channel_families import smoothed
 from daq_app.gap.rocking_model.channel_faults import SUSPECT
-from daq_app.gap.rocking_model.channel_shapes import TOLERANCE, Others, block_of, deviation
+from daq_app.gap.rocking_model.channel_shapes import TOLERANCE, Others, block_of, deviation, usual_remains
 from daq_app.gap.rocking_model.motion_grid import Grid
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 from daq_app.gap.rocking_model.sensor_blocks import Block
@@ -46,7 +46,9 @@ def odd_vertical(runs: Sequence[GapRun], grids: Sequence[Grid]) -> str | None:
 def vertical_block(run: GapRun, grid: Grid, name: str) -> Block | None:
     """The coefficients of one accelerometer along z as a block of features, as `channel_block` gives them."""
     beside = _vertical(run.including((name,)), grid).get(name)
-    return None if beside is None else block_of(name, "accelerometer", beside, deviation(beside).remains)
+    if beside is None:
+        return None
+    return block_of(name, "accelerometer", beside, usual_remains([deviation(beside).remains]))
 
 
 def _vertical(run: GapRun, grid: Grid) -> dict[str, Others]:
