@@ -52,3 +52,11 @@ def test_a_sag_of_the_lowest_wire_is_not_taken_for_one_of_all() -> None:
     """Among wires at four heights both bend the lowest against the others; one of all leaves more."""
     runs = simulate({"wire_cosine@WP-1": {"kappa": -0.17}}, LEVEL)
     assert found_channels(prepare(runs)[0]) == {"WP-1": "wire"}
+
+
+@pytest.mark.parametrize("gains", [{"WP-2": -0.006}, {"WP-4": 0.008}])
+def test_a_sag_of_the_lowest_wire_is_not_taken_for_a_fault_of_the_next(gains: dict[str, float]) -> None:
+    """Without the next one a base that moves takes up most of the sag, and calibrations may make the rest."""
+    errors = {f"gain@{name}": {"error": error} for name, error in gains.items()}
+    runs = simulate({"wire_cosine@WP-1": {"kappa": -0.27}, **errors}, LEVEL)
+    assert found_channels(prepare(runs)[0]) == {"WP-1": "wire"}

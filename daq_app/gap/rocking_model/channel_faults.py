@@ -13,11 +13,13 @@ from types import MappingProxyType
 import numpy as np
 
 from daq_app.config.rig import Family
+from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.channel_families import ChannelFamily, beside, channel_family
 from daq_app.gap.rocking_model.channel_shapes import (
     RINGING,
     SHAPES,
     TOLERANCE,
+    Others,
     block_of,
     deviation,
     usual_remains,
@@ -34,6 +36,9 @@ CROWDED: tuple[Family, ...] = ("lvdt", "accelerometer")
 """Families in which several channels may be wrong and the others still say so."""
 STRUCTURE = 0.5
 """Excess of the logarithm of what remains over noise from which a channel is suspect for it alone."""
+_POWERS = (1, 1, 2, 0, 1)
+"""Of a wire's shapes: the power of its reading that they go with. The wall's rotation θ adds height × f(θ) to
+every reading, and its base the same to all. The base stands still as far as a wire a metre up is right."""
 SCREENED = 3
 """Runs that are looked at before all are."""
 
@@ -103,7 +108,7 @@ def _alone(usable: Sequence[ChannelFamily], family: Family, order: Sequence[str]
         own = rest.pop(name)
         agree = max(bar, 0.4 * own)
         if own > bar and max(rest.values()) < agree:
-            doubt = max(rest.values()) if family == "lvdt" else _base_moves(usable, name)
+            doubt = _wires_doubt(usable, name) if family == "wire" else max(rest.values())
             agreed.append((doubt, agree, name))
     if not agreed:
         return None
@@ -145,14 +150,38 @@ def _together(usable: Sequence[ChannelFamily], family: Family) -> tuple[str, ...
     return ()
 
 
-def _base_moves(data: Sequence[ChannelFamily], without: str) -> float:
-    """Rms that the channels but one make of the base's movement: a wall stands still there, or nearly."""
-    total = 0.0
-    for entry in data:
-        others = [i for i, other in enumerate(entry.ids) if other != without]
-        moved = np.linalg.pinv(entry.design[others])[0] @ entry.signals[others]
-        total += float(np.mean(moved[entry.pick] ** 2))
-    return float(np.sqrt(total))
+def _wires_doubt(data: Sequence[ChannelFamily], without: str) -> float:
+    """How far all wires but one are from what sound ones show of a wall whose base stands still: χ².
+
+    The wall's rotation is free in every shape, and so is the base as far as one that stands still goes. Of
+    four wires at three heights a base that moves takes up most of what a fifth one is off by, so neither what
+    they disagree in nor how little the base moves tells alone which one is wrong.
+    """
+    return float(np.median([_misfit(entry, without) for entry in data]))
+
+
+def _misfit(data: ChannelFamily, without: str) -> float:
+    """The same of one run."""
+    heights = data.design[:, 1]
+    mean = heights @ data.signals / (heights @ heights)
+    powers, tolerance = np.array(_POWERS), np.array(TOLERANCE["wire"])
+    rows: list[FloatArray] = []
+    values: list[FloatArray] = []
+    for i, name in enumerate(data.ids):
+        if name == without:
+            continue
+        found = deviation(Others(data.signals[i], heights[i] * mean, data.pick, 1.0, sided=data.sided))
+        # In units of the errors of this wire, which differ from shape to shape and hang together.
+        whiten = np.linalg.inv(np.linalg.cholesky(np.diag(tolerance**2) + found.covariance))
+        rows.append(
+            whiten @ np.hstack([np.diag(heights[i] ** (1.0 - powers)), np.diag(heights[i] ** -powers)])
+        )
+        values.append(whiten @ found.values)
+    still = np.hstack([np.zeros((powers.size, powers.size)), np.diag(1.0 / tolerance)])
+    design = np.vstack([*rows, still])
+    seen = np.concatenate([*values, np.zeros(powers.size)])
+    left = seen - design @ np.linalg.lstsq(design, seen, rcond=None)[0]
+    return float(left @ left)
 
 
 def _sizes(
