@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from daq_app.config.rig import Family
-from daq_app.gap.core import CannotDiagnose, FeatureSet
+from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.channel_faults import channel_block, suspects
 from daq_app.gap.rocking_model.conditions import Mark, conditions_of, marks_of, without_hum
@@ -27,6 +27,7 @@ from daq_app.gap.rocking_model.run_features import Examined, RockingRun, examine
 from daq_app.gap.rocking_model.saturation import saturated
 from daq_app.gap.rocking_model.second_axis import second_axis
 from daq_app.gap.rocking_model.sensor_blocks import Block
+from daq_app.gap.rocking_model.stairs import beside_stairs
 from daq_app.gap.rocking_model.vertical import odd_vertical, vertical_block
 from daq_app.gap.rocking_model.wiring import Wiring, mend
 
@@ -34,10 +35,6 @@ LATE_S = 2.5e-3
 """Lag between LVDTs and wires from which it matters which of them the motion is read from."""
 _SPOILING = ("quantisation", "dropout", "saturation", "spikes")
 _COUNT_SD = 0.05
-_READ_FROM = {"lvdt": ("wire", "joint", "twist"), "wire": ("wire", "base")}
-"""Blocks that a family's readings enter."""
-_STAIRS = 25.0
-"""Factor on their errors where these readings go in steps."""
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer", "tiltmeter")
 
 
@@ -231,7 +228,8 @@ def completed(
     )
     marks = [[*row, *own] for row, own in zip(marks, bursts, strict=True)]
     runs = []
-    for row, entry, vibration, seen in zip(more, examined, vibrations, marks, strict=True):
+    known = beside_stairs(examined, steps)
+    for row, entry, vibration, seen, read in zip(more, examined, vibrations, marks, known, strict=True):
         grid = entry.features.grid
         if vibration is not None:
             shown = vibration.amplitude if vibration.found else 0.0
@@ -243,7 +241,7 @@ def completed(
             )
             row.append(scalar_block("floor", entries, grid))
         row.append(_mark_block(seen, entry))
-        features = replace(_beside_stairs(entry.features, seen), vibration=vibration, wiring=wiring)
+        features = replace(read, vibration=vibration, wiring=wiring)
         runs.append(features.with_blocks(row))
     return runs, bursts
 
@@ -254,23 +252,6 @@ def _on_still_floor(entry: Examined, vibration: Vibration | None) -> Examined:
         return entry
     still = without_vibration(entry.run, entry.features.grid, vibration)
     return examine(still, entry.features.reference)
-
-
-def _beside_stairs(run: RockingRun, marks: Sequence[Mark]) -> RockingRun:
-    """The run with wider errors of all that was read from a family whose reading goes in steps.
-
-    Steps are no noise: the same ones come back in every half-cycle, so that a regression does not see
-    what they do to it.
-    """
-    spoilt = {name for family in _steps([marks]) for name in _READ_FROM.get(family, ())}
-    if not spoilt:
-        return run
-    kept = tuple(
-        replace(b, covariance=_STAIRS**2 * b.covariance) if b.family in spoilt else b for b in run.blocks
-    )
-    first = len(run.features) - sum(len(b.names) for b in run.blocks)
-    features = FeatureSet(run.features.values[:first], run.features.sd[:first], run.features.labels[:first])
-    return replace(run, features=features, blocks=()).with_blocks(kept)
 
 
 def _mark_block(marks: Sequence[Mark], entry: Examined) -> Block:
