@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from simulated_wall import short_rig
+from simulated_wall import simulate as held_briefly
 
 from benchmarks.gap_campaign import simulate
 from daq_app.gap.core import fit
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.model import RockingModel
 from daq_app.gap.rocking_model.run_features import RockingRun
-from daq_app.gap.rocking_model.study import prepare
+from daq_app.gap.rocking_model.study import diagnose_runs, prepare
 
 SPEED_RAD_S = 0.012
 
@@ -68,3 +70,18 @@ def test_how_evenly_a_wall_is_let_go_is_found() -> None:
     assert result.values["slow_release.even"][1] > 0.5
     # What clean releases scatter by; with an exponential alone it grows to the 1.6 ms at which it is held.
     assert result.sigmas["scatter of releases"] < 8e-5
+
+
+def test_a_cable_that_holds_on_is_found_beside_sensors_that_are_slow() -> None:
+    """It grips at the same share of every pull: a free scatter of the releases takes up all that it does."""
+    effects = ("slow_response@lvdt", "residual_cable")
+    runs = []
+    for place, level in enumerate((-0.15, -0.25, -0.35, -0.4, -0.405, -0.41)):
+        held = abs(level) * short_rig().specimen.alpha0_rad
+        given = {"slow_response@lvdt": {"tau": 0.008}, "residual_cable": {"k": 0.2, "slack": 0.6 * held}}
+        (run,) = held_briefly(given, (level,))
+        runs.append(replace(run, name=f"FR1-L{min(place, 3) + 1}-{place}", level=f"L{min(place, 3) + 1}"))
+    found = diagnose_runs(runs, only=effects)
+    assert set(found.decision.effects) == set(effects)
+    stiffness = next(p for p in found.effect_parameters if p.name == "residual_cable.k")
+    assert stiffness.low < 0.2 < stiffness.high

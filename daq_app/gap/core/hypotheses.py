@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -101,12 +101,19 @@ class Hypotheses:
             hint = {k: u for name in effects for k, u in self.fits[(name,)].known().items() if "." in k[0]}
         return GlanceTask(task.effects, task.known, task.sigmas, task.columns, hint)
 
-    def _screened(self, hypotheses: Sequence[Hypothesis], starts: Sequence[Fit], text: str) -> list[Fit]:
-        """Fits of hypotheses, of those without a chance a glance only."""
+    def _screened(
+        self,
+        hypotheses: Sequence[Hypothesis],
+        starts: Sequence[Fit],
+        text: str,
+        beside: Mapping[Hypothesis, Fit] | None = None,
+    ) -> list[Fit]:
+        """Fits of hypotheses, of those without a chance (beside all fits so far or those given) a glance."""
         tasks = [self._glance(h, s) for h, s in zip(hypotheses, starts, strict=True)]
         found: list[Fit] = self.workers.run(tasks, text)
-        best = max(f.log_evidence for f in (*self.fits.values(), *found))
-        less = max(f.log_evidence for h, f in self.fits.items() if len(h) < max(len(hypotheses[0]), 1))
+        known = self.fits if beside is None else beside
+        best = max(f.log_evidence for f in (*known.values(), *found))
+        less = max(f.log_evidence for h, f in known.items() if len(h) < max(len(hypotheses[0]), 1))
         bar = best - max(REACH, REACH_SHARE * (best - less))
         # On its way a strength may still be too weak to be an effect: that is judged at the end.
         near = [
@@ -205,7 +212,40 @@ class Hypotheses:
         first = max((h for h in self.fits if len(h) == 1), key=lambda h: self.fits[h].log_evidence)
         candidates = pair_candidates(self.fits, self.library, self.options.pair_width)
         near = [pair for pair in candidates if first[0] in pair]
-        self._fit_likely([*self._promising(first, near), *(p for p in candidates if p not in near)])
+        likely = self._promising(self.fits[first], near)
+        self._fit_likely([*likely, *(p for p in candidates if p not in near)])
+        self._fit_scattered(first, near)
+
+    def _fit_scattered(self, first: Hypothesis, pairs: Sequence[Hypothesis]) -> None:
+        """The same once more where a scatter is beyond what repeatability explains.
+
+        It has grown until nothing stood out any more, so that what a second effect explains is within it,
+        and a step that leaves it as it is gains nothing. At the largest that may be, an effect can gain.
+        """
+        excessive = self.goodness(first).excessive_scatter
+        if not excessive:
+            return
+        start = self._repeating(self.fits[first], excessive)
+        likely = self._promising(start, pairs)
+        if not likely:
+            return
+        found = self._screened(likely, [start] * len(likely), "pairs at less scatter", {first: start})
+        for pair, result in zip(likely, found, strict=True):
+            if pair not in self.fits or result.log_evidence > self.fits[pair].log_evidence:
+                self.fits[pair] = result
+
+    def _repeating(self, found: Fit, excessive: Collection[str]) -> Fit:
+        """A fit with the scatters named at the largest that the gate lets pass, and what it is worth then."""
+        largest = {s.name: s.high for s in self.model.scatters if s.name in excessive}
+        start = replace(found, sigmas={**found.sigmas, **largest})
+        task = PromiseTask((replace(self._glance(found.effects, start), columns={}),), found.columns)
+        ((objective,),) = self.workers.run([task], "less scatter")
+        lost = objective - found.objective
+        return replace(
+            start,
+            log_likelihood=found.log_likelihood - lost,
+            log_evidence=found.log_evidence - lost,
+        )
 
     def _seek_second(self) -> None:
         """Pairs of the best effect with each other that promises to gain on top of it.
@@ -217,11 +257,10 @@ class Hypotheses:
         if len(first) == 1 and self._strength(first) >= PRESENT:
             others = [e.name for e in self.library.named if e.name != first[0]]
             pairs: list[Hypothesis] = [tuple(sorted((first[0], name))) for name in others]
-            self._fit_likely(self._promising(first, pairs))
+            self._fit_likely(self._promising(self.fits[first], pairs))
 
-    def _promising(self, first: Hypothesis, pairs: Sequence[Hypothesis]) -> list[Hypothesis]:
+    def _promising(self, start: Fit, pairs: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Those whose second effect passes its score test where the first one was found."""
-        start = self.fits[first]
         share = max(1, -(-len(pairs) // (2 * self.options.workers)))
         tasks = [
             PromiseTask(tuple(replace(self._glance(p, start), columns={}) for p in part), start.columns)
