@@ -49,6 +49,17 @@ def test_what_all_of_them_show_is_no_fault_of_one(
     assert found_channels(prepared) == {}
 
 
+@pytest.mark.parametrize("late_s", [0.004, 0.03])
+def test_a_delay_of_all_of_them_is_no_fault_of_one(late_s: float) -> None:
+    runs = simulate({}, LEVELS)
+    for run in runs:
+        late = round(late_s * run.rate_hz)
+        for i in run.indices("accelerometer"):
+            run.channels[i, late:] = run.channels[i, :-late].copy()
+    prepared, _ = prepare(runs)
+    assert found_channels(prepared) == {}
+
+
 def test_one_along_z_beside_one_along_x_are_two_that_disagree() -> None:
     prepared, limits = prepare(_scaled({"AC-8": 0.93, "AC-3": 1.07}))
     assert found_channels(prepared) == {}

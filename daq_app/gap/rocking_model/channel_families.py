@@ -14,7 +14,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.channel_shapes import SHAPES, Others
 from daq_app.gap.rocking_model.motion_grid import Grid, coarse
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.rotation import wall_rotation, zeroed
+from daq_app.gap.rocking_model.rotation import sooner, wall_rotation, zeroed
 
 _SMOOTH_S = 0.04
 """Window over which accelerations are averaged: with 30 ms of ringing it stays within the mask of 50 ms."""
@@ -93,12 +93,14 @@ def beside(data: ChannelFamily, name: str, without: tuple[str, ...]) -> Others:
     return Others(data.signals[place], expected, data.pick, spread, rough, data.repeats, data.sided)
 
 
-def smoothed(run: GapRun, chosen: Sequence[int]) -> FloatArray:
-    """Averages of accelerometers over 40 ms on the grid, (k, m), m/s².
+def smoothed(run: GapRun, chosen: Sequence[int], late_s: float = 0.0) -> FloatArray:
+    """Averages of accelerometers over 40 ms on the grid, (k, m), m/s², taken sooner by what they are late.
 
     At the full rate, so that local ringing above 100 Hz does not fold into the grid's own band, and with a
     window of finite length: each place rings in its own way, and none of it may leave the mask.
     """
     window = np.hanning(round(_SMOOTH_S * run.rate_hz))
     window /= window.sum()
-    return np.array([coarse(oaconvolve(zeroed(run, i), window, "same"), run.rate_hz) for i in chosen])
+    early = round(late_s * run.rate_hz)
+    rows = (oaconvolve(sooner(zeroed(run, i), early), window, "same") for i in chosen)
+    return np.array([coarse(row, run.rate_hz) for row in rows])

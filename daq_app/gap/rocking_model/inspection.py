@@ -14,6 +14,7 @@ import numpy as np
 from daq_app.config.rig import Family
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model import swing_timing
 from daq_app.gap.rocking_model.channel_faults import channel_block, suspects
 from daq_app.gap.rocking_model.conditions import Mark, conditions_of, marks_of, without_hum
 from daq_app.gap.rocking_model.extra_response import MARKS
@@ -138,6 +139,12 @@ def _coefficient(run: RockingRun, family: str, name: str) -> float | None:
     return None
 
 
+def _late(run: RockingRun) -> float:
+    """How late the accelerometers are, s, where that is more than their timing leaves open."""
+    delay = _coefficient(run, "swing timing", "delay") or 0.0
+    return delay if abs(delay) > swing_timing.LATE_S else 0.0
+
+
 def without_suspects(
     examined: Sequence[Examined], marks: Sequence[Sequence[Mark]], reference: str
 ) -> tuple[list[Examined], dict[str, Family], list[list[Mark]]]:
@@ -148,7 +155,8 @@ def without_suspects(
     """
     grids = [e.features.grid for e in examined]
     runs = [e.run for e in examined]
-    found = suspects(runs, grids, _steps(marks)).plus("accelerometer", odd_vertical(runs, grids))
+    along_z = odd_vertical(runs, grids, [_late(e.features) for e in examined])
+    found = suspects(runs, grids, _steps(marks)).plus("accelerometer", along_z)
     again = list(examined)
     if found.ids:
         again = []
@@ -211,7 +219,7 @@ def completed(
             grid = entry.features.grid
             block = channel_block(entry.run, grid, family, name, steps.get(family, 0.0))
             if block is None and family == "accelerometer":
-                block = vertical_block(entry.run, grid, name)
+                block = vertical_block(entry.run, grid, name, _late(entry.features))
             if block is not None:
                 row.append(block)
     bends = [bend_signals(e.run, e.features.grid, height) for e in examined]
