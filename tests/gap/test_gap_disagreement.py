@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from simulated_wall import simulate
 
-from daq_app.config import parse_rig
-from daq_app.gap.blind.case_files import write_case
-from daq_app.gap.blind.world.campaign import draw_world
-from daq_app.gap.blind.world.catalogue import Drawn
 from daq_app.gap.rocking_model.inspection import found_channels, found_marks
-from daq_app.gap.rocking_model.records import GapRun, load_run
+from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import diagnose_runs, model_and_library, prepare
 
 LEVEL = (-0.35,)
@@ -76,19 +70,6 @@ def test_a_burst_of_shaking_is_found_in_the_run_that_has_it() -> None:
     marks = [found_marks([run]) for run in prepared]
     assert marks == [{"shaking@floor": ""}, {}]
     assert any("burst of shaking" in words and words.endswith("in 1 run.") for words in limits)
-
-
-def test_a_wall_that_bends_in_another_shape_is_no_floor_that_shakes(tmp_path: Path) -> None:
-    """A blind check's wall bends with z to the 1.5th, not z²: some has the shape of a shaking floor."""
-    bends = {"gain": 0.6, "frequency_hz": 12.0, "zeta": 0.01}
-    effect = Drawn("flexible_wall", "structure", "library", bends, (), 1.0)
-    rig_text = Path("configs/fr1.toml").read_text(encoding="utf-8")
-    rig = parse_rig(rig_text, "configs/fr1.toml")
-    write_case(tmp_path, "case", draw_world(rig, (effect,), 4, np.random.default_rng(2)), rig_text, 0)
-    prepared, _ = prepare([load_run(path, rig) for path in sorted(tmp_path.glob("*.h5"))])
-    ring = next(b for b in prepared[0].blocks if b.kind == "bending")
-    assert ring.ring[0] == pytest.approx(12.0, rel=0.02)
-    assert found_marks(prepared) == {}
 
 
 @pytest.mark.parametrize("levels", [(-0.35,), (0.25, -0.35), (0.25, -0.35, 0.45)])

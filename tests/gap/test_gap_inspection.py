@@ -91,6 +91,17 @@ def test_exchanged_plugs_are_put_back() -> None:
     assert any("WP-1 and WP-4 exchanged" in limit for limit in limits)
 
 
+def test_accelerometers_along_z_that_are_exchanged_are_put_back() -> None:
+    """What impacts leave in these is half of what they show: their places are told between impacts."""
+    plain = simulate({}, LEVELS)
+    place = {sensor.id: i for i, sensor in enumerate(plain[0].sensors)}
+    for run in plain:
+        run.channels[[place["AC-7"], place["AC-8"]]] = run.channels[[place["AC-8"], place["AC-7"]]]
+    crossed, limits = prepare(plain)
+    assert set(found_marks(crossed)) == {"swap@accelerometer"}
+    assert any("AC-7 and AC-8 exchanged" in limit for limit in limits)
+
+
 @pytest.mark.parametrize(
     ("target", "places", "words"),
     [

@@ -20,6 +20,12 @@ POLYNOMIAL_DEGREE = 8
 SMALLEST_GRID_RAD = 8e-4
 MASK_S = 0.05
 """Accelerations near an impact are left out."""
+_END_OF_FALL_S = (0.1, 0.02)
+"""Before an impact: where the speed of the fall is read."""
+_FALLS = 4
+"""Falls that are compared: the first one and those after it."""
+_AS_FROM_A_PEAK = 0.01
+"""Relative difference of the first fall's speed beyond which it was no fall from rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +93,7 @@ def make_grid(
     distance = np.abs(time_s[:, None] - impact_s[None, :]).min(axis=1) if impact_s.size else time_s + 1e9
     good = coarse(valid.astype(float), rate_hz) > 0.999
     rotation, rate, acceleration = (coarse(v, rate_hz) for v in (smooth, omega, alpha))
-    before, after = _speeds(np.abs(rotation), time_s, impact_s, survey)
+    before, after = _speeds(np.abs(rotation), rate, time_s, impact_s, survey)
     side = np.sign(np.interp(impact_s - 0.02, time_s, rotation))
     return Grid(
         time_s,
@@ -106,21 +112,36 @@ def make_grid(
 
 
 def _speeds(
-    size: FloatArray, time_s: FloatArray, impact_s: FloatArray, survey: Survey
+    size: FloatArray, rate: FloatArray, time_s: FloatArray, impact_s: FloatArray, survey: Survey
 ) -> tuple[FloatArray, FloatArray]:
     """Speeds before and after each impact, from the peaks around it: ½ω² = p² (cos(α − φ) − cos α).
 
     A jump is the small difference of two speeds. Read off the motion beside the impact it would carry
-    an error of its own size, and what follows from it would look weaker than it is.
+    an error of its own size, and what follows from it would look weaker than it is. Only what is let go
+    slowly, held back or pushed comes down with another speed than from rest.
     """
     edges = np.append(np.searchsorted(time_s, impact_s), time_s.size)
     # The held rotation, not the overshoot of the pull.
     first = float(size[(time_s > -0.05) & (np.arange(time_s.size) < edges[0])].max(initial=0.0))
     peaks = np.array([first, *(float(size[a:b].max(initial=0.0)) for a, b in itertools.pairwise(edges))])
     alpha = survey.alpha_rad
-    energy = np.cos(alpha - np.minimum(peaks, alpha)) - np.cos(alpha)
-    speeds = survey.p_rad_s * np.sqrt(2.0 * energy)
-    return speeds[:-1], speeds[1:]
+
+    def height(angle: FloatArray) -> FloatArray:
+        return np.asarray(np.cos(alpha - np.minimum(angle, alpha)) - np.cos(alpha))
+
+    speeds = survey.p_rad_s * np.sqrt(2.0 * height(peaks))
+    shares: list[float] = []
+    for at, speed in zip(impact_s[:_FALLS], speeds, strict=False):
+        seen = (time_s > at - _END_OF_FALL_S[0]) & (time_s < at - _END_OF_FALL_S[1])
+        if speed > 0.0 and np.count_nonzero(seen) > 4:
+            square = np.mean(rate[seen] ** 2 + 2.0 * survey.p_rad_s**2 * height(size[seen]))
+            shares.append(float(np.sqrt(square) / speed))
+    # All falls are off alike where the wall is not quite that of the survey.
+    share = shares[0] / float(np.median(shares[1:])) if len(shares) > 1 else 1.0
+    approach = speeds[:-1].copy()
+    if abs(share - 1.0) > _AS_FROM_A_PEAK:
+        approach[0] *= share
+    return approach, speeds[1:]
 
 
 def _impact_samples(theta: FloatArray, smooth: FloatArray, release: int) -> list[int]:

@@ -171,7 +171,7 @@ class _Crushing:
         self._wear()
 
     def impact(self) -> None:
-        """One more. What moves under the wall is a few micrometres."""
+        """One more: a tenth of a millimetre at most, on edges that both touch the floor then."""
         self._impacts += 1
         self._wear()
 
