@@ -9,13 +9,14 @@ import pytest
 
 from daq_app.config import parse_rig
 from daq_app.gap.blind.case_files import write_case
+from daq_app.gap.blind.make import Order, draw_case
 from daq_app.gap.blind.world.campaign import draw_world
 from daq_app.gap.blind.world.catalogue import Drawn
 from daq_app.gap.rocking_model.inspection import found_marks
 from daq_app.gap.rocking_model.records import load_run
 from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.sensor_blocks import Block
-from daq_app.gap.rocking_model.study import prepare
+from daq_app.gap.rocking_model.study import diagnose_runs, prepare
 
 
 def _runs(folder: Path, seed: int, **effects: dict[str, float]) -> list[RockingRun]:
@@ -61,3 +62,15 @@ def test_a_base_that_takes_milliseconds_to_give_way_is_no_delay_of_the_wires(tmp
         sds = np.sqrt(np.diag(block.covariance))
         assert abs(block.values[lag]) < 3.0 * sds[lag]
         assert block.values[step] == pytest.approx(7e-4, rel=0.02)
+
+
+@pytest.mark.heavy
+def test_a_pair_that_a_glance_leaves_far_behind_is_fitted_to_its_end(tmp_path: Path) -> None:
+    """A clock that runs 5 % wrong on a soft joint: at a glance a gain of the accelerometers led by 700."""
+    texts = tuple(Path(f"configs/{name}.toml").read_text(encoding="utf-8") for name in ("fr1", "fr2"))
+    world, rig_text, _ = draw_case(Order(502441, tmp_path, tmp_path, texts), 101)
+    assert [effect.name for effect in world.effects] == ["winkler", "clock"]
+    write_case(tmp_path, "case", world, rig_text, 0)
+    runs = [load_run(path, world.rig) for path in sorted(tmp_path.glob("*.h5"))]
+    result = diagnose_runs(runs, only=("clock", "winkler", "gain@accelerometer"))
+    assert (result.decision.verdict, result.decision.effects) == ("pair", ("clock", "winkler"))

@@ -26,6 +26,8 @@ REACH_SHARE = 0.5
 """A hypothesis is fitted if a glance puts it within 60 of the best in log evidence, or if it gains half as
 much as the best over the best with one effect less; the others keep what the glance gave them, which leaves
 them without a chance."""
+FOLLOWED = 3
+"""The best few are fitted in any case: a glance may stop far below where its hypothesis ends."""
 STRAINED = 4.0
 """Prior sd from which a parameter of the model looks as if it stood for an effect."""
 PROMISE = 5.0
@@ -116,6 +118,8 @@ class Hypotheses:
         less = max(f.log_evidence for h, f in known.items() if len(h) < max(len(hypotheses[0]), 1))
         bar = best - max(REACH, REACH_SHARE * (best - less))
         # On its way a strength may still be too weak to be an effect: that is judged at the end.
+        sizes = sorted((f.log_evidence + f.withheld for f in found), reverse=True)
+        bar = min(bar, sizes[min(FOLLOWED, len(sizes)) - 1])
         near = [
             k
             for k, f in enumerate(found)
