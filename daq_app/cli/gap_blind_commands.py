@@ -30,7 +30,8 @@ _WithoutOption = Annotated[
     typer.Option(help="Part of the method to leave out: scatter, channels, probes or multistart."),
 ]
 _EngineOption = Annotated[
-    Literal["events", "contact"], typer.Option(help="What moves the wall: events or contact.")
+    Literal["events", "contact"],
+    typer.Option(help="What moves the wall: own equations, from event to event, or a contact engine."),
 ]
 _WorkersOption = Annotated[int, typer.Option(min=0, help="Processes; 0 takes one for each core.")]
 
@@ -83,8 +84,7 @@ def make(
 ) -> None:
     """Simulate release tests with hidden effects, and seal their labels. An interrupted making goes on.
 
-    With --engine contact a contact engine (extra `contact`) moves the wall, and effects are hidden that are
-    born where wall and floor touch.
+    With --engine contact MuJoCo moves the wall (extra: contact) and effects are of the feet it stands on.
     """
     from daq_app.gap.blind.make import Order, check_apart, make_cases
 

@@ -11,6 +11,7 @@ from simulated_wall import simulate
 from benchmarks.gap_campaign import simulate as longer_held
 from daq_app.gap.rocking_model.inspection import found_channels, found_marks
 from daq_app.gap.rocking_model.model import RockingModel
+from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rings import ring_columns
 from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.saturation import saturated
@@ -23,6 +24,12 @@ from sim_hardware.sensors.scene import pivots
 
 LEVELS = (0.25, -0.35)
 ONE = LEVELS[1:]
+
+
+def _exchange(run: GapRun, first: str, second: str) -> None:
+    """Plug two channels into each other's terminals."""
+    at = [next(i for i, sensor in enumerate(run.sensors) if sensor.id == name) for name in (first, second)]
+    run.channels[at] = run.channels[at[::-1]]
 
 
 def _prepared(effects: dict[str, dict[str, float]], levels: tuple[float, ...] = LEVELS) -> list[RockingRun]:
@@ -82,9 +89,8 @@ def test_electronics_are_named_by_channel_with_their_size(healthy: list[RockingR
 
 def test_exchanged_plugs_are_put_back() -> None:
     plain = simulate({}, LEVELS)
-    place = {sensor.id: i for i, sensor in enumerate(plain[0].sensors)}
     for run in plain:
-        run.channels[[place["WP-1"], place["WP-4"]]] = run.channels[[place["WP-4"], place["WP-1"]]]
+        _exchange(run, "WP-1", "WP-4")
     crossed, limits = prepare(plain)
     assert set(found_marks(crossed)) == {"swap@wire"}
     assert abs(_value(crossed[0], "wire", "gain")) < 5e-3
@@ -94,9 +100,8 @@ def test_exchanged_plugs_are_put_back() -> None:
 def test_accelerometers_along_z_that_are_exchanged_are_put_back() -> None:
     """What impacts leave in these is half of what they show: their places are told between impacts."""
     plain = simulate({}, LEVELS)
-    place = {sensor.id: i for i, sensor in enumerate(plain[0].sensors)}
     for run in plain:
-        run.channels[[place["AC-7"], place["AC-8"]]] = run.channels[[place["AC-8"], place["AC-7"]]]
+        _exchange(run, "AC-7", "AC-8")
     crossed, limits = prepare(plain)
     assert set(found_marks(crossed)) == {"swap@accelerometer"}
     assert any("AC-7 and AC-8 exchanged" in limit for limit in limits)
@@ -123,7 +128,7 @@ def test_a_channel_that_shows_no_sensor_of_its_kind_does_not_hide_exchanged_plug
     runs = simulate({}, ONE)
     place = {sensor.id: i for i, sensor in enumerate(runs[0].sensors)}
     for run in runs:
-        run.channels[[place["WP-1"], place["WP-4"]]] = run.channels[[place["WP-4"], place["WP-1"]]]
+        _exchange(run, "WP-1", "WP-4")
         run.channels[place["WP-3"]] *= 4.0
     crossed, limits = prepare(runs)
     assert "swap@wire" in found_marks(crossed)
@@ -133,9 +138,8 @@ def test_a_channel_that_shows_no_sensor_of_its_kind_does_not_hide_exchanged_plug
 def test_exchanged_accelerometers_are_seen_beside_one_that_is_off() -> None:
     """What the others misfit as they are and as they would be says nothing about the two plugs."""
     runs = simulate({"gain@AC-1": {"error": 0.3}}, ONE)
-    place = {sensor.id: i for i, sensor in enumerate(runs[0].sensors)}
     for run in runs:
-        run.channels[[place["AC-3"], place["AC-5"]]] = run.channels[[place["AC-5"], place["AC-3"]]]
+        _exchange(run, "AC-3", "AC-5")
     _, wiring = mend(runs)
     assert wiring.exchanged == (("AC-3", "AC-5"), ("AC-5", "AC-3"))
 

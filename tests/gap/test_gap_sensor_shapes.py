@@ -51,7 +51,19 @@ def test_a_slip_within_an_interval_counts_for_the_part_of_it_that_follows() -> N
     time_s = coarse(fine, RATE_HZ)
     none = np.zeros(time_s.size, dtype=bool)
     grid = Grid(
-        time_s, empty, empty, empty, none, none, impacts, empty, 1.5, empty, jumps=empty, approach=speeds
+        time_s,
+        empty,
+        empty,
+        empty,
+        none,
+        none,
+        none,
+        impacts,
+        empty,
+        1.5,
+        empty,
+        jumps=empty,
+        approach=speeds,
     )
     assert np.abs(slip_shape(grid) - coarse(slipped, RATE_HZ)).max() < 0.02
 

@@ -20,6 +20,8 @@ POLYNOMIAL_DEGREE = 8
 SMALLEST_GRID_RAD = 8e-4
 MASK_S = 0.05
 """Accelerations near an impact are left out."""
+SETTLING_S = 0.02
+"""After an impact: a base that gives way follows the reaction to its other edge within some milliseconds."""
 _END_OF_FALL_S = (0.1, 0.02)
 """Before an impact: where the speed of the fall is read."""
 _FALLS = 4
@@ -37,6 +39,8 @@ class Grid:
     omega: FloatArray
     alpha: FloatArray
     near_impact: NDArray[np.bool_]
+    settled: NDArray[np.bool_]
+    """Where a base that gives way has followed: how its step comes about looks like a delay of the wires."""
     valid: NDArray[np.bool_]
     impact_s: FloatArray
     """Impacts as the reference rotation has them, s from release, up to where half-cycles can be told."""
@@ -101,6 +105,7 @@ def make_grid(
         rate,
         acceleration,
         near_impact=distance < MASK_S,
+        settled=distance > SETTLING_S,
         valid=good,
         impact_s=impact_s,
         raw=coarse(theta, rate_hz),
@@ -130,14 +135,15 @@ def _speeds(
         return np.asarray(np.cos(alpha - np.minimum(angle, alpha)) - np.cos(alpha))
 
     speeds = survey.p_rad_s * np.sqrt(2.0 * height(peaks))
-    shares: list[float] = []
-    for at, speed in zip(impact_s[:_FALLS], speeds, strict=False):
+    shares = np.full(min(_FALLS, impact_s.size), np.nan)
+    for k, (at, speed) in enumerate(zip(impact_s[:_FALLS], speeds, strict=False)):
         seen = (time_s > at - _END_OF_FALL_S[0]) & (time_s < at - _END_OF_FALL_S[1])
         if speed > 0.0 and np.count_nonzero(seen) > 4:
             square = np.mean(rate[seen] ** 2 + 2.0 * survey.p_rad_s**2 * height(size[seen]))
-            shares.append(float(np.sqrt(square) / speed))
+            shares[k] = np.sqrt(square) / speed
     # All falls are off alike where the wall is not quite that of the survey.
-    share = shares[0] / float(np.median(shares[1:])) if len(shares) > 1 else 1.0
+    later = shares[1:][np.isfinite(shares[1:])]
+    share = float(shares[0] / np.median(later)) if later.size else np.nan
     approach = speeds[:-1].copy()
     if abs(share - 1.0) > _AS_FROM_A_PEAK:
         approach[0] *= share

@@ -22,8 +22,6 @@ from daq_app.gap.rocking_model.swings import Swings
 
 SWAY_HZ = 8.0
 """Nobody sways five tonnes faster."""
-SETTLING_S = 0.02
-"""After an impact: a base that gives way follows the reaction to its other edge within some milliseconds."""
 OTHER_WIRES = 2e-3
 """Difference in calibration between the mean of some wires and that of all."""
 
@@ -218,18 +216,12 @@ def _wire_block(
     compared = coarse(theta, run.rate_hz) - (
         coarse(joint.theta, run.rate_hz) if reference == "wire" else grid.theta
     )
-    settled = pick & _settled(grid)
-    found = regress("wire", compared, rotation_columns(grid, run.survey.alpha_rad), settled, ("zero",))
+    columns = rotation_columns(grid, run.survey.alpha_rad)
+    found = regress("wire", compared, columns, pick & grid.settled, ("zero",))
     if found is not None and some:
         # Other wires than in the other runs: their mean has another calibration.
         found.covariance[found.names.index("gain"), found.names.index("gain")] += OTHER_WIRES**2
     return found
-
-
-def _settled(grid: Grid) -> NDArray[np.bool_]:
-    """Samples away from impacts, (m,): how a step of the base comes about looks like a delay of the wires."""
-    distance = np.abs(grid.time_s[:, None] - grid.impact_s).min(axis=1, initial=np.inf)
-    return np.asarray(distance > SETTLING_S)
 
 
 def rotation_columns(grid: Grid, alpha: float) -> dict[str, tuple[FloatArray, str]]:

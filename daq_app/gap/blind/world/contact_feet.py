@@ -15,7 +15,7 @@ from daq_app.gap.blind.world.catalogue import Parameters
 from daq_app.gap.blind.world.wall import GRAVITY_M_S2, Wall
 
 STICKS: Final = 0.9
-"""Coefficient of friction that no rocking wall overcomes: it needs about tan α."""
+"""Coefficient of friction that no slender wall overcomes as it rocks (`needed_friction`)."""
 _SHARP_M: Final = 1e-3
 """Radius of an edge that counts as sharp."""
 _PADS: Final = 25
