@@ -54,6 +54,13 @@ def test_a_sag_of_the_lowest_wire_is_not_taken_for_one_of_all() -> None:
     assert found_channels(prepare(runs)[0]) == {"WP-1": "wire"}
 
 
+def test_a_sag_of_the_lowest_wire_of_half_a_millimetre_is_seen() -> None:
+    """Wires are straight to 0.1 % of their travel, and the lowest shows the least of its sag."""
+    runs = simulate({"wire_cosine@WP-1": {"kappa": -0.06}}, LEVEL)
+    assert np.abs(0.06 * (0.9 * 0.35 * runs[0].survey.alpha_rad) ** 2) < 6e-4
+    assert found_channels(prepare(runs)[0]) == {"WP-1": "wire"}
+
+
 @pytest.mark.parametrize("gains", [{"WP-2": -0.006}, {"WP-4": 0.008}])
 def test_a_sag_of_the_lowest_wire_is_not_taken_for_a_fault_of_the_next(gains: dict[str, float]) -> None:
     """Without the next one a base that moves takes up most of the sag, and calibrations may make the rest."""
