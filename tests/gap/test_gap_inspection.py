@@ -208,6 +208,26 @@ def test_a_family_that_comes_late_does_not_make_the_other_stop_short(
     assert [mark.value for mark in marks[0]] == [0.0, 0.0]
 
 
+def test_what_ends_one_face_ends_the_other_that_hardly_gets_there() -> None:
+    """A top cut by 2 % does not look flat, yet bends the rotation of whoever reads it."""
+    (plain,) = simulate({}, (0.4,))
+    rest = plain.channels[plain.indices("lvdt"), -400:].mean(axis=1, keepdims=True)
+    tops = (plain.channels[plain.indices("lvdt")] - rest).max(axis=1)
+    second = min(tops[:12].max(), tops[12:].max())
+    (run,), marks = saturated(simulate({"saturation@lvdt": {"limit": 0.98 * second}}, (0.4,)))
+    assert 1.0 / marks[0][0].value == pytest.approx(0.98 * second, rel=0.01)
+    ends = {run.sensors[i].id: run.sensors[i].range_si[1] for i in run.indices("lvdt")}
+    assert len(ends) == 24
+    assert max(ends.values()) < 0.99 * second
+
+
+def test_wires_that_drift_do_not_make_lvdts_stop_short() -> None:
+    """1.3 mrad in all of a record, and a hop of the wall at each impact."""
+    fault = {"drift@wire": {"rate": -2.4e-3}, "bounce": {"tau": 0.0095}}
+    _, marks = saturated(simulate(fault, (0.4,)))
+    assert [mark.value for mark in marks[0]] == [0.0, 0.0]
+
+
 def test_one_channel_with_another_gain_is_examined_on_its_own() -> None:
     runs = _prepared({"gain@WP-2": {"error": 0.05}})
     assert found_channels(runs) == {"WP-2": "wire"}

@@ -103,7 +103,7 @@ def _wiring_marks(wiring: Wiring, families: dict[str, Family]) -> list[Mark]:
 
 
 def choose_reference(inspected: Inspected) -> tuple[str, dict[int, Examined]]:
-    """The family that the motion is read from: the prompter one where LVDTs and wires differ in time.
+    """What the motion is read from (`examine`): the prompter family where LVDTs and wires differ in time.
 
     With it what was examined that way on the way to it, by the place of the run.
     """
@@ -122,14 +122,14 @@ def choose_reference(inspected: Inspected) -> tuple[str, dict[int, Examined]]:
     if first.features.reference != "lvdt" or lag is None or abs(lag) < LATE_S:
         return "", {place: first}
     try:
-        second = examine(run, "wire")
+        second = examine(run, "late")
     except (CannotDiagnose, IndexError):
         return "", {place: first}
     delays = [_coefficient(f.features, "impact timing", "delay") for f in (first, second)]
     if delays[0] is None or delays[1] is None or second.features.reference != "wire":
         return "", {place: first}
     late = [abs(delay - MIDDLE_OF_IMPACT_S) for delay in delays if delay is not None]
-    return ("wire", {place: second}) if late[1] < late[0] else ("", {place: first})
+    return ("late", {place: second}) if late[1] < late[0] else ("", {place: first})
 
 
 def _coefficient(run: RockingRun, family: str, name: str) -> float | None:
@@ -259,7 +259,7 @@ def _on_still_floor(entry: Examined, vibration: Vibration | None) -> Examined:
     if vibration is None or not vibration.found:
         return entry
     still = without_vibration(entry.run, entry.features.grid, vibration)
-    return examine(still, entry.features.reference)
+    return examine(still, entry.wanted)
 
 
 def _mark_block(marks: Sequence[Mark], entry: Examined) -> Block:

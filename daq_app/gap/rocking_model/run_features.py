@@ -120,11 +120,13 @@ class Examined:
     run: GapRun
     joint: Rotation
     features: RockingRun
+    wanted: str = ""
+    """Which rotation was asked for (`examine`)."""
 
     def after(self, impacts: float) -> Examined:
         """The same of a run that so many impacts went before; no feature depends on them."""
         features = replace(self.features, impacts_before=impacts)
-        return Examined(replace(self.run, impacts_before=impacts), self.joint, features)
+        return replace(self, run=replace(self.run, impacts_before=impacts), features=features)
 
 
 def extract(run: GapRun, reference: str = "") -> RockingRun:
@@ -133,12 +135,17 @@ def extract(run: GapRun, reference: str = "") -> RockingRun:
 
 
 def examine(run: GapRun, reference: str = "") -> Examined:
-    """Features of a run with what they were made from; `reference` ``wire`` overrides the LVDTs."""
+    """Features of a run with what they were made from.
+
+    `reference` ``wire`` overrides the LVDTs, ``late`` as well, but keeps what their joint shows of itself.
+    """
+    wanted = reference
     run, joint = _from_hold(run)
-    reference, theta, noise, notes = _reference(run, joint, reference)
+    reference, theta, noise, notes = _reference(run, joint, wanted)
     swings = sw.find_swings(theta, noise, run.rate_hz, run.name)
     grid = make_grid(theta, joint.valid, swings, run.rate_hz, run.survey)
-    blocks = tuple(blocks_of(run, joint, grid, swings, reference, quiet(run, grid)).values())
+    late_joint = wanted == "late"
+    blocks = tuple(blocks_of(run, joint, grid, swings, reference, quiet(run, grid), late_joint).values())
     late = acceleration_delay(run, grid)
     if late is not None:
         blocks = (*blocks, scalar_block("impact timing", (("delay", "s", late[0], late[1]),), grid))
@@ -177,7 +184,7 @@ def examine(run: GapRun, reference: str = "") -> Examined:
         notes,
         wires=wires_of(run),
     )
-    return Examined(run, joint, features.with_blocks(blocks))
+    return Examined(run, joint, features.with_blocks(blocks), wanted)
 
 
 BEFORE_RELEASE_S = 2.0
@@ -211,7 +218,7 @@ def _from_hold(run: GapRun) -> tuple[GapRun, Rotation]:
 def _reference(run: GapRun, joint: Rotation, wanted: str) -> tuple[str, FloatArray, float, tuple[str, ...]]:
     """The rotation that the dynamics are read from: LVDTs, or wires where the LVDTs reach their range."""
     notes = tuple(f"{run.name}: {name} left out, it disagrees with its family." for name in joint.left_out)
-    if joint.whole and wanted != "wire":
+    if joint.whole and not wanted:
         return "lvdt", joint.theta, joint.noise_rad, notes
     rows, heights, _ = wall_rotation(run)
     if len(rows) == 0:

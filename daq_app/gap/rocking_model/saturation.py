@@ -11,6 +11,7 @@ import numpy as np
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.conditions import Mark
+from daq_app.gap.rocking_model.late_joint import lateness
 from daq_app.gap.rocking_model.motion_grid import GRID_HZ, coarse
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.rotation import reaches_its_range, wire_reading, zeroed
@@ -22,8 +23,8 @@ LIMIT_SD = 0.01
 """Relative error of a limit."""
 _GOES_ON = 1.025
 """How much further the rotation must go on than the channel."""
-MOST_LATE = round(0.08 * GRID_HZ)
-"""Samples of the grid by which one family may be late against the other."""
+_BEYOND = 1.02
+"""How much further than those of its family that stop a channel may go that stops where they do."""
 
 
 def saturated(
@@ -55,14 +56,24 @@ def saturated(
         for k in clipped:
             limits[ids[k]] = float(np.median(table[table[:, k, 0] > 0.0, k, 0]))
         key = ids[clipped[0]] if len(clipped) == 1 else family
+        if len(clipped) > 1:
+            # What ends a family ends all of it: on the side that hardly gets there no top looks flat, and one
+            # that is 2 % short of its peak is a curvature to whoever reads the rotation from it.
+            common = float(np.median([limits[ids[k]] for k in clipped]))
+            reach = table[:, :, 1].max(axis=0)
+            limits |= {
+                name: common
+                for name, far in zip(ids, reach, strict=True)
+                if name not in limits and far < _BEYOND * common
+            }
         # Where several clip, those that travel furthest stand for them; zeros differ, so their middle does.
         furthest = max((limits[ids[k]] for k in clipped), default=0.0)
         chosen = [k for k in clipped if limits[ids[k]] > 0.9 * furthest]
         for run_marks, row in zip(marks, table, strict=True):
             seen = [row[k, 0] for k in chosen if row[k, 0] > 0.0]
-            reach = float(np.median(row[chosen or slice(None), 1])) if len(ids) else 0.0
+            usual = float(np.median(row[chosen or slice(None), 1])) if len(ids) else 0.0
             limit = float(np.median(seen)) if seen else 0.0
-            value, sd = (1.0 / limit, LIMIT_SD / limit) if limit else (0.0, 0.6 / max(reach, 1e-6))
+            value, sd = (1.0 / limit, LIMIT_SD / limit) if limit else (0.0, 0.6 / max(usual, 1e-6))
             run_marks.append(Mark(f"saturation@{key}", "inverse of the limit", "1/m", value, sd))
     return [_narrowed(run, limits) for run in runs], marks
 
@@ -109,22 +120,19 @@ def _rotation(run: GapRun, family: Family) -> FloatArray | None:
 
 
 def _in_step(mine: FloatArray | None, other: FloatArray | None) -> FloatArray | None:
-    """The other family's rotation, as late as this family shows it.
+    """The other family's rotation, as late as this family shows it, and drifting as little.
 
     Beside a rotation that comes sooner a late channel seems to stand still at the top while the wall
-    moves on. Where the delay is largest, the correlation of the rates is: a flat top does not move it.
+    moves on, and beside one that drifts a sound one seems to stop short. The drift is read below the tops.
     """
     if mine is None or other is None:
         return other
-    rates = np.gradient(mine), np.gradient(other)
-    shifts = np.arange(-MOST_LATE, MOST_LATE + 1)
-    inner = slice(MOST_LATE, mine.size - MOST_LATE)
-    alike = [float(rates[0][inner] @ np.roll(rates[1], k)[inner]) for k in shifts]
-    k = min(max(int(np.argmax(alike)), 1), shifts.size - 2)
-    bend = alike[k - 1] - 2.0 * alike[k] + alike[k + 1]
-    late = float(shifts[k]) + (0.5 * (alike[k - 1] - alike[k + 1]) / bend if bend < 0.0 else 0.0)
     place = np.arange(other.size, dtype=float)
-    return np.asarray(np.interp(place - late, place, other))
+    timed = np.interp(place - lateness(mine, other), place, other)
+    below = np.abs(mine) < _BELOW[1] * np.abs(mine).max()
+    columns = np.column_stack([place - place[-1], mine, np.ones_like(mine)])
+    drift = np.linalg.lstsq(columns[below], (timed - mine)[below], rcond=None)[0][0]
+    return np.asarray(timed - drift * columns[:, 0])
 
 
 def _roughness(run: GapRun, family: Family, step: float) -> float:

@@ -8,13 +8,14 @@ same coefficients by passing its own difference through the same regression.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.late_joint import in_step
 from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 from daq_app.gap.rocking_model.rotation import Rotation, WireInverse, wall_rotation, wire_reading, zeroed
@@ -78,7 +79,7 @@ class Block:
     fading: tuple[float, ...] = ()
     """Of a ring-down: change of each coefficient of unit size per ln of the damping ratio."""
     undone_s: float = 0.0
-    """Of a ring-down: delay of the accelerometers that was undone before they were looked at."""
+    """Delay of accelerometers (of a ring-down) or LVDTs (of the joint) that was undone before."""
     unequal: FloatArray | None = None
     """Of a ring-down, (k,): what calibrations that differ by one sd add to each coefficient in all runs."""
     tags: Mapping[str, str] = field(default_factory=dict)
@@ -176,8 +177,10 @@ def blocks_of(
     swings: Swings,
     reference: str,
     calm: NDArray[np.bool_],
+    late: bool = False,
 ) -> dict[str, Block]:
-    """All blocks that the run's channels allow, by name; `calm` are samples at which nothing rings."""
+    """All blocks that the run's channels allow, by name; `calm` are samples at which nothing rings, and
+    `late` says that the LVDTs are sound but for their time."""
     before = grid.time_s < -0.1
     middle = float(np.median(grid.raw[before])) if before.any() else 0.0
     held = calm & (np.abs(grid.raw - middle) < 0.01 * abs(middle))
@@ -202,6 +205,11 @@ def blocks_of(
     if reference == "lvdt":
         found["joint"] = _lift_block(run, joint, grid, pick)
         found["twist"] = _twist_block(run, joint, grid, pick)
+    elif late and joint.whole:
+        own = in_step(joint, grid, run.rate_hz)
+        lifted = _lift_block(run, own.joint, own.grid, pick & own.pick)
+        found["joint"] = lifted and replace(lifted, undone_s=own.late_s)
+        found["twist"] = _twist_block(run, own.joint, own.grid, pick & own.pick)
     return {name: block for name, block in found.items() if block is not None}
 
 

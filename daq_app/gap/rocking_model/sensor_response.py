@@ -326,7 +326,25 @@ def _joint(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatA
     if "drift@lvdt.rate" in values:
         rest = run.swings.rest_s - run.swings.release_s
         found = found + values["drift@lvdt.rate"] * _unit(run, block, "time", lambda: run.grid.time_s - rest)
-    return found
+    smeared = _smeared_opening(run, block.undone_s, values) if block.undone_s else None
+    return found if smeared is None else found + block.coefficients(smeared)
+
+
+def _smeared_opening(run: RockingRun, undone_s: float, values: Mapping[str, float]) -> FloatArray | None:
+    """What slow LVDTs make of an opening beyond that of their own rotation, m, put in step; None for nothing.
+
+    The opening goes with the size of the rotation: after an impact, where that has a corner, a response is
+    still on its way down while the other face opens.
+    """
+    theta, half = run.grid.theta, values["half_base"]
+    turned, opened = theta, half * np.abs(np.sin(theta))
+    for effect, response in (("slow_response", first_order), ("filter_delay", extra.bessel)):
+        if tau := values.get(f"{effect}@lvdt.tau", 0.0):
+            turned, opened = response(turned, tau), response(opened, tau)
+    if turned is theta:
+        return None
+    time_s = run.grid.time_s
+    return np.asarray(np.interp(time_s + undone_s, time_s, opened - half * np.abs(np.sin(turned))))
 
 
 def _release(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
