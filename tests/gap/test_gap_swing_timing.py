@@ -51,6 +51,18 @@ def test_the_form_of_an_impact_is_no_delay_between_impacts() -> None:
         assert _delay(second, "swing timing")[0] == pytest.approx(seen, abs=0.2 * sd)
 
 
+@pytest.mark.parametrize("tau", [0.02, 0.03])
+def test_impacts_behind_a_slow_filter_come_equally_late_in_all_runs(tau: float) -> None:
+    """Its response is longer than an impact and lopsided: what is largest of it is sooner than its middle."""
+    runs = simulate({"filter_delay@accelerometer": {"tau": tau}}, (0.25, -0.35, 0.4))
+    seen = [_delay(extract(run), "impact timing") for run in runs]
+    assert np.ptp([delay for delay, _ in seen]) < 2e-3
+    for delay, sd in seen:
+        assert abs(delay - tau) < 3.0 * sd
+    sharp = [_delay(extract(run), "impact timing")[1] for run in simulate({}, LEVELS)]
+    assert max(sharp) < 1e-3
+
+
 def test_an_accelerometer_that_disagrees_makes_the_delay_of_all_doubtful() -> None:
     (run,) = simulate({}, LEVELS[:1])
     low, high = (next(i for i, s in enumerate(run.sensors) if s.id == name) for name in ("AC-1", "AC-2"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
@@ -13,6 +15,10 @@ MOST = 14
 """Impacts used: the first ones are the loudest."""
 WINDOW_S = 0.11
 REACH_S = 0.065
+_SHARP_S = 8e-3
+"""Half width of the misfit's dip up to which it is that of impacts, whatever their form."""
+_NEAR_S = 3e-3
+"""How far from its lowest point the shape of a sharp dip is read."""
 MIDDLE_OF_IMPACT_S = 1.5e-3
 """By how much the middle of an impact is later than the contact, at sensors that are not late at all."""
 MODEL_ERROR_S = 3e-4
@@ -23,7 +29,8 @@ def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
     """(delay, its variance): shift of the record that fits the rotation's own acceleration best.
 
     What is compared are averages over 5 ms of z θ̈ − g sin θ with the jump of θ̇ at every impact: any
-    linear response of the accelerometers shifts its centroid by its delay. None without enough impacts.
+    linear response of the accelerometers shifts its centroid by its delay. Of a long and lopsided one the
+    largest value is sooner than that, which the variance says. None without enough impacts.
     """
     chosen = run.steady_accelerometers("x")
     if not chosen or grid.impact_s.size < 3:
@@ -42,14 +49,18 @@ def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
         expected = np.diff(np.interp(edges, fine, velocity)) * GRID_HZ
         return np.array([_left(measured[part] - expected[part], basis) for part, basis in windows])
 
-    delays = np.arange(-REACH_S, REACH_S, 2e-3)
-    best = float(delays[int(np.argmin([misfit(float(d)).sum() for d in delays]))])
-    fine_delays = best + np.linspace(-3e-3, 3e-3, 25)
+    delays = np.arange(-REACH_S, REACH_S, 1e-3)
+    curve = np.array([misfit(float(d)).sum() for d in delays])
+    dip = _Dip.of(delays, curve)
+    reach = min(dip.sooner_s, dip.later_s) if dip.broad else _NEAR_S
+    fine_delays = dip.middle_s + np.linspace(-reach, reach, 2 * round(reach / 2.5e-4) + 1)
     tables = np.array([misfit(float(d)) for d in fine_delays])
-    shift = _minimum(fine_delays, tables.sum(axis=1))
-    each = np.array([_minimum(fine_delays, tables[:, k]) for k in range(tables.shape[1])])
+    lowest = _middle if dip.broad else _minimum
+    shift = lowest(fine_delays, tables.sum(axis=1))
+    each = np.array([lowest(fine_delays, tables[:, k]) for k in range(tables.shape[1])])
     spread = 1.48 * float(np.median(np.abs(each - np.median(each))))
-    return shift, 1.57 * spread**2 / len(windows) + MODEL_ERROR_S**2
+    form = dip.lopsided_s if dip.broad else 0.0
+    return shift, 1.57 * spread**2 / len(windows) + MODEL_ERROR_S**2 + form**2
 
 
 def _windows(grid: Grid) -> list[tuple[slice, FloatArray]]:
@@ -74,6 +85,44 @@ def _windows(grid: Grid) -> list[tuple[slice, FloatArray]]:
 def _left(difference: FloatArray, basis: FloatArray) -> float:
     left = difference - basis @ (basis.T @ difference)
     return float(left @ left)
+
+
+@dataclass(frozen=True, slots=True)
+class _Dip:
+    """Where the misfit is least, s, and how broad it is to either side where it has half its depth, s."""
+
+    middle_s: float
+    sooner_s: float
+    later_s: float
+
+    @classmethod
+    def of(cls, delays: FloatArray, curve: FloatArray) -> _Dip:
+        """Of a misfit in steps of 1 ms, smoothed over 5 ms."""
+        smooth = np.convolve(np.pad(curve, 2, mode="edge"), np.full(5, 0.2), "valid")
+        k = int(np.argmin(smooth))
+        out = np.flatnonzero(smooth - smooth[k] > 0.5 * (np.median(smooth) - smooth[k]))
+        left, right = out[out < k].max(initial=0), out[out > k].min(initial=smooth.size - 1)
+        middle, first, last = (float(delays[i]) for i in (k, left, right))
+        return cls(middle, middle - first, last - middle)
+
+    @property
+    def broad(self) -> bool:
+        """Whether the accelerometers' response is longer than an impact: 5 to 6 ms as they are, 17 behind a
+        filter of 20 ms."""
+        return min(self.sooner_s, self.later_s) > _SHARP_S
+
+    @property
+    def lopsided_s(self) -> float:
+        """How far the middle of a response may be from where it is largest."""
+        return 0.5 * abs(self.later_s - self.sooner_s)
+
+
+def _middle(where: FloatArray, values: FloatArray) -> float:
+    """Lowest point of the parabola through all samples: a broad dip is ragged by what rings at 5 ms."""
+    centre = float(where.mean())
+    bend, slope, _ = np.polyfit(where - centre, values, 2)
+    shift = -0.5 * slope / bend if bend > 0 else 0.0
+    return centre + float(np.clip(shift, where[0] - centre, where[-1] - centre))
 
 
 def _minimum(where: FloatArray, values: FloatArray) -> float:
