@@ -107,7 +107,7 @@ def figures() -> list[Figure]:
     memory = [
         resource.getrusage(who).ru_maxrss / 1e3 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     ]
-    named = " + ".join(result.which[0].effects) or "nothing missing"
+    named = " + ".join(result.best) or "nothing missing"
     slow, fast = trajectory_s(200.0), trajectory_s(4000.0)
     scipy_s = least_s(lambda: scipy_run(1e-9, 200.0, 55), 3)
     return [

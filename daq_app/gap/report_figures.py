@@ -71,7 +71,7 @@ def draw_evidence(axes: Axes, result: Diagnosis, most: int = 9) -> None:
     best = ranked[-1].log_evidence
     lengths = [max(r.log_evidence - best, -60.0) for r in ranked]
     names = [effect_name(r.effects) for r in ranked]
-    colours = [AFTER if r.effects == result.which[0].effects else BEFORE for r in ranked]
+    colours = [AFTER if r.effects == result.best else BEFORE for r in ranked]
     axes.barh(range(len(ranked)), [length + 60.0 for length in lengths], left=-60.0, color=colours)
     axes.set_yticks(range(len(ranked)), names, fontsize=7)
     axes.set_xlim(-60.0, 8.0)

@@ -87,7 +87,7 @@ def traces(result: Diagnosis, runs: Sequence[GapRun], most: int = 2) -> list[Tra
 
 def _effects_of(result: Diagnosis) -> dict[str, dict[str, float]]:
     """The effects of the best hypothesis; parameters that each run has for itself are fitted here."""
-    effects: dict[str, dict[str, float]] = {name: {} for name in result.which[0].effects}
+    effects: dict[str, dict[str, float]] = {name: {} for name in result.best}
     for estimate in result.effect_parameters:
         name, _, parameter = estimate.name.rpartition(".")
         effects.setdefault(name, {})[parameter] = estimate.value

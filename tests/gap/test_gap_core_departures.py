@@ -8,8 +8,8 @@ import pytest
 from toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
 
 from daq_app.gap.core import Effect, Library, Options, Prediction, Run, diagnose, fit
-from daq_app.gap.core.decision import FreeForm, together
-from daq_app.gap.core.fit import on_top, searches_from
+from daq_app.gap.core.fit import Score, on_top, searches_from
+from daq_app.gap.core.other_forms import FreeForm, together
 from daq_app.gap.core.parameters import signed
 
 BEND = Effect("bend", "loss", (signed("c", 2.0),), "r + c (a − ½)²", "test", kind="departure", of=("slope",))
@@ -74,10 +74,10 @@ def test_a_coefficient_that_may_only_be_negative_gains_nothing_where_it_would_be
 
 
 def test_asking_the_same_twice_costs_nothing() -> None:
-    form = FreeForm.of(BEND, 4.0, 1.0)
+    form = FreeForm.of(BEND, Score(4.0, 1.0))
     assert form.p_value == pytest.approx(0.004678, rel=1e-3), "χ² of 8 with one degree of freedom"
     assert together([form, form]) == pytest.approx(form.p_value)
-    none = FreeForm.of(BEND, 0.0, 1.0)
+    none = FreeForm.of(BEND, Score(0.0, 1.0))
     assert together([form, none]) == pytest.approx(2 * form.p_value, rel=0.01)
 
 

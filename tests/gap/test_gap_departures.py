@@ -7,8 +7,8 @@ import pytest
 from simulated_wall import simulate
 
 from daq_app.gap.core import Library, Options, fit
-from daq_app.gap.core.decision import FreeForm, together
 from daq_app.gap.core.hypotheses import Hypotheses
+from daq_app.gap.core.other_forms import FreeForm, together
 from daq_app.gap.core.parallel import Workers
 from daq_app.gap.rocking_model.free_forms import with_uneven_loss
 from daq_app.gap.rocking_model.library import rocking_library

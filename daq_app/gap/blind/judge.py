@@ -171,11 +171,12 @@ def _matches(claimed: Sequence[str], accept: Sequence[tuple[str, ...]]) -> bool:
 def _outside_score(decision: str, result: dict[str, Any], which: Sequence[Hypothesis]) -> float:
     """How strongly a result speaks for "none of these", in [0, 2]; 1 and more where it decides so.
 
-    Within a decision the p-value of its goodness of fit ranks, and without one the probability that
-    the first hypothesis leaves over. A result may give ``notes.outside_score`` in [0, 1] instead.
+    Within a decision the chance of what it leaves ranks (``rest_p``, else the p-value of its goodness of
+    fit), and without one the probability that the first hypothesis leaves over. A result may give
+    ``notes.outside_score`` in [0, 1] instead.
     """
     given = (result.get("notes") or {}).get("outside_score")
-    p_value = (result.get("goodness") or {}).get("p_value")
+    p_value = result.get("rest_p", (result.get("goodness") or {}).get("p_value"))
     if isinstance(given, int | float):
         inner = min(1.0, max(0.0, float(given)))
     elif isinstance(p_value, int | float):

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from scipy.stats import chi2
-
-from daq_app.gap.core.effects import Effect, Library
+from daq_app.gap.core.effects import Library
 from daq_app.gap.core.evidence import NULL, Answer, Priors, credible_set, strength
 from daq_app.gap.core.fit import Fit
 from daq_app.gap.core.goodness import Goodness
+from daq_app.gap.core.other_forms import FreeForm, is_other_form, together
 from daq_app.gap.core.result import Decision, Verdict
 
 
@@ -48,42 +48,13 @@ class Thresholds:
     priors: Priors = field(default_factory=Priors)
 
 
-@dataclass(frozen=True, slots=True)
-class FreeForm:
-    """Score test of a probe or a departure on top of the best hypothesis."""
-
-    family: str
-    equation: str
-    gain: float
-    """In log posterior."""
-    p_value: float
-    """Of a gain as large by chance, where the named form is the right one."""
-
-    @classmethod
-    def of(cls, form: Effect, gain: float, determined: float) -> FreeForm:
-        """Twice the gain is χ² where there is nothing to gain, with as many degrees of freedom as the runs
-        determine coefficients of the form: r at five speeds includes r itself and its slope, which the model
-        or the named form have already. What is determined in part makes the chance a little too large."""
-        chance = float(chi2.sf(2.0 * gain, determined)) if gain > 0.0 and determined > 0.0 else 1.0
-        return cls(form.family, form.equation, gain, chance)
-
-
-def together(forms: Sequence[FreeForm]) -> float:
-    """Chance of all forms together: the harmonic mean of theirs (Wilson, PNAS 116, 2019).
-
-    A departure and a free form of the same family ask nearly the same, so that Bonferroni's correction would
-    count one question several times; the harmonic mean holds where they ask nearly the same.
-    """
-    return len(forms) / sum(1.0 / max(form.p_value, 1e-300) for form in forms)
-
-
 @dataclass(slots=True)
 class Material:
     """What the verdict is made from."""
 
     library: Library
     answers: Sequence[Answer]
-    """By what sensors can tell apart, most probable first: the best hypothesis is the first of the first."""
+    """By what sensors can tell apart, most probable first, with other forms of the best hypothesis."""
     fits: Mapping[tuple[str, ...], Fit]
     probes: Mapping[tuple[str, ...], Fit]
     goodness: Mapping[tuple[str, ...], Goodness]
@@ -97,10 +68,35 @@ class Material:
     nominal_gap: float
     """Gap with all shared parameters at their nominal values, in noise and scatter units."""
 
+    @property
+    def best(self) -> Answer:
+        """The most probable answer of the library: the best hypothesis is its first."""
+        return next(a for a in self.answers if not is_other_form(a.effects, self.library))
+
+    @property
+    def other_form(self) -> float:
+        """Probability that the family is right, and its form another than the library's."""
+        return sum(a.probability for a in self.answers if is_other_form(a.effects, self.library))
+
+    @property
+    def margin(self) -> float:
+        """Log evidence by which the best probe beats the best hypothesis; −inf without probes."""
+        best = self.fits[self.best.effects].log_evidence
+        return max((fit.log_evidence for fit in self.probes.values()), default=-math.inf) - best
+
+    @property
+    def rest_p(self) -> float:
+        """Chance of the largest departure from the best hypothesis, were it right.
+
+        The smallest of the gate's, that of free forms on top of it, and the odds against the best probe.
+        """
+        gate = self.goodness[self.best.effects].p_value
+        return min(gate, together(self.free_forms), math.exp(-max(self.margin, 0.0)))
+
 
 def decide(material: Material, thresholds: Thresholds) -> tuple[Decision, str]:
     """The verdict and the next measurement."""
-    library, best = material.library, material.answers[0]
+    library, best = material.library, material.best
     unexplained = _unexplained(material, thresholds)
     if unexplained is not None:
         return unexplained
@@ -135,6 +131,9 @@ def describe(answer: Answer, library: Library) -> str:
         return "nothing missing"
     words = []
     for name in answer.effects:
+        if library[name].kind == "probe":
+            words.append(f"another form of {library[name].family}")
+            continue
         alike = library.alike_to(name)
         if alike is None:
             words.append(name)
@@ -147,12 +146,11 @@ def describe(answer: Answer, library: Library) -> str:
 
 def _unexplained(material: Material, thresholds: Thresholds) -> tuple[Decision, str] | None:
     """None of these: the best hypothesis fails the gate, or a probe sees more than it explains."""
-    best = material.answers[0]
+    best = material.best
     good = material.goodness[best.effects]
     explained = good.passed or _forgiven(material, thresholds, good)
-    log_best = material.fits[best.effects].log_evidence
     leader = max(material.probes, key=lambda k: material.probes[k].log_evidence, default=None)
-    margin = material.probes[leader].log_evidence - log_best if leader else float("-inf")
+    margin = material.margin
     if explained and margin < thresholds.probe_log_bayes:
         return _another_form(material, thresholds)
     if leader is not None and margin >= thresholds.probe_log_bayes:
@@ -177,13 +175,14 @@ def _unexplained(material: Material, thresholds: Thresholds) -> tuple[Decision, 
 
 def _another_form(material: Material, thresholds: Thresholds) -> tuple[Decision, str] | None:
     """The family of the best hypothesis in a form that the library does not have."""
-    best = material.answers[0]
+    best = material.best
     if not best.effects or not material.free_forms:
         return None
     form = min(material.free_forms, key=lambda f: f.p_value)
     chance = together(material.free_forms)
     explained = material.fits[NULL].objective - material.fits[best.effects].objective
-    if chance >= thresholds.form_p or form.gain < thresholds.form_share * explained:
+    seen = chance < thresholds.form_p and form.gain >= thresholds.form_share * explained
+    if not seen and material.other_form < thresholds.name_probability:
         return None
     words = (
         f"None of the library's effects, but the family is {form.family}: "
@@ -204,7 +203,7 @@ def _forgiven(material: Material, thresholds: Thresholds, good: Goodness) -> boo
     No model is perfect: where an effect explains nearly all of a large gap, a small rest in one group
     does not speak for something else. A form that is only near the true one leaves more.
     """
-    best = material.answers[0]
+    best = material.best
     if not best.effects or good.excessive_scatter:
         return False
     closed = 1.0 - max(material.best_gap**2 - 1.0, 0.0) / max(material.null_gap**2 - 1.0, 1e-9)
@@ -213,7 +212,7 @@ def _forgiven(material: Material, thresholds: Thresholds, good: Goodness) -> boo
 
 
 def _null(material: Material, thresholds: Thresholds) -> tuple[Decision, str]:
-    probability = material.answers[0].probability
+    probability = material.best.probability
     if material.nominal_gap > thresholds.parameters_gap:
         words = (
             "No effect is missing: other parameter values close the gap "

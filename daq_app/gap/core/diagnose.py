@@ -17,6 +17,7 @@ from daq_app.gap.core.held_out import GapSize, HeldOutRun, gap_size
 from daq_app.gap.core.hypotheses import Hypotheses, Hypothesis, Options
 from daq_app.gap.core.likelihood import Covariance
 from daq_app.gap.core.model import Model
+from daq_app.gap.core.other_forms import with_other_forms
 from daq_app.gap.core.parallel import ScoreTask, Workers
 from daq_app.gap.core.problem import Problem
 from daq_app.gap.core.result import CannotDiagnose, Detection, Diagnosis, Estimate
@@ -80,19 +81,21 @@ class _Study(Hypotheses):
     def conclude(self, limits: list[str], began: float) -> Diagnosis:
         """Ranking, held-out scores, verdict."""
         ranked = self.ranked()
-        classes = answers(ranked, self.library)
-        best = classes[0].effects
+        best = answers(ranked, self.library)[0].effects
         probe_order = sorted(self.probes, key=lambda k: -self.probes[k].log_evidence)
         for hypothesis in [NULL, best, *probe_order[:1]]:
             self.goodness(hypothesis)
         found = self.fits[best]
+        forms = self.free_forms(best)
+        ranked = with_other_forms(ranked, best, forms, self.library, self.thresholds.priors.other_form)
+        classes = answers(ranked, self.library)
         material = Material(
             self.library,
             classes,
             self.fits,
             self.probes,
             self._goodness,
-            self.free_forms(best),
+            forms,
             null_gap=self._gap(found, self.fits[NULL].known()),
             best_gap=self.leftover(best),
             nominal_gap=self._gap(
@@ -125,6 +128,8 @@ class _Study(Hypotheses):
             remaining=gap_map(found.residuals, found.scales, self.runs),
             goodness=self.goodness(best),
             goodness_null=self.goodness(NULL),
+            free_forms=tuple(forms),
+            rest_p=material.rest_p,
             probes=tuple(
                 Ranked(k, family_of(k, self.library), 0.0, self.probes[k].log_evidence) for k in probe_order
             ),

@@ -23,6 +23,8 @@ class Priors:
 
     null: float = 0.2
     pair: float = 0.15
+    other_form: float = 0.5
+    """Odds of any other form of a law against the library's, where the law is one of an effect's family."""
 
     def log_prior(self, effects: tuple[str, ...], library: Library) -> float:
         if not effects:

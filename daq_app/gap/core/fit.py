@@ -184,6 +184,10 @@ class Score:
     """In log posterior."""
     determined: float
     """How many coefficients of the form the runs determine besides what the fit has already."""
+    coefficient: float = math.nan
+    """Of a form with one coefficient: what the runs alone make of it, in its unit; NaN of others."""
+    error: float = math.nan
+    """Its standard deviation."""
 
 
 def on_top(search: Search, form: str) -> Score:
@@ -191,7 +195,9 @@ def on_top(search: Search, form: str) -> Score:
     count here."""
     effects = np.array([unknown.effect for unknown in search.problem.unknowns])
     asked = effects == form
-    return Score(*search.score(asked, (effects != "") & ~asked))
+    gain, determined, unit, error = search.score(asked, (effects != "") & ~asked)
+    alone = next(q for q in search.problem.unknowns if q.effect == form)
+    return Score(gain, determined, unit * alone.parameter.sd, error * alone.parameter.sd)
 
 
 def _polish(search: Search, linear: Columns) -> bool:

@@ -8,13 +8,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from daq_app.gap.core.decision import FreeForm, Thresholds
-from daq_app.gap.core.effects import Library
+from daq_app.gap.core.decision import Thresholds
+from daq_app.gap.core.effects import Effect, Library
 from daq_app.gap.core.evidence import NULL, Ranked, pair_candidates, rank, strength
 from daq_app.gap.core.features import Run
 from daq_app.gap.core.fit import Fit, effects_of
 from daq_app.gap.core.goodness import Goodness, check
 from daq_app.gap.core.model import Model
+from daq_app.gap.core.other_forms import FreeForm
 from daq_app.gap.core.parallel import FitTask, GlanceTask, OnTopTask, PromiseTask, Workers
 
 Hypothesis = tuple[str, ...]
@@ -292,7 +293,18 @@ class Hypotheses:
             for form in forms
         ]
         scores = self.workers.run(tasks, "free forms") if tasks else []
-        return [FreeForm.of(form, s.gain, s.determined) for form, s in zip(forms, scores, strict=True)]
+        return [
+            FreeForm.of(form, score, self._departed_from(form, best))
+            for form, score in zip(forms, scores, strict=True)
+        ]
+
+    def _departed_from(self, form: Effect, best: Hypothesis) -> float:
+        """The first parameter, in its unit, of the effect of the best hypothesis that a form departs from."""
+        values = self.fits[best].values
+        return max(
+            (abs(values[(e := self.library[n]).key(e.parameters[0])][0]) for n in best if n in form.of),
+            default=0.0,
+        )
 
     def _fit_likely(self, pairs: Sequence[Hypothesis]) -> None:
         if not pairs:

@@ -11,6 +11,7 @@ from typing import Any, Final, Literal
 from daq_app.gap.core.evidence import Ranked
 from daq_app.gap.core.goodness import Goodness
 from daq_app.gap.core.held_out import GapSize
+from daq_app.gap.core.other_forms import FreeForm
 from daq_app.gap.core.where import GapMap
 
 FORMAT_VERSION: Final = 1
@@ -89,10 +90,20 @@ class Diagnosis:
     """Probe → knot → (value, low, high): the non-parametric shape of what is missing."""
     detection: tuple[Detection, ...]
     next_measurement: str
+    free_forms: tuple[FreeForm, ...] = ()
+    """What freer forms of its families gain on top of the best hypothesis."""
+    rest_p: float = 1.0
+    """Chance of the largest departure from the best hypothesis, if that were right."""
     limits: tuple[str, ...] = ()
     """Stated limits: one run only, channels left out, gaps in the record …"""
     seconds: float = 0.0
     notes: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def best(self) -> tuple[str, ...]:
+        """The most probable hypothesis of the library: what was fitted, simulated and held out."""
+        probes = {name for probe in self.probes for name in probe.effects}
+        return next(entry.effects for entry in self.which if not probes.intersection(entry.effects))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, with the keys of the documented format."""

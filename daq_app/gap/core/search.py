@@ -147,9 +147,10 @@ class Search:
         downhill = float(gradient[free] @ np.linalg.solve(hessian[np.ix_(free, free)], gradient[free]))
         return self.objective - 0.5 * downhill
 
-    def score(self, asked: NDArray[np.bool_], named: NDArray[np.bool_]) -> tuple[float, float]:
+    def score(self, asked: NDArray[np.bool_], named: NDArray[np.bool_]) -> tuple[float, float, float, float]:
         """What the `asked` unknowns (a mask) gain in log posterior on top of the others by one linear step,
-        and how many of them the data determine (1 − posterior over prior variance, summed).
+        and how many of them the data determine (1 − posterior over prior variance, summed). Of a single one
+        also its value (0 where it would be beyond its bound) and error by the data alone, in prior sd.
 
         The `named` unknowns give way as far as the data let them: a prior that would rather have their effect
         weaker is no evidence for another form of it.
@@ -165,7 +166,12 @@ class Search:
         free = self._free(slope)[asked]
         variance = np.linalg.inv(own[np.ix_(free, free)])
         left = slope[asked][free]
-        return 0.5 * float(left @ variance @ left), float(np.sum(1.0 - np.diag(variance)))
+        gain, determined = 0.5 * float(left @ variance @ left), float(np.sum(1.0 - np.diag(variance)))
+        if asked.sum() > 1:
+            return gain, determined, math.nan, math.nan
+        seen = max(float(own[0, 0]) - 1.0, 1e-12)  # the prior has a weight of one
+        value = -float(left[0]) / seen if free.any() else 0.0
+        return gain, determined, value, 1.0 / math.sqrt(seen)
 
     def step(self) -> float:
         """One accepted Levenberg–Marquardt step; returns the gain (0 when none was found)."""

@@ -5,9 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from daq_app.gap.core import Effect, Parameter
+from daq_app.gap.core import Confusion, Effect, Parameter
 from daq_app.gap.core.parameters import signed
 from daq_app.gap.rocking_model.vector import PROBE_SPEEDS
+
+_LAWS = ("restitution_slope",)
+_LOSSES = ("viscous", "coulomb")
+_MORE_SPEEDS = "release from lower and from higher levels: how r goes with the speed shows there"
+_MORE_ROTATIONS = "release from lower and from higher levels: how the loss grows with θ shows there"
 
 
 def probes() -> Iterable[Effect]:
@@ -20,6 +25,7 @@ def probes() -> Iterable[Effect]:
         knots + more,
         "r = r₀ + f(v) + s·side + c·n, f piecewise linear",
         "non-parametric",
+        confusable_with=tuple(Confusion(law, _MORE_SPEEDS) for law in _LAWS),
         kind="probe",
     )
     places = [
@@ -39,6 +45,7 @@ def probes() -> Iterable[Effect]:
         tuple(signed(f"t{i}", 0.005, "s", text, linear=True) for i, text in enumerate(places[:6])),
         "times of the fall + f(peak), of the rise − f(peak)",
         "non-parametric",
+        confusable_with=tuple(Confusion(loss, _MORE_ROTATIONS) for loss in _LOSSES),
         kind="probe",
     )
     for family, count in (("wire", 5), ("accelerometer", 2), ("joint", 5), ("base", 2), ("tiltmeter", 3)):
@@ -53,10 +60,6 @@ def probes() -> Iterable[Effect]:
         )
 
 
-_LAWS = ("restitution_slope",)
-_LOSSES = ("viscous", "coulomb")
-
-
 def departures() -> Iterable[Effect]:
     """First steps away from the form of an effect, one coefficient each.
 
@@ -64,19 +67,22 @@ def departures() -> Iterable[Effect]:
     curved one by the square; a damping that is not one number is asked as decrements show it, by amplitude
     and by side. Priors are wide: on top of an effect only the direction counts.
     """
-    yield _departure("slope_power", "restitution", _LAWS, signed("c", 0.6, "1"), "r = r₀ + k v + c v ln v")
+    power = signed("c", 0.6, "1")
+    yield _departure("slope_power", "restitution", _LAWS, power, 2.0, "r = r₀ + k v + c v ln v")
     square = signed("c", 1.0, "s²/rad²")
-    yield _departure("slope_square", "restitution", _LAWS, square, "r = r₀ + k v + c (v − 0.2 rad/s)²")
+    yield _departure("slope_square", "restitution", _LAWS, square, 5.0, "r = r₀ + k v + c (v − 0.2 rad/s)²")
     # Between viscous and Coulomb the library has the pair; a steeper law is neither with a positive share.
     steeper = replace(signed("mu", 0.02, "1"), high=0.0)
-    yield _departure(
-        "loss_power", "dissipation", ("viscous",), steeper, "loss steeper than ω: viscous less a Coulomb part"
-    )
+    words = "loss steeper than ω: viscous less a Coulomb part"
+    yield _departure("loss_power", "dissipation", ("viscous",), steeper, 0.5, words)
     growth, side = signed("zeta", 0.02, "1"), signed("zeta", 0.02, "1")
-    yield _departure("loss_growth", "dissipation", _LOSSES, growth, "loss + damping that grows as ln φ")
-    yield _departure("loss_side", "dissipation", _LOSSES, side, "loss + damping of either side's own, ± ζ")
+    yield _departure("loss_growth", "dissipation", _LOSSES, growth, 0.5, "loss + damping that grows as ln φ")
+    words = "loss + damping of either side's own, ± ζ"
+    yield _departure("loss_side", "dissipation", _LOSSES, side, 1.0, words)
 
 
-def _departure(name: str, family: str, of: tuple[str, ...], one: Parameter, equation: str) -> Effect:
+def _departure(
+    name: str, family: str, of: tuple[str, ...], one: Parameter, typical: float, equation: str
+) -> Effect:
     shape = replace(one, starts=(0.0,))
-    return Effect(name, family, (shape,), equation, "first order", kind="departure", of=of)
+    return Effect(name, family, (shape,), equation, "first order", kind="departure", of=of, typical=typical)

@@ -1,0 +1,112 @@
+"""Another form of the family: how far do the runs bear out the one form that the library has?
+
+A law of nature is no straight line because the library has one. Where an effect is strong its form shows;
+where it is only just there, other forms of its family look the same, and to name it for certain would claim
+too much.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from scipy.stats import chi2
+
+from daq_app.gap.core.effects import Effect, Library
+from daq_app.gap.core.evidence import Ranked, family_of
+from daq_app.gap.core.fit import Score
+
+OWN_FORM: Final = 0.05
+"""Departure from its own form, as a share of what another form's is, that our model of an effect may have."""
+_LARGEST: Final = 300.0
+"""Logarithm of the largest factor that is told from certainty."""
+
+
+@dataclass(frozen=True, slots=True)
+class FreeForm:
+    """Score test of a probe or a departure on top of the best hypothesis."""
+
+    name: str
+    family: str
+    equation: str
+    gain: float
+    """In log posterior."""
+    p_value: float
+    """Of a gain as large by chance, where the named form is the right one."""
+    log_bayes: float = math.nan
+    """Log of how much likelier what is seen is under another form of the family than under the named one.
+    Of a departure only; NaN without."""
+
+    @classmethod
+    def of(cls, form: Effect, score: Score, strength: float = 0.0) -> FreeForm:
+        """`strength`: the effect's own parameter that the form departs from, in its unit.
+
+        Twice the gain is χ² where there is nothing to gain, with as many degrees of freedom as the runs
+        determine coefficients of the form: r at five speeds includes r itself and its slope, which the model
+        or the named form have already. What is determined in part makes the chance a little too large.
+        """
+        known = score.gain > 0.0 and score.determined > 0.0
+        chance = float(chi2.sf(2.0 * score.gain, score.determined)) if known else 1.0
+        return cls(
+            form.name,
+            form.family,
+            form.equation,
+            score.gain,
+            chance,
+            _log_bayes(score, form.typical * abs(strength)),
+        )
+
+
+def _log_bayes(score: Score, typical: float) -> float:
+    """Evidence for a coefficient N(0, typical²) over one of nearly none, each seen with the score's error."""
+    if typical == 0.0 or not math.isfinite(score.error):
+        return math.nan
+    own = score.error**2 + (OWN_FORM * typical) ** 2
+    other = score.error**2 + typical**2
+    return 0.5 * (math.log(own / other) + score.coefficient**2 * (1.0 / own - 1.0 / other))
+
+
+def together(forms: Sequence[FreeForm]) -> float:
+    """Chance of all forms together: the harmonic mean of theirs (Wilson, PNAS 116, 2019); 1 of none.
+
+    A departure and a free form of the same family ask nearly the same, so that Bonferroni's correction would
+    count one question several times; the harmonic mean holds where they ask nearly the same.
+    """
+    return len(forms) / sum(1.0 / max(form.p_value, 1e-300) for form in forms) if forms else 1.0
+
+
+def with_other_forms(
+    ranked: Sequence[Ranked], best: tuple[str, ...], forms: Sequence[FreeForm], library: Library, odds: float
+) -> list[Ranked]:
+    """The hypotheses with "the same, but in another form of its family", which the family's probe stands for.
+
+    `forms` are those on top of the hypothesis `best`; `odds` are the prior odds of any other form against the
+    library's. All other probabilities give way. The other forms have no fit: their evidence is the named
+    form's and the Bayes factor, the mean over the departures of the family.
+    """
+    named = next(entry for entry in ranked if entry.effects == best)
+    factors: dict[str, list[float]] = {}
+    for form in forms:
+        if math.isfinite(form.log_bayes):
+            factors.setdefault(form.family, []).append(math.exp(min(form.log_bayes, _LARGEST)))
+    probes = {probe.family: probe.name for probe in reversed(library.probes)}
+    others = []
+    for family in factors.keys() & probes.keys():
+        factor = sum(factors[family]) / len(factors[family])
+        effects = tuple(
+            dict.fromkeys(sorted(probes[family] if library[n].family == family else n for n in best))
+        )
+        evidence = named.log_evidence + math.log(factor)
+        others.append(
+            Ranked(effects, family_of(effects, library), named.probability * odds * factor, evidence)
+        )
+    total = sum(entry.probability for entry in (*ranked, *others))
+    found = [replace(entry, probability=entry.probability / total) for entry in (*ranked, *others)]
+    return sorted(found, key=lambda r: (-r.probability, len(r.effects), r.effects))
+
+
+def is_other_form(effects: Collection[str], library: Library) -> bool:
+    """Whether a hypothesis is one of another form."""
+    return any(library[name].kind == "probe" for name in effects)
