@@ -11,7 +11,7 @@ from simulated_wall import simulate
 from daq_app.gap.rocking_model.extra_response import bessel
 from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
 from daq_app.gap.rocking_model.rotation import pivots_off, wire_reading, wires_of
-from daq_app.gap.rocking_model.run_features import examine, extract
+from daq_app.gap.rocking_model.run_features import RockingRun, examine, extract
 from daq_app.gap.rocking_model.sensor_blocks import UPRIGHT_RAD, moment_shape, side_of, slip_shape
 
 RATE_HZ = 4000.0
@@ -41,6 +41,28 @@ def test_a_base_that_gives_way_is_found_without_bias() -> None:
     columns = np.column_stack([moment_shape(mean, ALPHA), mean, np.gradient(mean) * GRID_HZ])
     step = np.linalg.lstsq(columns, seen, rcond=None)[0][0]
     assert abs(step - 1.0) < 2e-3
+
+
+def test_a_base_seems_to_move_by_what_calibrations_of_wires_make() -> None:
+    """Four wires a metre and a half up and higher say twice as little of it as five."""
+    (plain,) = simulate({}, (0.35,))
+    levers = []
+    for left_out in ((), ("WP-1",)):
+        run = plain.excluding(left_out)
+        seen = extract(run)
+        changed = []
+        for i in run.indices("wire"):
+            other = replace(run, channels=run.channels.copy())
+            other.channels[i] *= 1.01
+            changed.append((_follows(extract(other)) - _follows(seen)) / 0.01)
+        levers.append(seen.base_lever)
+        assert seen.base_lever == pytest.approx(np.linalg.norm(changed), rel=0.03)
+    assert levers[1] > 2.0 * levers[0]
+
+
+def _follows(run: RockingRun) -> float:
+    block = next(b for b in run.blocks if b.family == "base")
+    return float(block.values[block.names.index("follows rotation")])
 
 
 def test_a_slip_within_an_interval_counts_for_the_part_of_it_that_follows() -> None:

@@ -111,7 +111,7 @@ class RockingModel:
                 linear=True,
             ),
             Parameter(
-                "base_follow", 0.0, 8e-3, "m/rad", meaning="translation from wire calibrations", linear=True
+                "base_follow", 0.0, 4e-3, "1", meaning="translation from wire calibrations", linear=True
             ),
             Parameter("twist_follow", 0.0, 2e-3, "1/m", meaning="twist from LVDT calibrations", linear=True),
             Parameter(

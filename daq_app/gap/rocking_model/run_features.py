@@ -59,6 +59,8 @@ class RockingRun:
     """Height at which an error with the square of a wire's reading looks like one of the rotation."""
     base_bend_m2: float
     """What such an error of all wires makes of the base, over the square of the rotation."""
+    base_lever: float
+    """What the base seems to move by, m per rad, for wires whose calibrations are each off by one."""
     block_loadings: FloatArray
     """(n, k): measurement covariance of the blocks as loadings."""
     notes: tuple[str, ...] = ()
@@ -273,17 +275,23 @@ def _times(
     return values, sds, labels, np.array(places, dtype=np.intp)
 
 
-def _wire_heights(run: GapRun) -> tuple[float, float, float]:
+def _wire_heights(run: GapRun) -> tuple[float, float, float, float]:
     """How a displacement u of every wire, and κ u² of every wire, act on their mean rotation and base.
 
     The mean has the weights z²: Σ z² (u/z) / Σ z² for a displacement, Σ z² (κ z² θ²/z) / Σ z² for κ u².
-    The base is where the straight line through the displacements over z ends.
+    The base is where the straight line through the displacements over z ends; last, how far that seems to
+    move with the rotation where each wire has another calibration: the root of the sum of their squares.
     """
     z = np.array([run.sensors[i].position_m[2] for i in run.indices("wire")])
     if not z.size:
-        return 1.0, 1.0, 0.0
+        return 1.0, 1.0, 0.0, 0.0
     at_base = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
-    return float(np.sum(z**2) / np.sum(z)), float(np.sum(z**3) / np.sum(z**2)), float(at_base @ z**2)
+    return (
+        float(np.sum(z**2) / np.sum(z)),
+        float(np.sum(z**3) / np.sum(z**2)),
+        float(at_base @ z**2),
+        float(np.linalg.norm(at_base * z)),
+    )
 
 
 def _from_peak_error(swings: sw.Swings, survey: Survey, ka: int, a: int, kb: int, b: int) -> float:

@@ -50,13 +50,13 @@ def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
     drift = values.get("drift@wire.rate", 0.0) / run.wire_height_m if name == "wire" else 0.0
     offset = values["zero"] + drift * (run.swings.peak_s - rest)
     levels = side[:, None] * run.swings.levels
-    lost: FloatArray | float = 0.0
-    if slow := _second_order(values, name):
-        acceleration = -(values["p"] ** 2) * np.sin(values["alpha"] - np.abs(peaks)) * side
-        lost = np.where(np.arange(peaks.size) > 0, slow * acceleration, 0.0)
-    true = (peaks - offset - _bent(run, values, peaks) - lost) / gain
+    # A delay moves peaks and crossings alike; what a response rounds beyond it goes with the acceleration.
+    slow = _second_order(values, name) * values["p"] ** 2
+    rounded = [-slow * np.sign(seen) * np.sin(values["alpha"] - np.abs(seen)) for seen in (peaks, levels)]
+    rounded[0][0] = 0.0  # it is held there
+    true = (peaks - offset - _bent(run, values, peaks) - rounded[0]) / gain
     true[0] += side[0] * values["theta0"]
-    behind = (levels - offset[:, None] - _bent(run, values, levels)) / gain[:, None]
+    behind = (levels - offset[:, None] - _bent(run, values, levels) - rounded[1]) / gain[:, None]
     return true, np.abs(behind)
 
 
@@ -353,7 +353,8 @@ def _release(run: RockingRun, block: Block, values: Mapping[str, float]) -> Floa
 
 
 def _base(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
-    found = values["base_follow"] * _unit(run, block, "theta", lambda: run.grid.theta)
+    follow = values["base_follow"] * run.base_lever
+    found = follow * _unit(run, block, "theta", lambda: run.grid.theta)
     total: FloatArray = found + values.get("sliding.c", 0.0) * _unit(
         run, block, "slip", partial(slip_shape, run.grid)
     )
