@@ -243,6 +243,17 @@ def test_one_slow_lvdt_is_examined_on_its_own_before_it_shifts_the_times_of_impa
     assert _value(runs[0], "LV-B09", "lag") == pytest.approx(8e-4, abs=1.5e-4)
 
 
+def test_a_very_slow_lvdt_at_the_end_of_its_row_is_told_from_its_neighbours() -> None:
+    """It moves what three others are predicted by more than it leaves of its own fault."""
+    runs = _prepared({"slow_response@LV-A12": {"tau": 0.03}, "base_tilt": {"beta": 0.0024}})
+    assert found_channels(runs) == {"LV-A12": "lvdt"}
+    assert found_marks(runs) == {}
+
+
+def test_a_wire_that_is_half_a_millisecond_late_is_examined_on_its_own() -> None:
+    assert found_channels(_prepared({"lag@WP-5": {"tau": 5e-4}})) == {"WP-5": "wire"}
+
+
 def test_ring_down_and_floor_are_seen_at_their_frequency() -> None:
     runs = _prepared(
         {

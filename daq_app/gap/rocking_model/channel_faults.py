@@ -42,6 +42,9 @@ every reading, and its base the same to all. The base stands still as far as a w
 _STILL = (3.2e-3, 3e-4, 0.02, 1.2e-5, 5e-4)
 """How still a base stands, in those shapes, in m and at a reading of one: as far as a wire a metre up is
 right, and a pivot 40 mm further in makes 0.02 of the square, whatever wires do."""
+LOOKED_AT = 6
+"""The channels that are off most, of which any may be the wrong one: at the end of a row it moves what its
+neighbours are predicted by more than they leave of its own fault."""
 SCREENED = 3
 """Runs that are looked at before all are."""
 
@@ -92,7 +95,7 @@ def suspects(
         if not order:
             continue
         together = _together(usable, family)
-        alone = None if together else _alone(usable, family, order[:3])
+        alone = None if together else _alone(usable, family, order[:LOOKED_AT])
         if together:
             several[family] = together
         elif alone is not None:
