@@ -81,13 +81,19 @@ def perfect(label: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
         {
             "name": f"{e['name']}.{COMPARABLE.get(e['name'], key)}",
             "value": 1.01 * value,
-            "low": (1.01 - width) * value,
-            "high": (1.01 + width) * value,
+            "low": 1.01 * value - width * abs(value),
+            "high": 1.01 * value + width * abs(value),
         }
         for e in label["effects"]
         for key, value in ((k, comparable(e["name"], v)) for k, v in e["parameters"].items())
     ]
     return claim(names, 0.97, effect_parameters=parameters)
+
+
+def test_a_clock_is_compared_as_the_design_counts_it() -> None:
+    """4266.67 Hz taken for 4000 Hz: a rate 1/15 too high, and a time between samples that is 1/16 shorter."""
+    assert comparable("clock", 1.0 / 15.0) == pytest.approx(-1.0 / 16.0)
+    assert comparable("viscous", 0.01) == 0.01
 
 
 def always_viscous(label: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:

@@ -66,14 +66,21 @@ COMPARABLE: Final[dict[str, str]] = {
     "clock": "error",
 }
 """Effects whose strength can be compared between the generator and a result, and its name there."""
-_OF_THE_LABEL: Final[dict[str, float]] = {"slow_release": 0.5}
-"""Where the two count differently: what a result's number is of the label's. The world's force falls evenly
-until τ; a result's τ is the mean time of the force, whatever its form, and that of an even one is half."""
 
 
 def comparable(effect: str, label_value: float) -> float:
-    """The strength in a label as a result counts it."""
-    return label_value * _OF_THE_LABEL.get(effect, 1.0)
+    """The strength in a label as a result counts it, where the two count differently.
+
+    The world's force of a slow release falls evenly until τ; a result's τ is the mean time of the force,
+    whatever its form, and that of an even one is half. The world's clock runs at a rate that is wrong by its
+    error; a result's t' = (1 + ε) t (design) is of the time that passes between two samples.
+    """
+    match effect:
+        case "slow_release":
+            return 0.5 * label_value
+        case "clock":
+            return 1.0 / (1.0 + label_value) - 1.0
+    return label_value
 
 
 def base_name(name: str) -> str:
