@@ -38,6 +38,9 @@ class Case:
 L1 = Recorded((0.15,))
 FOUR = Recorded((0.15, -0.25, 0.35, 0.40))
 REPEATED = Recorded((*FOUR.levels, -0.15, 0.25))
+MANY = Recorded(
+    (*FOUR.levels, *(sign * level for level in (0.1, 0.2, 0.3, 0.35, 0.4, 0.45) for sign in (1, -1)))
+)
 _LEVELS = "three tests at higher levels, to both sides"
 _STEP = "a step or a knock on the sensor"
 _ONE = "one test, L1"
@@ -125,6 +128,16 @@ def _others() -> list[Case]:
     ]
 
 
+def _forms() -> list[Case]:
+    """Laws that are just there, so that another form of their family would leave the same runs."""
+    four, words = "four tests, L1 to L4", "twelve tests more, from a tenth to 0.45 of α"
+    lower = "release from lower and from higher levels"
+    return [
+        _case("restitution_slope", 0.035, "free_restitution", lower, FOUR, four, MANY, words),
+        _case("viscous", 0.0015, "free_dissipation", lower, FOUR, four, MANY, words),
+    ]
+
+
 _LEVEL_WORDS = "a level on the base, ± 0.05 mrad"
-CASES = {case.name: case for case in (*_both(), *_others())}
-"""By the truth's name."""
+CASES = {case.name: case for case in (*_both(), *_others())} | {f"{c.name}.form": c for c in _forms()}
+"""By the truth's name; where it is the form that is asked for, with `.form` behind it."""

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import pytest
+from scipy.stats import norm
 from test_gap_core_departures import BEND, BendingModel
 from toy_wave import LIBRARY, make_runs
 
@@ -28,8 +29,8 @@ def diagnosed(seed: int, library: Library = FORMS, **hidden: float) -> Diagnosis
 
 def test_an_effect_that_is_only_just_there_may_have_another_form() -> None:
     """The same runs: named for certain without the departure, which no r(a) of 6 sd deserves."""
-    weak = diagnosed(2, slope_k=0.02)
-    assert diagnosed(2, LIBRARY, slope_k=0.02).decision.confidence > 0.95
+    weak = diagnosed(3, slope_k=0.015)
+    assert diagnosed(3, LIBRARY, slope_k=0.015).decision.confidence > 0.95
     shared = {entry.effects: entry.probability for entry in weak.which}
     assert 0.1 < shared[("free",)] < 0.6
     assert weak.decision.verdict == "cannot_tell"
@@ -62,11 +63,14 @@ def _form(coefficient: float, error: float, strength: float = 1.0) -> FreeForm:
 
 
 def test_evidence_for_another_form_is_that_of_a_coefficient_of_its_size() -> None:
-    own, other = 1.0 + (OWN_FORM * 3.0) ** 2, 1.0 + 3.0**2
-    expected = 0.5 * math.log(own / other) + 0.5 * 4.0 * (1.0 / own - 1.0 / other)
-    assert _form(2.0, 1.0, -2.0).log_bayes == pytest.approx(expected)
-    assert _form(0.0, 1e-6).log_bayes == pytest.approx(math.log(OWN_FORM), abs=0.01), "as our model is"
+    own, other = math.hypot(1.0, OWN_FORM * 3.0), math.hypot(1.0, 1.5)
+    named = norm.pdf(2.0, 0.0, own)
+    elsewhere = 0.5 * (norm.pdf(2.0, -3.0, other) + norm.pdf(2.0, 3.0, other))
+    assert _form(2.0, 1.0, -2.0).log_bayes == pytest.approx(math.log(elsewhere / named))
     assert _form(0.0, 1e3).log_bayes == pytest.approx(0.0, abs=1e-3), "what cannot be seen says nothing"
+    small = [_form(0.02 * 1.5, error).log_bayes for error in (1.0, 0.3, 0.05, 1e-6)]
+    assert small == sorted(small, reverse=True)
+    assert -5.0 < small[-1] < -4.0, "no surer of its form than our model of it is good"
     assert math.isnan(FreeForm.of(BEND, Score(1.0, 1.0, 2.0, 1.0), 1.0).log_bayes), "its size is not known"
     assert math.isnan(FreeForm.of(PROBE, Score(1.0, 3.0), 1.0).log_bayes)
 

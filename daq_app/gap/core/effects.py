@@ -40,7 +40,7 @@ class Effect:
     of: tuple[str, ...] = ()
     """Of a departure: the effects whose forms it departs from."""
     typical: float = 0.0
-    """Of a departure: its coefficient (one sd) where the family has another form, per unit of the first
+    """Of a departure: size of its coefficient where the family has another form, per unit of the first
     parameter of the effect that it departs from. Without it the departure says nothing of that."""
     null_value: Mapping[str, float] = field(default_factory=dict)
     """Parameter values at which the effect vanishes; 0 for each that is not listed."""

@@ -12,7 +12,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from scipy.stats import chi2
+import numpy as np
+from scipy.stats import chi2, norm
 
 from daq_app.gap.core.effects import Effect, Library
 from daq_app.gap.core.evidence import Ranked, family_of
@@ -60,12 +61,16 @@ class FreeForm:
 
 
 def _log_bayes(score: Score, typical: float) -> float:
-    """Evidence for a coefficient N(0, typical²) over one of nearly none, each seen with the score's error."""
+    """Evidence for a coefficient of ± `typical`, half of it its sd, over one of nearly none.
+
+    Each is seen with the score's error. Another form is no form that departs by next to nothing.
+    """
     if typical == 0.0 or not math.isfinite(score.error):
         return math.nan
-    own = score.error**2 + (OWN_FORM * typical) ** 2
-    other = score.error**2 + typical**2
-    return 0.5 * (math.log(own / other) + score.coefficient**2 * (1.0 / own - 1.0 / other))
+    own = math.hypot(score.error, OWN_FORM * typical)
+    other = math.hypot(score.error, 0.5 * typical)
+    sides = [norm.logpdf(score.coefficient, side * typical, other) for side in (-1.0, 1.0)]
+    return float(np.logaddexp(*sides) - math.log(2.0) - norm.logpdf(score.coefficient, 0.0, own))
 
 
 def together(forms: Sequence[FreeForm]) -> float:

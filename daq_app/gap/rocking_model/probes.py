@@ -68,17 +68,17 @@ def departures() -> Iterable[Effect]:
     and by side. Priors are wide: on top of an effect only the direction counts.
     """
     power = signed("c", 0.6, "1")
-    yield _departure("slope_power", "restitution", _LAWS, power, 2.0, "r = r₀ + k v + c v ln v")
+    yield _departure("slope_power", "restitution", _LAWS, power, 2.4, "r = r₀ + k v + c v ln v")
     square = signed("c", 1.0, "s²/rad²")
-    yield _departure("slope_square", "restitution", _LAWS, square, 5.0, "r = r₀ + k v + c (v − 0.2 rad/s)²")
+    yield _departure("slope_square", "restitution", _LAWS, square, 6.0, "r = r₀ + k v + c (v − 0.2 rad/s)²")
     # Between viscous and Coulomb the library has the pair; a steeper law is neither with a positive share.
     steeper = replace(signed("mu", 0.02, "1"), high=0.0)
     words = "loss steeper than ω: viscous less a Coulomb part"
-    yield _departure("loss_power", "dissipation", ("viscous",), steeper, 0.5, words)
+    yield _departure("loss_power", "dissipation", ("viscous",), steeper, 0.6, words)
     growth, side = signed("zeta", 0.02, "1"), signed("zeta", 0.02, "1")
-    yield _departure("loss_growth", "dissipation", _LOSSES, growth, 0.5, "loss + damping that grows as ln φ")
+    yield _departure("loss_growth", "dissipation", _LOSSES, growth, 0.6, "loss + damping that grows as ln φ")
     words = "loss + damping of either side's own, ± ζ"
-    yield _departure("loss_side", "dissipation", _LOSSES, side, 1.0, words)
+    yield _departure("loss_side", "dissipation", _LOSSES, side, 1.2, words)
 
 
 def _departure(
