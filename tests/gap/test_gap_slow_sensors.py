@@ -156,6 +156,18 @@ def test_the_transfer_of_a_response_is_what_it_does_to_a_wave() -> None:
     assert late == pytest.approx(np.exp(-rate * 0.01))
 
 
+def test_wires_swing_on_their_springs_after_a_slip_too() -> None:
+    """A base that slips by 2 mm in an instant rings every wire that has a spring, as an impact does."""
+    _, predicted, off = _bending(
+        {"sliding": {"c": 0.008}, "wire_inertia@wire": {"frequency": 15.0, "zeta": 0.09}}
+    )
+    wires = {name: values for name, values in off.items() if name.endswith("wires")}
+    assert len(wires) == 2
+    for name, (error, sd) in wires.items():
+        assert abs(error) < 4.0 * sd, name
+    assert np.abs(predicted[:2]).max() > 0.05
+
+
 @pytest.mark.parametrize("effect", ["slow_response@lvdt", "filter_delay@lvdt"])
 def test_a_slow_reference_moves_crossings_as_it_moves_peaks(effect: str) -> None:
     """What a response rounds beyond its delay goes with the acceleration, which is there at crossings too.

@@ -107,7 +107,10 @@ def decide(material: Material, thresholds: Thresholds) -> tuple[Decision, str]:
     weakest = min(strength(fit, library[name]) for name in best.effects)
     null = next((a.probability for a in material.answers if not a.effects), 0.0)
     others = tuple(r.effects for r in best.alternatives[1:])
-    if weakest < thresholds.minimum_strength and null > 1e-3:
+    members = credible_set(material.answers)
+    # Too weak to be sure that it is there at all; or it is there, and which of several it is stays open.
+    unseen = any(not a.effects for a in members) or best.probability >= thresholds.name_probability
+    if weakest < thresholds.minimum_strength and null > 1e-3 and unseen:
         sentence = (
             f"{words} fits best, but at {weakest:.1f} posterior sd it is below detection "
             f"(nothing missing: {100 * null:.0f} %)."
@@ -116,7 +119,6 @@ def decide(material: Material, thresholds: Thresholds) -> tuple[Decision, str]:
         return Decision(
             "below_detection", best.effects, best.first.family, sentence, best.probability, others
         ), advice
-    members = credible_set(material.answers)
     if best.probability >= thresholds.name_probability or len(members) == 1:
         verdict: Verdict = "effect" if len(best.effects) == 1 else "pair"
         sentence = f"{words} ({best.first.family}) explains the gap, probability {best.probability:.3f}."

@@ -125,6 +125,11 @@ def _family_keys(family: str) -> dict[str, None]:
 def _family_difference(run: RockingRun, family: str, values: Mapping[str, float]) -> FloatArray | None:
     """What a family's sensor effects add to the rotation it shows, on the grid; None for nothing."""
     shown = run.grid.theta
+    if family == "wire" and family != run.reference and "sliding.c" in values:
+        # A slip is a step to whatever the wires answer with.
+        if "slips" not in run.cache:
+            run.cache["slips"] = slip_shape(run.grid) / run.wire_height_m
+        shown = shown + values["sliding.c"] * run.cache["slips"]
     total = _added(run, family, values, shown)
     if total is None or family != run.reference:
         return total
