@@ -118,7 +118,7 @@ def _print(result: Diagnosis) -> None:
     table = Table("hypothesis", "family", "probability", "log evidence")
     for entry in result.which[:6]:
         table.add_row(
-            " + ".join(entry.effects) or "nothing missing",
+            result.in_words(entry.effects),
             entry.family,
             f"{entry.probability:.3f}",
             f"{entry.log_evidence:.1f}",

@@ -98,7 +98,7 @@ def _pictures(result: Diagnosis, shown: Sequence[Trace], maps: Sequence[ProbeMap
 def _draw_traces(figure: Any, result: Diagnosis, shown: Sequence[Trace]) -> None:
     panels = figure.subplots(2, len(shown), squeeze=False, height_ratios=(2.0, 1.0))
     for column, trace in enumerate(shown):
-        name = draw.effect_name(result.best)
+        name = result.in_words(result.best)
         draw.draw_trace(panels[0, column], panels[1, column], trace, name)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -19,11 +19,6 @@ _KNOT: Final = re.compile(r"^(.*?) at ([\d.]+) (.+)$")
 _MOST_SENSOR_ROWS: Final = 7
 
 Shape = Mapping[str, tuple[float, float, float]]
-
-
-def effect_name(effects: Sequence[str]) -> str:
-    """The hypothesis in words."""
-    return " + ".join(effects) or "nothing missing"
 
 
 def map_table(found: GapMap) -> tuple[list[str], list[str], np.ndarray]:
@@ -70,7 +65,7 @@ def draw_evidence(axes: Axes, result: Diagnosis, most: int = 9) -> None:
     ranked = sorted(result.which, key=lambda r: -r.log_evidence)[:most][::-1]
     best = ranked[-1].log_evidence
     lengths = [max(r.log_evidence - best, -60.0) for r in ranked]
-    names = [effect_name(r.effects) for r in ranked]
+    names = [result.in_words(r.effects) for r in ranked]
     colours = [AFTER if r.effects == result.best else BEFORE for r in ranked]
     axes.barh(range(len(ranked)), [length + 60.0 for length in lengths], left=-60.0, color=colours)
     axes.set_yticks(range(len(ranked)), names, fontsize=7)

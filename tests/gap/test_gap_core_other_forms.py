@@ -38,6 +38,7 @@ def test_an_effect_that_is_only_just_there_may_have_another_form() -> None:
     assert "slope from another form of loss" in weak.decision.sentence
     assert MORE in weak.next_measurement
     assert weak.best == ("slope",)
+    assert weak.in_words(("free", "kick")) == "another form of loss + kick"
     assert {estimate.name for estimate in weak.effect_parameters} == {"slope.k"}
 
 

@@ -105,6 +105,12 @@ class Diagnosis:
         probes = {name for probe in self.probes for name in probe.effects}
         return next(entry.effects for entry in self.which if not probes.intersection(entry.effects))
 
+    def in_words(self, effects: tuple[str, ...]) -> str:
+        """A hypothesis as people read it: a probe stands for another form of its family."""
+        families = {name: probe.family for probe in self.probes for name in probe.effects}
+        words = [f"another form of {families[name]}" if name in families else name for name in effects]
+        return " + ".join(words) or "nothing missing"
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data, with the keys of the documented format."""
         data = asdict(self)
