@@ -300,11 +300,10 @@ class Hypotheses:
 
     def _departed_from(self, form: Effect, best: Hypothesis) -> float:
         """The first parameter, in its unit, of the effect of the best hypothesis that a form departs from."""
-        values = self.fits[best].values
-        return max(
-            (abs(values[(e := self.library[n]).key(e.parameters[0])][0]) for n in best if n in form.of),
-            default=0.0,
-        )
+        values, largest = self.fits[best].values, 0.0
+        for effect in (self.library[name] for name in best if name in form.of):
+            largest = max(largest, abs(values.get(effect.key(effect.parameters[0]), (0.0,))[0]))
+        return largest
 
     def _fit_likely(self, pairs: Sequence[Hypothesis]) -> None:
         if not pairs:

@@ -17,6 +17,7 @@ from daq_app.gap.rocking_model.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.records import Survey
 from daq_app.gap.rocking_model.repeatability import biases
 from daq_app.gap.rocking_model.run_features import RockingRun
+from daq_app.gap.rocking_model.true_motion import pause_at_impact, true_rotations
 from daq_app.gap.rocking_model.vector import acts_on, half_cycle_table, kernel_vector, restitution_of
 from sim_hardware.dynamics import shooting
 
@@ -201,13 +202,13 @@ class RockingModel:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Times (T,), log peaks (P,) and d ln speed / d ln peak (P,)."""
         key, vector, clock = kernel_vector(run, values)
-        true, levels = response.true_rotations(run, values)
+        true, levels = true_rotations(run, values)
         table = self._half_cycles(run, vector, true, levels, key)
         table = with_uneven_loss(run, values, vector, true, levels, table)
         count = levels.shape[1]
         first = shooting.FIRST_CROSSING
         speeds_out, speeds_in = table[:, shooting.SPEED_OUT], table[:, shooting.SPEED_IN]
-        pause = response.pause_at_impact(values, speeds_out)
+        pause = pause_at_impact(values, speeds_out)
         # Crossings as times from their own peak: positive in the fall, negative in the rise.
         crossings = table[:, first : first + 2 * count].copy()
         crossings[:, count:] *= -1.0
