@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from toy_wave import LIBRARY, DecayModel, make_runs
 
-from daq_app.gap.core import CannotDiagnose, Confusion, Effect, Library, Options, diagnose, fit
+from daq_app.gap.core import CannotDiagnose, Confusion, Library, Options, diagnose, fit
 from daq_app.gap.core.fit import glance, searches_from
 from daq_app.gap.core.parallel import Interrupted
-from daq_app.gap.core.parameters import signed
 
 FAST = Options()
 
@@ -130,15 +129,8 @@ class Twins(DecayModel):
 
 TWINS = Library(
     [
-        Effect(
-            "slope",
-            "loss",
-            (signed("k", 0.1),),
-            "r + k (a − ½)",
-            "test",
-            confusable_with=(Confusion("twin", "Fit a torque sensor at the hinge."),),
-        ),
-        Effect("twin", "loss", (signed("k", 0.1),), "same", "test"),
+        replace(LIBRARY["slope"], confusable_with=(Confusion("twin", "Fit a torque sensor at the hinge."),)),
+        replace(LIBRARY["slope"], name="twin", confusable_with=()),
         LIBRARY["shift"],
     ]
 )

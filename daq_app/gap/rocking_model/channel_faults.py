@@ -38,7 +38,7 @@ STRUCTURE = 0.5
 """Excess of the logarithm of what remains over noise from which a channel is suspect for it alone."""
 _POWERS = (1, 1, 2, 0, 1)
 """Of a wire's shapes: the power of its reading that they go with. The wall's rotation θ adds height × f(θ) to
-every reading, and its base the same to all. The base stands still as far as a wire a metre up is right."""
+every reading, and its base the same to all."""
 _STILL = (3.2e-3, 3e-4, 0.02, 1.2e-5, 5e-4)
 """How still a base stands, in those shapes, in m and at a reading of one: as far as a wire a metre up is
 right, and a pivot 40 mm further in makes 0.02 of the square, whatever wires do."""

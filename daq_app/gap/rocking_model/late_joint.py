@@ -58,6 +58,5 @@ def in_step(joint: Rotation, grid: Grid, rate_hz: float) -> InStep:
         lift=sooner(joint.lift, early),
         twist=sooner(joint.twist, early),
     )
-    distance = np.abs(grid.time_s[:, None] - grid.impact_s).min(axis=1, initial=np.inf)
-    apart = distance > MASK_S + abs(late_s)
+    apart = grid.from_impact_s > MASK_S + abs(late_s)
     return InStep(moved, replace(grid, theta=coarse(moved.theta, rate_hz)), apart, early / rate_hz)

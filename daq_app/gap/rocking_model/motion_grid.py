@@ -38,9 +38,8 @@ class Grid:
     theta: FloatArray
     omega: FloatArray
     alpha: FloatArray
-    near_impact: NDArray[np.bool_]
-    settled: NDArray[np.bool_]
-    """Where a base that gives way has followed: how its step comes about looks like a delay of the wires."""
+    from_impact_s: FloatArray
+    """Time to the nearest impact, before or after it; infinite without any."""
     valid: NDArray[np.bool_]
     impact_s: FloatArray
     """Impacts as the reference rotation has them, s from release, up to where half-cycles can be told."""
@@ -54,6 +53,17 @@ class Grid:
     """Jump of θ̇ at each impact, rad/s."""
     approach: FloatArray
     """θ̇ just before each impact, rad/s."""
+
+    @property
+    def near_impact(self) -> NDArray[np.bool_]:
+        """Where an impact spoils accelerations, (m,)."""
+        return np.asarray(self.from_impact_s < MASK_S)
+
+    @property
+    def settled(self) -> NDArray[np.bool_]:
+        """Where a base that gives way has followed, (m,): how its step comes about looks like a delay of the
+        wires."""
+        return np.asarray(self.from_impact_s > SETTLING_S)
 
 
 def coarse(values: FloatArray, rate_hz: float) -> FloatArray:
@@ -94,7 +104,6 @@ def make_grid(
         alpha[whole] = fitted.deriv(2)(position) * scale**2
     time_s = coarse(np.arange(n) / rate_hz, rate_hz) - swings.release_s
     impact_s = np.array(crossings) / rate_hz - swings.release_s
-    distance = np.abs(time_s[:, None] - impact_s[None, :]).min(axis=1) if impact_s.size else time_s + 1e9
     good = coarse(valid.astype(float), rate_hz) > 0.999
     rotation, rate, acceleration = (coarse(v, rate_hz) for v in (smooth, omega, alpha))
     before, after = _speeds(np.abs(rotation), rate, time_s, impact_s, survey)
@@ -104,8 +113,7 @@ def make_grid(
         rotation,
         rate,
         acceleration,
-        near_impact=distance < MASK_S,
-        settled=distance > SETTLING_S,
+        from_impact_s=np.abs(time_s[:, None] - impact_s[None, :]).min(axis=1, initial=np.inf),
         valid=good,
         impact_s=impact_s,
         raw=coarse(theta, rate_hz),
