@@ -19,11 +19,11 @@ import psutil
 
 from benchmarks.figure import Figure
 from daq_app.acquisition import AcquisitionProcess
-from daq_app.acquisition.items import Begin, End, Item, Lost, SourceEnded, Started
-from daq_app.acquisition.messages import HealthMessage, State, StateMessage
-from daq_app.acquisition.reader import Reader
-from daq_app.acquisition.recorder import Recorder
-from daq_app.acquisition.simulated import SimulatedServer
+from daq_app.acquisition.messages.items import Begin, End, Item, Lost, SourceEnded, Started
+from daq_app.acquisition.messages.published import HealthMessage, State, StateMessage
+from daq_app.acquisition.pipeline.reader import Reader
+from daq_app.acquisition.pipeline.recorder import Recorder
+from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.config import load_rig, plan_tasks
 from daq_app.runfile import RunHeader
 from drivers import open_driver

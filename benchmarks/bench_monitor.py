@@ -30,10 +30,10 @@ class Bench:
     """A window, its acquisition and its wall."""
 
     def __init__(self, folder: Path) -> None:
-        from daq_app.acquisition.launcher import AcquisitionProcess
-        from daq_app.acquisition.messages import State
-        from daq_app.monitor.app import application, open_window
-        from daq_app.monitor.settings import WindowSettings
+        from daq_app.acquisition.messages.published import State
+        from daq_app.acquisition.viewers.launcher import AcquisitionProcess
+        from daq_app.monitor.widgets.settings import WindowSettings
+        from daq_app.monitor.window.app import application, open_window
         from sim_hardware.control import SimControl
 
         self.app = application()

@@ -34,7 +34,7 @@ import sys, threading, time, psutil
 from pathlib import Path
 from daq_app.config import load_rig
 from daq_app.runfile.importers import import_file
-import daq_app.runfile.importers.from_tdms, daq_app.runfile.saving
+import daq_app.runfile.importers.formats.from_tdms, daq_app.runfile.integrity.saving
 rig, source, out = map(Path, sys.argv[1:])
 process = psutil.Process()
 before = peak = process.memory_info().rss

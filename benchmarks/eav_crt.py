@@ -24,8 +24,9 @@ from scipy.signal import butter, sosfiltfilt
 from daq_app.config import load_rig, plan_tasks
 from daq_app.config.rig import Rig
 from daq_app.config.scaling import Scaling
-from daq_app.rocking import AnalysisOptions, TestAnalysis, TestRecord, VelocityFilter, analyse_record, theory
-from daq_app.rocking.filtered_peaks import filtered_peaks
+from daq_app.rocking import AnalysisOptions, TestAnalysis, TestRecord, VelocityFilter, analyse_record
+from daq_app.rocking.motion.filtered_peaks import filtered_peaks
+from daq_app.rocking.theory import classic as theory
 from sim_hardware.direct import synthesise_test
 from sim_hardware.dynamics.effects import MOTION_EFFECTS
 from sim_hardware.sensors.effects import SENSOR_EFFECTS

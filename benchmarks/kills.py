@@ -25,8 +25,8 @@ from benchmarks.marked_check import check_marked
 from benchmarks.marked_recording import RIG, command_line, console, marked_server, write_report
 from benchmarks.processes import free_the_hardware, quick_context
 from daq_app.acquisition import AcquisitionClient, read_session_file
-from daq_app.acquisition.messages import HealthMessage
-from daq_app.acquisition.process import run_and_exit
+from daq_app.acquisition.messages.published import HealthMessage
+from daq_app.acquisition.process.process import run_and_exit
 from daq_app.config import load_rig
 from daq_app.runfile import open_run, verify
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from rich.console import Console
 
-from daq_app.acquisition.simulated import SimulatedServer
+from daq_app.acquisition.process.simulated import SimulatedServer
 
 RIG: Final = Path(__file__).parents[1] / "configs" / "fr1.toml"
 

@@ -17,7 +17,8 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.runfile import JournalWriter, RunHeader, journal, read_journal
+from daq_app.runfile import JournalWriter, RunHeader, read_journal
+from daq_app.runfile.journal import writer as journal
 
 _PAGE: Final = 4096
 _CHANNELS: Final = 8

@@ -18,7 +18,11 @@ def quick_context() -> ForkServerContext | SpawnContext:
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(
-        ["daq_app.acquisition.process", "daq_app.acquisition.session", "drivers.nidaqmx_driver"]
+        [
+            "daq_app.acquisition.process.process",
+            "daq_app.acquisition.session.session",
+            "drivers.nidaqmx_driver",
+        ]
     )
     return context
 

@@ -29,7 +29,7 @@ from rich.table import Table
 from benchmarks.marked_check import check_marked
 from benchmarks.marked_recording import RIG, command_line, console, marked_server, write_report
 from daq_app.acquisition import AcquisitionClient, AcquisitionProcess
-from daq_app.acquisition.messages import EventMessage, HealthMessage, State, StateMessage
+from daq_app.acquisition.messages.published import EventMessage, HealthMessage, State, StateMessage
 from daq_app.config import load_rig
 from daq_app.runfile import Gap, open_run, verify
 from sim_hardware.control import SimControl

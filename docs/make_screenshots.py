@@ -15,12 +15,12 @@ from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
-from daq_app.acquisition.launcher import AcquisitionProcess
-from daq_app.acquisition.messages import State
-from daq_app.cli.run_simulate import simulate_run
-from daq_app.monitor.app import application, open_window
-from daq_app.monitor.main_window import MainWindow
-from daq_app.monitor.settings import WindowSettings
+from daq_app.acquisition.messages.published import State
+from daq_app.acquisition.viewers.launcher import AcquisitionProcess
+from daq_app.cli.record.simulate import simulate_run
+from daq_app.monitor.widgets.settings import WindowSettings
+from daq_app.monitor.window.app import application, open_window
+from daq_app.monitor.window.main_window import MainWindow
 from sim_hardware.control import SimControl
 
 REPOSITORY = Path(__file__).parents[1]

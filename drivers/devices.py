@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from daq_app.config.plan import TaskPlan
+from daq_app.config.planning.plan import TaskPlan
 from drivers.connection import Connection
 from drivers.protocol import DeviceInfo, DriverError
 

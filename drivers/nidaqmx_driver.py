@@ -11,7 +11,7 @@ import nidaqmx
 import numpy as np
 from nidaqmx import errors as ni_errors
 
-from daq_app.config.plan import TaskPlan
+from daq_app.config.planning.plan import TaskPlan
 from drivers.clock_line import ClockLine
 from drivers.connection import Connection
 from drivers.devices import Inspection, check_devices

@@ -13,7 +13,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.config.plan import TaskPlan
+from daq_app.config.planning.plan import TaskPlan
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.config.plan import TaskPlan
+from daq_app.config.planning.plan import TaskPlan
 from drivers.protocol import Block, DriverError, Opened
 
 

@@ -9,7 +9,7 @@ from nidaqmx.constants import ReadRelativeTo
 from nidaqmx.stream_readers import AnalogMultiChannelReader
 from numpy.typing import NDArray
 
-from daq_app.config.plan import PlannedTask
+from daq_app.config.planning.plan import PlannedTask
 from drivers.protocol import DriverError
 from drivers.tasks import virtual_name
 

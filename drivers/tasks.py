@@ -22,7 +22,7 @@ from nidaqmx.constants import (
     VoltageUnits,
 )
 
-from daq_app.config.plan import PlannedTask
+from daq_app.config.planning.plan import PlannedTask
 from daq_app.config.rig import Channel
 from daq_app.config.units import G_M_S2
 from drivers.connection import Connection

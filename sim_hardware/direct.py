@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.config import catalogue
-from daq_app.config.inventory import devices_of
-from daq_app.config.plan import PlannedChannel, TaskPlan
+from daq_app.config.hardware import catalogue
+from daq_app.config.hardware.inventory import devices_of
+from daq_app.config.planning.plan import PlannedChannel, TaskPlan
 from daq_app.config.rig import Channel, Rig
 from sim_hardware.daqmx_server.converter import Converter
 from sim_hardware.sensors.rows import excitation_v

@@ -1,6 +1,6 @@
 """``python -m daq_app.acquisition``: the acquisition process."""
 
-from daq_app.acquisition.process import main
+from daq_app.acquisition.process.process import main
 
 if __name__ == "__main__":
     raise SystemExit(main())

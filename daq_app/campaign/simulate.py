@@ -20,8 +20,8 @@ from typing import Final
 import numpy as np
 import psutil
 
-from daq_app.acquisition.offline import Readings, record_offline
-from daq_app.acquisition.tare import NotSteady
+from daq_app.acquisition.course.tare import NotSteady
+from daq_app.acquisition.session.offline import Readings, record_offline
 from daq_app.campaign.plan import Campaign
 from daq_app.config import ConfigError, Problem, Rig, TaskPlan, load_rig, plan_tasks
 from daq_app.runfile import RunFileError

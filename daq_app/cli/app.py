@@ -34,17 +34,17 @@ _COMMANDS: Final[Mapping[str, _Entry]] = {
     ),
     "config": _Entry(("config_commands",), "Check and show rig files."),
     "run": _Entry(
-        ("record_commands",),
+        ("record.commands",),
         "Take one release test: zero, arm, hold, release, rest, and the table of r.",
     ),
     "simulate": _Entry(
-        ("record_commands",),
+        ("record.commands",),
         "Write the run of a simulated test without real time, through the same sensors and modules.",
     ),
-    "keys": _Entry(("record_commands",), "Keys for viewers beyond this machine."),
-    "campaign": _Entry(("campaign_commands",), "Plan and follow a campaign of tests."),
+    "keys": _Entry(("record.commands",), "Keys for viewers beyond this machine."),
+    "campaign": _Entry(("campaign.commands",), "Plan and follow a campaign of tests."),
     "analyse": _Entry(
-        ("analyse_commands",),
+        ("analyse.commands",),
         "Analyse a recorded test: θ0, impacts, peaks, speeds, periods, r by each method, base joint.",
     ),
     "theory": _Entry(
@@ -65,7 +65,7 @@ _COMMANDS: Final[Mapping[str, _Entry]] = {
     ),
     "import": _Entry(("run_file_commands",), "Turn a recording of another program into a run."),
     "gap": _Entry(
-        ("gap_commands", "gap_blind_commands"),
+        ("gap.commands", "gap.blind_commands"),
         "Where simulator and recordings differ, which effect explains it, how far it shrinks.",
     ),
 }

@@ -8,9 +8,10 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from daq_app.config import Rig, TaskPlan, catalogue
-from daq_app.config.inventory import Device, devices_of
-from daq_app.config.wiring import terminal_of
+from daq_app.config import Rig, TaskPlan
+from daq_app.config.hardware import catalogue
+from daq_app.config.hardware.inventory import Device, devices_of
+from daq_app.config.hardware.wiring import terminal_of
 
 
 def plan_tables(rig: Rig, plan: TaskPlan) -> Iterator[RenderableType]:

@@ -56,9 +56,9 @@ def monitor(
     Closing the window never ends a test: the acquisition is a process of its own.
     """
     window = _window()
-    from daq_app.acquisition.client import AcquisitionUnreachable
-    from daq_app.acquisition.curve import KeyFileError, ViewerKeys
-    from daq_app.acquisition.launcher import AcquisitionDied
+    from daq_app.acquisition.viewers.client import AcquisitionUnreachable
+    from daq_app.acquisition.viewers.curve import KeyFileError, ViewerKeys
+    from daq_app.acquisition.viewers.launcher import AcquisitionDied
 
     if (key is None) != (server_key is None):
         print_paragraph(
@@ -95,7 +95,7 @@ def view(
 def _window() -> Any:
     """The window's module; what is missing on this machine is said in words."""
     try:
-        return importlib.import_module("daq_app.monitor.app")
+        return importlib.import_module("daq_app.monitor.window.app")
     except ImportError as error:
         print_paragraph(
             "Error",

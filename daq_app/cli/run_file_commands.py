@@ -132,7 +132,9 @@ def recover_command(
 
 
 def _derived(contents: JournalContents) -> DerivedData | None:
-    from daq_app.acquisition.derive import derive  # loads the analysis: only where there is a run to make
+    from daq_app.acquisition.closing.derive import (
+        derive,  # loads the analysis: only where there is a run to make
+    )
 
     return derive(contents)[0]
 

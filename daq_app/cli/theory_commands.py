@@ -14,7 +14,7 @@ from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, reported
 from daq_app.config import load_rig
 
 if TYPE_CHECKING:
-    from daq_app.rocking.block import RigidBlock
+    from daq_app.rocking.theory.block import RigidBlock
 
 _LEVELS = (0.15, 0.25, 0.35, 0.40)
 
@@ -76,7 +76,7 @@ def _block(
 ) -> tuple[RigidBlock, tuple[float, float] | None]:
     """The block, and the joint's (strength in Pa, length in m) where both are known."""
     # Imported here, as below: `daq-app --help` should not load SciPy.
-    from daq_app.rocking.block import RigidBlock
+    from daq_app.rocking.theory.block import RigidBlock
 
     specimen = load_rig(rig).specimen if rig is not None else None
     strength = mortar_mpa * 1e6 if mortar_mpa is not None else None
@@ -110,7 +110,8 @@ def _block(
 def _compute(
     block: RigidBlock, joint: tuple[float, float] | None, phis: list[float], r: float | None, impacts: int
 ) -> dict[str, Any]:
-    from daq_app.rocking import exact_period, theory
+    from daq_app.rocking import exact_period
+    from daq_app.rocking.theory import classic as theory
 
     p, alpha = block.p_rad_s, block.alpha0_rad
     used = block.r_max_rectangular if r is None else r

@@ -8,10 +8,10 @@ from typing import get_args
 
 from daq_app.config.connection import parse_connection
 from daq_app.config.errors import Problem
+from daq_app.config.hardware.wiring import channel_key
 from daq_app.config.rig import Channel, Family, Rig, Specimen
 from daq_app.config.units import FAMILY_SI_UNIT, SENSITIVITY_TO_SI
 from daq_app.config.validation import nearest
-from daq_app.config.wiring import channel_key
 
 _P_TOLERANCE = 0.01
 _OUTPUT_TOLERANCE = 1e-6

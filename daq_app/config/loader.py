@@ -10,8 +10,8 @@ from pydantic import ValidationError
 
 from daq_app.config.checks import rig_problems
 from daq_app.config.errors import ConfigError, Problem
-from daq_app.config.grouping import OwnKeys, grouped
-from daq_app.config.planner import channel_problems
+from daq_app.config.planning.grouping import OwnKeys, grouped
+from daq_app.config.planning.planner import channel_problems
 from daq_app.config.rig import Channel, Family, Rig
 from daq_app.config.toml_file import parse_toml, read_text
 from daq_app.config.validation import Location, nearest, problems_of

@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, select_autoescape
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
-from daq_app.campaign.captioned import CaptionedFigure
+from daq_app.campaign.report.captioned import CaptionedFigure
 from daq_app.gap import report_figures as draw
 from daq_app.gap.core import CannotDiagnose, Diagnosis
 from daq_app.gap.report_figures import ProbeMap

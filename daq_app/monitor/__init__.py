@@ -1,0 +1,1 @@
+"""The operator's window: data ← widgets ← plots ← pages ← window."""

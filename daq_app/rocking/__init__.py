@@ -5,16 +5,16 @@ block = RigidBlock(weight_n=51300, r0_m=1.525, inertia_kg_m2=16107, alpha0_rad=0
 block.p_rad_s, block.r_max, period(0.35, block.p_rad_s)
 """
 
-from daq_app.rocking.analysis import AnalysisOptions, analyse_record
-from daq_app.rocking.block import RigidBlock, SemiRigid
+from daq_app.rocking.analysis.analyse import AnalysisOptions, analyse_record
+from daq_app.rocking.analysis.results import TestAnalysis
 from daq_app.rocking.estimators import RestitutionEstimate, RestitutionPoint
-from daq_app.rocking.housner import FreeRocking, exact_period, free_rocking
-from daq_app.rocking.kinematics import RotationGeometry, WireRotation
+from daq_app.rocking.geometry.kinematics import RotationGeometry, WireRotation
 from daq_app.rocking.live import Estimate, LiveAnalyser, LiveResult
-from daq_app.rocking.phases import Phase, PhaseDetector, PhaseEvent, PhaseSettings
+from daq_app.rocking.motion.phases import Phase, PhaseDetector, PhaseEvent, PhaseSettings
+from daq_app.rocking.motion.velocity import VelocityFilter, VelocityStream
 from daq_app.rocking.record import TestRecord
-from daq_app.rocking.results import TestAnalysis
-from daq_app.rocking.theory import (
+from daq_app.rocking.theory.block import RigidBlock, SemiRigid
+from daq_app.rocking.theory.classic import (
     amplitude_after,
     energy,
     energy_after,
@@ -29,7 +29,7 @@ from daq_app.rocking.theory import (
     time_of_impact,
     time_to_decay,
 )
-from daq_app.rocking.velocity import VelocityFilter, VelocityStream
+from daq_app.rocking.theory.housner import FreeRocking, exact_period, free_rocking
 
 __all__ = [
     "AnalysisOptions",

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from daq_app.rocking import theory
-from daq_app.rocking.housner import exact_energy
+from daq_app.rocking.theory import classic as theory
+from daq_app.rocking.theory.housner import exact_energy
 
 Floats = NDArray[np.float64]
 

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from daq_app.config.rig import Rig
 from daq_app.config.scaling import Scaling
-from daq_app.rocking import theory
 from daq_app.rocking.estimators import RestitutionEstimate
-from daq_app.rocking.kinematics import RotationGeometry
-from daq_app.rocking.motion import MotionSettings, MotionTrack
-from daq_app.rocking.phases import Phase, PhaseDetector, PhaseEvent, PhaseSettings
-from daq_app.rocking.rolling import RollingArray
-from daq_app.rocking.velocity import VelocityFilter, VelocityStream
+from daq_app.rocking.geometry.kinematics import RotationGeometry
+from daq_app.rocking.motion.phases import Phase, PhaseDetector, PhaseEvent, PhaseSettings
+from daq_app.rocking.motion.rolling import RollingArray
+from daq_app.rocking.motion.swings import MotionSettings, MotionTrack
+from daq_app.rocking.motion.velocity import VelocityFilter, VelocityStream
+from daq_app.rocking.theory import classic as theory
 
 Floats = NDArray[np.float64]
 

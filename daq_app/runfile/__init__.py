@@ -9,10 +9,13 @@ from daq_app.runfile.errors import (
     RunFileError,
 )
 from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX
-from daq_app.runfile.hdf5_read import Run, open_run
-from daq_app.runfile.journal import JournalWriter
-from daq_app.runfile.journal_read import JournalContents, read_journal
-from daq_app.runfile.locks import FolderLock
+from daq_app.runfile.hdf5.read import Run, open_run
+from daq_app.runfile.integrity.recovery import Recovery, recover
+from daq_app.runfile.integrity.saving import finalise
+from daq_app.runfile.integrity.verification import VerifyReport, verify
+from daq_app.runfile.journal.locks import FolderLock
+from daq_app.runfile.journal.read import JournalContents, read_journal
+from daq_app.runfile.journal.writer import JournalWriter
 from daq_app.runfile.model import (
     DerivedData,
     DerivedSignal,
@@ -23,10 +26,7 @@ from daq_app.runfile.model import (
     plan_to_dict,
     software_versions,
 )
-from daq_app.runfile.recovery import Recovery, recover
-from daq_app.runfile.saving import finalise
 from daq_app.runfile.source import rig_of
-from daq_app.runfile.verification import VerifyReport, verify
 
 __all__ = [
     "JOURNAL_SUFFIX",

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from daq_app.config.plan import TaskPlan
+from daq_app.config.planning.plan import TaskPlan
 
 RUN_FORMAT = "rocking-run"
 RUN_FORMAT_VERSION = 1

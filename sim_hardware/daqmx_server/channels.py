@@ -20,8 +20,8 @@ from nidaqmx.constants import (
     VoltageUnits,
 )
 
-from daq_app.config import catalogue
-from daq_app.config.products import Product
+from daq_app.config.hardware import catalogue
+from daq_app.config.hardware.products import Product
 from sim_hardware.daqmx_server.converter import Converter
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory import Device, Inventory, channel_list

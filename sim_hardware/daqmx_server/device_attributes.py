@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from nidaqmx.constants import AcquisitionType, UsageTypeAI
 
-from daq_app.config import catalogue
-from daq_app.config.products import Product
+from daq_app.config.hardware import catalogue
+from daq_app.config.hardware.products import Product
 from sim_hardware.daqmx_server.attributes import unsupported
 from sim_hardware.daqmx_server.bench import Bench
 from sim_hardware.daqmx_server.channels import measurements_of

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from nidaqmx.constants import BusType, ProductCategory
 from nidaqmx.utils import unflatten_channel_string
 
-from daq_app.config import catalogue
-from daq_app.config.products import ChassisProduct, Product
+from daq_app.config.hardware import catalogue
+from daq_app.config.hardware.products import ChassisProduct, Product
 from daq_app.config.rig import Rig
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 

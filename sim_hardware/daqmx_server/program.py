@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from daq_app.config.catalogue import UnknownProduct
 from daq_app.config.errors import ConfigError
+from daq_app.config.hardware.catalogue import UnknownProduct
 from daq_app.config.loader import load_rig
 from daq_app.config.rig import Rig
 from sim_hardware.daqmx_server.bench import Bench

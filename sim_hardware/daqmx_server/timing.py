@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from nidaqmx.constants import AcquisitionType, DigitalWidthUnits, SampleTimingType
 
-from daq_app.config import catalogue
-from daq_app.config.products import Product
+from daq_app.config.hardware import catalogue
+from daq_app.config.hardware.products import Product
 from sim_hardware.daqmx_server import triggers
 from sim_hardware.daqmx_server.acquisition import StartRule
 from sim_hardware.daqmx_server.errors import Code, DaqmxError

@@ -19,13 +19,13 @@ sys.path.insert(0, str(Path(__file__).parent))
 from process_bench import SPEED, Running, quick_rig
 
 from benchmarks.processes import free_the_hardware
-from daq_app.acquisition.client import AcquisitionClient
-from daq_app.acquisition.desk import Desk
-from daq_app.acquisition.finaliser import Finaliser
-from daq_app.acquisition.messages import EventMessage, Message, Reply, State, StateMessage
-from daq_app.acquisition.reader import Patience
-from daq_app.acquisition.session import Session, SessionSettings
-from daq_app.acquisition.simulated import SimulatedServer
+from daq_app.acquisition.closing.finaliser import Finaliser
+from daq_app.acquisition.messages.published import EventMessage, Message, Reply, State, StateMessage
+from daq_app.acquisition.pipeline.reader import Patience
+from daq_app.acquisition.process.simulated import SimulatedServer
+from daq_app.acquisition.session.session import Session, SessionSettings
+from daq_app.acquisition.viewers.client import AcquisitionClient
+from daq_app.acquisition.viewers.desk import Desk
 from daq_app.config import Rig, Scaling, TaskPlan, load_rig, plan_tasks
 from daq_app.rocking import RotationGeometry, free_rocking
 from drivers import Block, DriverError, Opened

@@ -27,9 +27,9 @@ import zmq
 
 from benchmarks.marked_check import check_marked
 from daq_app.acquisition import AcquisitionClient, AcquisitionProcess
-from daq_app.acquisition.client import decode
-from daq_app.acquisition.messages import HealthMessage, Message, State, StateMessage
-from daq_app.acquisition.simulated import SimulatedServer
+from daq_app.acquisition.messages.published import HealthMessage, Message, State, StateMessage
+from daq_app.acquisition.process.simulated import SimulatedServer
+from daq_app.acquisition.viewers.client import decode
 from daq_app.config import load_rig
 from daq_app.runfile import open_run, verify
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from benchmarks.processes import quick_context
 from daq_app.acquisition import AcquisitionClient, AcquisitionUnreachable, read_session_file
-from daq_app.acquisition.messages import EventMessage, HealthMessage, Message, State, StateMessage
-from daq_app.acquisition.process import run_and_exit
+from daq_app.acquisition.messages.published import EventMessage, HealthMessage, Message, State, StateMessage
+from daq_app.acquisition.process.process import run_and_exit
 from sim_hardware.control import SimControl, SimControlError
 
 SPEED = 5

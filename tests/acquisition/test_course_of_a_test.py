@@ -9,7 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from daq_app.acquisition.messages import EstimateMessage, EventMessage, HealthMessage, State, StateMessage
+from daq_app.acquisition.messages.published import (
+    EstimateMessage,
+    EventMessage,
+    HealthMessage,
+    State,
+    StateMessage,
+)
 from daq_app.runfile import open_run, verify
 from drivers import DriverError
 

@@ -17,10 +17,7 @@ import zmq
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from daq_app.acquisition.client import AcquisitionClient, AcquisitionUnreachable, decode
-from daq_app.acquisition.curve import ViewerKeys, create_recorder_keys, create_viewer_keys
-from daq_app.acquisition.desk import Desk, DeskError
-from daq_app.acquisition.messages import (
+from daq_app.acquisition.messages.published import (
     BlockMessage,
     Command,
     EstimateMessage,
@@ -29,6 +26,9 @@ from daq_app.acquisition.messages import (
     State,
     StateMessage,
 )
+from daq_app.acquisition.viewers.client import AcquisitionClient, AcquisitionUnreachable, decode
+from daq_app.acquisition.viewers.curve import ViewerKeys, create_recorder_keys, create_viewer_keys
+from daq_app.acquisition.viewers.desk import Desk, DeskError
 
 TOKEN = "the right token"
 

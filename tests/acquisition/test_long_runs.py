@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from daq_app.acquisition import derive as module
-from daq_app.acquisition.derive import derive
+from daq_app.acquisition.closing import derive as module
+from daq_app.acquisition.closing.derive import derive
 from daq_app.runfile import DerivedData, JournalWriter, RunHeader, finalise, open_run, read_journal, verify
 
 

@@ -13,8 +13,8 @@ import pytest
 from process_bench import RESTITUTION, SPEED, Running, whole_test
 
 from daq_app.acquisition import AcquisitionClient
-from daq_app.acquisition.messages import State
-from daq_app.acquisition.simulated import SimulatedServer
+from daq_app.acquisition.messages.published import State
+from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.runfile import open_run, verify
 from sim_hardware.control import SimControl
 

@@ -11,9 +11,9 @@ import pytest
 from process_bench import Running
 
 from daq_app.acquisition import AcquisitionDied, AcquisitionProcess
-from daq_app.acquisition.messages import State
-from daq_app.acquisition.process import main
-from daq_app.acquisition.simulated import SimulatedServer
+from daq_app.acquisition.messages.published import State
+from daq_app.acquisition.process.process import main
+from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.runfile import FolderLock
 from sim_hardware.control import SimControl
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from daq_app.acquisition.messages import EventMessage, HealthMessage, State
-from daq_app.acquisition.reader import Patience
+from daq_app.acquisition.messages.published import EventMessage, HealthMessage, State
+from daq_app.acquisition.pipeline.reader import Patience
 from daq_app.runfile import open_run, verify
 from drivers import Block, DriverError
 

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from daq_app.acquisition.items import Arrived, Begin, End, Item, Lost, Noted, RequestRefused
-from daq_app.acquisition.messages import EventMessage
-from daq_app.acquisition.recorder import Recorded, Recorder
+from daq_app.acquisition.messages.items import Arrived, Begin, End, Item, Lost, Noted, RequestRefused
+from daq_app.acquisition.messages.published import EventMessage
+from daq_app.acquisition.pipeline.recorder import Recorded, Recorder
 from daq_app.runfile import JournalWriter, RunHeader, read_journal
 from drivers import Block
 

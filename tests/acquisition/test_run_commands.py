@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from daq_app.cli.app import build_app
-from daq_app.cli.record_commands import LEVELS, level_of
+from daq_app.cli.record.commands import LEVELS, level_of
 from daq_app.runfile import open_run, verify
 
 runner = CliRunner()

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daq_app.acquisition.items import End
-from daq_app.acquisition.messages import State
-from daq_app.acquisition.sequence import Change, Sequence
-from daq_app.acquisition.tare import NotSteady, take_tare
+from daq_app.acquisition.course.sequence import Change, Sequence
+from daq_app.acquisition.course.tare import NotSteady, take_tare
+from daq_app.acquisition.messages.items import End
+from daq_app.acquisition.messages.published import State
 from daq_app.config import Rig
 from daq_app.config.rig import Acquisition
 from daq_app.rocking import PhaseEvent

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from daq_app.acquisition.channel_watch import ChannelWatch, Doubt
-from daq_app.acquisition.clock_watch import ClockNews, ClockWatch
-from daq_app.acquisition.machine_watch import LOW_MEMORY_BYTES, MachineNews, MachineWatch
+from daq_app.acquisition.course.channel_watch import ChannelWatch, Doubt
+from daq_app.acquisition.pipeline.clock_watch import ClockNews, ClockWatch
+from daq_app.acquisition.session.machine_watch import LOW_MEMORY_BYTES, MachineNews, MachineWatch
 from daq_app.config import Rig, Scaling
 from drivers import Block, ClockReading
 

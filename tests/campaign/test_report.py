@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from daq_app.campaign.collect import Failure
 from daq_app.campaign.names import TestName
 from daq_app.campaign.plan import load_campaign
-from daq_app.campaign.report import write_report
+from daq_app.campaign.report.collect import Failure
+from daq_app.campaign.report.summary import MethodResult, TestSummary
+from daq_app.campaign.report.tables import mean_of_specimens, repetition_effect, table_4_1
+from daq_app.campaign.report.write import write_report
 from daq_app.campaign.status import CampaignStatus, RecordedTest, TestVerdict
-from daq_app.campaign.summary import MethodResult, TestSummary
-from daq_app.campaign.tables import mean_of_specimens, repetition_effect, table_4_1
 from daq_app.rocking import amplitude_after, period_after, time_of_impact
 
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from daq_app.campaign.names import TestName
-from daq_app.campaign.result import judged, load_summary, save_summary
-from daq_app.campaign.result_figures import measured_periods, theory_motion
-from daq_app.campaign.result_report import period_deviation, repetition_rows, verdict_sentence, write_result
+from daq_app.campaign.report.summary import MethodResult, TestSummary
+from daq_app.campaign.result.figures import measured_periods, theory_motion
+from daq_app.campaign.result.report import period_deviation, repetition_rows, verdict_sentence, write_result
+from daq_app.campaign.result.result import judged, load_summary, save_summary
 from daq_app.campaign.status import RecordedTest, TestVerdict
-from daq_app.campaign.summary import MethodResult, TestSummary
 from daq_app.rocking import free_rocking
 
 ALPHA, P = 0.215, 2.20

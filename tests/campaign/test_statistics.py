@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from daq_app.campaign.statistics import random_effects_mean
+from daq_app.campaign.report.statistics import random_effects_mean
 
 
 def test_equal_values_have_no_scatter_and_the_error_of_the_mean() -> None:

@@ -7,8 +7,8 @@ import io
 import pytest
 from rich.console import Console
 
-from daq_app.acquisition.messages import EventMessage, State, StateMessage
-from daq_app.cli.run_view import RunView
+from daq_app.acquisition.messages.published import EventMessage, State, StateMessage
+from daq_app.cli.record.view import RunView
 
 
 def said(about, *messages):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daq_app.config import catalogue
+from daq_app.config.hardware import catalogue
 
 
 @pytest.mark.parametrize(

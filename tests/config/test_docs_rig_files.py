@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from daq_app.config import catalogue
+from daq_app.config.hardware import catalogue
 from daq_app.config.rig import Acquisition, Channel, ExpectedChannels, Simulation, Specimen, Table
 from daq_app.config.units import SENSITIVITY_TO_SI
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from daq_app.config import PlannedChannel
-from daq_app.config.plan import PlannedTask, TaskPlan
+from daq_app.config.planning.plan import PlannedTask, TaskPlan
 from drivers import Block, Driver, DriverError, open_driver
 from drivers.error_advice import BY_CODE, BY_GRPC_STATUS, advice_for
 

@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from fault_bench import SPEED, Acquisition, Row, RunFacts, Start, Told
 
 from benchmarks.processes import free_the_hardware
-from daq_app.acquisition.simulated import SimulatedServer
+from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.config import Rig, load_rig
 from sim_hardware.control import SimControl
 

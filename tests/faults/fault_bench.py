@@ -14,7 +14,7 @@ from saboteur import run_sabotaged
 from benchmarks.marked_check import check_marked
 from benchmarks.processes import quick_context
 from daq_app.acquisition import AcquisitionClient, read_session_file
-from daq_app.acquisition.messages import EventMessage, HealthMessage, Message, State, StateMessage
+from daq_app.acquisition.messages.published import EventMessage, HealthMessage, Message, State, StateMessage
 from daq_app.config import Rig
 from daq_app.runfile import open_run, verify
 

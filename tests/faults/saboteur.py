@@ -17,7 +17,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from daq_app.acquisition.process import run_and_exit
+from daq_app.acquisition.process.process import run_and_exit
 
 Usage = namedtuple("Usage", "total used free")
 
@@ -91,8 +91,8 @@ class Saboteur:
     def _on_clock_and_memory(self) -> None:
         import psutil
 
-        from daq_app.acquisition import machine_watch
-        from daq_app.runfile import journal
+        from daq_app.acquisition.session import machine_watch
+        from daq_app.runfile.journal import writer as journal
 
         seconds, nanoseconds, memory, pack = (
             time.time,

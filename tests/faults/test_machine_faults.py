@@ -14,7 +14,7 @@ from fault_bench import SPEED, Acquisition, Row, Start, look_at
 
 from benchmarks.processes import free_the_hardware
 from daq_app.acquisition import AcquisitionDied, AcquisitionProcess
-from daq_app.acquisition.messages import State
+from daq_app.acquisition.messages.published import State
 from daq_app.config import Rig
 from daq_app.runfile import open_run
 from sim_hardware.control import SimControl

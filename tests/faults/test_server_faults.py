@@ -12,8 +12,8 @@ import pytest
 from fault_bench import RATE_HZ, SPEED, Acquisition, Row, Start, look_at
 from nptdms import TdmsFile
 
-from daq_app.acquisition.messages import HealthMessage, State
-from daq_app.acquisition.simulated import SimulatedServer
+from daq_app.acquisition.messages.published import HealthMessage, State
+from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.config import Rig
 from daq_app.runfile import open_run
 from sim_hardware.control import SimControl

@@ -66,7 +66,7 @@ def stand_in(rig: Any) -> Any:
 
 @pytest.fixture
 def settings(tmp_path: Path) -> Any:
-    from daq_app.monitor.settings import WindowSettings
+    from daq_app.monitor.widgets.settings import WindowSettings
 
     return WindowSettings(tmp_path / "window.ini")
 
@@ -88,7 +88,7 @@ def clock() -> Clock:
 @pytest.fixture
 def play() -> Callable[..., None]:
     """Feeds a session what the stand-in publishes up to a time, each message at its instant."""
-    from daq_app.monitor.session import Published
+    from daq_app.monitor.data.session import Published
 
     def feed(session: Any, clock: Clock, stand_in: Any, until_s: float) -> None:
         start = clock.now
@@ -103,7 +103,7 @@ def play() -> Callable[..., None]:
 @pytest.fixture
 def window(qtbot: Any, settings: Any, rig: Any, clock: Clock) -> Any:
     """A window without a link, whose session a test feeds by hand."""
-    from daq_app.monitor.main_window import MainWindow
+    from daq_app.monitor.window.main_window import MainWindow
 
     window: Any = MainWindow(None, settings)
     qtbot.addWidget(window)

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import BaseModel
 
-from daq_app.acquisition.messages import (
+from daq_app.acquisition.messages.published import (
     BlockMessage,
     EstimateMessage,
     EstimatePoint,
@@ -24,8 +24,8 @@ from daq_app.acquisition.messages import (
 )
 from daq_app.config import Scaling
 from daq_app.config.rig import Channel, Rig
-from daq_app.rocking import theory
-from daq_app.rocking.housner import FreeRocking, free_rocking
+from daq_app.rocking.theory import classic as theory
+from daq_app.rocking.theory.housner import FreeRocking, free_rocking
 from daq_app.runfile import JournalWriter, RunHeader, finalise
 
 

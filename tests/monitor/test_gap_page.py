@@ -11,11 +11,11 @@ from pathlib import Path
 import psutil
 import pytest
 
-from daq_app.monitor import gap_runner
-from daq_app.monitor.background import Background
-from daq_app.monitor.gap_page import GapPage
-from daq_app.monitor.gap_runner import GapRunner
-from daq_app.monitor.gap_views import closure_bars, evidence_bars, map_cells
+from daq_app.monitor.data import gap_runner
+from daq_app.monitor.data.background import Background
+from daq_app.monitor.data.gap_runner import GapRunner
+from daq_app.monitor.pages.gap_page import GapPage
+from daq_app.monitor.plots.gap_views import closure_bars, evidence_bars, map_cells
 
 LONG_WORK = """
 import threading

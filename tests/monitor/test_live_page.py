@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from daq_app.acquisition.messages import (
+from daq_app.acquisition.messages.published import (
     BlockMessage,
     EstimateMessage,
     EstimatePoint,
@@ -13,9 +13,9 @@ from daq_app.acquisition.messages import (
     State,
     StateMessage,
 )
-from daq_app.monitor.plot_base import envelope
-from daq_app.monitor.session import Published
-from daq_app.monitor.strip_panel import arrange
+from daq_app.monitor.data.session import Published
+from daq_app.monitor.plots.plot_base import envelope
+from daq_app.monitor.plots.strip_panel import arrange
 
 
 def recorded(sample: int, *, safe: int) -> HealthMessage:

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from daq_app.monitor.minmax_ring import MinMaxRing
-from daq_app.monitor.motion_trace import MotionTrace
+from daq_app.monitor.data.minmax_ring import MinMaxRing
+from daq_app.monitor.data.motion_trace import MotionTrace
 
 
 @given(

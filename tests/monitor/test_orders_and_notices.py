@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from daq_app.acquisition.messages import EventMessage, State
-from daq_app.campaign.check_model import ChannelCheck, Finding, SensorCheck, Verdict
-from daq_app.monitor.actions import ActionBar
-from daq_app.monitor.background import Background
-from daq_app.monitor.notices import NoticeLine
-from daq_app.monitor.state_look import LOOKS, look_of
+from daq_app.acquisition.messages.published import EventMessage, State
+from daq_app.campaign.checks.check_model import ChannelCheck, Finding, SensorCheck, Verdict
+from daq_app.monitor.data.background import Background
+from daq_app.monitor.widgets.actions import ActionBar
+from daq_app.monitor.widgets.notices import NoticeLine
+from daq_app.monitor.widgets.state_look import LOOKS, look_of
 
 
 def test_every_state_has_its_own_word_and_shape_so_that_colour_is_not_needed():

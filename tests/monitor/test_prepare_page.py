@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from daq_app.monitor.pull_gauge import pull_advice
-from daq_app.monitor.test_card import TestCard
+from daq_app.monitor.widgets.pull_gauge import pull_advice
+from daq_app.monitor.widgets.test_card import TestCard
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 # qtbot: this module needs Qt; tests/monitor/conftest.py skips it where Qt cannot start.
-from daq_app.monitor.background import Background
-from daq_app.monitor.campaign_page import CampaignPage
-from daq_app.monitor.main_window import MainWindow
-from daq_app.monitor.replay_data import ROTATION, VELOCITY, ReplayRun
+from daq_app.monitor.data.background import Background
+from daq_app.monitor.data.replay_data import ROTATION, VELOCITY, ReplayRun
+from daq_app.monitor.pages.campaign_page import CampaignPage
+from daq_app.monitor.window.main_window import MainWindow
 from daq_app.runfile import RunFileError, open_run
 
 

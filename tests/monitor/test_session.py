@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from daq_app.acquisition.messages import (
+from daq_app.acquisition.messages.published import (
     BlockMessage,
     EstimateMessage,
     HealthMessage,
@@ -15,10 +15,10 @@ from daq_app.acquisition.messages import (
     State,
     StateMessage,
 )
-from daq_app.monitor.counters import AlarmLevels, tile_texts
-from daq_app.monitor.health_bar import health_texts
-from daq_app.monitor.labels import DASH, number, size_text
-from daq_app.monitor.session import Published, Session
+from daq_app.monitor.data.session import Published, Session
+from daq_app.monitor.widgets.counters import AlarmLevels, tile_texts
+from daq_app.monitor.widgets.labels import DASH, number, size_text
+from daq_app.monitor.window.health_bar import health_texts
 
 
 @pytest.fixture

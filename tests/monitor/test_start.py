@@ -8,8 +8,8 @@ from typer.testing import CliRunner
 # qtbot: this module needs Qt; tests/monitor/conftest.py skips it where Qt cannot start.
 from daq_app.cli.app import build_app
 from daq_app.config import load_rig
-from daq_app.monitor.app import campaign_beside
-from daq_app.monitor.start_page import StartWindow, known_rigs
+from daq_app.monitor.pages.start_page import StartWindow, known_rigs
+from daq_app.monitor.window.app import campaign_beside
 
 
 @pytest.fixture

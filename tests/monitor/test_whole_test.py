@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from daq_app.acquisition.launcher import AcquisitionProcess
-from daq_app.acquisition.messages import BlockMessage, State
-from daq_app.campaign.check_model import Verdict
+from daq_app.acquisition.messages.published import BlockMessage, State
+from daq_app.acquisition.viewers.launcher import AcquisitionProcess
+from daq_app.campaign.checks.check_model import Verdict
 from daq_app.runfile import open_run, verify
 
 pytestmark = pytest.mark.heavy
@@ -23,9 +23,9 @@ WINDOW = """
 import sys
 from pathlib import Path
 from PySide6.QtCore import QTimer
-from daq_app.acquisition.messages import MotionMessage
-from daq_app.monitor.app import application, open_window
-from daq_app.monitor.settings import WindowSettings
+from daq_app.acquisition.messages.published import MotionMessage
+from daq_app.monitor.window.app import application, open_window
+from daq_app.monitor.widgets.settings import WindowSettings
 
 app = application()
 window = open_window(sys.argv[1], "", WindowSettings(Path(sys.argv[2])))
@@ -55,7 +55,7 @@ def acquisition(configs, tmp_path_factory):
 
 
 def test_from_the_check_to_the_next_test(qtbot, acquisition, configs, settings):
-    from daq_app.monitor.app import open_window
+    from daq_app.monitor.window.app import open_window
 
     window = open_window(
         acquisition.address, acquisition.token, settings, plan=configs / "campaigns" / "costa.toml"
@@ -169,7 +169,7 @@ def test_killing_the_window_while_the_wall_rocks_costs_no_sample(qtbot, acquisit
 
 
 def test_a_window_without_the_token_watches_and_cannot_command(qtbot, acquisition, settings):
-    from daq_app.monitor.app import open_window
+    from daq_app.monitor.window.app import open_window
 
     window = open_window(acquisition.address, "", settings)
     qtbot.addWidget(window)

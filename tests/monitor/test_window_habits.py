@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from daq_app.monitor.main_window import MainWindow
-from daq_app.monitor.settings import WindowSettings
+from daq_app.monitor.widgets.settings import WindowSettings
+from daq_app.monitor.window.main_window import MainWindow
 
 
 def test_theme_type_size_and_layout_are_remembered(qtbot, settings, tmp_path):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from daq_app.config import Rig, Scaling, load_rig, plan_tasks
-from daq_app.rocking.housner import FreeRocking, free_rocking
+from daq_app.rocking.theory.housner import FreeRocking, free_rocking
 
 Floats = NDArray[np.float64]
 

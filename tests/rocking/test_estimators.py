@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from daq_app.rocking.arcs import fit_arc
 from daq_app.rocking.estimators import crt, eav
-from daq_app.rocking.housner import free_rocking
-from daq_app.rocking.motion import MotionSettings, MotionTrack
-from daq_app.rocking.motion_fit import fit_motion
-from daq_app.rocking.motion_model import FIXED, MotionModel
+from daq_app.rocking.motion.arcs import fit_arc
+from daq_app.rocking.motion.motion_fit import fit_motion
+from daq_app.rocking.motion.motion_model import FIXED, MotionModel
+from daq_app.rocking.motion.swings import MotionSettings, MotionTrack
+from daq_app.rocking.theory.housner import free_rocking
 
 P, ALPHA, RATE = 2.2, 0.215, 4000.0
 SETTINGS = MotionSettings(RATE, P, ALPHA)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from daq_app.rocking import theory
-from daq_app.rocking.housner import (
+from daq_app.rocking.theory import classic as theory
+from daq_app.rocking.theory.housner import (
     exact_amplitude,
     exact_energy,
     exact_impact_speed,

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from daq_app.acquisition.messages import EstimateMessage
+from daq_app.acquisition.messages.published import EstimateMessage
 from daq_app.rocking import LiveAnalyser, Phase
 
 

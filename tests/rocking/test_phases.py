@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from daq_app.rocking import Phase, PhaseDetector, PhaseSettings, free_rocking
-from daq_app.rocking.housner import exact_impact_speed
+from daq_app.rocking.theory.housner import exact_impact_speed
 
 RATE, P, ALPHA, NOISE = 4000.0, 2.2, 0.215, 6e-5
 SETTINGS = PhaseSettings(RATE, P, ALPHA, NOISE)

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq_app.config import load_rig
-from daq_app.rocking import theory
-from daq_app.rocking.block import RigidBlock
+from daq_app.rocking.theory import classic as theory
+from daq_app.rocking.theory.block import RigidBlock
 
 TABLE_3_1 = {
     # name: weight N, inertia, R0, alpha0, p printed, mass, base width, I_G

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from daq_app.rocking import VelocityFilter, VelocityStream, free_rocking
 from daq_app.rocking.estimators import eav
-from daq_app.rocking.filtered_peaks import corrected_peaks, filtered_peaks
+from daq_app.rocking.motion.filtered_peaks import corrected_peaks, filtered_peaks
 
 P, ALPHA, RATE = 2.2, 0.215, 4000.0
 FILTER = VelocityFilter(RATE, 25.0)

@@ -20,7 +20,7 @@ import os, sys
 import numpy as np
 from pathlib import Path
 from daq_app.runfile import JournalWriter, RunHeader, finalise, recover
-import daq_app.runfile.saving as f
+import daq_app.runfile.integrity.saving as f
 BLOCK, CHANNELS = {BLOCK}, {CHANNELS}
 header = RunHeader(run_id="r", channel_ids=tuple("abcdefgh"), reading_units=("V",) * 8, rate_hz=4000.0)
 def truth(samples):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from daq_app.runfile import JournalWriter, RunFileError, RunHeader, finalise, open_run, recover, verify
-from daq_app.runfile.frames import FrameType, pack_frame
+from daq_app.runfile.journal.frames import FrameType, pack_frame
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ def test_tdms_volts_are_kept_bit_for_bit(tmp_path: Path, bring, write_tdms) -> N
 def test_tdms_in_one_big_segment_is_read_channel_by_channel(
     tmp_path: Path, bring, write_tdms, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from daq_app.runfile.importers import from_tdms
+    from daq_app.runfile.importers.formats import from_tdms
 
     monkeypatch.setattr(from_tdms, "_WHOLE_CHUNK_BYTES", 1000)
     values = np.arange(4000.0) * 1e-3

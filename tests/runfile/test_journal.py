@@ -20,10 +20,10 @@ from daq_app.runfile import (
     JournalWriter,
     RunFileError,
     RunHeader,
-    journal,
     read_journal,
 )
-from daq_app.runfile.locks import journal_locked
+from daq_app.runfile.journal import writer as journal
+from daq_app.runfile.journal.locks import journal_locked
 
 
 def whole(path: Path) -> np.ndarray:

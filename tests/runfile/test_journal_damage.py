@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from daq_app.runfile import JournalWriter, RunFileError, RunHeader, read_journal
-from daq_app.runfile.frames import HEADING_BYTES, FrameType, pack_frame
+from daq_app.runfile.journal.frames import HEADING_BYTES, FrameType, pack_frame
 
 CHANNELS, BLOCK, BLOCKS, FIRST = 2, 5, 9, 40
 GAP = range(FIRST + 4 * BLOCK, FIRST + 4 * BLOCK + 7)

@@ -21,9 +21,9 @@ from daq_app.runfile import (
     finalise,
     open_run,
     recover,
-    saving,
     verify,
 )
+from daq_app.runfile.integrity import saving
 
 
 @pytest.fixture

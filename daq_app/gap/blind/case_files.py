@@ -16,7 +16,7 @@ from daq_app.config import Rig, plan_tasks
 from daq_app.gap.blind.layout import RIG_FILE
 from daq_app.gap.blind.world.campaign import MadeRun, World
 from daq_app.runfile import Event, Gap, RunHeader, plan_to_dict
-from daq_app.runfile.hdf5_write import write_run
+from daq_app.runfile.hdf5.write import write_run
 from daq_app.runfile.source import Provenance
 
 

@@ -11,7 +11,7 @@ from daq_app.runfile.durable import replace_durably
 from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.exporters.selection import Selection, Units
 from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX
-from daq_app.runfile.hdf5_read import open_run
+from daq_app.runfile.hdf5.read import open_run
 
 ExportFormat = Literal["csv", "mat", "tdms", "parquet", "netcdf", "npz"]
 FORMATS: Final[dict[str, str]] = {

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.runfile.errors import RunFileError
-from daq_app.runfile.hdf5_read import Run
+from daq_app.runfile.hdf5.read import Run
 
 Units = Literal["raw", "si"]
 PIECE_SAMPLES: Final = 65536

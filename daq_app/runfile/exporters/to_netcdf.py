@@ -10,7 +10,7 @@ import numpy as np
 
 from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.exporters.selection import PIECE_SAMPLES, Selection
-from daq_app.runfile.guarded_file import GuardedFile
+from daq_app.runfile.hdf5.guarded_file import GuardedFile
 from daq_app.runfile.layout import CONVENTIONS
 
 _COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}

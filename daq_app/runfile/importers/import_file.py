@@ -17,8 +17,8 @@ from daq_app.runfile.importers.imported import ImportedRun
 from daq_app.runfile.importers.mapping import MappedChannel, map_channels
 from daq_app.runfile.importers.recording import Reader, Spool
 from daq_app.runfile.importers.timing import Timing, timing_of
+from daq_app.runfile.integrity.saving import save_run
 from daq_app.runfile.model import RunHeader, host_name, software_versions
-from daq_app.runfile.saving import save_run
 from daq_app.runfile.source import Provenance
 
 _HASH_BYTES: Final = 2**20
@@ -42,15 +42,15 @@ def _opener(suffix: str) -> _Opener:
     """The reader of a format. Imported on demand: SciPy and npTDMS are slow to load."""
     match suffix:
         case ".tdms":
-            from daq_app.runfile.importers.from_tdms import TdmsReader as reader
+            from daq_app.runfile.importers.formats.from_tdms import TdmsReader as reader
         case ".lvm":
-            from daq_app.runfile.importers.from_lvm import LvmReader as reader  # type: ignore[assignment]
+            from daq_app.runfile.importers.formats.from_lvm import LvmReader as reader  # type: ignore[assignment]
         case ".csv" | ".txt":
-            from daq_app.runfile.importers.from_csv import CsvReader as reader  # type: ignore[assignment]
+            from daq_app.runfile.importers.formats.from_csv import CsvReader as reader  # type: ignore[assignment]
         case ".mat":
-            from daq_app.runfile.importers.from_mat import open_mat as reader  # type: ignore[assignment]
+            from daq_app.runfile.importers.formats.from_mat import open_mat as reader  # type: ignore[assignment]
         case ".npz":
-            from daq_app.runfile.importers.from_npz import NpzReader as reader  # type: ignore[assignment]
+            from daq_app.runfile.importers.formats.from_npz import NpzReader as reader  # type: ignore[assignment]
         case ".h5" | ".journal":
             raise RunFileError(
                 "runs and journals of this program need no import",

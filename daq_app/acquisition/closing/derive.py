@@ -1,0 +1,175 @@
+"""Derived signals and results of a run, from its journal: rotation, velocity, θ0, impacts, r, quality."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.config.rig import Rig
+from daq_app.config.scaling import Scaling
+from daq_app.rocking.analysis.analyse import AnalysisOptions, analyse_record
+from daq_app.rocking.analysis.results import Series, TestAnalysis
+from daq_app.rocking.live import LiveAnalyser
+from daq_app.rocking.record import TestRecord
+from daq_app.runfile import DerivedData, DerivedSignal, JournalContents
+from daq_app.runfile.source import rig_of
+
+Floats = NDArray[np.float64]
+
+_WINDOW: Final = 4000
+_LONGEST_S: Final = 600.0
+_BEFORE_RELEASE_S: Final = 120.0
+_OPTIONS: Final = AnalysisOptions(fit=False, bias_runs=0)
+"""What takes long (simulated bias, fit of the whole motion) waits for `daq-app analyse`."""
+_SIGNALS: Final = {
+    "rotation_rad": ("rotation", "rad", "rotation of the wall from the wire potentiometers"),
+    "velocity_rad_s": ("velocity", "rad/s", "angular velocity, filtered derivative of rotation"),
+    "best_rotation_rad": ("rotation_fused", "rad", "rotation of the wall from wires and LVDTs"),
+    "neutral_axis_m": ("neutral_axis", "m", "x of zero opening of the base joint"),
+    "contact_m": ("contact_length", "m", "length of the base joint in contact"),
+    "twist_rad_per_m": ("twist", "rad/m", "change of the joint's rotation along the wall's length"),
+}
+
+
+def derive(contents: JournalContents) -> tuple[DerivedData | None, str]:
+    """Derived data, and a sentence where there are none (empty otherwise). Never raises."""
+    if contents.n_samples == 0:
+        return None, ""
+    rig = rig_of(contents.header)
+    if rig is None or rig.channel_ids != contents.header.channel_ids:
+        return None, "The run's rig file is not understood, so nothing was derived"
+    start, stop = _analysed(contents)
+    try:
+        analysis = analyse_record(_record(contents, rig, start, stop), _OPTIONS)
+        online = _online(contents, rig)
+    except Exception as error:
+        return None, f"The analysis failed ({type(error).__name__}: {error}); the readings are complete"
+    results: dict[str, Any] = {"analysis": analysis.as_dict(), "online": online}
+    quality = _quality(contents, analysis)
+    if quality is not None:
+        results["quality"] = quality
+    said = ""
+    if stop - start < contents.n_samples:
+        rate_hz = contents.header.rate_hz
+        said = f"Analysed from {start / rate_hz:.0f} s to {stop / rate_hz:.0f} s of this long recording"
+    return DerivedData(contents.first_sample + start, _signals(analysis.series), results=results), said
+
+
+def _analysed(contents: JournalContents) -> tuple[int, int]:
+    """First sample and end (from the run's first sample on) of what is analysed: all of a usual run.
+
+    A wall may stand armed for half an hour; its readings are kept whole, but the analysis would need
+    gigabytes of memory for them. So a long run is analysed from two minutes before its release on, or, where
+    nothing was released, at its end.
+    """
+    longest = round(_LONGEST_S * contents.header.rate_hz)
+    if contents.n_samples <= longest:
+        return 0, contents.n_samples
+    released = [event.sample for event in contents.events if event.kind in ("released", "rocking")]
+    if not released:
+        return contents.n_samples - longest, contents.n_samples
+    before = round(_BEFORE_RELEASE_S * contents.header.rate_hz)
+    start = min(max(0, released[-1] - contents.first_sample - before), contents.n_samples - longest)
+    return start, start + longest
+
+
+def _record(contents: JournalContents, rig: Rig, start: int, stop: int) -> TestRecord:
+    header = contents.header
+    row = {channel_id: index for index, channel_id in enumerate(header.channel_ids)}
+
+    begin, whole = contents.first_sample + start, stop - start
+
+    def load(ids: tuple[str, ...], start: int = 0, stop: int | None = None) -> Floats:
+        """Some channels of what is analysed; the journal is walked through once for each call."""
+        rows = [row[channel_id] for channel_id in ids]
+        scaling = Scaling.of([rig.channel(channel_id) for channel_id in ids], header.tare)
+        first_column, last_column, _ = slice(start, stop).indices(whole)
+        si = np.empty((len(rows), max(last_column - first_column, 0)))
+        for first, window in contents.windows(_WINDOW):
+            at = first - begin - first_column
+            low, high = max(at, 0), min(at + window.shape[1], si.shape[1])
+            if low < high:
+                si[:, low:high] = scaling.to_si(window[rows, low - at : high - at])
+        return si
+
+    return TestRecord(
+        rig=rig,
+        rate_hz=header.rate_hz,
+        n_samples=whole,
+        channel_ids=header.channel_ids,
+        load=load,
+        first_sample=begin,
+        time_offsets_s={channel_id: header.time_offset_s(channel_id) for channel_id in header.channel_ids},
+        tared=bool(header.tare),
+        label=header.test or header.run_id,
+    )
+
+
+def _online(contents: JournalContents, rig: Rig) -> dict[str, Any] | None:
+    """What the causal analyser makes of the same samples: it is what the operator saw."""
+    analyser = LiveAnalyser(rig, contents.header.rate_hz, contents.header.tare)
+    estimate = None
+    for first, window in contents.windows(_WINDOW):
+        estimate = analyser.process(first, window).estimate or estimate
+    return None if estimate is None else _plain(estimate.as_message())
+
+
+def _plain(value: Any) -> Any:
+    """NaN (a half-cycle that could not be fitted) becomes None: JSON has no NaN."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _signals(series: Series | None) -> dict[str, DerivedSignal]:
+    if series is None:
+        return {}
+    return {
+        name: DerivedSignal(getattr(series, attribute), unit, long_name)
+        for attribute, (name, unit, long_name) in _SIGNALS.items()
+    }
+
+
+_SPOILS_TIME: Final = ("stood_still", "rate")
+"""News of the sample clock after which times within the run are wrong."""
+
+
+def _quality(contents: JournalContents, analysis: TestAnalysis) -> dict[str, Any] | None:
+    """Whether this run is a whole test, and every doubt; None for an aborted arming."""
+    ends = [event for event in contents.events if event.kind == "end"]
+    outcome = str(ends[-1].data.get("outcome", "")) if ends else "cut off"
+    if outcome == "aborted":
+        return None
+    hard = []
+    if contents.gaps:
+        hard.append(f"{contents.lost_samples} samples are missing in {len(contents.gaps)} gap(s)")
+    if outcome != "complete":
+        hard.append({"timeout": "the wall did not come to rest in time"}.get(outcome, f"it was {outcome}"))
+    if contents.damage:
+        hard.append(f"the journal is damaged: {contents.damage[0]}")
+    hard += _told(contents, "clock", lambda data: data.get("clock") in _SPOILS_TIME)
+    if not analysis.found:
+        hard.append("no release and impact were found")
+    doubts = [
+        *_told(contents, "clock", lambda data: data.get("clock") not in _SPOILS_TIME),
+        *_told(contents, "channel"),
+        *_told(contents, "overload"),
+        *_told(contents, "alarm", lambda data: data.get("alarm") == "wall_clock"),
+    ]
+    channels = sorted({str(e.data["channel"]) for e in contents.events if e.kind == "channel"})
+    return {"verdict": "bad" if hard else "good", "reasons": hard + doubts, "doubtful_channels": channels}
+
+
+def _told(
+    contents: JournalContents, kind: str, which: Callable[[dict[str, Any]], bool] = lambda data: True
+) -> list[str]:
+    """What was said of that kind while the run was recorded, each sentence once."""
+    return sorted({event.text for event in contents.events if event.kind == kind and which(event.data)})

@@ -1,0 +1,103 @@
+"""``python -m daq_app.acquisition.closing.finalise_worker``: makes run files, one JSON line a job.
+
+Jobs: ``{"job": "finalise", "journal": PATH, "out": PATH}`` and ``{"job": "recover", "journal": PATH}``. The
+process ends at once when its standard input closes, that is, when its parent dies: a half-made run
+file is a ``.tmp`` beside an untouched journal, and the next start makes it again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import sys
+import threading
+from dataclasses import asdict
+from pathlib import Path
+
+import psutil
+
+from daq_app.acquisition.closing.finaliser import Finished
+
+
+def finalise_job(journal: Path, out: Path) -> Finished:
+    """Verify the journal, derive, write, prove; the journal goes once its run is proven."""
+    from daq_app.acquisition.closing.derive import derive
+    from daq_app.runfile import RunFileError, finalise, read_journal
+
+    try:
+        with read_journal(journal) as contents:
+            empty = contents.n_samples == 0
+            derived, trouble = derive(contents)
+            damaged = bool(contents.damage)
+        if empty:
+            _put_away(journal)
+            return Finished(True, "It ended before its first sample, so there is no run")
+        finalise(journal, out, derived, keep_journal=damaged)
+    except RunFileError as error:
+        return Finished(False, f"The run file could not be made: {error} The journal is kept: {journal}")
+    except Exception as error:
+        return Finished(
+            False,
+            f"Making the run file failed ({type(error).__name__}: {error}). The journal is kept: {journal}",
+        )
+    return Finished(True, f"Saved as {out.name}{trouble and f'. {trouble}'}", str(out))
+
+
+def _put_away(journal: Path) -> None:
+    """Its run is proven, or it is empty; under its own name it would be read again at every start."""
+    journal.replace(journal.with_suffix(".journal-recovered"))
+
+
+def recover_job(journal: Path) -> Finished:
+    """Make the run of an orphan journal. No text where there was nothing to do."""
+    from daq_app.acquisition.closing.derive import derive
+    from daq_app.runfile import recover
+
+    (found,) = recover(journal, derive=lambda contents: derive(contents)[0])
+    if found.outcome == "in use":
+        return Finished(True, "")
+    if found.outcome in ("recovered", "saved already", "empty"):
+        _put_away(journal)
+    text = "" if found.outcome == "saved already" else found.text
+    return Finished(found.outcome != "failed", text, str(found.run or ""))
+
+
+def _do(job: dict[str, str]) -> Finished:
+    match job:
+        case {"job": "finalise", "journal": journal, "out": out}:
+            return finalise_job(Path(journal), Path(out))
+        case {"job": "recover", "journal": journal}:
+            try:
+                return recover_job(Path(journal))
+            except Exception as error:
+                return Finished(False, f"Recovery of {journal} failed ({type(error).__name__}: {error})")
+    return Finished(False, f"There is no job like {job}")
+
+
+def _listen(jobs: queue.SimpleQueue[str]) -> None:
+    for line in sys.stdin:
+        jobs.put(line)
+    os._exit(0)
+
+
+def main() -> None:
+    """Serve until the parent goes."""
+    # Reading and drawing come first; a run file may take a second longer.
+    with contextlib.suppress(psutil.Error, OSError, AttributeError):
+        psutil.Process().nice(psutil.BELOW_NORMAL_PRIORITY_CLASS if sys.platform == "win32" else 5)
+    answers = sys.stdout
+    sys.stdout = sys.stderr  # whatever a library prints must not be taken for an answer
+    jobs: queue.SimpleQueue[str] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(jobs,), daemon=True).start()
+    import daq_app.acquisition.closing.derive  # noqa: F401  # loaded now, so that the first run need not wait
+
+    while True:
+        answer = _do(json.loads(jobs.get()))
+        answers.write(json.dumps(asdict(answer)) + "\n")
+        answers.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,94 @@
+"""Live figures of the samples: computed by `daq_app.rocking`, published to viewers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from daq_app.acquisition.messages.published import BlockMessage, EstimateMessage, MotionMessage
+from daq_app.acquisition.messages.publisher import Publisher
+from daq_app.config.rig import Rig
+from daq_app.config.scaling import Scaling
+from daq_app.rocking.live import Estimate, LiveAnalyser, LiveResult
+from daq_app.rocking.motion.phases import PhaseEvent
+from drivers import Block
+
+_MOTION_RATE_HZ: Final = 500.0
+"""Rotation and velocity are shown at about this rate: fine enough for the shape of an impact."""
+
+
+class LiveView:
+    """One analyser and what it publishes. A new one for each zero and for each test."""
+
+    def __init__(self, rig: Rig, rate_hz: float, tare: Mapping[str, float], publisher: Publisher) -> None:
+        self._rate_hz = rate_hz
+        self._publisher = publisher
+        self._scaling = Scaling.of(rig.channels, tare)
+        self._analyser: LiveAnalyser | None = LiveAnalyser(rig, rate_hz, tare)
+        self._step = max(1, round(rate_hz / _MOTION_RATE_HZ))
+        self.estimate: Estimate | None = None
+        """The newest whole estimate of this test."""
+        self.trouble = ""
+        """A sentence on the analysis after the last `show`; empty when all is well."""
+        self._excluded: tuple[str, ...] = ()
+
+    def show(self, block: Block, overloaded: tuple[str, ...], *, quietly: bool) -> tuple[PhaseEvent, ...]:
+        """Analyse and publish a block; answers what happened in it. `quietly`: leave out the raw block.
+
+        What follows from the block goes out before the block itself: somebody waits for r.
+        """
+        events = self._analyse(block)
+        if not quietly:
+            self._publish_block(block, overloaded)
+        return events
+
+    def _analyse(self, block: Block) -> tuple[PhaseEvent, ...]:
+        self.trouble = ""
+        if self._analyser is None:
+            return ()
+        try:
+            result = self._analyser.process(block.first_sample, block.readings)
+        except Exception as error:
+            # The recording does not need the analysis: go on without it, and say so.
+            self._analyser = None
+            self.trouble = (
+                f"The live analysis failed ({type(error).__name__}: {error}). Recording goes on; release and "
+                "rest are not detected any more: stop by hand, and analyse the run afterwards"
+            )
+            return ()
+        self._publish(result)
+        if result.excluded_wires != self._excluded:
+            self._excluded = result.excluded_wires
+            if self._excluded:
+                self.trouble = f"These wires disagree with the others: {', '.join(self._excluded)}"
+        return result.events
+
+    def _publish_block(self, block: Block, overloaded: tuple[str, ...]) -> None:
+        heading = BlockMessage(
+            first_sample=block.first_sample,
+            n_samples=block.n_samples,
+            n_channels=int(block.readings.shape[0]),
+            rate_hz=self._rate_hz,
+            overloaded=overloaded,
+        )
+        si = np.ascontiguousarray(self._scaling.to_si(block.readings), dtype="<f4")
+        self._publisher.send("block", heading, si.tobytes())
+
+    def _publish(self, result: LiveResult) -> None:
+        if result.estimate is not None:
+            self.estimate = result.estimate
+            self._publisher.send("estimate", EstimateMessage.model_validate(result.estimate.as_message()))
+        start = -result.first_sample % self._step
+        rotation = result.rotation_rad[start :: self._step]
+        if rotation.size:
+            motion = MotionMessage(
+                first_sample=result.first_sample + start,
+                step=self._step,
+                rate_hz=self._rate_hz,
+                rotation_rad=rotation.tolist(),
+                velocity_rad_s=result.velocity_rad_s[start :: self._step].tolist(),
+                tilt_rad=result.tilt_rad,
+            )
+            self._publisher.send("motion", motion)

@@ -1,0 +1,1 @@
+"""What travels between threads and to viewers: items, published messages, options of the process."""

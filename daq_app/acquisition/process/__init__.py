@@ -1,0 +1,1 @@
+"""The acquisition process: hardware, session and sockets under one roof."""

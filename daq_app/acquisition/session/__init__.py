@@ -1,0 +1,1 @@
+"""One recording session: threads joined together, watched, kept awake."""

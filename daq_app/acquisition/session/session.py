@@ -1,0 +1,319 @@
+"""One session at the rig: wires the threads together and answers the requests of viewers."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from daq_app.acquisition.closing.finaliser import Finaliser, Finished
+from daq_app.acquisition.course.analyst import Analyst
+from daq_app.acquisition.course.header import make_header
+from daq_app.acquisition.course.preflight import check_name, check_space
+from daq_app.acquisition.messages.items import (
+    Ask,
+    Begin,
+    Closed,
+    Item,
+    Noted,
+    RequestRefused,
+    Saved,
+    SourceEnded,
+    Started,
+)
+from daq_app.acquisition.messages.published import Command, EventMessage, Reply, State
+from daq_app.acquisition.messages.publisher import Publisher
+from daq_app.acquisition.pipeline.reader import Patience, Reader
+from daq_app.acquisition.pipeline.recorder import Recorded, Recorder
+from daq_app.acquisition.session.wakefulness import Wakefulness
+from daq_app.acquisition.session.watchdog import Watchdog
+from daq_app.acquisition.viewers.desk import Answer
+from daq_app.config.planning.plan import TaskPlan
+from daq_app.config.rig import Rig
+from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX, find_journals
+from drivers import BackupRecorder, Driver, DriverError, Opened
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True, slots=True)
+class SessionSettings:
+    """What a session needs to know beside the rig."""
+
+    rig: Rig
+    rig_text: str
+    plan: TaskPlan
+    folder: Path
+    make_driver: Callable[[], Driver]
+    release_within_s: float = 1800.0
+    spare_folder: Path | None = None
+    truth: dict[str, Any] | None = None
+    """What a simulated wall is made from; goes into every run."""
+    patience: Patience = field(default_factory=Patience)
+    speed: float = 1.0
+    """How much faster than real time the simulated device or the replay runs."""
+
+
+class Session:
+    """Call everything from the main thread; the threads inside talk through queues."""
+
+    def __init__(self, settings: SessionSettings, publisher: Publisher, finaliser: Finaliser) -> None:
+        self._settings = settings
+        self._publisher = publisher
+        self._finaliser = finaliser
+        self._saving: list[Future[Finished]] = []
+        self.recorder = Recorder(self._forward, self._announce, self._hand_over, settings.spare_folder)
+        self.analyst = Analyst(
+            settings.rig,
+            publisher,
+            self.recorder.inbox.put,
+            self._hurry,
+            release_within_s=settings.release_within_s,
+            planned_rate_hz=settings.plan.rate_hz,
+        )
+        self.watchdog = Watchdog(self.recorder, settings.folder, self._say)
+        self._wakefulness = Wakefulness()
+        self.opened: Opened | None = None
+        self.error: DriverError | None = None
+        """Why sampling ended, if it ended by a fault."""
+        self.recent_events: deque[EventMessage] = deque(maxlen=50)
+        """For viewers that come later: what was recovered, which module is wrong, what was lost."""
+        self._reader: Reader | None = None
+
+    # -- life ------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start the threads, recover what an earlier session left behind, and begin to sample."""
+        self.recorder.start()
+        self.analyst.start()
+        # Listed now: what this session will record is none of them.
+        folders = [self._settings.folder, self._settings.spare_folder]
+        left = [path for folder in folders if folder and folder.is_dir() for path in find_journals(folder)]
+        if left:
+            names = ", ".join(path.stem for path in left[:3]) + (" …" if len(left) > 3 else "")
+            text = (
+                f"An earlier session was cut off: {len(left)} recording(s) ({names}) are being made into "
+                "runs now. You may go on; what is in them is told when they are there"
+            )
+            self._say(EventMessage(kind="recovering", sample=0, text=text, severity="warning"))
+        for journal in left:
+            job = {"job": "recover", "journal": str(journal)}
+            self._finaliser.submit(job, self._tell_recovery)
+        self.preview()
+
+    def close(self) -> None:
+        """Stop sampling, close what is open, wait until it is saved, end the threads.
+
+        Journals of earlier sessions that have not been recovered yet wait for the next start.
+        """
+        if self._reader is not None:
+            self._reader.request_stop()
+            self._reader.join()
+        self.recorder.inbox.put(None)
+        self.recorder.join()
+        for job in self._saving:
+            job.result()
+        self.analyst.inbox.put(None)
+        self.analyst.join()
+        self._wakefulness.close()
+
+    def tick(self) -> None:
+        """Five times a second, on the main thread."""
+        if self.recording:
+            self._wakefulness.hold()
+        else:
+            self._wakefulness.let_go()
+        self._publisher.send("health", self.watchdog.look(self._reader, self.analyst.overloaded))
+
+    def tell_fault(self, text: str) -> None:
+        """Say that something of ours failed, once for each text."""
+        if all(event.text != text for event in self.recent_events):
+            self._say(
+                EventMessage(
+                    kind="alarm",
+                    sample=self.recorder.status.sample,
+                    text=text,
+                    severity="error",
+                    data={"alarm": "fault"},
+                )
+            )
+
+    @property
+    def state(self) -> State:
+        return self.analyst.state
+
+    @property
+    def recording(self) -> bool:
+        return self.recorder.status.recording
+
+    @property
+    def busy(self) -> bool:
+        """Whether a run is being recorded or made into its file."""
+        return self.recording or self.state is State.SAVING or not all(job.done() for job in self._saving)
+
+    # -- between the threads ---------------------------------------------------------------------
+
+    def _forward(self, item: Item) -> None:
+        """On the recorder's thread, after the journal has the item."""
+        match item:
+            case Started(opened=opened):
+                self.opened = opened
+            case SourceEnded(error=error):
+                self.opened = None
+                self.error = error
+        self.analyst.inbox.put(item)
+
+    def _hurry(self, quickly: bool) -> None:
+        """On the analyst's thread."""
+        if self._reader is not None:
+            self._reader.hurry(quickly)
+
+    def _announce(self, event: EventMessage) -> None:
+        self.recent_events.append(event)
+        self._publisher.send("event", event)
+
+    def _say(self, event: EventMessage) -> None:
+        self.recorder.inbox.put(Noted(event))
+
+    def _hand_over(self, recorded: Recorded) -> None:
+        """On the recorder's thread, when a journal is closed."""
+        self.analyst.inbox.put(Closed(recorded.journal, recorded.end))
+        self._stop_backup()
+        out = recorded.journal.with_suffix(RUN_SUFFIX)
+        job = {"job": "finalise", "journal": str(recorded.journal), "out": str(out)}
+        self._saving.append(self._finaliser.submit(job, lambda done: self._tell_saved(recorded, done)))
+
+    def _tell_saved(self, recorded: Recorded, finished: Finished) -> None:
+        """On the finaliser's thread."""
+        ok = finished.ok and recorded.end.outcome != "failed"
+        text = finished.text if ok else f"{recorded.end.text}. {finished.text}"
+        self._say(
+            EventMessage(
+                kind="saved" if finished.ok else "unsaved",
+                sample=recorded.end.sample,
+                text=text,
+                severity="info" if ok else "error",
+                data={"run": finished.path, "outcome": recorded.end.outcome, "test": recorded.header.test},
+            )
+        )
+        self.analyst.inbox.put(Saved(ok, text, finished.path))
+
+    def _tell_recovery(self, finished: Finished) -> None:
+        """On the finaliser's thread."""
+        if not finished.text:
+            return
+        self._say(
+            EventMessage(
+                kind="recovered" if finished.ok else "unrecovered",
+                sample=0,
+                text=f"Left by an earlier session: {finished.text}",
+                severity="warning" if finished.ok else "error",
+                data={"run": finished.path},
+            )
+        )
+
+    # -- requests --------------------------------------------------------------------------------
+
+    def preview(self) -> str:
+        """Begin to sample, if nothing samples yet."""
+        if self._reader is not None and self._reader.is_alive():
+            return "Sampling already"
+        self.error = None
+        self._reader = Reader(
+            self._settings.make_driver,
+            self._settings.plan,
+            self.recorder.inbox.put,
+            self._settings.patience,
+            self._settings.speed,
+        )
+        self._reader.start()
+        return "Sampling begins"
+
+    def arm(self, test: str, notes: str = "") -> Future[Path]:
+        """Record from now on as `test`. Raises `RequestRefused`; the future gives the journal's path."""
+        settings = self._settings
+        check_name(test)
+        if self.opened is None:
+            raise RequestRefused("Nothing is being sampled. Start the preview first")
+        if self.recording:
+            raise RequestRefused("A run is being recorded already. Stop or abort it before the next one")
+        check_space(settings.folder, settings.rig, self.opened.rate_hz)
+        header = make_header(
+            settings.rig,
+            settings.rig_text,
+            settings.plan,
+            self.opened,
+            self.analyst.tare,
+            test=test,
+            notes=notes,
+            truth=settings.truth,
+        )
+        begin = Begin(settings.folder / f"{header.run_id}{JOURNAL_SUFFIX}", header)
+        self.recorder.inbox.put(begin)
+        if self._reader is not None:
+            self._reader.ask(lambda driver: self._start_backup(driver, header.run_id))
+        return begin.done
+
+    def _start_backup(self, driver: Driver, stem: str) -> None:
+        """On the reader's thread: the second recorder, where it is on. It must never cost the first."""
+        if not isinstance(driver, BackupRecorder):
+            return
+        try:
+            paths = driver.start_backup(stem)
+        except DriverError as error:
+            self._say(EventMessage(kind="backup", sample=0, text=str(error), severity="error"))
+            return
+        if paths:
+            text = f"The NI driver records as well: {', '.join(paths)}"
+            self._say(EventMessage(kind="backup", sample=self.recorder.status.sample, text=text))
+
+    def _stop_backup(self) -> None:
+        def stop(driver: Driver) -> None:
+            if isinstance(driver, BackupRecorder):
+                driver.stop_backup()
+
+        if self._reader is not None:
+            self._reader.ask(stop)
+
+    def ask(self, name: str, arguments: dict[str, Any]) -> Future[tuple[str, dict[str, Any]]]:
+        """Hand a request to the analyst, in step with the samples."""
+        ask = Ask(name, arguments)
+        self.recorder.inbox.put(ask)
+        return ask.done
+
+    def handle(self, command: Command) -> Answer:
+        """Answer a viewer's command (not hello and shutdown, which the process answers)."""
+        match command.name:
+            case "preview":
+                return Reply(ok=True, text=self.preview())
+            case "arm":
+                test, notes = (str(command.arguments.get(name, "")) for name in ("test", "notes"))
+                return _reply_of(self.arm(test, notes[:20_000]), _armed)
+            case "tare" | "abort" | "stop" | "marker" | "note":
+                return _reply_of(self.ask(command.name, dict(command.arguments)), _answered)
+        raise RequestRefused(
+            f"There is no command '{command.name[:40]}'. There are hello, preview, tare, arm, abort, stop, "
+            "marker, note and shutdown"
+        )
+
+
+def _armed(journal: Path) -> Reply:
+    return Reply(ok=True, text="Armed and recording", data={"journal": str(journal)})
+
+
+def _answered(answer: tuple[str, dict[str, Any]]) -> Reply:
+    return Reply(ok=True, text=answer[0], data=answer[1])
+
+
+def _reply_of(asked: Future[_T], say: Callable[[_T], Reply]) -> Future[Reply]:
+    reply: Future[Reply] = Future()
+
+    def pass_on(done: Future[_T]) -> None:
+        error = done.exception()
+        reply.set_result(say(done.result()) if error is None else Reply(ok=False, text=str(error)))
+
+    asked.add_done_callback(pass_on)
+    return reply

@@ -1,0 +1,1 @@
+"""How viewers reach the acquisition process: sockets, keys, client, launcher."""

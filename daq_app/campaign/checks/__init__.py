@@ -1,0 +1,1 @@
+"""Checks before a test: do the sensors answer, and as they should."""

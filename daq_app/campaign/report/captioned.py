@@ -1,0 +1,85 @@
+"""The figures of a campaign with their captions, and as SVG."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from daq_app.campaign.report import figures
+from daq_app.campaign.report.summary import TestSummary
+
+
+@dataclass(frozen=True, slots=True)
+class CaptionedFigure:
+    """A figure with the file name it is saved under and its caption."""
+
+    name: str
+    figure: Figure
+    caption: str
+
+    @property
+    def svg(self) -> str:
+        """The picture as an SVG element that can stand inside a page."""
+        buffer = io.StringIO()
+        # A fixed salt makes the file depend on the data alone.
+        with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": self.name}):
+            self.figure.savefig(buffer, format="svg", metadata={"Date": None})
+        text = buffer.getvalue()
+        return text[text.index("<svg") :]
+
+
+def campaign_figures(tests: Sequence[TestSummary]) -> list[CaptionedFigure]:
+    """Figures 4.1 to 4.4, laid out; 4.1 and 4.3 once per specimen for its level with most tests."""
+    found = _built(tests)
+    for one in found:
+        # Otherwise each time a figure is saved it is laid out anew, and drawn twice for it.
+        engine = one.figure.get_layout_engine()
+        if engine is not None:
+            engine.execute(one.figure)
+            one.figure.set_layout_engine(None)
+    return found
+
+
+def _built(tests: Sequence[TestSummary]) -> list[CaptionedFigure]:
+    found: list[CaptionedFigure] = []
+    specimens = list(dict.fromkeys(test.specimen for test in tests))
+    richest = {specimen: _richest_level(tests, specimen) for specimen in specimens}
+    for specimen, level in richest.items():
+        own = [t for t in tests if (t.specimen, t.level) == (specimen, level)]
+        caption = f"Figure 4.1: rotation and angular velocity of {specimen}-{level}; dashed: the repetition"
+        picture = figures.histories(own, f"{specimen}-{level}")
+        found.append(CaptionedFigure(f"figure_4_1_{specimen}_{level}", picture, caption))
+    found.append(
+        CaptionedFigure(
+            "figure_4_2",
+            figures.period_against_amplitude(tests),
+            "Figure 4.2: period against peak rotation, measured and theory (4.1)",
+        )
+    )
+    for specimen, level in richest.items():
+        own = [t for t in tests if (t.specimen, t.level) == (specimen, level)]
+        caption = f"Figure 4.3: periods Tₙ and rotations φₙ of {specimen}-{level} against the impact n"
+        picture = figures.decay(own, f"{specimen}-{level}")
+        found.append(CaptionedFigure(f"figure_4_3_{specimen}_{level}", picture, caption))
+    found.append(
+        CaptionedFigure(
+            "figure_4_4",
+            figures.restitution_by_level(tests),
+            "Figure 4.4: r by level from classic theory (CRT) and from experimental evidence (EAV); "
+            "bars: 95 % of the test's own error",
+        )
+    )
+    return found
+
+
+def _richest_level(tests: Sequence[TestSummary], specimen: str) -> str:
+    """The level with most good tests; of equals the one of larger rotation, as the paper shows L3."""
+    own = [test for test in tests if test.specimen == specimen]
+    return max(
+        {test.level for test in own},
+        key=lambda level: (sum(t.good for t in own if t.level == level), level),
+    )

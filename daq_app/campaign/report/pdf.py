@@ -1,0 +1,186 @@
+"""The campaign report as PDF: the same tables and figures as the page, one after the other."""
+
+from __future__ import annotations
+
+import io
+import textwrap
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from itertools import accumulate
+from typing import Final
+
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import text_to_path
+from matplotlib.transforms import Bbox
+
+from daq_app.campaign.report import tables
+from daq_app.campaign.report.captioned import campaign_figures
+from daq_app.campaign.report.collect import Failure
+from daq_app.campaign.report.number_words import interval, number, signed
+from daq_app.campaign.report.summary import TestSummary
+
+_ROWS = 40
+"""Rows of a table on one page."""
+_WIDTH = 54
+"""Characters of a remark on one line."""
+_LINE: Final = 0.26
+"""Height of a line of a table, inches."""
+_GAP: Final = 0.35
+_MARGIN: Final = 0.4
+_FONT: Final = FontProperties(size=9)
+_HEADER_FONT: Final = FontProperties(size=9, weight="bold")
+
+
+def report_pdf(
+    title: str,
+    places: Sequence[tables.PlaceRow],
+    restitution: Sequence[tables.RestitutionRow],
+    repetitions: Sequence[tables.RepetitionRow],
+    tests: Sequence[TestSummary],
+    failures: Sequence[Failure],
+) -> bytes:
+    """A whole document."""
+    buffer = io.BytesIO()
+    with PdfPages(buffer, metadata={"Title": title}) as pages:
+        for page in _tables(title, "Table 4.1: coefficient of restitution", *_restitution_rows(restitution)):
+            pages.savefig(page)
+        if repetitions:
+            for page in _tables(title, "Effect of the repetitions", *_repetition_rows(repetitions)):
+                pages.savefig(page)
+        for picture in campaign_figures(tests):
+            figure = picture.figure
+            width, height = figure.get_size_inches()
+            figure.text(0.02, -0.02, picture.caption, fontsize=9, va="top")
+            # Room for the caption below: a tight box would lay out and draw everything once more to find it.
+            pages.savefig(figure, bbox_inches=Bbox([[-_MARGIN, -0.8], [width + _MARGIN, height + _MARGIN]]))
+        for page in _tables(title, "Table 3.2: sequence and status", *_place_rows(places)):
+            pages.savefig(page)
+        for page in _tables(title, "All tests", *_test_rows(tests)):
+            pages.savefig(page)
+        if failures:
+            rows = [[failure.test, failure.path.name, _wrapped(failure.reason)] for failure in failures]
+            for page in _tables(title, "Not analysed", ["Test", "Run", "Why"], rows):
+                pages.savefig(page)
+    return buffer.getvalue()
+
+
+def _restitution_rows(rows: Sequence[tables.RestitutionRow]) -> tuple[list[str], list[list[str]]]:
+    header = ["Specimen", "Estimator", "Tests", "Mean", "95 % interval", "Scatter", "r/r_max"]
+    header += ["Bias-corrected", "95 % interval", "r_max"]
+    return header, [
+        [
+            row.specimen,
+            row.method,
+            str(row.mean.tests),
+            number(row.mean.mean, 4),
+            interval(row.mean),
+            number(row.mean.scatter, 4),
+            number(row.ratio, 3),
+            number(row.corrected.mean, 4),
+            interval(row.corrected),
+            number(row.r_max, 3),
+        ]
+        for row in rows
+    ]
+
+
+def _repetition_rows(rows: Sequence[tables.RepetitionRow]) -> tuple[list[str], list[list[str]]]:
+    header = ["Level", "Estimator", "First tests", "Repeated", "Change", "95 % interval"]
+    return header, [
+        [
+            f"{row.specimen}-{row.level}",
+            row.method,
+            number(row.first.mean, 4),
+            number(row.repeated.mean, 4),
+            signed(row.change),
+            " … ".join(map(signed, row.change_interval95)),
+        ]
+        for row in rows
+    ]
+
+
+def _place_rows(rows: Sequence[tables.PlaceRow]) -> tuple[list[str], list[list[str]]]:
+    header = ["Test", "θ0/α", "Status", "Runs", "Remark"]
+    return header, [
+        [row.test, number(row.theta0_over_alpha, 2), row.state, row.runs, _wrapped(row.remark)]
+        for row in rows
+    ]
+
+
+def _test_rows(tests: Sequence[TestSummary]) -> tuple[list[str], list[list[str]]]:
+    methods = [m for m in tables.METHODS if any(m in t.methods for t in tests)]
+    header = ["Test", "θ0/α", "Impacts", *(f"r {m} ± SE" for m in methods), "In the mean"]
+    rows = []
+    for test in tests:
+        values = [
+            f"{test.methods[m].r:.4f} ± {number(test.methods[m].standard_error, 4)}"
+            if m in test.methods
+            else "–"
+            for m in methods
+        ]
+        inside = "yes" if test.good else _wrapped("no: " + "; ".join(test.reasons))
+        rows.append([test.test, number(test.phi0, 4), str(len(test.impacts_s)), *values, inside])
+    return header, rows
+
+
+def _wrapped(text: str) -> str:
+    return "\n".join(textwrap.wrap(text, _WIDTH))
+
+
+def _tables(title: str, heading: str, header: list[str], rows: list[list[str]]) -> Iterator[Figure]:
+    """One page after the other; rows of several lines take the room of several."""
+    start = 0
+    while start < len(rows):
+        end, lines = start, 0
+        while end < len(rows) and (end == start or lines + _lines(rows[end]) <= _ROWS):
+            lines += _lines(rows[end])
+            end += 1
+        yield _page(title, heading, header, rows[start:end], lines)
+        start = end
+
+
+def _lines(row: list[str]) -> int:
+    return max(cell.count("\n") + 1 for cell in row)
+
+
+def _page(title: str, heading: str, header: list[str], rows: list[list[str]], lines: int) -> Figure:
+    """Cells as plain texts on measured columns: a table of matplotlib costs five times as much to draw."""
+    width, height = 11.0, max(4.0, 1.2 + _LINE * (lines + 2))
+    figure = Figure(figsize=(width, height))
+    figure.text(0.05, 1.0 - 0.35 / height, title, fontsize=14, fontweight="bold", va="center")
+    figure.text(0.05, 1.0 - 0.70 / height, heading, fontsize=11, va="center")
+    columns = _columns(header, rows, 0.9 * width)
+    top, rules = 1.2, []
+    for place, row in enumerate([header, *rows]):
+        deep = _LINE * _lines(row)
+        for x, cell in zip(columns, row, strict=False):
+            figure.text(
+                (0.05 * width + x) / width,
+                1.0 - (top + 0.5 * deep) / height,
+                cell,
+                fontproperties=_FONT if place else _HEADER_FONT,
+                va="center",
+            )
+        top += deep
+        rules.append([(0.05, 1.0 - top / height), (0.05 + columns[-1] / width, 1.0 - top / height)])
+    colours, strokes = ["#333333"] + ["#dddddd"] * len(rows), [1.0] + [0.6] * len(rows)
+    figure.add_artist(LineCollection(rules, transform=figure.transFigure, colors=colours, linewidths=strokes))
+    return figure
+
+
+def _columns(header: list[str], rows: list[list[str]], room: float) -> list[float]:
+    """Where each column begins and where the last ends, in inches; gaps shrink where the room is short."""
+    widths = [max(map(_width, cells)) for cells in zip(header, *rows, strict=True)]
+    gap = min(_GAP, max(0.08, (room - sum(widths)) / len(widths)))
+    return [0.0, *accumulate(width + gap for width in widths)]
+
+
+@lru_cache(maxsize=4096)
+def _width(cell: str) -> float:
+    """Width of a text in inches."""
+    lines = cell.split("\n")
+    sizes = (text_to_path.get_text_width_height_descent(line, _HEADER_FONT, False) for line in lines if line)
+    return max((float(size[0]) for size in sizes), default=0.0) / 72.0

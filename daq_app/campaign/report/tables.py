@@ -1,0 +1,280 @@
+"""The tables of the campaign report: Table 3.2 with status, Table 4.1, effect of the repetitions."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from scipy.special import stdtrit
+
+from daq_app.campaign.report.statistics import GroupMean, random_effects_mean
+from daq_app.campaign.report.summary import TestSummary
+from daq_app.campaign.status import CampaignStatus
+
+METHODS: Final = ("CRT", "EAV", "fit")
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceRow:
+    """One row of Table 3.2: a place of the plan and what became of it."""
+
+    test: str
+    specimen: str
+    level: str
+    theta0_over_alpha: float
+    state: str
+    runs: str
+    remark: str
+
+
+@dataclass(frozen=True, slots=True)
+class RestitutionRow:
+    """One cell group of Table 4.1."""
+
+    specimen: str
+    method: str
+    mean: GroupMean
+    """Of the tests' values, as in the paper."""
+    corrected: GroupMean
+    """Of the values less each method's own bias."""
+    r_max: float
+
+    @property
+    def ratio(self) -> float:
+        """r / r_max."""
+        return self.mean.mean / self.r_max
+
+
+@dataclass(frozen=True, slots=True)
+class RepetitionRow:
+    """What the tests in between did to r: the repetition at the end less the level's first tests."""
+
+    specimen: str
+    level: str
+    method: str
+    first: GroupMean
+    repeated: GroupMean
+
+    @property
+    def change(self) -> float:
+        return self.repeated.mean - self.first.mean
+
+    @property
+    def change_standard_error(self) -> float:
+        """Two independent groups; a single test's error includes the scatter of the others."""
+        scatter = 0.0 if math.isnan(self.first.scatter) else self.first.scatter
+        own = math.hypot(self.repeated.standard_error, scatter if self.repeated.tests == 1 else 0.0)
+        return math.hypot(self.first.standard_error, own)
+
+    @property
+    def change_interval95(self) -> tuple[float, float]:
+        """Student's t with as many degrees of freedom as the scatter is known with."""
+        freedom = max(self.first.tests + self.repeated.tests - 2, 1)
+        reach = float(stdtrit(freedom, 0.975)) * self.change_standard_error
+        return self.change - reach, self.change + reach
+
+
+def table_3_2(status: CampaignStatus) -> list[PlaceRow]:
+    """Every place of the plan in order, then releases that the plan has no place for."""
+    rows = []
+    for place in status.places:
+        planned = place.planned
+        remarks = [f"{test.name}: {test.reason}" for test in place.tests if test.reason]
+        if planned.lost_originally:
+            remarks.append("lost in the original campaign")
+        runs = ", ".join(str(test.name) for test in place.tests)
+        name = planned.name
+        rows.append(
+            PlaceRow(
+                str(name),
+                name.specimen,
+                name.level,
+                planned.theta0_over_alpha,
+                place.state.value,
+                runs,
+                "; ".join(remarks),
+            )
+        )
+    for test in status.extra:
+        level = status.campaign.theta0_over_alpha(test.name)
+        rows.append(
+            PlaceRow(
+                str(test.name),
+                test.name.specimen,
+                test.name.level,
+                math.nan if level is None else level,
+                "not in the plan",
+                str(test.name),
+                test.reason,
+            )
+        )
+    return rows
+
+
+def table_4_1(tests: Sequence[TestSummary]) -> list[RestitutionRow]:
+    """Mean r by specimen and estimator over the good tests."""
+    rows: list[RestitutionRow] = []
+    for specimen in dict.fromkeys(test.specimen for test in tests):
+        own = [test for test in tests if test.specimen == specimen and test.good]
+        if not own:
+            continue
+        rows += [
+            RestitutionRow(
+                specimen,
+                method,
+                _mean(own, method, corrected=False),
+                _mean(own, method, corrected=True),
+                own[0].r_max,
+            )
+            for method in METHODS
+            if any(method in test.methods for test in own)
+        ]
+    return rows
+
+
+def mean_of_specimens(rows: Sequence[RestitutionRow]) -> list[RestitutionRow]:
+    """The last row of Table 4.1: the plain mean of the specimens, by estimator; none with one specimen.
+
+    It has no interval: specimens are not drawn from one population, and two tell no scatter.
+    """
+    means = []
+    for method in METHODS:
+        own = [row for row in rows if row.method == method]
+        if len(own) > 1:
+            plain, corrected = (
+                GroupMean(sum(values) / len(own), math.nan, math.nan, math.nan, math.nan, tests)
+                for values, tests in (
+                    ([row.mean.mean for row in own], sum(row.mean.tests for row in own)),
+                    ([row.corrected.mean for row in own], sum(row.corrected.tests for row in own)),
+                )
+            )
+            r_max = sum(row.r_max for row in own) / len(own)
+            means.append(RestitutionRow("mean", method, plain, corrected, r_max))
+    return means
+
+
+def repetition_effect(tests: Sequence[TestSummary]) -> list[RepetitionRow]:
+    """Levels of which a repetition at the end exists, against their first tests."""
+    rows = []
+    series = dict.fromkeys((t.specimen, t.level) for t in tests if t.repetition and t.good)
+    for specimen, level in series:
+        own = [t for t in tests if (t.specimen, t.level) == (specimen, level) and t.good]
+        first = [t for t in own if not t.repetition]
+        repeated = [t for t in own if t.repetition]
+        if not first:
+            continue
+        for method in METHODS:
+            a, b = (_mean(group, method, corrected=True) for group in (first, repeated))
+            if a.known and b.known:
+                rows.append(RepetitionRow(specimen, level, method, a, b))
+    return rows
+
+
+def _mean(tests: Iterable[TestSummary], method: str, *, corrected: bool) -> GroupMean:
+    results = [test.methods[method] for test in tests if method in test.methods]
+    if corrected:
+        return random_effects_mean(
+            [result.corrected for result in results],
+            [result.corrected_standard_error for result in results],
+        )
+    return random_effects_mean(
+        [result.r for result in results], [result.standard_error for result in results]
+    )
+
+
+def write_csv(
+    folder: Path,
+    places: Sequence[PlaceRow],
+    tests: Sequence[TestSummary],
+    restitution: Sequence[RestitutionRow],
+    repetitions: Sequence[RepetitionRow],
+) -> list[Path]:
+    """Every number of the report as CSV (UTF-8, comma, decimal point); returns the files."""
+    place_header = ("test", "specimen", "level", "theta0_over_alpha", "state", "runs", "remark")
+    place_rows: list[tuple[object, ...]] = [
+        (p.test, p.specimen, p.level, p.theta0_over_alpha, p.state, p.runs, p.remark) for p in places
+    ]
+    mean_header = ("specimen", "method", *_group_header("r"), *_group_header("r_corrected"), "r_max", "ratio")
+    mean_rows: list[tuple[object, ...]] = [
+        (r.specimen, r.method, *_group(r.mean), *_group(r.corrected), r.r_max, r.ratio) for r in restitution
+    ]
+    change_header = ("specimen", "level", "method", *_group_header("r_first"), *_group_header("r_repeated"))
+    change_header += ("change", "change_standard_error", "change_low95", "change_high95")
+    change_rows: list[tuple[object, ...]] = [
+        (
+            *(r.specimen, r.level, r.method, *_group(r.first), *_group(r.repeated)),
+            *(r.change, r.change_standard_error, *r.change_interval95),
+        )
+        for r in repetitions
+    ]
+    return [
+        _write(folder / "table_3_2.csv", place_header, place_rows),
+        _write(folder / "table_4_1.csv", mean_header, mean_rows),
+        _write(folder / "repetitions.csv", change_header, change_rows),
+        _write(folder / "tests.csv", *_test_table(tests)),
+        _write(folder / "half_cycles.csv", *_half_cycle_table(tests)),
+        _write(folder / "points.csv", *_point_table(tests)),
+    ]
+
+
+def _group_header(name: str) -> tuple[str, ...]:
+    parts = ("", "_standard_error", "_low95", "_high95", "_scatter", "_tests")
+    return tuple(name + part for part in parts)
+
+
+def _group(group: GroupMean) -> tuple[object, ...]:
+    return (group.mean, group.standard_error, group.low95, group.high95, group.scatter, group.tests)
+
+
+def _test_table(tests: Sequence[TestSummary]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
+    header = ["test", "run", "specimen", "level", "repetition", "good", "reasons", "theta0_rad"]
+    header += ["theta0_over_alpha", "impacts", "r_max"]
+    for method in METHODS:
+        header += [f"r_{method}", f"r_{method}_standard_error", f"r_{method}_bias"]
+    rows = []
+    for t in tests:
+        row: list[object] = [t.test, t.run, t.specimen, t.level, t.repetition, t.good, "; ".join(t.reasons)]
+        row += [t.theta0_rad, t.phi0, len(t.impacts_s), t.r_max]
+        for method in METHODS:
+            result = t.methods.get(method)
+            row += [result.r, result.standard_error, result.bias] if result else ["", "", ""]
+        rows.append(tuple(row))
+    return tuple(header), rows
+
+
+def _half_cycle_table(tests: Sequence[TestSummary]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
+    header = ("test", "n", "impact_s", "peak_rad", "peak_over_alpha", "period_s")
+    rows: list[tuple[object, ...]] = []
+    for t in tests:
+        for n, peak in enumerate(t.peaks_rad):
+            impact = t.impacts_s[n - 1] if 0 < n <= len(t.impacts_s) else ""
+            period = t.periods_s[n - 1] if 0 < n <= len(t.periods_s) else ""
+            rows.append((t.test, n, impact, peak, peak / t.alpha_rad, period))
+    return header, rows
+
+
+def _point_table(tests: Sequence[TestSummary]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
+    rows: list[tuple[object, ...]] = [
+        (t.test, method, impact, r)
+        for t in tests
+        for method, result in t.methods.items()
+        for impact, r in result.points
+    ]
+    return ("test", "method", "impact", "r"), rows
+
+
+def _write(path: Path, header: Sequence[str], rows: Sequence[Sequence[object]]) -> Path:
+    part = path.with_name(path.name + ".tmp")
+    with part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(header)
+        writer.writerows([["" if _missing(cell) else cell for cell in row] for row in rows])
+    return part.replace(path)
+
+
+def _missing(cell: object) -> bool:
+    return isinstance(cell, float) and math.isnan(cell)

@@ -1,0 +1,1 @@
+"""The result page of one test, beside its level."""

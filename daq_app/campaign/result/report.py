@@ -1,0 +1,171 @@
+"""The result of one test on one page: HTML and PDF, saved beside its run."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from jinja2 import Environment, PackageLoader, select_autoescape
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.figure import Figure
+
+from daq_app.campaign.report.captioned import CaptionedFigure
+from daq_app.campaign.report.summary import TestSummary
+from daq_app.campaign.result.figures import measured_periods, result_figure
+from daq_app.config.wording import plus_minus
+from daq_app.rocking import period
+
+METHODS: Final = ("EAV", "CRT")
+
+
+@dataclass(frozen=True, slots=True)
+class RepetitionRow:
+    """One test of the level in the comparison."""
+
+    test: str
+    phi0: float
+    impacts: int
+    r: dict[str, float | None]
+    good: bool
+    this: bool
+
+
+def is_repetition_of(test: TestSummary, other: TestSummary) -> bool:
+    """Whether two tests were released from the same level of the same specimen."""
+    return other.test != test.test and (other.specimen, other.level) == (test.specimen, test.level)
+
+
+def repetition_rows(test: TestSummary, earlier: Sequence[TestSummary]) -> list[RepetitionRow]:
+    """The test and the others of its level, in the order given, the test last."""
+    return [
+        RepetitionRow(
+            test=one.test,
+            phi0=one.phi0,
+            impacts=len(one.impacts_s),
+            r={name: one.methods[name].r if name in one.methods else None for name in METHODS},
+            good=one.good,
+            this=one is test,
+        )
+        for one in [*earlier, test]
+    ]
+
+
+def verdict_sentence(test: TestSummary) -> str:
+    """The quality verdict in words."""
+    if test.good:
+        return "Good." + (f" To note: {'; '.join(test.reasons)}." if test.reasons else "")
+    return f"Not good: {'; '.join(test.reasons) or 'rejected'}. The test is offered again."
+
+
+def period_deviation(test: TestSummary) -> float | None:
+    """Mean relative deviation of the measured periods from Eqn 4.1; None without two impacts."""
+    phi, measured = measured_periods(test)
+    inside = (phi > 0.0) & (phi < 1.0)
+    if not inside.any():
+        return None
+    return float((measured[inside] / period(phi[inside], test.p_rad_s) - 1.0).mean())
+
+
+def write_result(run: Path, test: TestSummary, earlier: Sequence[TestSummary] = ()) -> list[Path]:
+    """Write ``RUN.result.html`` and ``RUN.result.pdf`` beside the run; returns both. Raises `OSError`."""
+    figure = result_figure(test, earlier)
+    rows = repetition_rows(test, earlier)
+    html = (
+        Environment(
+            loader=PackageLoader("daq_app.campaign"), autoescape=select_autoescape(), trim_blocks=True
+        )
+        .get_template("result.html")
+        .render(
+            test=test,
+            run=run.name,
+            verdict=verdict_sentence(test),
+            methods=[(name, test.methods.get(name)) for name in METHODS],
+            picture=CaptionedFigure(f"result_{test.test}", figure, test.test).svg,
+            rows=rows,
+            names=METHODS,
+            deviation=period_deviation(test),
+            plus_minus=plus_minus,
+            bias=_bias,
+        )
+    )
+    return [
+        _replace(run.with_suffix(".result.html"), html.encode()),
+        _replace(run.with_suffix(".result.pdf"), _pdf(test, figure, rows)),
+    ]
+
+
+def _pdf(test: TestSummary, figure: Figure, rows: Sequence[RepetitionRow]) -> bytes:
+    buffer = io.BytesIO()
+    with PdfPages(buffer, metadata={"Title": test.test}) as pages:
+        pages.savefig(figure, bbox_inches="tight", pad_inches=0.4)
+        pages.savefig(_table_page(test, rows))
+    return buffer.getvalue()
+
+
+def _bias(value: float) -> str:
+    """With its sign; none where it rounds to nothing."""
+    return f"{value:+.4f}".replace("-", "−") if abs(value) >= 5e-5 else "0.0000"
+
+
+def _table_page(test: TestSummary, rows: Sequence[RepetitionRow]) -> Figure:
+    """r by each estimator, and the tests of the level, as on the HTML page."""
+    page = Figure(figsize=(11.0, 7.2))
+    page.text(0.05, 0.93, test.test, fontsize=15, fontweight="bold")
+    page.text(0.05, 0.88, verdict_sentence(test), fontsize=11, wrap=True)
+    methods = [(name, method) for name in METHODS if (method := test.methods.get(name)) is not None]
+    estimates = [
+        [
+            name,
+            f"{method.r:.4f}",
+            plus_minus(method.standard_error),
+            f"{method.r / test.r_max:.3f}",
+            _bias(method.bias),
+            f"{method.corrected:.4f}",
+        ]
+        for name, method in methods
+    ]
+    if estimates:
+        header = ["Estimator", "r", "standard error", "r/r_max", "bias of the method", "bias-corrected r"]
+        _table(page, (0.05, 0.62, 0.9, 0.22), header, estimates)
+    deviation = period_deviation(test)
+    if deviation is not None:
+        said = f"The measured periods deviate from theory (4.1) by {100 * deviation:+.1f} % on average."
+        page.text(0.05, 0.65, said.replace("-", "−"), fontsize=10)
+    cells = [
+        [
+            row.test + ("  (this test)" if row.this else ""),
+            f"{row.phi0:.4f}",
+            str(row.impacts),
+            *("–" if row.r[name] is None else f"{row.r[name]:.4f}" for name in METHODS),
+            "good" if row.good else "not good",
+        ]
+        for row in rows
+    ]
+    page.text(0.05, 0.58, "Tests of this level", fontsize=12, fontweight="bold")
+    header = ["Test", "θ0/α", "Impacts", *(f"r {name}" for name in METHODS), "Verdict"]
+    _table(page, (0.05, 0.05, 0.9, 0.5), header, cells)
+    return page
+
+
+def _table(
+    page: Figure, box: tuple[float, float, float, float], header: list[str], cells: list[list[str]]
+) -> None:
+    axis = page.add_axes(box)
+    axis.axis("off")
+    table = axis.table(
+        cellText=cells, colLabels=header, loc="upper left", edges="horizontal", cellLoc="center"
+    )
+    table.auto_set_font_size(False)
+    table.set_fontsize(10)
+    table.scale(1.0, 1.5)
+
+
+def _replace(path: Path, content: bytes) -> Path:
+    """Whole or not at all."""
+    part = path.with_name(path.name + ".tmp")
+    part.write_bytes(content)
+    part.replace(path)
+    return path

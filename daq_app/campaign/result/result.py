@@ -1,0 +1,156 @@
+"""``python -m daq_app.campaign.result.result RUN.h5``: analyse a run beside its level, save the page.
+
+A process of its own, so that a window that shows the result is never held up. Beside the run it
+leaves ``RUN.result.json`` (the summary, also the cache for later comparisons), ``.html`` and ``.pdf``.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from daq_app.campaign.names import TestName
+from daq_app.campaign.recorded import read_recorded
+from daq_app.campaign.report.summary import MethodResult, TestSummary
+from daq_app.campaign.status import RecordedTest, TestVerdict
+from daq_app.config import ConfigError
+from daq_app.runfile import RunFileError
+
+SUFFIX: Final = ".result.json"
+_FORMAT: Final = 1
+_ARRAYS: Final = ("time_s", "rotation_rad", "velocity_rad_s")
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """A test with the earlier ones of its level, oldest first."""
+
+    test: TestSummary
+    earlier: tuple[TestSummary, ...]
+
+
+class NoResult(Exception):
+    """The run gives no result: why, in words."""
+
+
+def save_summary(run: Path, summary: TestSummary) -> Path:
+    """Write the summary beside its run."""
+    content = asdict(summary)
+    for name in _ARRAYS:
+        content[name] = np.round(np.asarray(content[name], dtype=np.float64), 9).tolist()
+    path = run.with_suffix(SUFFIX)
+    part = path.with_name(path.name + ".tmp")
+    document = {"format": _FORMAT, "run_bytes": run.stat().st_size, "summary": content}
+    part.write_text(json.dumps(document), encoding="utf-8")
+    part.replace(path)
+    return path
+
+
+def load_summary(run: Path) -> TestSummary | None:
+    """The summary saved beside a run; None if there is none for just this file."""
+    try:
+        document = json.loads(run.with_suffix(SUFFIX).read_text(encoding="utf-8"))
+        if document["format"] != _FORMAT or document["run_bytes"] != run.stat().st_size:
+            return None
+        return _summary(document["summary"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _summary(content: dict[str, Any]) -> TestSummary:
+    methods = {
+        name: MethodResult(**{**method, "points": tuple((int(i), float(r)) for i, r in method["points"])})
+        for name, method in content["methods"].items()
+    }
+    arrays = {name: np.asarray(content[name], dtype=np.float64) for name in _ARRAYS}
+    tuples = {name: tuple(content[name]) for name in ("impacts_s", "peaks_rad", "periods_s", "reasons")}
+    return TestSummary(**{**content, **arrays, **tuples, "methods": methods})
+
+
+def judged(summary: TestSummary, test: RecordedTest) -> TestSummary:
+    """The summary under the verdict that holds now: the operator may have changed it since."""
+    if test.verdict is TestVerdict.BAD:
+        return replace(summary, good=False, reasons=(test.reason,) if test.reason else summary.reasons)
+    return replace(summary, good=True)
+
+
+def level_of(run: Path) -> tuple[RecordedTest, list[RecordedTest]]:
+    """The test of a run, and the tests of its level released before it. Raises `NoResult`."""
+    try:
+        recorded = [test for test in read_recorded(run.parent) if test.path is not None]
+    except (ConfigError, RunFileError) as error:
+        raise NoResult(str(error)) from error
+    this = next((test for test in recorded if test.path is not None and test.path.name == run.name), None)
+    if this is None:
+        raise NoResult(f"{run.name} holds no release of a named test: there is no result to show")
+    own: TestName = this.name
+    earlier = [
+        test
+        for test in recorded
+        if (test.name.specimen, test.name.level) == (own.specimen, own.level)
+        and test is not this
+        and test.released_ns < this.released_ns
+        and test.verdict is not TestVerdict.LOST
+    ]
+    return this, sorted(earlier, key=lambda test: test.released_ns)
+
+
+def load_result(run: Path) -> Result | None:
+    """The result as saved beside the runs; None if the run itself has none yet. Raises `NoResult`."""
+    this, earlier = level_of(run)
+    summary = load_summary(run)
+    if summary is None:
+        return None
+    others = [(test, load_summary(test.path)) for test in earlier if test.path is not None]
+    return Result(judged(summary, this), tuple(judged(s, t) for t, s in others if s is not None))
+
+
+def make_result(run: Path) -> Result:
+    """Analyse the run (and earlier ones that have no summary), save everything. Raises `NoResult`."""
+    # Imported here: reading a saved result needs neither the analysis nor matplotlib.
+    from daq_app.campaign.report.collect import Failure, summarise_run
+    from daq_app.campaign.result.report import write_result
+    from daq_app.rocking.analysis.analyse import AnalysisOptions
+
+    this, earlier = level_of(run)
+    summaries: list[TestSummary] = []
+    for test in [*earlier, this]:
+        assert test.path is not None
+        found = load_summary(test.path)
+        if found is None:
+            made = summarise_run(test, AnalysisOptions())
+            if isinstance(made, Failure):
+                if test is this:
+                    raise NoResult(f"{this.name} could not be analysed: {made.reason}")
+                continue
+            save_summary(test.path, made)
+            found = made
+        summaries.append(judged(found, test))
+    result = Result(summaries[-1], tuple(summaries[:-1]))
+    write_result(run, result.test, result.earlier)
+    return result
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """0 when the result is saved; 1 with a sentence on standard output when there is none."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    if len(arguments) != 1:
+        print("usage: python -m daq_app.campaign.result.result RUN.h5")
+        return 2
+    try:
+        make_result(Path(arguments[0]))
+    except (NoResult, OSError) as error:
+        print(error)
+        return 1
+    print("The result is saved")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,98 @@
+"""`daq-app analyse`: everything that one recorded test tells."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from daq_app.cli.analyse.bias import with_whole_chain_bias
+from daq_app.cli.analyse.files import write_outputs
+from daq_app.cli.analyse.tables import analysis_tables
+from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, reported
+from daq_app.config import Rig, load_rig
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command ``analyse``."""
+    app.command("analyse", epilog="Example: daq-app analyse runs/FR1-L3-2.h5 --out results")(analyse)
+
+
+def analyse(
+    run: Annotated[Path, typer.Argument(help="Run file (HDF5).", metavar="RUN")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the whole analysis as JSON.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Also write JSON, CSV tables and a picture into this folder.")
+    ] = None,
+    rig: Annotated[
+        Path | None, typer.Option(help="Use this rig file in place of the one kept in the run.")
+    ] = None,
+    cutoff: Annotated[
+        float | None, typer.Option(help="Cut-off of the velocity filter, Hz; the rig's if left out.")
+    ] = None,
+    zero_at_rest: Annotated[
+        bool,
+        typer.Option(help="Take every sensor's zero from the rest after the test (runs without a tare)."),
+    ] = False,
+    bias_runs: Annotated[
+        int, typer.Option(min=0, max=1000, help="Simulated tests behind each method's bias; 0: none.")
+    ] = 6,
+    chain_runs: Annotated[
+        int,
+        typer.Option(
+            min=0, max=1000, help="As well, whole simulated tests with all sensors (about 1 s each)."
+        ),
+    ] = 0,
+) -> None:
+    """Analyse a recorded test: θ0, impacts, peaks, speeds, periods, r by each method, base joint.
+
+    Exit code 0; 1 where the run shows no release test; 2 for a file that cannot be used.
+    """
+    # Imported here: `daq-app --help` should not load SciPy.
+    from daq_app.rocking import AnalysisOptions, TestRecord, analyse_record
+    from daq_app.runfile import open_run
+
+    with reported():
+        replacement = load_rig(rig) if rig is not None else None
+        options = AnalysisOptions(
+            velocity_cutoff_hz=cutoff,
+            zero_at_rest=zero_at_rest,
+            bias_runs=bias_runs,
+            keep_series=out is not None,
+        )
+        with open_run(run) as opened:
+            used: Rig | None = replacement or opened.rig
+            if used is None:
+                print_paragraph(
+                    "Error",
+                    f"{run}: the rig file kept in this run is not understood by this version. "
+                    "Give one with --rig",
+                )
+                raise typer.Exit(EXIT_BAD_INPUT)
+            try:
+                analysis = analyse_record(TestRecord.from_run(opened, used), options)
+            except (ValueError, KeyError) as error:
+                print_paragraph("Error", f"{run}: {error}")
+                raise typer.Exit(EXIT_BAD_INPUT) from None
+        if chain_runs and analysis.found:
+            analysis = with_whole_chain_bias(analysis, used, chain_runs)
+        if as_json:
+            typer.echo(json.dumps(analysis.as_dict(), ensure_ascii=False, allow_nan=False))
+        else:
+            console = Console()
+            if not console.is_terminal:
+                console = Console(width=130)  # a file or pipe has no width of its own
+            for part in analysis_tables(analysis):
+                console.print(part)
+        if out is not None:
+            try:
+                written = write_outputs(analysis, out, run.stem)
+            except OSError as error:
+                print_paragraph("Error", f"the results could not be written into {out}: {error}")
+                raise typer.Exit(EXIT_BAD_INPUT) from None
+            if not as_json:
+                typer.echo("Written: " + ", ".join(str(path) for path in written))
+    raise typer.Exit(0 if analysis.found else EXIT_FAILED)

@@ -1,0 +1,116 @@
+"""`daq-app campaign report`: from run files to Table 4.1 and Figures 4.1 to 4.4."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from daq_app.campaign.status import CampaignStatus
+from daq_app.cli.campaign.progress import DEFAULT_PLAN, open_plan, progress_bar
+from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
+from daq_app.workers import warm_up
+
+if TYPE_CHECKING:
+    from daq_app.campaign.report.summary import TestSummary
+    from daq_app.campaign.report.tables import RestitutionRow
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(help="Folder of the runs.", metavar="DIR")],
+    plan_file: Annotated[Path, typer.Option("--plan", help="Campaign file (TOML).")] = DEFAULT_PLAN,
+    out: Annotated[Path | None, typer.Option(help="Folder of the report.", show_default="DIR/report")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="all cores")] = None,
+    bias_runs: Annotated[
+        int, typer.Option(min=0, help="Simulated tests behind each method's bias; 0 leaves it out.")
+    ] = 6,
+    as_json: Annotated[bool, typer.Option("--json", help="Print Table 4.1 as JSON.")] = False,
+) -> None:
+    """Analyse every run of a campaign: HTML and PDF report, figures as SVG, every number as CSV.
+
+    Runs with a bad verdict are shown and left out of the means. Exit code 1 when a run that nobody had
+    flagged bad could not be analysed.
+    """
+    with reported():
+        campaign = open_plan(plan_file)
+        # Imported here: `--help` should not load SciPy.
+        drawing = ("daq_app.campaign.report.captioned", "daq_app.campaign.report.pdf")
+        # The program itself too: each worker imports it anew otherwise.
+        warm_up("daq_app.campaign.report.collect", *drawing, "daq_app.cli.app")
+        from daq_app.campaign.report import collect as gathering
+        from daq_app.campaign.report.tables import mean_of_specimens, table_4_1
+        from daq_app.campaign.report.write import write_report
+        from daq_app.rocking.analysis.analyse import AnalysisOptions
+
+        with progress_bar("analysing") as advance:
+            options = AnalysisOptions(bias_runs=bias_runs)
+            found = gathering.collect(folder, options=options, workers=workers, progress=advance)
+        tests, failures = found.tests, found.failures
+        for failure in failures:
+            print_paragraph("Not analysed", f"{failure.test} ({failure.path}): {failure.reason}")
+        if not tests:
+            print_paragraph("Error", f"no run in {folder} could be analysed; nothing was written")
+            raise typer.Exit(EXIT_FAILED)
+        target = out or folder / "report"
+        made = time.strftime("%Y-%m-%d %H:%M", time.localtime())
+        footer = f"Made {made} from {len(found.recorded)} recorded tests in {folder.name}."
+        status = CampaignStatus(campaign, found.recorded)
+        write_report(target, campaign.name, status, tests, footer, failures, at_once=workers != 1)
+        rows = table_4_1(tests)
+        _print(rows + mean_of_specimens(rows), tests, target, as_json)
+    if any(not failure.flagged_bad for failure in failures):
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _known(value: float) -> float | None:
+    """JSON has no NaN."""
+    return None if math.isnan(value) else value
+
+
+def _print(rows: list[RestitutionRow], tests: Sequence[TestSummary], target: Path, as_json: bool) -> None:
+    if as_json:
+        document = [
+            {
+                "specimen": row.specimen,
+                "method": row.method,
+                "tests": row.mean.tests,
+                "r": row.mean.mean,
+                "low95": _known(row.mean.low95),
+                "high95": _known(row.mean.high95),
+                "scatter": _known(row.mean.scatter),
+                "r_corrected": row.corrected.mean,
+                "r_corrected_low95": _known(row.corrected.low95),
+                "r_corrected_high95": _known(row.corrected.high95),
+                "r_max": row.r_max,
+                "ratio": row.ratio,
+            }
+            for row in rows
+        ]
+        typer.echo(json.dumps({"report": str(target / "report.html"), "table_4_1": document}, indent=1))
+        return
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=120)  # a file or pipe has no width of its own
+    table = Table(title="Table 4.1: coefficient of restitution", title_justify="left", box=SIMPLE_HEAD)
+    for column in ("wall", "by", "tests", "mean", "95 %", "r/r_max", "corrected", "95 %"):
+        table.add_column(column, justify="left" if column in ("wall", "by") else "right", no_wrap=True)
+    for row in rows:
+        intervals = [
+            "" if math.isnan(group.low95) else f"{group.low95:.4f}–{group.high95:.4f}"
+            for group in (row.mean, row.corrected)
+        ]
+        cells = (str(row.mean.tests), f"{row.mean.mean:.4f}", intervals[0], f"{row.ratio:.3f}")
+        table.add_row(row.specimen, row.method, *cells, f"{row.corrected.mean:.4f}", intervals[1])
+    console.print(table)
+    left_out = [test.test for test in tests if not test.good]
+    if left_out:
+        console.print(f"Left out of the means: {', '.join(left_out)}", highlight=False, markup=False)
+    console.print(f"Report: {target / 'report.html'}", highlight=False, markup=False, soft_wrap=True)

@@ -1,0 +1,1 @@
+"""`daq-app run`, `simulate`, `view` and keys."""

@@ -1,0 +1,1 @@
+"""What hardware there is: products, modules in slots, what is wired to each terminal."""

@@ -1,0 +1,1 @@
+"""What the window knows: state of the acquisition, recorded runs, background work. Draws nothing."""

@@ -1,0 +1,137 @@
+"""The live page: the motion large, what follows from it beside, all channels below."""
+
+from __future__ import annotations
+
+import math
+import time
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QVBoxLayout, QWidget
+
+from daq_app.acquisition.course.tare import UNZEROED
+from daq_app.acquisition.messages.published import EstimateMessage, MotionMessage, StateMessage
+from daq_app.monitor.data.session import Session
+from daq_app.monitor.plots.estimate_plots import PeriodPlot, PhasePlane, RestitutionPlot, side_by_side
+from daq_app.monitor.plots.motion_plots import MotionPlots
+from daq_app.monitor.plots.strip_panel import StripPanel
+from daq_app.monitor.widgets.counters import AlarmLevels, Counters
+from daq_app.monitor.widgets.labels import role_label, set_role
+from daq_app.monitor.widgets.theme import Colours
+
+
+class LivePage(QWidget):
+    """Everything that moves. The window calls `draw_frame` 40 times and `draw_slow` 6 times a second."""
+
+    def __init__(self, session: Session, levels: AlarmLevels, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self.counters = Counters(session, levels)
+        self.motion = MotionPlots(session)
+        self.restitution = RestitutionPlot(session)
+        self.phase = PhasePlane(session)
+        self.periods = PeriodPlot(session)
+        self.strips = StripPanel(session)
+        self.estimate_drawn_s = -math.inf
+        """When r was last handed to its plot (`time.monotonic`); the benchmark reads it."""
+        self.frames = 0
+        """Frames of the large plots drawn so far."""
+        self._seen: tuple[int, int] = (-1, -1)
+
+        self.theory_button = QPushButton("Theory  (T)")
+        self.theory_button.setCheckable(True)
+        self.theory_button.setProperty("role", "flat")
+        self.theory_button.toggled.connect(self._on_theory)
+        self.strips_button = QPushButton("Channels  (C)")
+        self.strips_button.setCheckable(True)
+        self.strips_button.setProperty("role", "flat")
+        self.strips_button.setToolTip("Give the whole page to the 41 channels, and back")
+        self.strips_button.toggled.connect(self._on_strips)
+        self._caption: QLabel = role_label("", "muted")
+
+        tools = QHBoxLayout()
+        tools.setContentsMargins(0, 0, 0, 0)
+        tools.addWidget(self._caption, 1)
+        tools.addWidget(self.theory_button)
+        tools.addWidget(self.strips_button)
+        left = QWidget()
+        left_layout = QVBoxLayout(left)
+        left_layout.setContentsMargins(0, 0, 0, 0)
+        left_layout.addWidget(self.motion)
+        self._right = QSplitter(Qt.Orientation.Vertical)
+        self._right.addWidget(self.restitution)
+        self._right.addWidget(side_by_side(self.phase, self.periods))
+        self._right.setSizes([1000, 1000])
+        self.upper = QSplitter(Qt.Orientation.Horizontal)
+        self.upper.addWidget(left)
+        self.upper.addWidget(self._right)
+        self.upper.setSizes([6200, 3800])
+        self.upper.setStretchFactor(0, 62)
+        self.upper.setStretchFactor(1, 38)
+        self.whole = QSplitter(Qt.Orientation.Vertical)
+        self.whole.addWidget(self.upper)
+        self.whole.addWidget(self.strips)
+        self.whole.setSizes([6800, 3200])
+        self.whole.setStretchFactor(0, 7)
+        self.whole.setStretchFactor(1, 4)
+        for splitter in (self._right, self.upper, self.whole):
+            splitter.setHandleWidth(6)
+            splitter.setChildrenCollapsible(False)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(10, 8, 10, 8)
+        layout.setSpacing(6)
+        layout.addWidget(self.counters)
+        layout.addLayout(tools)
+        layout.addWidget(self.whole, 1)
+
+    def restyle(self, colours: Colours) -> None:
+        """Take over a theme."""
+        for part in (self.motion, self.restitution, self.phase, self.periods, self.strips):
+            part.restyle(colours)
+
+    def draw_frame(self) -> None:
+        """Draw the large plots."""
+        if not self.strips_button.isChecked():
+            self.motion.draw()
+        self.frames += 1
+        self._draw_estimate()
+
+    def draw_slow(self) -> None:
+        """Draw figures, strips and the phase plane."""
+        self.counters.refresh()
+        self.strips.refresh()
+        self.phase.draw(self._session.fresh(MotionMessage))
+        self._show_caption()
+
+    def _show_caption(self) -> None:
+        """What must be known beside the plots: a missing zero first, then which theory is laid over."""
+        doubtful = self._session.run_zeroed is False and self._session.estimate is not None
+        parts = [UNZEROED if doubtful else "", self.motion.theory_caption()]
+        text = "  ".join(part for part in parts if part)
+        if self._caption.text() != text:
+            self._caption.setText(text)
+        set_role(self._caption, "warning" if doubtful else "muted")
+
+    def show_estimate(self) -> None:
+        """Draw and paint r now, between two frames: it is what the operator waits for."""
+        if self._draw_estimate():
+            self.restitution.plot.viewport().repaint()
+
+    def _draw_estimate(self) -> bool:
+        """Hand r to its plots; false where it has not changed."""
+        revision = self._session.revision
+        seen = (revision.get(EstimateMessage, 0), revision.get(StateMessage, 0))
+        if seen == self._seen:
+            return False
+        self._seen = seen
+        self.restitution.draw()
+        self.estimate_drawn_s = time.monotonic()
+        self.periods.draw()
+        self.counters.refresh()
+        return True
+
+    def _on_theory(self, on: bool) -> None:
+        self.motion.set_theory(on)
+        self._show_caption()
+
+    def _on_strips(self, on: bool) -> None:
+        self.upper.setVisible(not on)

@@ -1,0 +1,1 @@
+"""Plots of live, replayed and analysed signals."""

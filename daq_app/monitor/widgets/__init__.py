@@ -1,0 +1,1 @@
+"""Small pieces of the window: labels, tables, banners, gauges, the theme."""

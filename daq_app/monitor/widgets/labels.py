@@ -1,0 +1,93 @@
+"""Text on screen: labels with a role, and numbers as a person reads them."""
+
+from __future__ import annotations
+
+import math
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFrame, QLabel, QSizePolicy, QVBoxLayout, QWidget
+
+from daq_app.monitor.widgets.theme import font
+
+DASH = "–"
+"""Stands where no true value is known."""
+
+
+def role_label(text: str, role: str, parent: QWidget | None = None) -> QLabel:
+    """A label that the style sheet knows by its role."""
+    label = QLabel(text, parent)
+    label.setProperty("role", role)
+    return label
+
+
+def set_role(label: QWidget, role: str) -> None:
+    """Change a widget's role and have its style computed anew."""
+    if label.property("role") != role:
+        label.setProperty("role", role)
+        label.style().unpolish(label)
+        label.style().polish(label)
+
+
+def number(value: float | None, digits: int, unit: str = "") -> str:
+    """A number with fixed decimals and a true minus sign; a dash when there is none."""
+    if value is None or not math.isfinite(value):
+        return DASH
+    text = f"{value:.{digits}f}".replace("-", "−")
+    if text.strip("−0.") == "":
+        text = text.lstrip("−")
+    return f"{text} {unit}" if unit else text
+
+
+def size_text(n_bytes: float) -> str:
+    """Bytes as kB, MB, GB (powers of ten, as disks are sold)."""
+    for unit, scale, digits in (("TB", 1e12, 2), ("GB", 1e9, 1), ("MB", 1e6, 1), ("kB", 1e3, 0)):
+        if n_bytes >= scale:
+            return f"{n_bytes / scale:.{digits}f} {unit}"
+    return f"{n_bytes:.0f} B"
+
+
+def restitution_text(mean: float | None) -> str:
+    """Mean r."""
+    return DASH if mean is None else f"{mean:.3f}"
+
+
+class Tile(QFrame):
+    """A caption, one large value and a line below: what can be read at three metres."""
+
+    def __init__(self, caption: str, points: float = 21.0, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("card")
+        self._caption = role_label(caption, "heading")
+        self._value = QLabel(DASH)
+        self._value.setFont(font(points, bold=True))
+        self._points = points
+        self._detail = role_label("", "muted")
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(12, 6, 10, 6)
+        layout.setSpacing(0)
+        for widget in (self._caption, self._value, self._detail):
+            widget.setTextInteractionFlags(Qt.TextInteractionFlag.NoTextInteraction)
+            widget.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+            layout.addWidget(widget)
+
+    def set_points(self, points: float) -> None:
+        """Change the size of the value."""
+        self._value.setStyleSheet(f"font-size: {points:.1f}pt;")
+
+    def show_value(self, value: str, detail: str = "", role: str = "") -> None:
+        """Set the value, the line below it and the role of its colour (good, warning, bad or none)."""
+        if self._value.text() != value:
+            self._value.setText(value)
+        if self._detail.text() != detail:
+            self._detail.setText(detail)
+        set_role(self._value, role)
+
+    @property
+    def value(self) -> str:
+        """The value as shown."""
+        return self._value.text()
+
+    @property
+    def detail(self) -> str:
+        """The line below the value."""
+        return self._detail.text()

@@ -1,0 +1,97 @@
+"""Messages to the operator: a line that stays until it is read, never a box in the way."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Final, Literal
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
+
+from daq_app.monitor.widgets.labels import role_label
+from daq_app.monitor.widgets.shapes import Sign
+from daq_app.monitor.widgets.theme import Colours
+
+INFO_MS: Final = 8000
+Severity = Literal["info", "warning", "error"]
+_SHAPES: dict[str, str] = {"info": "disc", "warning": "triangle", "error": "cross"}
+_TONES: dict[str, str] = {"info": "accent", "warning": "warning", "error": "bad"}
+
+
+class NoticeLine(QFrame):
+    """Shows the newest notice; hidden while there is none. Errors stay in front of what is milder."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("bar")
+        self._colours: Colours | None = None
+        self._queue: deque[tuple[Severity, str]] = deque(maxlen=50)
+        self._sign = Sign(18)
+        self._text = QLabel()
+        self._text.setWordWrap(True)
+        self._text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._more = role_label("", "muted")
+        button = QPushButton("Read  (Ctrl+D)")
+        button.setShortcut("Ctrl+D")
+        button.setProperty("role", "flat")
+        button.clicked.connect(self.dismiss)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(16, 5, 16, 5)
+        layout.setSpacing(10)
+        layout.addWidget(self._sign)
+        layout.addWidget(self._text, 1)
+        layout.addWidget(self._more)
+        layout.addWidget(button)
+        self._fade = QTimer(self)
+        self._fade.setSingleShot(True)
+        self._fade.setInterval(INFO_MS)
+        self._fade.timeout.connect(self._let_info_go)
+        self.hide()
+
+    def restyle(self, colours: Colours) -> None:
+        """Take over a theme."""
+        self._colours = colours
+        self._show()
+
+    def tell(self, severity: Severity, text: str) -> None:
+        """Show a notice; a repetition of one that waits is not added."""
+        if not text or any(text == waiting for _, waiting in self._queue):
+            return
+        if severity == "info":
+            # What is good to know gives way to the next such line by itself.
+            for old in [notice for notice in self._queue if notice[0] == "info"]:
+                self._queue.remove(old)
+            self._queue.append((severity, text))
+            self._fade.start()
+        else:
+            self._queue.appendleft((severity, text))
+        self._show()
+
+    def _let_info_go(self) -> None:
+        """What was only good to know leaves by itself; warnings and errors wait to be read."""
+        for old in [notice for notice in self._queue if notice[0] == "info"]:
+            self._queue.remove(old)
+        self._show()
+
+    def dismiss(self) -> None:
+        """The notice in front has been read."""
+        if self._queue:
+            self._queue.popleft()
+        self._show()
+
+    @property
+    def current(self) -> tuple[Severity, str] | None:
+        """Severity and text of the notice in front."""
+        return self._queue[0] if self._queue else None
+
+    def _show(self) -> None:
+        if not self._queue:
+            self.hide()
+            return
+        severity, text = self._queue[0]
+        if self._colours is not None:
+            self._sign.show_shape(_SHAPES[severity], str(getattr(self._colours, _TONES[severity])))
+        self._text.setText(text)
+        rest = len(self._queue) - 1
+        self._more.setText(f"{rest} more" if rest else "")
+        self.show()

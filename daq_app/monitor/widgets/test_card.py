@@ -1,0 +1,101 @@
+"""Which test comes next: its name, the rotation to pull to, and notes that go into the run."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QFrame,
+    QGridLayout,
+    QHBoxLayout,
+    QLineEdit,
+    QPlainTextEdit,
+    QPushButton,
+    QWidget,
+)
+
+from daq_app.monitor.widgets.labels import role_label
+
+LEVELS = {"L1": 0.15, "L2": 0.25, "L3": 0.35, "L4": 0.40}
+"""θ0/α of Table 3.2."""
+_LEVEL = re.compile(r"(?:^|-)(L[1-4])(?:-|$)")
+
+
+@dataclass(frozen=True, slots=True)
+class TestChoice:
+    """The test that would be armed now."""
+
+    __test__ = False  # no test case of pytest
+
+    name: str = ""
+    target_ratio: float = math.nan
+    """θ0/α to pull to; NaN when no level is chosen."""
+    notes: str = ""
+
+
+class TestCard(QFrame):
+    """Edits the choice; `changed` tells of every edit."""
+
+    __test__ = False
+    changed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("card")
+        self._name = QLineEdit()
+        self._name.setPlaceholderText("for instance FR1-L3-2")
+        self._name.setMaxLength(60)
+        self._notes = QPlainTextEdit()
+        self._notes.setPlaceholderText("Notes for the run: weather, cracks, who pulled …")
+        self._notes.setMaximumHeight(58)
+        self._notes.setTabChangesFocus(True)
+        self._group = QButtonGroup(self)
+        levels = QHBoxLayout()
+        levels.setSpacing(4)
+        self._buttons: dict[str, QPushButton] = {}
+        for level, ratio in LEVELS.items():
+            button = QPushButton(f"{level}  {ratio:.2f}")
+            button.setCheckable(True)
+            button.setProperty("role", "flat")
+            self._group.addButton(button)
+            self._buttons[level] = button
+            levels.addWidget(button, 1)
+        layout = QGridLayout(self)
+        layout.setContentsMargins(12, 10, 12, 10)
+        layout.setVerticalSpacing(6)
+        layout.addWidget(role_label("Test", "heading"), 0, 0)
+        layout.addWidget(self._name, 0, 1)
+        layout.addWidget(role_label("θ0/α", "heading"), 1, 0)
+        layout.addLayout(levels, 1, 1)
+        layout.addWidget(self._notes, 2, 0, 1, 2)
+        self._name.textEdited.connect(self._on_name)
+        self._group.buttonClicked.connect(lambda _button: self.changed.emit())
+        self._notes.textChanged.connect(self.changed.emit)
+
+    @property
+    def choice(self) -> TestChoice:
+        """What is chosen now."""
+        ratio = next((LEVELS[name] for name, button in self._buttons.items() if button.isChecked()), math.nan)
+        return TestChoice(self._name.text().strip(), ratio, self._notes.toPlainText().strip())
+
+    def propose(self, name: str, target_ratio: float = math.nan) -> None:
+        """Fill in the next test. Notes of the last test are not carried over."""
+        self._name.setText(name)
+        self._notes.clear()
+        self._check_level(name, target_ratio)
+        self.changed.emit()
+
+    def _on_name(self, text: str) -> None:
+        self._check_level(text, math.nan)
+        self.changed.emit()
+
+    def _check_level(self, name: str, ratio: float) -> None:
+        found = _LEVEL.search(name)
+        for level, button in self._buttons.items():
+            if (found is not None and found[1] == level) or abs(LEVELS[level] - ratio) < 1e-6:
+                button.setChecked(True)
+                return

@@ -1,0 +1,113 @@
+"""The strip at the top: the state in words, shape and colour, and the recording light."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+
+from daq_app.acquisition.messages.published import HealthMessage, State
+from daq_app.monitor.data.session import RECORDING, Session
+from daq_app.monitor.widgets.labels import role_label, set_role
+from daq_app.monitor.widgets.shapes import Sign
+from daq_app.monitor.widgets.state_look import look_of
+from daq_app.monitor.widgets.theme import Colours, font
+
+
+class Header(QFrame):
+    """Shows a session's state; `refresh` is called several times a second."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("bar")
+        self._session = session
+        self._sign = Sign(34)
+        self._word = QLabel()
+        self._word.setFont(font(21, bold=True))
+        self._test = QLabel()
+        self._test.setFont(font(15, bold=True))
+        self._sentence = role_label("", "muted")
+        self._sentence.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._light = Sign(22)
+        self._light_word = QLabel()
+        self._light_word.setFont(font(15, bold=True))
+        self._light_detail = role_label("", "muted")
+        self._light_detail.setMinimumWidth(170)
+
+        middle = QVBoxLayout()
+        middle.setSpacing(0)
+        middle.addWidget(self._test)
+        middle.addWidget(self._sentence)
+        right = QVBoxLayout()
+        right.setSpacing(0)
+        right.addWidget(self._light_word)
+        right.addWidget(self._light_detail)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(16, 8, 16, 8)
+        layout.setSpacing(12)
+        layout.addWidget(self._sign)
+        layout.addWidget(self._word)
+        layout.addSpacing(16)
+        layout.addLayout(middle, 1)
+        layout.addSpacing(16)
+        layout.addWidget(self._light)
+        layout.addLayout(right)
+
+    def refresh(self, colours: Colours) -> None:
+        """Bring the strip up to date."""
+        session = self._session
+        state = session.current_state
+        look = look_of(state)
+        colour = str(getattr(colours, look.tone))
+        self._sign.show_shape(look.shape, colour)
+        self._word.setText(look.word)
+        _colour(self._word, colour)
+        message = session.state
+        self._test.setText(message.test if message is not None and message.test else "No test chosen")
+        sentence = look.sentence
+        if state is not None and message is not None and message.text:
+            told = message.text.rstrip(".")
+            sentence = f"{told[:1].upper()}{told[1:]}. {look.sentence}"
+        if session.data_missing:
+            sentence = "No data for more than half a second: what is shown is not live."
+        self._sentence.setText(sentence)
+        self._sentence.setToolTip(sentence)
+        set_role(self._sentence, "bad" if session.data_missing or state is None else "muted")
+        self._refresh_light(state, colours)
+
+    def _refresh_light(self, state: State | None, colours: Colours) -> None:
+        session = self._session
+        if session.recording_on_disk:
+            self._show_light("disc", colours.bad, "Recording", f"{session.safe_s:.1f} s safe on disk")
+        elif state in RECORDING and session.fresh(HealthMessage) and session.safe_s > 0:
+            behind = f"{session.unsafe_s:.1f} s wait for the disk"
+            self._show_light("triangle", colours.warning, "Disk is slow", behind)
+        elif state in RECORDING:
+            self._show_light("triangle", colours.warning, "Not confirmed", "no sample confirmed on disk")
+        elif state is State.SAVED:
+            self._show_light("tick", colours.good, "On disk", "checked and closed")
+        else:
+            self._show_light("ring", colours.muted, "Not recording", "")
+
+    def _show_light(self, shape: str, colour: str, word: str, detail: str) -> None:
+        self._light.show_shape(shape, colour)
+        self._light_word.setText(word)
+        _colour(self._light_word, colour)
+        self._light_detail.setText(detail)
+        self._light_detail.setVisible(bool(detail))
+
+    @property
+    def words(self) -> dict[str, str]:
+        """What is written: keys state, test, sentence, recording, recording_detail."""
+        return {
+            "state": self._word.text(),
+            "test": self._test.text(),
+            "sentence": self._sentence.text(),
+            "recording": self._light_word.text(),
+            "recording_detail": self._light_detail.text(),
+        }
+
+
+def _colour(label: QLabel, colour: str) -> None:
+    """Colour a label's text; a style sheet that is set anew is worked out anew, so only on a change."""
+    sheet = f"color: {colour};"
+    if label.styleSheet() != sheet:
+        label.setStyleSheet(sheet)

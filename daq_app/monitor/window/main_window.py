@@ -1,0 +1,361 @@
+"""The operator's window: pages around one session, fed by one link.
+
+The window is a client. It may be closed, killed or opened twice; the acquisition does not notice.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtWidgets import QApplication, QMainWindow, QPushButton, QWidget
+
+from daq_app.acquisition.messages.published import (
+    BlockMessage,
+    EventMessage,
+    HealthMessage,
+    MotionMessage,
+    Reply,
+    State,
+    StateMessage,
+)
+from daq_app.campaign.plan import Campaign
+from daq_app.config import ConfigError, parse_rig
+from daq_app.monitor.data.background import Background
+from daq_app.monitor.data.link import Link
+from daq_app.monitor.data.session import RECORDING, Session
+from daq_app.monitor.pages.campaign_page import CampaignPage
+from daq_app.monitor.pages.gap_page import GapPage
+from daq_app.monitor.pages.live_page import LivePage
+from daq_app.monitor.pages.prepare_page import PreparePage, Zero
+from daq_app.monitor.pages.replay_page import ReplayPage
+from daq_app.monitor.pages.result_page import ResultPage
+from daq_app.monitor.widgets.settings import TYPE_SIZES, WindowSettings
+from daq_app.monitor.widgets.theme import THEMES, Colours, apply_theme
+from daq_app.monitor.window.orders import Orders
+from daq_app.monitor.window.window_frame import WindowFrame
+
+FRAME_MS: Final = 25
+SLOW_MS: Final = 160
+_QUIET_EVENTS: Final = frozenset({"impact", "marker", "tare", "saved", *State})
+"""Events that the pages show anyway, unless they are more than information."""
+
+
+class MainWindow(QMainWindow):
+    """Everything on screen. `link` None: a window for looking at runs only."""
+
+    def __init__(self, link: Link | None, settings: WindowSettings, *, started_here: bool = False) -> None:
+        """`started_here`: this window started the acquisition and ends it again when nothing is recorded."""
+        super().__init__()
+        self._started_here = started_here
+        self.setWindowTitle("Rocking-test recorder")
+        self.link = link
+        self.settings = settings
+        self.session = Session()
+        self.background = Background(self)
+        self._analyses = Background(self)
+        """Its own queue: an analysis takes seconds, a sensor check must not wait for it."""
+        self.colours: Colours = THEMES[settings.theme]
+        self.longest_stall_s = 0.0
+        """Longest time between two frames so far: how long the window was deaf at worst."""
+        self._last_frame_s = math.nan
+        self._rig_text = ""
+        self._state_before: State | None = None
+        self._was_live: tuple[bool, ...] = ()
+        self._told_past = False
+        self._runs_folder: Path | None = None
+        self._released = False
+        """Whether the wall was let go since the last arming: an aborted arming has no result."""
+
+        self.live = LivePage(self.session, settings.alarm_levels)
+        self.prepare = PreparePage(self.session, self.background)
+        self.campaign = CampaignPage(self.background)
+        self.replay = ReplayPage(self.background)
+        self.result = ResultPage(self._analyses)
+        self._diagnoses = Background(self)
+        self.gap = GapPage(self._diagnoses)
+        live_pages: dict[str, QWidget] = {"Prepare": self.prepare, "Live": self.live}
+        self.pages: dict[str, QWidget] = {
+            **(live_pages if link is not None else {}),
+            "Campaign": self.campaign,
+            "Result": self.result,
+            "Replay": self.replay,
+            "Gap": self.gap,
+        }
+        self.frame = WindowFrame(self.session, self.pages, live=link is not None)
+        self.header, self.notices, self.note_entry = (
+            self.frame.header,
+            self.frame.notices,
+            self.frame.note_entry,
+        )
+        self.actions_bar, self.health = self.frame.actions_bar, self.frame.health
+        self.stack, self.rail = self.frame.stack, self.frame.rail
+        self.setCentralWidget(self.frame)
+        self.splitters = {
+            "live_upper": self.live.upper,
+            "live_whole": self.live.whole,
+            "replay": self.replay.splitter,
+        }
+        self.show_page(self.prepare if link is not None else self.replay)
+        self.orders = Orders(
+            link,
+            self.session,
+            (self.prepare, self.campaign, self.result),
+            self.notices,
+            self.show_page,
+            self,
+        )
+        self.restyle()
+        self._connect()
+        self.resize(1366, 768)
+        settings.restore_layout(self, self.splitters)
+        if link is not None:
+            link.replied.connect(self._on_reply)
+            link.urgent.connect(self._on_urgent)
+            self._adopt(link.about)
+            if not link.may_command:
+                self.notices.tell(
+                    "info", "This window may watch, not command: it was opened without the token."
+                )
+        self._frame_timer = QTimer(self)
+        self._frame_timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._frame_timer.timeout.connect(self._on_frame)
+        self._frame_timer.start(FRAME_MS)
+        self._slow_timer = QTimer(self)
+        self._slow_timer.timeout.connect(self._on_slow)
+        self._slow_timer.start(SLOW_MS)
+
+    def _connect(self) -> None:
+        self.actions_bar.ordered.connect(self._on_order)
+        self.rail.page_wanted.connect(lambda place: self.show_page(list(self.pages.values())[place]))
+        self.rail.theme_wanted.connect(self.toggle_theme)
+        self.rail.size_wanted.connect(self.change_type_size)
+        self.note_entry.noted.connect(self.orders.note)
+        self.prepare.tare_wanted.connect(lambda: self.orders.request("tare"))
+        self.prepare.told.connect(self.notices.tell)
+        self.prepare.card.changed.connect(self._on_choice)
+        self.campaign.told.connect(self.notices.tell)
+        self.campaign.run_chosen.connect(lambda name: self.open_run(Path(name)))
+        self.replay.told.connect(self.notices.tell)
+        if self.link is None:
+            self.replay.opened.connect(lambda name: self.gap.set_folder(Path(name).parent))
+        self.gap.told.connect(self.notices.tell)
+        self.result.told.connect(self.notices.tell)
+        self.result.replay.connect(lambda name: self.open_run(Path(name)))
+        for key, button in self.prepare.keys.items() if self.link is not None else ():
+            QShortcut(QKeySequence(key), self).activated.connect(lambda b=button: self._prepare_by_key(b))
+        QShortcut(QKeySequence("T"), self.live).activated.connect(self.live.theory_button.toggle)
+        QShortcut(QKeySequence("C"), self.live).activated.connect(self.live.strips_button.toggle)
+
+    def _prepare_by_key(self, button: QPushButton) -> None:
+        """Check, pull test and zero from any page; their answer is on the page that comes to the front."""
+        self.prepare.refresh()
+        self.show_page(self.prepare)
+        button.click()
+
+    def show_page(self, page: QWidget) -> None:
+        """Bring a page to the front; one that this window does not have stays away."""
+        self.frame.show_page(page)
+
+    # -- look ------------------------------------------------------------------------------------
+
+    def restyle(self) -> None:
+        """Apply theme and type size to everything."""
+        app = QApplication.instance()
+        assert isinstance(app, QApplication)
+        self.colours = THEMES[self.settings.theme]
+        apply_theme(app, self, self.colours, self.settings.type_size)
+        self.frame.set_type_size(self.settings.type_size)
+        for page in (self.prepare, self.live, self.campaign, self.result, self.replay, self.gap):
+            page.restyle(self.colours)
+        self.notices.restyle(self.colours)
+
+    def toggle_theme(self) -> None:
+        """Change between light and dark."""
+        self.settings.theme = "light" if self.settings.theme == "dark" else "dark"
+        self.restyle()
+
+    def change_type_size(self, steps: int) -> None:
+        """Make the type larger or smaller by steps."""
+        place = TYPE_SIZES.index(self.settings.type_size) + steps
+        self.settings.type_size = TYPE_SIZES[max(0, min(len(TYPE_SIZES) - 1, place))]
+        self.restyle()
+
+    # -- flow ------------------------------------------------------------------------------------
+
+    def _adopt(self, about: Mapping[str, Any]) -> None:
+        """Take over what the acquisition says of itself."""
+        text = str(about.get("rig_text", ""))
+        rate_hz = float(about.get("rate_hz", 0.0) or 0.0)
+        if text and text != self._rig_text:
+            try:
+                rig = parse_rig(text, str(about.get("rig_name", "rig")))
+            except ConfigError as error:
+                self.notices.tell("error", f"The acquisition's rig file cannot be read here: {error}")
+                return
+            self._rig_text = text
+            self.session.set_rig(rig, rate_hz or rig.acquisition.rate_hz)
+            self.prepare.set_rig(rig)
+            self.setWindowTitle(f"{rig.name} – Rocking-test recorder")
+        self.prepare.wall.set_address(str(about.get("connection", "")) if about.get("simulated") else "")
+        folder = str(about.get("folder", ""))
+        self._runs_folder = Path(folder) if folder else None
+        if self._runs_folder is not None and self._runs_folder != self.gap.folder:
+            self.gap.set_folder(self._runs_folder)
+        self.prepare.planned_rate_hz = float(about.get("planned_rate_hz", 0.0) or 0.0)
+        if "tare" in about:
+            self.prepare.set_zero(Zero(dict(about["tare"]), dict(about.get("tare_record", {}))))
+            self.session.set_zeroed(bool(about["tare"]))
+        self._adopt_past(about.get("events", []))
+
+    def _adopt_past(self, events: Sequence[Any]) -> None:
+        """What was said before this window came: warnings are told now, the arming dates the run."""
+        if self._told_past:
+            return
+        self._told_past = True
+        past = [EventMessage.model_validate(event) for event in events]
+        self.session.adopt_past(past)
+        for event in past:
+            if event.severity != "info":
+                self.notices.tell(event.severity, event.text)
+
+    def _on_frame(self) -> None:
+        now = time.monotonic()
+        if math.isfinite(self._last_frame_s):
+            self.longest_stall_s = max(self.longest_stall_s, now - self._last_frame_s)
+        self._last_frame_s = now
+        self._take_in()
+        live = tuple(self.session.fresh(kind) for kind in (BlockMessage, MotionMessage, HealthMessage))
+        if live != self._was_live:
+            # What has just gone stale must not stand as live until the next slow tick.
+            self._was_live = live
+            self._on_slow()
+        if self.stack.currentWidget() is self.live:
+            self.live.draw_frame()
+
+    def _take_in(self) -> None:
+        if self.link is not None:
+            for published in self.link.take():
+                self.session.feed(published)
+                self._after(published.message)
+
+    def _on_urgent(self) -> None:
+        """r has come: it is on screen before the next frame is drawn."""
+        self._take_in()
+        if self.stack.currentWidget() is self.live:
+            self.live.show_estimate()
+
+    def _after(self, message: object) -> None:
+        match message:
+            case StateMessage():
+                self._on_state(message)
+            case EventMessage():
+                if message.kind == "tare" and self.link is not None:
+                    self.link.request("hello")
+                if message.kind not in _QUIET_EVENTS or message.severity != "info":
+                    self.notices.tell(message.severity, message.text)
+
+    def _on_state(self, message: StateMessage) -> None:
+        before, self._state_before = self._state_before, message.state
+        if before is message.state:
+            return
+        self.gap.set_recording(message.state in RECORDING | {State.SAVING})
+        if message.state is State.ARMED:
+            self._released = False
+        if message.state in (State.RELEASED, State.ROCKING):
+            self._released = True
+        if message.state is State.ARMED:
+            self.show_page(self.live)
+        if message.state is State.PREVIEWING and before in (State.IDLE, None) and self.link is not None:
+            self.link.request("hello")
+        if message.state is State.SAVED and before is State.SAVING:
+            self._on_saved(Path(message.run_path))
+        self._on_slow()
+
+    def _on_saved(self, run: Path) -> None:
+        """A run has just been closed."""
+        self.campaign.scan()
+        if not run.is_file():
+            self.notices.tell("info", f"The run is saved on the recording machine: {run}")
+            return
+        self.replay.open(run)
+        if self._released:
+            self.show_page(self.result)
+            self.result.open(run)
+            self.gap.after_run(run)
+
+    def _on_slow(self) -> None:
+        self.header.refresh(self.colours)
+        self.health.refresh()
+        may_command = self.link is not None and self.link.may_command
+        self.actions_bar.refresh(
+            self.session.current_state, sampling=self.session.sampling, may_command=may_command
+        )
+        page = self.stack.currentWidget()
+        if page is self.live:
+            self.live.draw_slow()
+        elif page is self.prepare:
+            self.prepare.refresh()
+
+    def _on_choice(self) -> None:
+        self.live.motion.set_target(self.prepare.card.choice.target_ratio * self.session.alpha_rad)
+
+    # -- orders ----------------------------------------------------------------------------------
+
+    def _on_order(self, name: str) -> None:
+        if name == "note":
+            self.note_entry.ask()
+        else:
+            self.orders.order(name)
+
+    def next_test(self) -> None:
+        """Take the next test of the campaign."""
+        self.orders.next_test()
+
+    def open_run(self, path: Path) -> None:
+        """Show a run on the replay page."""
+        self.show_page(self.replay)
+        self.replay.open(path)
+
+    def set_campaign(self, campaign: Campaign, folder: Path | None = None) -> None:
+        """Follow a campaign; the runs lie in `folder`, else where the acquisition puts them."""
+        self.orders.set_campaign(campaign, folder or self._runs_folder)
+
+    def _on_reply(self, name: str, reply: Reply) -> None:
+        if not reply.ok:
+            self.notices.tell("error" if name != "tare" else "warning", reply.text)
+            return
+        if name == "hello":
+            self._adopt(reply.data)
+        elif name == "tare":
+            self.notices.tell("info", reply.text)
+            self.prepare.set_zero(Zero(_numbers(reply.data.get("tare")), {}))
+            self.session.set_zeroed(True)
+            self.orders.request("hello")
+        elif name in ("marker", "note"):
+            self.notices.tell("info", f"Written: {reply.text}.")
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Remember the layout and hang up; a run under way goes on without the window."""
+        self._frame_timer.stop()
+        self._slow_timer.stop()
+        self.settings.save_layout(self, self.splitters)
+        if self.link is not None:
+            idle = self.session.current_state not in RECORDING | {State.SAVING}
+            if self._started_here and idle:
+                self.link.request("shutdown")  # refused if a test was armed this very moment
+            self.link.close()
+        self.gap.close_down()
+        self.background.finish()
+        self._analyses.finish(0)
+        self._diagnoses.finish(2000)
+        super().closeEvent(event)
+
+
+def _numbers(value: object) -> dict[str, float]:
+    return {str(k): float(v) for k, v in value.items()} if isinstance(value, dict) else {}

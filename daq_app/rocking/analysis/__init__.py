@@ -1,0 +1,1 @@
+"""A recorded test from signals to results, with bias and quality."""

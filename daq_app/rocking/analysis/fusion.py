@@ -1,0 +1,87 @@
+"""One best rotation from wires and LVDTs, and one best θ0 from all families, with uncertainty."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.rocking.analysis.results import ValueWithSigma
+
+Floats = NDArray[np.float64]
+
+CALIBRATION_SHARE = 0.002
+"""Standard uncertainty of a family's calibration, as a share of the value."""
+ZERO_SHARE_RAD = 3e-5
+"""Standard uncertainty of a family's zero."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fused:
+    """Best rotation (n,) with its standard uncertainty, and how the two families compare."""
+
+    rotation_rad: Floats
+    sigma_rad: Floats
+    gain: float
+    """Slope of LVDT rotation against wire rotation; 1 when they agree."""
+    offset_rad: float
+    scatter_rad: float
+    """rms of the difference after gain and offset."""
+
+
+def fuse(wires_rad: Floats, lvdts_rad: Floats, wire_noise_rad: float, lvdt_noise_rad: float) -> Fused:
+    """Weighted mean by white noise where both are known; the other where only one is.
+
+    The uncertainty holds the noise, the calibration and zero of both, and half of what the families
+    differ by.
+    """
+    both = np.isfinite(wires_rad) & np.isfinite(lvdts_rad)
+    gain, offset, scatter = 1.0, 0.0, math.nan
+    if np.count_nonzero(both) > 10 and np.ptp(wires_rad[both]) > 5e-3:
+        x, y = wires_rad[both], lvdts_rad[both]
+        gain = float(((x - x.mean()) @ (y - y.mean())) / ((x - x.mean()) @ (x - x.mean())))
+        offset = float(y.mean() - gain * x.mean())
+        scatter = float(np.std(y - gain * x - offset))
+    w, v = 1.0 / wire_noise_rad**2, 1.0 / lvdt_noise_rad**2
+    rotation = np.where(
+        both,
+        (w * wires_rad + v * lvdts_rad) / (w + v),
+        np.where(np.isfinite(wires_rad), wires_rad, lvdts_rad),
+    )
+    noise = np.where(
+        both, 1.0 / math.sqrt(w + v), np.where(np.isfinite(wires_rad), wire_noise_rad, lvdt_noise_rad)
+    )
+    size = np.abs(rotation)
+    share = np.where(both, CALIBRATION_SHARE / math.sqrt(2.0), CALIBRATION_SHARE)
+    disagreement = 0.5 * np.abs((gain - 1.0) * size) + 0.5 * abs(offset)
+    sigma = np.sqrt(noise**2 + (share * size) ** 2 + ZERO_SHARE_RAD**2 + disagreement**2)
+    return Fused(rotation, sigma, gain, offset, scatter)
+
+
+def best_value(families: Mapping[str, ValueWithSigma]) -> ValueWithSigma:
+    """Weighted mean of independent values; sigma widened where they scatter beyond their own (Birge)."""
+    good = [v for v in families.values() if math.isfinite(v.value) and v.sigma > 0]
+    if not good:
+        return ValueWithSigma(math.nan, math.nan)
+    weights = np.array([1.0 / v.sigma**2 for v in good])
+    values = np.array([v.value for v in good])
+    mean = float(weights @ values / weights.sum())
+    sigma = 1.0 / math.sqrt(float(weights.sum()))
+    if len(good) > 1:
+        birge = math.sqrt(float(weights @ (values - mean) ** 2) / (len(good) - 1))
+        sigma *= max(1.0, birge)
+    return ValueWithSigma(mean, sigma)
+
+
+def level(signal: Floats, scale: float, noise: float) -> ValueWithSigma:
+    """Mean of a steady stretch, its sigma from noise, calibration (of `scale`) and zero."""
+    good = signal[np.isfinite(signal)]
+    if good.size < 10:
+        return ValueWithSigma(math.nan, math.nan)
+    statistical = max(float(good.std()), noise) / math.sqrt(good.size)
+    return ValueWithSigma(
+        float(good.mean()), math.sqrt(statistical**2 + (CALIBRATION_SHARE * scale) ** 2 + ZERO_SHARE_RAD**2)
+    )

@@ -1,0 +1,187 @@
+"""Notes on the quality of a test: what a reader must know before believing its numbers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from daq_app.config.rig import Family
+from daq_app.rocking.analysis.results import QualityNote, TestAnalysis
+from daq_app.rocking.analysis.signals import Signals, TestTimes
+from daq_app.rocking.motion.swings import MotionTrack
+from daq_app.rocking.motion.transients import Onset
+from daq_app.rocking.record import TestRecord
+
+_THETA0_DISAGREEMENT = 0.005
+_GAIN_TOLERANCE = 0.01
+_REST_TOLERANCE_RAD = 3e-4
+_SLIDING_TOLERANCE_M = 5e-4
+_CLEAN_RELEASE_SHARE = 0.01
+
+
+def quality_notes(
+    record: TestRecord,
+    signals: Signals,
+    times: TestTimes,
+    track: MotionTrack | None,
+    analysis: TestAnalysis | None,
+    onsets: list[Onset | None],
+) -> tuple[QualityNote, ...]:
+    """All notes, warnings first."""
+    notes = [*_sensors(record, signals), *_course(times), _alignment(record)]
+    if track is not None and analysis is not None:
+        notes += [*_agreement(signals, analysis), *_motion(times, track, analysis), *_shocks(record, onsets)]
+    return tuple(sorted(notes, key=lambda note: note.severity != "warning"))
+
+
+def _warn(text: str) -> QualityNote:
+    return QualityNote("warning", text)
+
+
+def _info(text: str) -> QualityNote:
+    return QualityNote("info", text)
+
+
+def _sensors(record: TestRecord, signals: Signals) -> list[QualityNote]:
+    notes = []
+    missing = [channel_id for channel_id in record.rig.channel_ids if channel_id not in record.channel_ids]
+    if missing:
+        notes.append(_warn(f"channels of the rig that the record does not have: {', '.join(missing)}"))
+    if not record.tared:
+        notes.append(
+            _warn("no zero was taken before the test: rotation is counted from the certificates' offsets")
+        )
+    for name, share in signals.excluded_share.items():
+        notes.append(
+            _warn(f"wire {name} disagreed with the others and was left out for {share:.1%} of the record")
+        )
+    bad = 1.0 - float(np.isfinite(signals.rotation_rad).mean())
+    if bad > 0:
+        notes.append(_warn(f"{bad:.2%} of the record has no rotation (gaps); half-cycles there are left out"))
+    ids = record.family("wire")
+    for name, values in zip(ids, signals.wires_m, strict=True):
+        low, high = record.rig.channel(name).range_si
+        edge = 0.002 * (high - low)
+        if np.any((values <= low + edge) | (values >= high - edge)):
+            notes.append(_warn(f"wire {name} reached the end of its range"))
+    joint = signals.joint
+    if joint is None:
+        notes.append(_warn("too few LVDTs for a profile of the base joint"))
+    else:
+        if joint.suspects:
+            notes.append(
+                _warn(
+                    f"LVDTs that do not fit the line of their face were left out: {', '.join(joint.suspects)}"
+                )
+            )
+        if joint.clipped:
+            notes.append(_info(f"LVDTs that reached the end of their range: {', '.join(joint.clipped)}"))
+    return notes
+
+
+def _alignment(record: TestRecord) -> QualityNote:
+    """By what the families are shifted onto one time base; the offsets are those of the run's task plan."""
+    told = []
+    families: tuple[tuple[Family, str], ...] = (
+        ("wire", "wires"),
+        ("lvdt", "LVDTs"),
+        ("accelerometer", "accelerometers"),
+        ("tiltmeter", "tiltmeters"),
+    )
+    for family, name in families:
+        offsets = [record.offset_s(channel_id) * 1e3 for channel_id in record.family(family)]
+        if offsets and max(map(abs, offsets)) > 0:
+            told.append(f"{name} {min(offsets):+.3f} to {max(offsets):+.3f}")
+    if not told:
+        return _info("no known skews or delays: all channels are taken as sampled at the same instants")
+    return _info("channels aligned by their known skews and delays, ms: " + ", ".join(told))
+
+
+def _course(times: TestTimes) -> list[QualityNote]:
+    notes = []
+    kinds = [event.kind for event in times.events]
+    if times.release_s is None:
+        told = (
+            "the wall was held, but no release follows"
+            if "hold" in kinds
+            else "no steady hold and no release"
+        )
+        return [_warn(f"this record shows no test: {told}")]
+    if not times.impacts_s:
+        return [_warn("a release but no impact: the wall was caught or the record ends too early")]
+    if "caught" in kinds:
+        notes.append(_warn("a first fall was caught; the last release is analysed"))
+    if kinds.count("release") > 1 + kinds.count("caught"):
+        notes.append(_warn("more than one release: the last is analysed"))
+    if times.rest_s is None:
+        notes.append(_warn("the record ends before the wall is at rest"))
+    fallen = (event for event in times.events if event.kind == "rest" and "not upright" in event.text)
+    notes.extend(_warn(event.text) for event in fallen)
+    return notes
+
+
+def _agreement(signals: Signals, analysis: TestAnalysis) -> list[QualityNote]:
+    notes = []
+    alpha = signals.settings.alpha_rad
+    values = {name: v.value for name, v in analysis.theta0_by_family.items() if name != "best"}
+    if "tiltmeters" not in values:
+        notes.append(_warn("no tiltmeter: θ0 is read from the wires"))
+    spread = max(values.values()) - min(values.values())
+    if spread > _THETA0_DISAGREEMENT * alpha:
+        told = ", ".join(f"{name} {value * 1e3:.2f}" for name, value in values.items())
+        notes.append(_warn(f"the families disagree on θ0 by {spread / alpha:.1%} of α (mrad: {told})"))
+    if signals.fused is not None and abs(signals.fused.gain - 1.0) > _GAIN_TOLERANCE:
+        notes.append(
+            _warn(
+                f"LVDT rotation is {signals.fused.gain:.3f} of wire rotation: "
+                "a calibration is wrong, or the wall is not rigid"
+            )
+        )
+    residuals = analysis.residuals
+    if residuals is not None:
+        left = residuals.rotation_wires_rad.value
+        if abs(left) > _REST_TOLERANCE_RAD:
+            notes.append(
+                _warn(f"the wall came to rest at {left * 1e3:+.2f} mrad from the zero before the test")
+            )
+        slid = residuals.sliding_m
+        if slid is not None and abs(slid.value) > max(_SLIDING_TOLERANCE_M, 4 * slid.sigma):
+            notes.append(_warn(f"the base slid by {slid.value * 1e3:+.2f} mm"))
+    return notes
+
+
+def _motion(times: TestTimes, track: MotionTrack, analysis: TestAnalysis) -> list[QualityNote]:
+    notes = []
+    residual = track.release.residual_rad
+    if not math.isfinite(residual) or residual > _CLEAN_RELEASE_SHARE * abs(track.theta0_rad):
+        notes.append(_warn("the release was no clean one: the fall does not start from rest at the hold"))
+    lost = [n + 1 for n, arc in enumerate(track.arcs) if arc is None]
+    if lost:
+        notes.append(_info(f"half-cycles before impacts {', '.join(map(str, lost))} could not be fitted"))
+    eav, crt = analysis.estimates["eav"], analysis.estimates["crt"]
+    if eav.r is not None and crt.r is not None and eav.standard_error and crt.standard_error:
+        difference = eav.r - crt.r
+        sigma = math.hypot(eav.standard_error, crt.standard_error, 5e-4)
+        if abs(difference) > 4 * sigma:
+            notes.append(
+                _warn(
+                    f"EAV and CRT differ by {difference:+.4f} ({abs(difference) / sigma:.0f} σ): "
+                    "the motion is not Housner's"
+                )
+            )
+    if analysis.fit is not None and not analysis.fit.explains_the_motion:
+        notes.append(
+            _info(
+                f"Housner's motion leaves {analysis.fit.residual_rad * 1e3:.2f} mrad rms, "
+                f"noise is {analysis.fit.noise_rad * 1e3:.3f}: the wall does more than the model"
+            )
+        )
+    return notes
+
+
+def _shocks(record: TestRecord, onsets: list[Onset | None]) -> list[QualityNote]:
+    if not record.family("accelerometer"):
+        return [_info("no accelerometers: impact times are from the rotation alone")]
+    heard = sum(onset is not None for onset in onsets)
+    return [_info(f"accelerometers show {heard} of {len(onsets)} impacts")]

@@ -1,0 +1,1 @@
+"""From sensor positions and readings to rotations: wires and the base joint."""

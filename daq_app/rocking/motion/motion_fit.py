@@ -1,0 +1,186 @@
+"""r by a fit of the whole motion: exact Housner rocking to the recorded rotation, all at once.
+
+Free: θ0, release time, p, α, the zero of the rotation and r; p and α are held to their nominal
+values by 5 % and 10 %. Where r scatters from impact to impact, each impact has its own deviation,
+held to zero by that scatter: the standard error of the mean r then says so.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import OptimizeResult, least_squares
+from scipy.special import stdtrit
+
+from daq_app.rocking.motion.motion_model import (
+    ALPHA_PRIOR,
+    FIXED,
+    P_PRIOR,
+    POINT_S,
+    ZERO_PRIOR_RAD,
+    MotionModel,
+)
+
+Floats = NDArray[np.float64]
+
+_SMALLEST_SHARE = 0.02
+"""The motion is fitted until its peaks fall below this share of the first."""
+
+_POOR = 1.5
+"""A fit that leaves more than this many times the noise may have ended in a minimum that is not the least."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotionFit:
+    """Result of the fit; standard errors include the misfit (scaled by its χ² where above 1)."""
+
+    r: float
+    standard_error: float
+    p_rad_s: float
+    sigma_p_rad_s: float
+    alpha_rad: float
+    sigma_alpha_rad: float
+    theta0_rad: float
+    release_s: float
+    zero_rad: float
+    restitutions: tuple[float, ...]
+    """r of each impact of the fitted span."""
+    impacts: int
+    residual_rad: float
+    """rms of what the model leaves."""
+    noise_rad: float
+    """rms expected of a perfect model at the fitted points."""
+
+    @property
+    def explains_the_motion(self) -> bool:
+        """Whether the misfit is no more than twice the noise."""
+        return self.residual_rad < 2.0 * self.noise_rad
+
+    def interval95(self) -> tuple[float, float]:
+        """95 % confidence interval (Student t: what r scatters by is known from these impacts only)."""
+        reach = float(stdtrit(max(self.impacts - 1, 1), 0.975)) * self.standard_error
+        return self.r - reach, self.r + reach
+
+
+def fit_motion(
+    time_s: Floats,
+    rotation_rad: Floats,
+    *,
+    release_s: float,
+    theta0_rad: float,
+    impacts_s: list[float],
+    peaks_rad: list[float],
+    speeds_rad_s: list[float],
+    r: float,
+    scatter: float | None,
+    noise_rad: float,
+    p_rad_s: float,
+    alpha_rad: float,
+) -> MotionFit | None:
+    """Fit the rotation (n,) from release to the last half-cycle worth it; None with too few impacts.
+
+    `r`, `impacts_s`, `peaks_rad` (release first) and `speeds_rad_s` (at the impacts) start the fit;
+    `noise_rad` is the rms of one sample.
+    `scatter` is the relative standard deviation of r from impact to impact (at least 0.0003 is
+    allowed for); None says that r is the same at every impact.
+    """
+    count = _span(peaks_rad, len(impacts_s))
+    if count < 2 or not 0.0 < r <= 1.0:
+        return None
+    stop = impacts_s[count - 1] + 0.5 * (
+        impacts_s[count] - impacts_s[count - 1] if count < len(impacts_s) else 0.0
+    )
+    t, y, sigma = _points(time_s, rotation_rad, release_s - 0.1, stop, noise_rad)
+    if t.size < 4 * FIXED:
+        return None
+    spread = None if scatter is None else max(scatter, 3e-4)
+    side = 1.0 if theta0_rad > 0 else -1.0
+    problem = MotionModel(
+        t, y, sigma, release_s, abs(theta0_rad), side, p_rad_s, alpha_rad, math.log(r), spread
+    )
+    start = np.zeros(0) if spread is None else _deviations(speeds_rad_s, count, math.log(r)) / spread
+    x = np.zeros(FIXED)
+    # Where r is one number, later half-cycles join once the earlier ones are in phase; where every
+    # impact has its own, the speeds put all of them in phase from the start.
+    for span in sorted({min(4, count), count}) if spread is None else [count]:
+        x = np.concatenate((x, start[x.size - FIXED : span]))
+        end = min(impacts_s[span] if span < len(impacts_s) else stop, stop)
+        found = _least(problem, x, span, end)
+        x = found.x
+    return _result(problem, found, count, sigma)
+
+
+def _least(problem: MotionModel, start: Floats, span: int, stop_s: float) -> OptimizeResult:
+    """The fit of the first `span` impacts; where it leaves too much, another way and start as well."""
+    search = partial(
+        least_squares, problem.residual, jac=problem.jacobian, args=(span, stop_s), x_scale="jac", max_nfev=60
+    )
+    best = search(start, method="lm")
+    settled = np.concatenate((best.x[:FIXED], np.clip(best.x[FIXED:], -1.0, 1.0)))
+    for other, method in ((start, "trf"), (settled, "lm")):
+        if np.mean(best.fun**2) > _POOR**2:
+            best = min(best, search(other, method=method), key=lambda found: float(found.cost))
+    return best
+
+
+def _span(peaks_rad: list[float], impacts: int) -> int:
+    floor = _SMALLEST_SHARE * abs(peaks_rad[0])
+    large = [n for n in range(1, min(len(peaks_rad), impacts)) if abs(peaks_rad[n]) >= floor]
+    return max(large, default=0)
+
+
+def _deviations(speeds_rad_s: list[float], count: int, log_r: float) -> Floats:
+    """ln r of single impacts about `log_r`, from the speeds at neighbouring impacts; 0 where unknown."""
+    speeds = np.abs(np.asarray(speeds_rad_s, dtype=np.float64))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = np.log(speeds[1:] / speeds[:-1]) - log_r
+    found = np.where(np.isfinite(found), np.clip(found, -0.2, 0.2), 0.0)
+    return np.concatenate((found, np.zeros(count)))[:count]
+
+
+def _points(
+    time_s: Floats, rotation_rad: Floats, start_s: float, stop_s: float, noise_rad: float
+) -> tuple[Floats, Floats, float]:
+    """Averages over 8 ms and their noise."""
+    low, high = np.searchsorted(time_s, [start_s, stop_s])
+    size = max(1, round(POINT_S * (time_s.size - 1) / (time_s[-1] - time_s[0])))
+    groups = int(high - low) // size
+    t = time_s[low : low + groups * size].reshape(groups, size).mean(axis=1)
+    y = rotation_rad[low : low + groups * size].reshape(groups, size).mean(axis=1)
+    good = np.isfinite(y)
+    return t[good], y[good], noise_rad / math.sqrt(size)
+
+
+def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: float) -> MotionFit | None:
+    x = found.x
+    data = found.fun[: found.fun.size - 3 - (x.size - FIXED)]
+    excess = max(1.0, float(data @ data) / max(data.size - FIXED, 1))
+    # Data rows are weakened by what the model leaves; priors keep their weight.
+    scaled = found.jac.copy()
+    scaled[: data.size] /= math.sqrt(excess)
+    try:
+        covariance = np.linalg.inv(scaled.T @ scaled)
+    except np.linalg.LinAlgError:
+        return None
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    motion = problem.motion(x, count)
+    r = math.exp(problem.log_r + 0.01 * float(x[5]))
+    return MotionFit(
+        r=r,
+        standard_error=r * 0.01 * float(deviations[5]),
+        p_rad_s=motion.p_rad_s,
+        sigma_p_rad_s=motion.p_rad_s * P_PRIOR * float(deviations[2]),
+        alpha_rad=motion.alpha_rad,
+        sigma_alpha_rad=motion.alpha_rad * ALPHA_PRIOR * float(deviations[3]),
+        theta0_rad=motion.side * float(motion.peaks_rad[0]),
+        release_s=motion.release_s,
+        zero_rad=ZERO_PRIOR_RAD * float(x[4]),
+        restitutions=tuple(float(value) for value in motion.restitution[:count]),
+        impacts=count,
+        residual_rad=float(np.sqrt(np.mean(data**2))) * sigma,
+        noise_rad=sigma,
+    )

@@ -1,0 +1,175 @@
+"""From impacts to r: collects half-cycles one by one. Online and offline both go through here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.rocking.estimators import DecaySeries, RestitutionEstimate, crt_series, eav_series, estimate_all
+from daq_app.rocking.motion.arcs import Arc, fit_arcs
+from daq_app.rocking.motion.release import Release, locate_release
+
+Floats = NDArray[np.float64]
+
+ZERO_SIGMA_RAD = 2e-5
+"""What the tared zero of the rotation may be wrong by."""
+_HOLD_S = 0.3
+_HOLD_POINT_S = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class MotionSettings:
+    """What the half-cycles are judged with."""
+
+    rate_hz: float
+    p_rad_s: float
+    alpha_rad: float
+    zero_sigma_rad: float = ZERO_SIGMA_RAD
+
+
+@dataclass
+class MotionTrack:
+    """The motion after one release, growing impact by impact. Times in s, absolute (sample / rate)."""
+
+    settings: MotionSettings
+    release: Release
+    theta0_rad: float
+    """Rotation just before the release, from the same signal as the peaks."""
+    sigma_theta0_rad: float
+    crossings_s: list[float] = field(default_factory=list)
+    """Impacts as detected."""
+    arcs: list[Arc | None] = field(default_factory=list)
+    """Arc n ends at impact n + 1; None where it could not be fitted."""
+
+    @classmethod
+    def begin(
+        cls, settings: MotionSettings, time_s: Floats, rotation_rad: Floats, release_s: float, hold_rad: float
+    ) -> MotionTrack:
+        """Start at a release near `release_s` from about `hold_rad`.
+
+        `time_s`, `rotation_rad` (n,) reach from before the release to the first impact.
+        """
+        size = max(1, round(0.005 * settings.rate_hz))
+        count = time_s.size // size
+        t = time_s[: count * size].reshape(count, size).mean(axis=1)
+        y = rotation_rad[: count * size].reshape(count, size).mean(axis=1)
+        inside = (t > release_s - 0.5) & (y * math.copysign(1.0, hold_rad) > 0.03 * abs(hold_rad))
+        release = locate_release(t[inside], y[inside], hold_rad, settings.p_rad_s, settings.alpha_rad)
+        if release is None or abs(release.time_s - release_s) > 0.3:
+            release = Release(release_s, hold_rad, math.nan)
+        level, sigma = hold_level(time_s, rotation_rad, release.time_s, settings)
+        if not math.isfinite(level):
+            level, sigma = release.rotation_rad, max(abs(release.rotation_rad - hold_rad), ZERO_SIGMA_RAD)
+        return cls(settings, release, level, sigma)
+
+    def add_impact(self, crossing_s: float, time_s: Floats, rotation_rad: Floats) -> Arc | None:
+        """Impact at about `crossing_s` ends a half-cycle, which is fitted and returned."""
+        return self.add_impacts([crossing_s], time_s, rotation_rad)[0]
+
+    def add_impacts(
+        self, crossings_s: Sequence[float], time_s: Floats, rotation_rad: Floats
+    ) -> list[Arc | None]:
+        """The same for the next impacts, all at once."""
+        arcs = fit_arcs(
+            time_s,
+            rotation_rad,
+            [self.crossings_s[-1] if self.crossings_s else self.release.time_s, *crossings_s],
+            first_index=len(self.crossings_s),
+            p_rad_s=self.settings.p_rad_s,
+            alpha_rad=self.settings.alpha_rad,
+            zero_sigma_rad=self.settings.zero_sigma_rad,
+        )
+        self.crossings_s.extend(crossings_s)
+        self.arcs.extend(arcs)
+        return arcs
+
+    @property
+    def impacts_s(self) -> list[float]:
+        """Impact times: both neighbouring half-cycles' zero crossings, weighted; else as detected."""
+        return [self._impact(index) for index in range(len(self.crossings_s))]
+
+    def _impact(self, index: int) -> float:
+        before = self.arcs[index]
+        after = self.arcs[index + 1] if index + 1 < len(self.arcs) else None
+        known = [(arc.end_s, arc.sigma_end_s) for arc in (before,) if arc is not None]
+        known += [(arc.start_s, arc.sigma_start_s) for arc in (after,) if arc is not None]
+        if not known:
+            return self.crossings_s[index]
+        weights = [1.0 / max(sigma, 1e-9) ** 2 for _, sigma in known]
+        return sum(w * t for w, (t, _) in zip(weights, known, strict=True)) / sum(weights)
+
+    @property
+    def peaks_rad(self) -> list[float]:
+        """Signed peaks, the release first; NaN where a half-cycle could not be fitted."""
+        return [self.theta0_rad, *(math.nan if arc is None else arc.peak_rad for arc in self.arcs[1:])]
+
+    @property
+    def sigma_peaks_rad(self) -> list[float]:
+        fitted = (math.nan if arc is None else arc.sigma_peak_rad for arc in self.arcs[1:])
+        return [self.sigma_theta0_rad, *fitted]
+
+    @property
+    def speeds_before_rad_s(self) -> list[float]:
+        """Signed θ̇⁻ at each impact."""
+        return [math.nan if arc is None else arc.speed_end_rad_s for arc in self.arcs]
+
+    @property
+    def sigma_speeds_before_rad_s(self) -> list[float]:
+        return [math.nan if arc is None else arc.sigma_speed_end_rad_s for arc in self.arcs]
+
+    @property
+    def speeds_after_rad_s(self) -> list[float]:
+        """Signed θ̇⁺ at each impact; NaN for the last, whose half-cycle is not complete."""
+        after: Sequence[Arc | None] = [*self.arcs[1:], None]
+        return [math.nan if arc is None else arc.speed_start_rad_s for arc in after[: len(self.arcs)]]
+
+    @property
+    def sigma_speeds_after_rad_s(self) -> list[float]:
+        after: Sequence[Arc | None] = [*self.arcs[1:], None]
+        return [math.nan if arc is None else arc.sigma_speed_start_rad_s for arc in after[: len(self.arcs)]]
+
+    def eav(self) -> RestitutionEstimate:
+        """EAV (4.4) from one-sided fits."""
+        return estimate_all([self.eav_series()])[0]
+
+    def crt(self) -> RestitutionEstimate:
+        """CRT (4.5), the paper's linearised energy."""
+        return estimate_all([self.crt_series()])[0]
+
+    def crt_exact(self) -> RestitutionEstimate:
+        """CRT with the exact potential of the nonlinear equation."""
+        return estimate_all([self.crt_exact_series()])[0]
+
+    def eav_series(self, method: str = "EAV") -> DecaySeries:
+        """What `eav` is found from: many series are estimated together at the cost of one."""
+        return eav_series(self.speeds_before_rad_s, self.sigma_speeds_before_rad_s, method=method)
+
+    def crt_series(self, method: str = "CRT") -> DecaySeries:
+        """What `crt` is found from."""
+        return crt_series(self.peaks_rad, self.sigma_peaks_rad, self.settings.alpha_rad, method=method)
+
+    def crt_exact_series(self, method: str = "CRT exact potential") -> DecaySeries:
+        """What `crt_exact` is found from."""
+        alpha = self.settings.alpha_rad
+        return crt_series(self.peaks_rad, self.sigma_peaks_rad, alpha, exact=True, method=method)
+
+
+def hold_level(
+    time_s: Floats, rotation_rad: Floats, release_s: float, settings: MotionSettings
+) -> tuple[float, float]:
+    """Rotation in the last 0.3 s before the release, and its sigma (unsteadiness included)."""
+    low, high = np.searchsorted(time_s, [release_s - _HOLD_S, release_s - 0.005])
+    size = max(1, round(_HOLD_POINT_S * settings.rate_hz))
+    count = int(high - low) // size
+    if count < 3:
+        return math.nan, math.nan
+    points = rotation_rad[high - count * size : high].reshape(count, size).mean(axis=1)
+    points = points[np.isfinite(points)]
+    if points.size < 3:
+        return math.nan, math.nan
+    sigma = float(points.std(ddof=1)) / math.sqrt(points.size)
+    return float(points.mean()), math.hypot(sigma, settings.zero_sigma_rad)

@@ -1,0 +1,1 @@
+"""Housner's block and the classic closed forms. Equations only; no recordings."""

@@ -1,0 +1,1 @@
+"""A run is kept: journal to run file, verification, recovery."""
