@@ -48,11 +48,12 @@ def page(found: list[Found]) -> str:
     lines = [
         "# Cannot tell A from B: does the measurement that is named resolve it?",
         "",
-        "`python -m benchmarks.gap_cannot_tell --seed S` for each seed (the last with "
-        "`--page docs/gap-cannot-tell.md` writes this page). A wall with one effect comes from the blind "
-        "check's generator, which shares no code with the diagnosis (wall, sensors and runs drawn from the "
-        "seed; restitution scatter 0.2 to 0.8 %). It is diagnosed from little; then the measurement that the "
-        "library names for the pair is added, for the same wall with the same sensors, and it is diagnosed "
+        "`python -m benchmarks.gap_cannot_tell --seed S` for each seed (the last with `--page "
+        "docs/explanation/gap-cannot-tell.md` writes this page). A wall with one effect comes from the "
+        "blind check's generator, which shares no code with the diagnosis (wall, sensors and runs drawn "
+        "from the seed; restitution scatter 0.2 to 0.8 %). It is diagnosed from little; then the "
+        "measurement that the library names for the pair is added, for the same wall with the same "
+        "sensors, and it is diagnosed "
         "again. *Set*: the 95 % set with probabilities, forms that the library declares alike to all sensors "
         "each by itself. *Resolved*: the set has shrunk to the truth alone. What is read by hand (a level, a "
         f"rule, a knock) is one more feature with its own error. {states_in_words(found)}",

@@ -1,6 +1,6 @@
 """When the diagnosis cannot tell A from B and names a measurement: does that measurement resolve it?
 
-    python -m benchmarks.gap_cannot_tell [CASE …] [--seed S] [--again] [--page docs/gap-cannot-tell.md]
+    python -m benchmarks.gap_cannot_tell [CASE …] [--seed S] [--again] [--page PAGE.md]
 
 A wall with effect A is simulated by the blind check's generator (`daq_app.gap.blind.world`, which shares
 nothing with the diagnosis), and diagnosed from little: one level, no LVDTs, a short record. Then what the

@@ -1,6 +1,6 @@
 """Each effect of the library alone on six simulated runs: is it named first, is its strength covered?
 
-    python -m benchmarks.gap_effects [EFFECT …] [--seed S] [--again] [--page docs/gap-effects.md] [--cores N]
+    python -m benchmarks.gap_effects [EFFECT …] [--seed S] [--again] [--page PAGE.md] [--cores N]
 
 One JSON per effect and seed, with the state of the code; those that exist are not done again, so that an
 interrupted study goes on (`--again`: those of another state are). The whole results are kept too, by state
@@ -172,10 +172,10 @@ def page(found: list[Found]) -> str:
     lines = [
         "# Each effect alone, on the product's own simulated hardware",
         "",
-        "`python -m benchmarks.gap_effects --seed S` for each seed (the last with "
-        "`--page docs/gap-effects.md` writes this page). Six runs over four levels to both sides, scatter "
-        "of r 0.4 %, sensor noise, calibration errors of 0.2 %. The simulator is the one that the diagnosis "
-        "fits with, so this is the first hurdle and not the proof; the proof is "
+        "`python -m benchmarks.gap_effects --seed S` for each seed (the last with `--page "
+        "docs/explanation/gap-effects.md` writes this page). Six runs over four levels to both sides, "
+        "scatter of r 0.4 %, sensor noise, calibration errors of 0.2 %. The simulator is the one that the"
+        " diagnosis fits with, so this is the first hurdle and not the proof; the proof is "
         f"[blind-check.md](blind-check.md). {states_in_words(found)} {NOTE}",
         "",
         *_counts(found),

@@ -1,6 +1,6 @@
 """Closing the loop: diagnose → apply → simulate → compare, for effects of every kind.
 
-    python -m benchmarks.gap_loops [EFFECT …] [--seed S] [--again] [--page docs/gap-loops.md] [--cores N]
+    python -m benchmarks.gap_loops [EFFECT …] [--seed S] [--again] [--page PAGE.md] [--cores N]
 
 The first six runs are diagnosed and the result is applied to the rig file. Six further runs of the same
 wall, which nothing was fitted to, are then predicted by the rig file as it was and as it is now: α, p,

@@ -40,7 +40,7 @@ def page(document: Mapping[str, Any]) -> str:
         "Measure again with",
         "",
         "```",
-        "python -m benchmarks [NAME…] --page docs/benchmarks.md",
+        "python -m benchmarks [NAME…] --page docs/reference/benchmarks.md",
         "```",
         "",
         "which replaces the tables of the benchmarks that were run.",

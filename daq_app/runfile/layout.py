@@ -1,4 +1,4 @@
-"""Names inside a run file, kept in one place for writer and reader (docs/run-format.md)."""
+"""Names inside a run file, kept in one place for writer and reader (docs/reference/run-format.md)."""
 
 from __future__ import annotations
 

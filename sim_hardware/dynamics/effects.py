@@ -1,7 +1,7 @@
 """The library of effects on the motion: declarative, one entry each; the terms live in `terms`.
 
 Ranges are judgement (the project's survey of the literature and of a prototype); names of the
-parameters carry no unit, the entry says it.  θc, ζ … follow the symbols of docs/physics.md.
+parameters carry no unit, the entry says it.  θc, ζ … follow the symbols of docs/explanation/physics.md.
 """
 
 from __future__ import annotations

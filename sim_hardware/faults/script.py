@@ -25,7 +25,7 @@ def load_faults(path: Path) -> list[Fault]:
             faults.append(fault_from(table))
         except ValueError as error:
             problems.append(
-                Problem(str(path), f"fault[{index}]", str(error), "See docs/simulated-hardware.md")
+                Problem(str(path), f"fault[{index}]", str(error), "See docs/how-to/simulated-hardware.md")
             )
     if problems:
         raise ConfigError(problems)

@@ -1,4 +1,4 @@
-"""docs/rig-files.md tells of every key and product that there is."""
+"""docs/reference/rig-files.md tells of every key and product that there is."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from daq_app.config.units import SENSITIVITY_TO_SI
 
 @pytest.fixture(scope="module")
 def page(repository: Path) -> str:
-    return (repository / "docs" / "rig-files.md").read_text(encoding="utf-8")
+    return (repository / "docs" / "reference" / "rig-files.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("table", [Specimen, Acquisition, ExpectedChannels, Channel, Simulation])

@@ -244,7 +244,7 @@ def test_a_file_of_forged_headings_is_given_up_quickly(tmp_path: Path, sound: by
 
 def test_the_reference_reader_agrees(tmp_path: Path, sound: bytes, foreign: bytes, repository: Path) -> None:
     """The reader in docs, which shares no code with the program, sees the same samples."""
-    reader = runpy.run_path(str(repository / "docs" / "journal_reader.py"))
+    reader = runpy.run_path(str(repository / "docs" / "reference" / "journal_reader.py"))
     middle = len(sound) // 2
     broken = bytearray(sound)
     broken[middle] ^= 4

@@ -1,4 +1,4 @@
-"""The result of a diagnosis, and its JSON (format version 1, documented in docs/gap-method.md)."""
+"""The result of a diagnosis, and its JSON (format version 1, see docs/explanation/gap-method.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Writes a run as HDF5 that any HDF5 or netCDF4 program reads (docs/run-format.md)."""
+"""Writes a run as HDF5 that any HDF5 or netCDF4 program reads (docs/reference/run-format.md)."""
 
 from __future__ import annotations
 

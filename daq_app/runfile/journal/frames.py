@@ -1,7 +1,7 @@
 """One frame of a journal: a heading of 56 bytes and a payload, each with its CRC-32.
 
 Little-endian.  CRC-32 is that of IEEE 802.3 (`zlib.crc32`): every Python has it, and at 3 GB/s it is
-sixty times faster than 41 channels at 40 times the rate need.  ``docs/journal-format.md`` is the
+sixty times faster than 41 channels at 40 times the rate need.  ``docs/reference/journal-format.md`` is the
 specification.
 """
 
