@@ -10,9 +10,9 @@ import numpy as np
 
 from benchmarks.figure import Figure
 from daq_app.config import parse_rig
-from daq_app.gap.blind.case_files import write_case
+from daq_app.gap.blind.making.case_files import write_case
 from daq_app.gap.blind.world.campaign import draw_world
-from daq_app.gap.blind.world.catalogue import ENTRIES, draw
+from daq_app.gap.blind.world.effects.catalogue import ENTRIES, draw
 
 _RIG = Path(__file__).parents[1] / "configs" / "fr1.toml"
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from benchmarks.cannot_tell_measured import KNOCK, LEVEL, RULE, Instrument
 from benchmarks.cannot_tell_wall import Recorded, truth_of
-from daq_app.gap.blind.world.catalogue import Drawn
+from daq_app.gap.blind.world.effects.catalogue import Drawn
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,8 @@ import numpy as np
 
 from daq_app.config import Rig, Scaling, load_rig, plan_tasks
 from daq_app.gap.blind.world.campaign import MadeRun, PlannedRun, World
-from daq_app.gap.blind.world.catalogue import ENTRIES, Drawn
-from daq_app.gap.blind.world.chain import draw_calibration
+from daq_app.gap.blind.world.effects.catalogue import ENTRIES, Drawn
+from daq_app.gap.blind.world.sensors.chain import draw_calibration
 from daq_app.gap.blind.world.wall import draw_wall
 from daq_app.gap.rocking_model.records import GapRun, Sensor, Survey
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from daq_app.config import parse_rig
-from daq_app.gap.blind.case_files import write_case
-from daq_app.gap.blind.make import Order, draw_case
+from daq_app.gap.blind.making.case_files import write_case
+from daq_app.gap.blind.making.make import Order, draw_case
 from daq_app.gap.blind.world.campaign import draw_world
-from daq_app.gap.blind.world.catalogue import Drawn
+from daq_app.gap.blind.world.effects.catalogue import Drawn
 from daq_app.gap.rocking_model.inspection import found_marks
 from daq_app.gap.rocking_model.records import load_run
 from daq_app.gap.rocking_model.run_features import RockingRun

@@ -13,19 +13,23 @@ from typer.testing import CliRunner
 
 from daq_app.cli.app import build_app
 from daq_app.config import Rig, load_rig
-from daq_app.gap.blind.case_files import write_case
-from daq_app.gap.blind.diagnosers import product
-from daq_app.gap.blind.mix import case_generator, category_of, draw_effects
+from daq_app.gap.blind.making.case_files import write_case
+from daq_app.gap.blind.making.mix import case_generator, category_of, draw_effects
+from daq_app.gap.blind.running.diagnosers import product
 from daq_app.gap.blind.world.campaign import World, draw_world
-from daq_app.gap.blind.world.catalogue import Drawn
-from daq_app.gap.blind.world.chain import Place, quiet_signals
-from daq_app.gap.blind.world.contact_catalogue import CONTACT_ENTRIES, CONTACT_LIBRARY, CONTACT_OUTSIDE
-from daq_app.gap.blind.world.contact_feet import needed_friction, plastic_restitution
-from daq_app.gap.blind.world.contact_motion import ContactMotion, rock
-from daq_app.gap.blind.world.contact_scene import contact_stage
-from daq_app.gap.blind.world.mechanics import Effects, Release, build
-from daq_app.gap.blind.world.motion import Motion, integrate
-from daq_app.gap.blind.world.scene import stage
+from daq_app.gap.blind.world.contact.feet import needed_friction, plastic_restitution
+from daq_app.gap.blind.world.contact.motion import ContactMotion, rock
+from daq_app.gap.blind.world.contact.scene import contact_stage
+from daq_app.gap.blind.world.effects.catalogue import Drawn
+from daq_app.gap.blind.world.effects.contact_catalogue import (
+    CONTACT_ENTRIES,
+    CONTACT_LIBRARY,
+    CONTACT_OUTSIDE,
+)
+from daq_app.gap.blind.world.events.mechanics import Effects, Release, build
+from daq_app.gap.blind.world.events.motion import Motion, integrate
+from daq_app.gap.blind.world.events.scene import stage
+from daq_app.gap.blind.world.sensors.chain import Place, quiet_signals
 from daq_app.gap.blind.world.wall import Wall
 
 THETA0 = -0.05

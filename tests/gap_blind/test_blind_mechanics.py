@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from daq_app.gap.blind.detectability import block_swing
-from daq_app.gap.blind.world.joint import cubic_joint, rigid, rounded_edge, winkler
-from daq_app.gap.blind.world.mechanics import Release, build
-from daq_app.gap.blind.world.motion import Motion, integrate
+from daq_app.gap.blind.making.detectability import block_swing
+from daq_app.gap.blind.world.events.joint import cubic_joint, rigid, rounded_edge, winkler
+from daq_app.gap.blind.world.events.mechanics import Release, build
+from daq_app.gap.blind.world.events.motion import Motion, integrate
 from daq_app.gap.blind.world.wall import Wall
 
 THETA0 = 0.06

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from daq_app.config import Rig, load_rig
-from daq_app.gap.blind.make import Order, check_apart, draw_case
-from daq_app.gap.blind.mix import case_generator, category_of, draw_effects
+from daq_app.gap.blind.making.make import Order, check_apart, draw_case
+from daq_app.gap.blind.making.mix import case_generator, category_of, draw_effects
 from daq_app.gap.blind.names import FAMILIES, accepted_names
-from daq_app.gap.blind.world.catalogue import ENTRIES, LIBRARY, OUTSIDE
+from daq_app.gap.blind.world.effects.catalogue import ENTRIES, LIBRARY, OUTSIDE
 
 
 @pytest.fixture(scope="module")

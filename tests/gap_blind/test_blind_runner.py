@@ -10,9 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from daq_app.cli.app import build_app
-from daq_app.gap.blind.diagnosers import ABLATIONS, load_diagnoser
 from daq_app.gap.blind.layout import results_without, run_files
-from daq_app.gap.blind.runner import case_folders, pending, read_outcome, run_pending
+from daq_app.gap.blind.running.diagnosers import ABLATIONS, load_diagnoser
+from daq_app.gap.blind.running.runner import case_folders, pending, read_outcome, run_pending
 from daq_app.gap.blind.seal import SealBroken, open_label, seal_case
 from daq_app.runfile import open_run
 

@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from daq_app.gap.blind.confusion import confusion
-from daq_app.gap.blind.judge import Judged, judge
 from daq_app.gap.blind.layout import SEAL_FILE
-from daq_app.gap.blind.mix import category_of
+from daq_app.gap.blind.making.mix import category_of
 from daq_app.gap.blind.names import COMPARABLE, accepted_names, base_name, class_of, comparable
-from daq_app.gap.blind.report import write_markdown, write_report
-from daq_app.gap.blind.runner import Outcome, save_outcome
-from daq_app.gap.blind.score import Row, Score, score_folder, table
+from daq_app.gap.blind.running.runner import Outcome, save_outcome
+from daq_app.gap.blind.scoring.confusion import confusion
+from daq_app.gap.blind.scoring.judge import Judged, judge
+from daq_app.gap.blind.scoring.report import write_markdown, write_report
+from daq_app.gap.blind.scoring.score import Row, Score, score_folder, table
+from daq_app.gap.blind.scoring.statistics import auroc, calibration_error, reliability, share
 from daq_app.gap.blind.seal import SealBroken, file_sha256, read_seal, seal_case
-from daq_app.gap.blind.statistics import auroc, calibration_error, reliability, share
-from daq_app.gap.blind.world.catalogue import ENTRIES, LIBRARY, OUTSIDE
+from daq_app.gap.blind.world.effects.catalogue import ENTRIES, LIBRARY, OUTSIDE
 from daq_app.gap.rocking_model.library import rocking_library
 
 Answer = Callable[[dict[str, Any], np.random.Generator], dict[str, Any]]

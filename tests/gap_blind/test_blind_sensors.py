@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from daq_app.config import Rig, Scaling, load_rig
 from daq_app.gap.blind.world.campaign import PlannedRun, World, draw_world
-from daq_app.gap.blind.world.catalogue import ENTRIES, Drawn, draw
-from daq_app.gap.blind.world.chain import Place, quiet_signals
-from daq_app.gap.blind.world.faults import ELECTRONICS
+from daq_app.gap.blind.world.effects.catalogue import ENTRIES, Drawn, draw
+from daq_app.gap.blind.world.sensors.chain import Place, quiet_signals
+from daq_app.gap.blind.world.sensors.faults import ELECTRONICS
 from daq_app.gap.blind.world.wall import Wall
 
 THETA0 = 0.05

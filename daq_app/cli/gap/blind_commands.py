@@ -18,10 +18,10 @@ from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, rep
 from daq_app.config import load_rig
 
 if TYPE_CHECKING:
-    from daq_app.gap.blind.score import Score
+    from daq_app.gap.blind.scoring.score import Score
 
 _RIGS = (Path("configs/fr1.toml"), Path("configs/fr2.toml"))
-_PRODUCT = "daq_app.gap.blind.diagnosers:product"
+_PRODUCT = "daq_app.gap.blind.running.diagnosers:product"
 _LabelsOption = Annotated[
     Path | None, typer.Option(help="Folder of the labels; beside the cases, as DIR-labels, if left out.")
 ]
@@ -56,10 +56,10 @@ def register(app: typer.Typer) -> None:
 @contextmanager
 def _refusals() -> Iterator[None]:
     """Broken seals, missing diagnosers, schedulers and engines are told in one paragraph."""
-    from daq_app.gap.blind.diagnosers import DiagnoserError
-    from daq_app.gap.blind.scheduler import SchedulerMissing
+    from daq_app.gap.blind.running.diagnosers import DiagnoserError
+    from daq_app.gap.blind.running.scheduler import SchedulerMissing
     from daq_app.gap.blind.seal import SealBroken
-    from daq_app.gap.blind.world.contact_motion import EngineMissing
+    from daq_app.gap.blind.world.contact.motion import EngineMissing
 
     with reported():
         try:
@@ -86,7 +86,7 @@ def make(
 
     With --engine contact MuJoCo moves the wall (extra: contact) and effects are of the feet it stands on.
     """
-    from daq_app.gap.blind.make import Order, check_apart, make_cases
+    from daq_app.gap.blind.making.make import Order, check_apart, make_cases
 
     with _refusals():
         kept = labels or _beside(out)
@@ -117,10 +117,10 @@ def run(
     With --without the diagnosis lacks a part of its method, and its results are kept apart: score them
     with the same option.
     """
-    from daq_app.gap.blind.diagnosers import ABLATIONS, load_diagnoser
     from daq_app.gap.blind.layout import results_without
-    from daq_app.gap.blind.runner import case_folders, pending, run_pending
-    from daq_app.gap.blind.scheduler import run_on_scheduler
+    from daq_app.gap.blind.running.diagnosers import ABLATIONS, load_diagnoser
+    from daq_app.gap.blind.running.runner import case_folders, pending, run_pending
+    from daq_app.gap.blind.running.scheduler import run_on_scheduler
 
     with _refusals():
         kept = results_without(_part(without))
@@ -157,7 +157,7 @@ def score(
 ) -> None:
     """Open the labels, check the seals, say how good the diagnosis is. Exit code 1: a target is missed."""
     from daq_app.gap.blind.layout import results_without
-    from daq_app.gap.blind.score import score_folder
+    from daq_app.gap.blind.scoring.score import score_folder
 
     with _refusals():
         found = score_folder(folder, labels or _beside(folder), results_without(_part(without)))
@@ -165,11 +165,11 @@ def score(
         if json_out:
             json_out.write_text(json.dumps(found.to_dict(), ensure_ascii=False, indent=1), encoding="utf-8")
         if html:
-            from daq_app.gap.blind.report import write_report
+            from daq_app.gap.blind.scoring.report import write_report
 
             write_report(found, html)
         if page:
-            from daq_app.gap.blind.report import write_markdown
+            from daq_app.gap.blind.scoring.report import write_markdown
 
             write_markdown(found, page)
         if not found.passed:
@@ -177,7 +177,7 @@ def score(
 
 
 def _print_score(found: Score) -> None:
-    from daq_app.gap.blind.report import interval, number
+    from daq_app.gap.blind.scoring.report import interval, number
 
     console = Console()
     table = Table(title=f"Blind check: {len(found.judged)} cases", title_justify="left")
@@ -196,7 +196,7 @@ def _print_score(found: Score) -> None:
 
 def _print_confusion(found: Score, console: Console) -> None:
     """What was hidden → what was answered, most frequent first; the matrix is in the HTML page."""
-    from daq_app.gap.blind.confusion import confusion
+    from daq_app.gap.blind.scoring.confusion import confusion
 
     counts = confusion(found.judged)
     table = Table(title="Hidden and answered", title_justify="left")
@@ -226,7 +226,7 @@ def _progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
 
 def _part(without: str) -> str:
     """The part of the method to leave out, if there is one of that name."""
-    from daq_app.gap.blind.diagnosers import ABLATIONS
+    from daq_app.gap.blind.running.diagnosers import ABLATIONS
 
     if without and without not in ABLATIONS:
         raise ValueError(f"--without is {', '.join(ABLATIONS)}, not {without}")

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.config import Rig, plan_tasks
-from daq_app.gap.blind.world.catalogue import Drawn
-from daq_app.gap.blind.world.chain import Calibration, Place, draw_calibration, readings
 from daq_app.gap.blind.world.course import Course, Engine, follow
-from daq_app.gap.blind.world.faults import Fault
-from daq_app.gap.blind.world.mechanics import Release
-from daq_app.gap.blind.world.motion import Followed
+from daq_app.gap.blind.world.effects.catalogue import Drawn
+from daq_app.gap.blind.world.events.mechanics import Release
+from daq_app.gap.blind.world.events.motion import Followed
+from daq_app.gap.blind.world.sensors.chain import Calibration, Place, draw_calibration, readings
+from daq_app.gap.blind.world.sensors.faults import Fault
 from daq_app.gap.blind.world.wall import Wall, draw_wall
 
 LEVELS: Final = {"L1": 0.15, "L2": 0.25, "L3": 0.35, "L4": 0.40}

@@ -9,11 +9,11 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.gap.blind.world.contact_motion import rock
-from daq_app.gap.blind.world.contact_scene import contact_stage
-from daq_app.gap.blind.world.mechanics import Effects, Release, build
-from daq_app.gap.blind.world.motion import Followed, integrate
-from daq_app.gap.blind.world.scene import Scene, stage
+from daq_app.gap.blind.world.contact.motion import rock
+from daq_app.gap.blind.world.contact.scene import contact_stage
+from daq_app.gap.blind.world.events.mechanics import Effects, Release, build
+from daq_app.gap.blind.world.events.motion import Followed, integrate
+from daq_app.gap.blind.world.events.scene import Scene, stage
 from daq_app.gap.blind.world.wall import Wall
 
 FloatArray = NDArray[np.float64]

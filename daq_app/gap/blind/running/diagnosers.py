@@ -16,7 +16,7 @@ from daq_app.gap.blind.layout import RIG_FILE, run_files
 Result = dict[str, Any]
 Diagnoser = Callable[[Path], Result]
 
-PRODUCT: Final = "daq_app.gap.blind.diagnosers:product"
+PRODUCT: Final = "daq_app.gap.blind.running.diagnosers:product"
 """The diagnosis of this program."""
 
 

@@ -13,10 +13,10 @@ from jinja2 import Environment
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from daq_app.gap.blind.confusion import confusion
-from daq_app.gap.blind.judge import Judged
-from daq_app.gap.blind.score import Score, claims
-from daq_app.gap.blind.statistics import Value, reliability
+from daq_app.gap.blind.scoring.confusion import confusion
+from daq_app.gap.blind.scoring.judge import Judged
+from daq_app.gap.blind.scoring.score import Score, claims
+from daq_app.gap.blind.scoring.statistics import Value, reliability
 
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Blind check</title>

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from daq_app.gap.blind.world.mechanics import Impact, Mechanics, Release
+from daq_app.gap.blind.world.events.mechanics import Impact, Mechanics, Release
 
 FloatArray = NDArray[np.float64]
 

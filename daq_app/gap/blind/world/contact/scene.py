@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.gap.blind.world.contact_motion import ContactMotion
-from daq_app.gap.blind.world.scene import Scene
+from daq_app.gap.blind.world.contact.motion import ContactMotion
+from daq_app.gap.blind.world.events.scene import Scene
 from daq_app.gap.blind.world.wall import Wall
 
 FloatArray = NDArray[np.float64]

@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from daq_app.gap.blind.judge import Judged, judge
 from daq_app.gap.blind.layout import RESULTS, SEAL_FILE
-from daq_app.gap.blind.runner import case_folders, read_outcome
-from daq_app.gap.blind.seal import SealBroken, file_sha256, open_label
-from daq_app.gap.blind.statistics import (
+from daq_app.gap.blind.running.runner import case_folders, read_outcome
+from daq_app.gap.blind.scoring.judge import Judged, judge
+from daq_app.gap.blind.scoring.statistics import (
     NOTHING,
     Value,
     at_false_alarms,
@@ -23,6 +22,7 @@ from daq_app.gap.blind.statistics import (
     calibration_error,
     share,
 )
+from daq_app.gap.blind.seal import SealBroken, file_sha256, open_label
 
 _SURE = 0.95
 _FALSE_ALARMS = 0.05

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from daq_app.gap.blind.layout import RESULTS
-from daq_app.gap.blind.runner import Outcome, diagnose_apart, pending, save_outcome
+from daq_app.gap.blind.running.runner import Outcome, diagnose_apart, pending, save_outcome
 
 
 class SchedulerMissing(Exception):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from daq_app.gap.blind.world.joint import JOINTS, Joint, Parameters, rigid
+from daq_app.gap.blind.world.events.joint import JOINTS, Joint, Parameters, rigid
 from daq_app.gap.blind.world.wall import GRAVITY_M_S2, Wall
 
 Effects = Mapping[str, Parameters]

@@ -15,9 +15,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.gap.blind.world.contact_feet import Foot, feet, plastic_restitution
-from daq_app.gap.blind.world.mechanics import Effects, Release
-from daq_app.gap.blind.world.motion import LONGEST_S, REST_RAD, ImpactRecord
+from daq_app.gap.blind.world.contact.feet import Foot, feet, plastic_restitution
+from daq_app.gap.blind.world.events.mechanics import Effects, Release
+from daq_app.gap.blind.world.events.motion import LONGEST_S, REST_RAD, ImpactRecord
 from daq_app.gap.blind.world.wall import GRAVITY_M_S2, Wall
 
 FloatArray = NDArray[np.float64]

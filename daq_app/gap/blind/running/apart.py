@@ -93,7 +93,7 @@ class Apart:
         if self._process is None:
             with self._words.open("w", encoding="utf-8") as stderr:
                 self._process = psutil.Popen(
-                    [sys.executable, "-m", "daq_app.gap.blind.child", self._diagnoser],
+                    [sys.executable, "-m", "daq_app.gap.blind.running.child", self._diagnoser],
                     cwd=self._home.name,
                     env=_environment(),
                     stdin=subprocess.PIPE,

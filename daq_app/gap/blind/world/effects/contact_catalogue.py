@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from daq_app.gap.blind.world.catalogue import ENTRIES, LIBRARY, Entry, uniform
+from daq_app.gap.blind.world.effects.catalogue import ENTRIES, LIBRARY, Entry, uniform
 
 _LIBRARY: Final = (
     ENTRIES["pivot_shift"],

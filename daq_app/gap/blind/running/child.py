@@ -1,4 +1,4 @@
-"""The process that diagnoses: ``python -m daq_app.gap.blind.child DIAGNOSER``, one case after another.
+"""The process that diagnoses: ``python -m daq_app.gap.blind.running.child DIAGNOSER``, case by case.
 
 On standard input it is told one case a line, as JSON ``{"case": folder, "out": file}``, and on standard
 output it answers each with ``{"failure": words}``, empty where the result is in the file. What the
@@ -15,7 +15,7 @@ import sys
 import traceback
 from pathlib import Path
 
-from daq_app.gap.blind.diagnosers import Diagnoser, DiagnoserError, load_diagnoser
+from daq_app.gap.blind.running.diagnosers import Diagnoser, DiagnoserError, load_diagnoser
 
 _WORDS_KEPT = 4000
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from daq_app.gap.blind.world.joint import Parameters
-from daq_app.gap.blind.world.mechanics import Effects, Mechanics, ground_acceleration
-from daq_app.gap.blind.world.motion import Followed
+from daq_app.gap.blind.world.events.joint import Parameters
+from daq_app.gap.blind.world.events.mechanics import Effects, Mechanics, ground_acceleration
+from daq_app.gap.blind.world.events.motion import Followed
 
 FloatArray = NDArray[np.float64]
 

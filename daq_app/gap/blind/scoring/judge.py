@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from daq_app.gap.blind.names import COMPARABLE, base_name, class_of, comparable, families_of
-from daq_app.gap.blind.runner import Outcome
+from daq_app.gap.blind.running.runner import Outcome
 
 DECISIONS: Final = (
     "effect",

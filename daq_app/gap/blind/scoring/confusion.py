@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from daq_app.gap.blind.judge import Judged
 from daq_app.gap.blind.names import base_name
+from daq_app.gap.blind.scoring.judge import Judged
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from daq_app.gap.blind.apart import Apart
 from daq_app.gap.blind.layout import CASE_PREFIX, RESULTS, SEAL_FILE
+from daq_app.gap.blind.running.apart import Apart
 from daq_app.gap.blind.seal import check_files, file_sha256, read_seal
 
 

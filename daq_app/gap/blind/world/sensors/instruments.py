@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from daq_app.config.rig import G_M_S2, Channel
-from daq_app.gap.blind.world.scene import Scene
+from daq_app.gap.blind.world.events.scene import Scene
 
 FloatArray = NDArray[np.float64]
 

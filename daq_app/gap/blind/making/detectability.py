@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.blind.world.campaign import PlannedRun, World
-from daq_app.gap.blind.world.catalogue import Drawn
-from daq_app.gap.blind.world.chain import CALIBRATION_TOLERANCE, Place, quiet_signals
 from daq_app.gap.blind.world.course import Course
-from daq_app.gap.blind.world.faults import ELECTRONICS, Bench
-from daq_app.gap.blind.world.motion import Followed
+from daq_app.gap.blind.world.effects.catalogue import Drawn
+from daq_app.gap.blind.world.events.motion import Followed
+from daq_app.gap.blind.world.sensors.chain import CALIBRATION_TOLERANCE, Place, quiet_signals
+from daq_app.gap.blind.world.sensors.faults import ELECTRONICS, Bench
 from daq_app.gap.blind.world.wall import Wall
 
 FloatArray = NDArray[np.float64]

@@ -12,14 +12,14 @@ from typing import Any, Final
 import numpy as np
 
 from daq_app.config import Rig, parse_rig
-from daq_app.gap.blind.case_files import write_case
-from daq_app.gap.blind.detectability import detectability
 from daq_app.gap.blind.layout import CASE_PREFIX, SEAL_FILE
-from daq_app.gap.blind.mix import case_generator, category_of, draw_effects
+from daq_app.gap.blind.making.case_files import write_case
+from daq_app.gap.blind.making.detectability import detectability
+from daq_app.gap.blind.making.mix import case_generator, category_of, draw_effects
 from daq_app.gap.blind.names import accepted_names
 from daq_app.gap.blind.seal import seal_case
 from daq_app.gap.blind.world.campaign import MadeRun, World, draw_world
-from daq_app.gap.blind.world.contact_motion import require_engine
+from daq_app.gap.blind.world.contact.motion import require_engine
 from daq_app.gap.blind.world.course import Engine
 
 _EPOCH_UTC_NS: Final = 1_767_225_600 * 10**9

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from daq_app.config.rig import Channel
-from daq_app.gap.blind.world.instruments import first_order
-from daq_app.gap.blind.world.scene import Scene
+from daq_app.gap.blind.world.events.scene import Scene
+from daq_app.gap.blind.world.sensors.instruments import first_order
 
 FloatArray = NDArray[np.float64]
 Parameters = dict[str, float]

@@ -16,14 +16,14 @@ from typing import Final, Literal
 import numpy as np
 
 from daq_app.config import Rig
-from daq_app.gap.blind.world.catalogue import ENTRIES, LIBRARY, OUTSIDE, Drawn, Entry, draw
-from daq_app.gap.blind.world.contact_catalogue import (
+from daq_app.gap.blind.world.course import Engine
+from daq_app.gap.blind.world.effects.catalogue import ENTRIES, LIBRARY, OUTSIDE, Drawn, Entry, draw
+from daq_app.gap.blind.world.effects.contact_catalogue import (
     BESIDE_CONTACT,
     CONTACT_ENTRIES,
     CONTACT_LIBRARY,
     CONTACT_OUTSIDE,
 )
-from daq_app.gap.blind.world.course import Engine
 
 Category = Literal["single", "pair", "outside", "null"]
 

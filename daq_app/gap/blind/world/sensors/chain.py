@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.config import Rig, Scaling
-from daq_app.gap.blind.world.faults import ELECTRONICS, RESPONSES, Bench, Fault
-from daq_app.gap.blind.world.instruments import ideal
-from daq_app.gap.blind.world.scene import Scene
+from daq_app.gap.blind.world.events.scene import Scene
+from daq_app.gap.blind.world.sensors.faults import ELECTRONICS, RESPONSES, Bench, Fault
+from daq_app.gap.blind.world.sensors.instruments import ideal
 
 FloatArray = NDArray[np.float64]
 

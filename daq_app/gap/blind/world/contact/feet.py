@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from daq_app.gap.blind.world.catalogue import Parameters
+from daq_app.gap.blind.world.effects.catalogue import Parameters
 from daq_app.gap.blind.world.wall import GRAVITY_M_S2, Wall
 
 STICKS: Final = 0.9

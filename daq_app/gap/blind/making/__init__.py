@@ -1,0 +1,1 @@
+"""Draw, write, label and seal the cases of a check."""

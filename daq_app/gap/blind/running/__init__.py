@@ -1,0 +1,1 @@
+"""Diagnose cases in processes that are given nothing but their files."""

@@ -1,0 +1,1 @@
+"""The wall as a rigid body of a contact engine."""

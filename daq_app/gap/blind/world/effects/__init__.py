@@ -1,0 +1,1 @@
+"""What a case can hide, as data: effects with their ranges, for either engine."""

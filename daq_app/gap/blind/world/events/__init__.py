@@ -1,0 +1,1 @@
+"""The wall by its own equations of motion, from event to event."""

@@ -1,0 +1,1 @@
+"""From what the wall does to what the NI channels read."""
