@@ -14,7 +14,7 @@ from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.inventory import devices_of
 from daq_app.config.planning.plan import PlannedChannel, TaskPlan
 from daq_app.config.rig import Channel, Rig
-from sim_hardware.daqmx_server.converter import Converter
+from sim_hardware.daqmx_server.channels.converter import Converter
 from sim_hardware.sensors.rows import excitation_v
 from sim_hardware.virtual_rig import DEFAULT_LEVEL, VirtualRig
 

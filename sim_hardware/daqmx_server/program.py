@@ -16,11 +16,11 @@ from daq_app.config.errors import ConfigError
 from daq_app.config.hardware.catalogue import UnknownProduct
 from daq_app.config.loader import load_rig
 from daq_app.config.rig import Rig
-from sim_hardware.daqmx_server.bench import Bench
-from sim_hardware.daqmx_server.clock import BenchClock, PacedClock, SteppedClock
-from sim_hardware.daqmx_server.inventory import Inventory
-from sim_hardware.daqmx_server.max_export import load_max_export
-from sim_hardware.daqmx_server.server import DaqmxServer
+from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.bench.clock import BenchClock, PacedClock, SteppedClock
+from sim_hardware.daqmx_server.inventory.devices import Inventory
+from sim_hardware.daqmx_server.inventory.max_export import load_max_export
+from sim_hardware.daqmx_server.services.server import DaqmxServer
 from sim_hardware.faults.script import load_faults
 from sim_hardware.marked_line import MarkedLine
 from sim_hardware.signals import SignalSource

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from daq_app.config import Rig, TaskPlan, load_rig, plan_tasks
 from sim_hardware.control import SimControl
-from sim_hardware.daqmx_server.bench import Bench
-from sim_hardware.daqmx_server.clock import SteppedClock
-from sim_hardware.daqmx_server.inventory import Inventory
-from sim_hardware.daqmx_server.server import DaqmxServer
+from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.bench.clock import SteppedClock
+from sim_hardware.daqmx_server.inventory.devices import Inventory
+from sim_hardware.daqmx_server.services.server import DaqmxServer
 
 sys.path.insert(0, str(Path(__file__).parent))
 

@@ -14,10 +14,10 @@ from nidaqmx.grpc_session_options import GrpcSessionOptions
 from numpy.typing import NDArray
 
 from sim_hardware.control import SimControl
-from sim_hardware.daqmx_server.bench import Bench
-from sim_hardware.daqmx_server.clock import PacedClock, SteppedClock
-from sim_hardware.daqmx_server.inventory import Inventory, cdaq_chassis, module_device
-from sim_hardware.daqmx_server.server import DaqmxServer
+from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.bench.clock import PacedClock, SteppedClock
+from sim_hardware.daqmx_server.inventory.devices import Inventory, cdaq_chassis, module_device
+from sim_hardware.daqmx_server.services.server import DaqmxServer
 
 MODULES = {1: "NI 9205", 2: "NI 9205", 3: "NI 9234", 4: "NI 9239", 5: "NI 9205"}
 

@@ -23,9 +23,9 @@ from nidaqmx.grpc_session_options import GrpcSessionOptions
 
 from daq_app.config.errors import ConfigError
 from sim_hardware.control import SimControl, SimControlError
-from sim_hardware.daqmx_server.max_export import load_max_export
+from sim_hardware.daqmx_server.inventory.max_export import load_max_export
 from sim_hardware.daqmx_server.program import build_bench, main, parser
-from sim_hardware.daqmx_server.server import DaqmxServer
+from sim_hardware.daqmx_server.services.server import DaqmxServer
 
 RIG = Path(__file__).parents[3] / "configs" / "fr1.toml"
 Start = Callable[..., tuple[subprocess.Popen[str], str]]

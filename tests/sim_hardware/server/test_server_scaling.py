@@ -11,7 +11,7 @@ from nidaqmx.errors import DaqError
 from nidaqmx.scale import Scale
 from server_support import Rig, TestSignals, continuous
 
-from sim_hardware.daqmx_server.inventory import cdaq_chassis, module_device
+from sim_hardware.daqmx_server.inventory.devices import cdaq_chassis, module_device
 
 RATE = 1000.0
 

@@ -8,13 +8,13 @@ from typing import Any, Final
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 from session_pb2 import Session
 
-from sim_hardware.daqmx_server import triggers
-from sim_hardware.daqmx_server.attributes import Handler, unsupported
-from sim_hardware.daqmx_server.bench import Bench
-from sim_hardware.daqmx_server.channels import create_channels
+from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.channels.virtual import create_channels
 from sim_hardware.daqmx_server.errors import Code, DaqmxError, error_text
 from sim_hardware.daqmx_server.requests import fields_of
-from sim_hardware.daqmx_server.task import Task
+from sim_hardware.daqmx_server.services.attributes import Handler, unsupported
+from sim_hardware.daqmx_server.tasks.task import Task, task_named, tasks_of
+from sim_hardware.daqmx_server.timing import triggers
 
 _NEW, _ATTACH = 1, 2
 
@@ -48,38 +48,38 @@ def load_task(bench: Bench, request: Any) -> Any:
 
 
 def clear_task(bench: Bench, request: Any) -> Any:
-    bench.task(request.task.name).clear()
+    task_named(bench, request.task.name).clear()
     del bench.tasks[request.task.name]
     return pb.ClearTaskResponse()
 
 
 def start_task(bench: Bench, request: Any) -> Any:
-    bench.task(request.task.name).start()
+    task_named(bench, request.task.name).start()
     return pb.StartTaskResponse()
 
 
 def stop_task(bench: Bench, request: Any) -> Any:
-    bench.task(request.task.name).stop()
+    task_named(bench, request.task.name).stop()
     return pb.StopTaskResponse()
 
 
 def task_control(bench: Bench, request: Any) -> Any:
-    bench.task(request.task.name).control(fields_of(request)["action"])
+    task_named(bench, request.task.name).control(fields_of(request)["action"])
     return pb.TaskControlResponse()
 
 
 def is_task_done(bench: Bench, request: Any) -> Any:
-    return pb.IsTaskDoneResponse(is_task_done=bench.task(request.task.name).is_done())
+    return pb.IsTaskDoneResponse(is_task_done=task_named(bench, request.task.name).is_done())
 
 
 def wait_until_done(bench: Bench, request: Any) -> Any:
-    bench.task(request.task.name).wait_until_done(request.time_to_wait)
+    task_named(bench, request.task.name).wait_until_done(request.time_to_wait)
     return pb.WaitUntilTaskDoneResponse()
 
 
 def sample_clock(bench: Bench, request: Any) -> Any:
     """CfgSampClkTiming."""
-    task = bench.task(request.task.name)
+    task = task_named(bench, request.task.name)
     task.configure()
     fields = fields_of(request)
     task.timing.settings.update(
@@ -94,7 +94,7 @@ def sample_clock(bench: Bench, request: Any) -> Any:
 
 
 def input_buffer(bench: Bench, request: Any) -> Any:
-    task = bench.task(request.task.name)
+    task = task_named(bench, request.task.name)
     task.configure()
     task.input_buffer = request.num_samps_per_chan
     return pb.CfgInputBufferResponse()
@@ -129,7 +129,7 @@ def _trigger_handler(rpc: str, which: str, kind: int, names: dict[str, str]) -> 
     reply = getattr(pb, f"{rpc}Response")
 
     def configure(bench: Bench, request: Any) -> Any:
-        task = bench.task(request.task.name)
+        task = task_named(bench, request.task.name)
         task.configure()
         fields = fields_of(request)
         task.trigger[f"{which}_TRIG_TYPE"] = kind
@@ -146,7 +146,7 @@ def _disable_handler(which: str) -> Handler:
     reply = getattr(pb, f"Disable{which.capitalize()}TrigResponse")
 
     def disable(bench: Bench, request: Any) -> Any:
-        task = bench.task(request.task.name)
+        task = task_named(bench, request.task.name)
         task.configure()
         task.trigger[f"{which}_TRIG_TYPE"] = triggers.NONE
         return reply()
@@ -158,7 +158,7 @@ def _create_handler(rpc: str) -> Handler:
     reply = getattr(pb, f"{rpc}Response")
 
     def create(bench: Bench, request: Any) -> Any:
-        task = bench.task(request.task.name)
+        task = task_named(bench, request.task.name)
         existing = {channel.name for channel in task.channels}
         task.add_channels(create_channels(bench.inventory, bench.scales, rpc, fields_of(request), existing))
         return reply()
@@ -170,7 +170,7 @@ def _nth_handler(rpc: str) -> Handler:
     reply = getattr(pb, f"{rpc}Response")
 
     def nth(bench: Bench, request: Any) -> Any:
-        task = bench.task(request.task.name)
+        task = task_named(bench, request.task.name)
         names = task.devices if rpc.endswith("Device") else [channel.name for channel in task.channels]
         if not 1 <= request.index <= len(names):
             raise DaqmxError(Code.INVALID_VALUE, f"Index: {request.index}")
@@ -181,7 +181,7 @@ def _nth_handler(rpc: str) -> Handler:
 
 def configure_logging(bench: Bench, request: Any) -> Any:
     """DAQmx's own TDMS recorder."""
-    task = bench.task(request.task.name)
+    task = task_named(bench, request.task.name)
     task.configure()
     fields = fields_of(request)
     task.reading.update(
@@ -194,7 +194,7 @@ def configure_logging(bench: Bench, request: Any) -> Any:
 
 
 def start_new_file(bench: Bench, request: Any) -> Any:
-    task = bench.task(request.task.name)
+    task = task_named(bench, request.task.name)
     if not task.log.enabled:
         raise unsupported("Read_Logging_FilePath")
     task.log.new_file(request.file_path)
@@ -206,7 +206,7 @@ def unregister_handler(kind_of: Callable[[dict[str, Any]], str], rpc: str) -> Ha
     reply = getattr(pb, f"{rpc}Response")
 
     def unregister(bench: Bench, request: Any) -> Any:
-        bench.task(request.task.name).events.discard(kind_of(fields_of(request)))
+        task_named(bench, request.task.name).events.discard(kind_of(fields_of(request)))
         bench.changed.notify_all()
         return reply()
 
@@ -221,7 +221,7 @@ def device_handler(rpc: str) -> Handler:
         device = bench.inventory.device(request.device_name)
         bench.check_access(device)
         if rpc == "ResetDevice":
-            for task in bench.tasks.values():
+            for task in tasks_of(bench):
                 if device.name in (*task.devices, *task.hosts):
                     task.abort()
         return reply()

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_hardware.daqmx_server.converter import Converter
+from sim_hardware.daqmx_server.channels.converter import Converter
 from sim_hardware.faults.model import ClockChange
 from sim_hardware.signals import SignalSource
 

@@ -3,31 +3,51 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol, cast
 
+import numpy as np
 from nidaqmx.constants import AcquisitionType, DigitalWidthUnits, SampleTimingType
+from numpy.typing import NDArray
 
 from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.products import Product
-from sim_hardware.daqmx_server import triggers
-from sim_hardware.daqmx_server.acquisition import StartRule
+from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.routing import plain, terminals_of
-from sim_hardware.daqmx_server.sampling import SampleTimes
-from sim_hardware.daqmx_server.triggers import CrossingSearch
-
-if TYPE_CHECKING:
-    from sim_hardware.daqmx_server.task import Task
+from sim_hardware.daqmx_server.inventory.terminals import plain
+from sim_hardware.daqmx_server.timing import triggers
+from sim_hardware.daqmx_server.timing.acquisition import StartRule
+from sim_hardware.daqmx_server.timing.routing import SignalTask, terminals_of
+from sim_hardware.daqmx_server.timing.sampling import Sampler, SampleTimes
+from sim_hardware.daqmx_server.timing.triggers import CrossingSearch
 
 _RATE_OF_SLOW_MODULES_HZ = 100e3
 _FEWEST_SAMPLES = 2
 _OWN_CLOCKS = ("", "onboardclock")
 
 
+class TimedTask(SignalTask, Protocol):
+    """A task as far as its clocks and start are concerned."""
+
+    bench: Bench
+    channels: list[VirtualChannel]
+    trigger: dict[str, Any]
+    timing: TaskTiming
+
+    @property
+    def is_buffered(self) -> bool: ...
+
+    def make_sampler(self, times: SampleTimes) -> Sampler: ...
+
+    def trigger_readings(
+        self, sampler: Sampler, source: str, start: int, stop: int
+    ) -> NDArray[np.float64]: ...
+
+
 class TaskTiming:
     """`settings` are what the client set; the properties are what the hardware makes of it."""
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: TimedTask) -> None:
         self._task = task
         self.settings: dict[str, Any] = {}
 
@@ -150,11 +170,11 @@ class TaskTiming:
         places = [*owner.hosts, *owner.devices]
         return SampleTimes(first_s, rate_hz, self._task.bench.faults.clock_changes(places))
 
-    def source_task(self) -> Task | None:
+    def source_task(self) -> TimedTask | None:
         """The task whose sample clock this one uses."""
         if not self.source_is_foreign:
             return None
-        for other in self._task.bench.tasks.values():
+        for other in cast("dict[str, TimedTask]", self._task.bench.tasks).values():
             if (
                 other is not self._task
                 and not other.timing.source_is_foreign
@@ -180,7 +200,7 @@ def _skews_at(scan: list[tuple[str, Product]], period_s: float) -> list[float]:
     return out
 
 
-def _start_edge(task: Task, after_s: float) -> float | None:
+def _start_edge(task: TimedTask, after_s: float) -> float | None:
     """The edge that a digital start trigger waits for, if it has come."""
     source = triggers.source_of(task.trigger, "START")
     return task.bench.first_edge(source, after_s, triggers.is_rising(task.trigger, "START"))
@@ -189,7 +209,7 @@ def _start_edge(task: Task, after_s: float) -> float | None:
 class _OwnClock:
     """The clock starts at the start trigger, or at once."""
 
-    def __init__(self, task: Task, armed_s: float) -> None:
+    def __init__(self, task: TimedTask, armed_s: float) -> None:
         self._task = task
         self._armed_s = armed_s
         self._kind = int(task.trigger["START_TRIG_TYPE"])
@@ -236,7 +256,7 @@ class _OwnClock:
 class _SharedClock:
     """Samples are taken at the clock of another task, from its first edge after this one is armed."""
 
-    def __init__(self, task: Task, armed_s: float) -> None:
+    def __init__(self, task: TimedTask, armed_s: float) -> None:
         self._task = task
         self._armed_s = armed_s
 

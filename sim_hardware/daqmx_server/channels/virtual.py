@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from nidaqmx.constants import (
     AccelSensitivityUnits,
@@ -22,12 +22,10 @@ from nidaqmx.constants import (
 
 from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.products import Product
-from sim_hardware.daqmx_server.converter import Converter
+from sim_hardware.daqmx_server.channels.converter import Converter
+from sim_hardware.daqmx_server.channels.scale import CustomScale
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.inventory import Device, Inventory, channel_list
-
-if TYPE_CHECKING:
-    from sim_hardware.daqmx_server.scales import CustomScale
+from sim_hardware.daqmx_server.inventory.devices import Device, Inventory, channel_list
 
 _G: Final = 9.80665
 _INCH_M: Final = 0.0254

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import psutil
 
-from sim_hardware.daqmx_server.bench import Bench
+from sim_hardware.daqmx_server.bench.bench import Bench
 
 _POLL_S = 0.01
 

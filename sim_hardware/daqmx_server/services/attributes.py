@@ -13,7 +13,7 @@ from typing import Any, Final, Protocol
 
 from nidaqmx._stubs import nidaqmx_pb2
 
-from sim_hardware.daqmx_server.bench import Bench
+from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 
 _CALL: Final = re.compile(

@@ -7,9 +7,10 @@ from typing import Any, Final
 
 from nidaqmx.constants import DataJustification, ResolutionType, TerminalConfiguration
 
-from sim_hardware.daqmx_server.attributes import unsupported
-from sim_hardware.daqmx_server.bench import Bench
-from sim_hardware.daqmx_server.channels import CHANNEL_TYPE, USAGE, VirtualChannel
+from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.channels.virtual import CHANNEL_TYPE, USAGE, VirtualChannel
+from sim_hardware.daqmx_server.services.attributes import unsupported
+from sim_hardware.daqmx_server.tasks.task import task_named
 
 DEFAULTS: Final[dict[str, Any]] = {"CHAN_DESCR": "", "CHAN_IS_GLOBAL": False, "AI_CUSTOM_SCALE_NAME": ""}
 """Attributes that every channel has and that are only kept."""
@@ -42,7 +43,7 @@ class ChannelGroup:
     """Channel attributes; a list of channels answers for its first and is set as a whole."""
 
     def get(self, bench: Bench, request: Any, name: str) -> Any:
-        task = bench.task(request.task.name)
+        task = task_named(bench, request.task.name)
         channel = task.channels_named(request.channel)[0]
         if name in DERIVED:
             return DERIVED[name](channel)
@@ -67,7 +68,7 @@ class ChannelGroup:
 
     @staticmethod
     def _changing(bench: Bench, request: Any, name: str) -> list[VirtualChannel]:
-        task = bench.task(request.task.name)
+        task = task_named(bench, request.task.name)
         channels = task.channels_named(request.channel)
         for channel in channels:
             if name not in channel.settable:

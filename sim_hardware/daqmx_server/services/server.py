@@ -11,18 +11,29 @@ import session_pb2
 import session_pb2_grpc
 from nidaqmx._stubs import nidaqmx_pb2
 
-from sim_hardware.daqmx_server.attributes import AttributeGroup, Handler, attribute_handlers
-from sim_hardware.daqmx_server.bench import Bench
-from sim_hardware.daqmx_server.channel_attributes import ChannelGroup
-from sim_hardware.daqmx_server.control_service import control_handler
-from sim_hardware.daqmx_server.device_attributes import DeviceGroup, PhysicalChannelGroup, SystemGroup
+from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.errors import DaqmxError
-from sim_hardware.daqmx_server.events import STREAMS
-from sim_hardware.daqmx_server.gate import Gate
-from sim_hardware.daqmx_server.read_calls import read_handlers
-from sim_hardware.daqmx_server.scales import ScaleGroup, scale_handlers
-from sim_hardware.daqmx_server.sessions import SessionError, session_handlers
-from sim_hardware.daqmx_server.task_attributes import EXPORT, READ, TIMING, TRIGGER, BufferGroup, TaskGroup
+from sim_hardware.daqmx_server.services.attributes import AttributeGroup, Handler, attribute_handlers
+from sim_hardware.daqmx_server.services.channel_attributes import ChannelGroup
+from sim_hardware.daqmx_server.services.control_service import control_handler
+from sim_hardware.daqmx_server.services.device_attributes import (
+    DeviceGroup,
+    PhysicalChannelGroup,
+    SystemGroup,
+)
+from sim_hardware.daqmx_server.services.events import STREAMS
+from sim_hardware.daqmx_server.services.gate import Gate
+from sim_hardware.daqmx_server.services.read_calls import read_handlers
+from sim_hardware.daqmx_server.services.scale_calls import ScaleGroup, scale_handlers
+from sim_hardware.daqmx_server.services.sessions import SessionError, session_handlers
+from sim_hardware.daqmx_server.services.task_attributes import (
+    EXPORT,
+    READ,
+    TIMING,
+    TRIGGER,
+    BufferGroup,
+    TaskGroup,
+)
 
 _THREADS: Final = 64
 _MAX_MESSAGE: Final = 256 * 1024 * 1024

@@ -9,10 +9,10 @@ from nidaqmx.constants import AcquisitionType, UsageTypeAI
 
 from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.products import Product
-from sim_hardware.daqmx_server.attributes import unsupported
-from sim_hardware.daqmx_server.bench import Bench
-from sim_hardware.daqmx_server.channels import measurements_of
-from sim_hardware.daqmx_server.inventory import Device
+from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.channels.virtual import measurements_of
+from sim_hardware.daqmx_server.inventory.devices import Device
+from sim_hardware.daqmx_server.services.attributes import unsupported
 
 DRIVER_VERSION: Final = (26, 0, 0)
 """What the simulated driver says it is; the client uses newer calls from 24.5 on."""

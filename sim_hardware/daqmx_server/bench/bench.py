@@ -5,26 +5,38 @@ from __future__ import annotations
 import datetime as dt
 from concurrent.futures import ThreadPoolExecutor
 from threading import Condition, RLock
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, Protocol
 
 import hightime
 import numpy as np
 
-from sim_hardware.daqmx_server.clock import BenchClock, SteppedClock
+from sim_hardware.daqmx_server.bench.clock import BenchClock, SteppedClock
+from sim_hardware.daqmx_server.channels.scale import CustomScale
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.inventory import Device, Inventory, module_device
-from sim_hardware.daqmx_server.routing import edges_of, plain
+from sim_hardware.daqmx_server.inventory.devices import Device, Inventory, module_device
+from sim_hardware.daqmx_server.inventory.terminals import plain
 from sim_hardware.faults.board import FaultBoard
 from sim_hardware.faults.model import Fault
 from sim_hardware.signals import SignalSource
 
-if TYPE_CHECKING:
-    from sim_hardware.daqmx_server.scales import CustomScale
-    from sim_hardware.daqmx_server.task import Task
-
 _SKEW_MARGIN_S = 1e-3
 """Multiplexers look at their last channel this long after the sample clock at most."""
 FiniteClock = Literal["real", "instant"]
+
+
+class BenchTask(Protocol):
+    """A task as the bench sees it."""
+
+    @property
+    def is_buffered(self) -> bool: ...
+
+    def edges_at(self, terminal: str) -> list[float]:
+        """Instants of the task's edges at a (plain) terminal, as far as they have happened."""
+        ...
+
+    def disturbed(self) -> None: ...
+
+    def clear(self) -> None: ...
 
 
 class Bench:
@@ -44,7 +56,7 @@ class Bench:
         self.finite = finite
         self.faults = FaultBoard(clock.now, self._volts_at)
         self.helper = ThreadPoolExecutor(1, thread_name_prefix="samples ahead")
-        self.tasks: dict[str, Task] = {}
+        self.tasks: dict[str, BenchTask] = {}
         self.scales: dict[str, CustomScale] = {}
         self._owners: dict[str, str] = {}
         self._edges: dict[str, list[tuple[float, bool]]] = {}
@@ -59,12 +71,6 @@ class Bench:
     def utc(self, time_s: float) -> hightime.datetime:
         """Wall-clock time of an instant of the bench, finer than a float's seconds since 1970 could be."""
         return self._epoch + hightime.timedelta(seconds=time_s)
-
-    def task(self, name: str) -> Task:
-        try:
-            return self.tasks[name]
-        except KeyError:
-            raise DaqmxError(Code.INVALID_TASK, f"Task Name: {name}") from None
 
     # --- devices --------------------------------------------------------------------------------
 
@@ -169,7 +175,7 @@ class Bench:
         wanted = plain(terminal)
         seen = [t for t, up in self._edges.get(wanted, ()) if t >= after_s and up is rising]
         for task in self.tasks.values():
-            seen += [t for t in edges_of(task, wanted) if t >= after_s - 1e-12]
+            seen += [t for t in task.edges_at(wanted) if t >= after_s - 1e-12]
         return min(seen, default=None)
 
     def reset(self) -> None:

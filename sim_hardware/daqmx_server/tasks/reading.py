@@ -8,10 +8,10 @@ import numpy as np
 from nidaqmx.constants import AcquisitionType, ReadRelativeTo
 from numpy.typing import NDArray
 
-from sim_hardware.daqmx_server.acquisition import Run, overwritten
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.sampling import SampleTimes
-from sim_hardware.daqmx_server.task import State, Task
+from sim_hardware.daqmx_server.tasks.task import State, Task
+from sim_hardware.daqmx_server.timing.acquisition import Run, overwritten
+from sim_hardware.daqmx_server.timing.sampling import SampleTimes
 
 ALL_AVAILABLE = -1
 

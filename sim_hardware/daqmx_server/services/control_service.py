@@ -10,7 +10,8 @@ from typing import Any, Final
 
 import grpc
 
-from sim_hardware.daqmx_server.bench import Bench
+from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.tasks.task import tasks_of
 from sim_hardware.faults.model import fault_from
 
 SERVICE: Final = "rocking.SimControl"
@@ -23,7 +24,7 @@ def run_command(bench: Bench, name: str, arguments: dict[str, Any]) -> dict[str,
         if name == "bench":
             return {
                 "time_s": bench.clock.now(),
-                "tasks": {t.name: t.state.name for t in bench.tasks.values()},
+                "tasks": {t.name: t.state.name for t in tasks_of(bench)},
             }
         if name == "digital_edge":
             bench.clock.power_on()

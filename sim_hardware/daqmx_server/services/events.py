@@ -12,11 +12,11 @@ from typing import Any, TypeGuard
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 from nidaqmx.constants import EveryNSamplesEventType, Signal
 
-from sim_hardware.daqmx_server.acquisition import Run
-from sim_hardware.daqmx_server.bench import Bench
+from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.requests import fields_of
-from sim_hardware.daqmx_server.task import State, Task
+from sim_hardware.daqmx_server.tasks.task import State, Task, task_named
+from sim_hardware.daqmx_server.timing.acquisition import Run
 
 _LISTEN_S = 0.25
 
@@ -26,7 +26,7 @@ class EventStream:
 
     def __init__(self, bench: Bench, request: Any, context: Any, kind: str, already: Code) -> None:
         self.bench = bench
-        self.task = bench.task(request.task.name)
+        self.task = task_named(bench, request.task.name)
         if self.task.state is State.RUNNING:
             raise DaqmxError(Code.EVENT_WHILE_RUNNING)
         if kind in self.task.events:
@@ -82,7 +82,7 @@ def every_n_samples(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
     interval = int(fields["n_samples"])
     kind = fields["every_n_samples_event_type"]
     with bench.changed:
-        task = bench.task(request.task.name)
+        task = task_named(bench, request.task.name)
         _check_interval(task, interval, kind)
         stream = EventStream(bench, request, context, "every_n", Code.EVERY_N_REGISTERED)
     context.send_initial_metadata(())
@@ -185,7 +185,7 @@ def signal(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
 
 
 def unregister(bench: Bench, task_name: str, kind: str) -> None:
-    bench.task(task_name).events.discard(kind)
+    task_named(bench, task_name).events.discard(kind)
     bench.changed.notify_all()
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Any, Final, Protocol
 
-from sim_hardware.daqmx_server.inventory import channel_list
-
-if TYPE_CHECKING:
-    from sim_hardware.daqmx_server.task import Task
+from sim_hardware.daqmx_server.inventory.devices import channel_list
+from sim_hardware.daqmx_server.inventory.terminals import plain
+from sim_hardware.daqmx_server.timing.acquisition import Run
 
 _ENGINES: Final = ("ai", "te0", "te1", "te2")
 _EXPORTS: Final = {
@@ -17,12 +16,20 @@ _EXPORTS: Final = {
 }
 
 
-def plain(terminal: str) -> str:
-    """Terminals compare without case and without the leading slash."""
-    return terminal.lower().strip("/")
+class SignalTask(Protocol):
+    """A task as far as its terminals are concerned."""
+
+    exported: dict[str, Any]
+    run: Run | None
+
+    @property
+    def hosts(self) -> list[str]: ...
+
+    @property
+    def devices(self) -> list[str]: ...
 
 
-def terminals_of(task: Task, signal: str) -> set[str]:
+def terminals_of(task: SignalTask, signal: str) -> set[str]:
     """Plain names of the terminals at which a signal of the task appears."""
     owners = [(host, engine) for host in task.hosts for engine in _ENGINES]
     owners += [(device, "ai") for device in task.devices]
@@ -30,7 +37,7 @@ def terminals_of(task: Task, signal: str) -> set[str]:
     return out | {plain(term) for term in channel_list(str(task.exported.get(_EXPORTS[signal], "")))}
 
 
-def edges_of(task: Task, terminal: str) -> list[float]:
+def edges_of(task: SignalTask, terminal: str) -> list[float]:
     """Instants of the task's edges at a (plain) terminal, as far as they have happened.
 
     Of a sample clock only the first edge counts: it is what starts whoever listens.

@@ -1,78 +1,23 @@
-"""Custom scales: readings in units of the user's own."""
+"""Calls that create, read and change custom scales."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
 from nidaqmx._stubs import nidaqmx_pb2 as pb
-from nidaqmx.constants import ScaleType
-from numpy.typing import NDArray
 
-from sim_hardware.daqmx_server.attributes import Handler, unsupported
-from sim_hardware.daqmx_server.bench import Bench
+from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.channels.scale import LINEAR, MAP, POLYNOMIAL, TABLE, CustomScale
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.requests import fields_of
-
-Values = NDArray[np.float64]
-
-_LINEAR: Final[int] = ScaleType.LINEAR.value
-_MAP: Final[int] = ScaleType.MAP_RANGES.value
-_POLYNOMIAL: Final[int] = ScaleType.POLYNOMIAL.value
-_TABLE: Final[int] = ScaleType.TABLE.value
-
-
-@dataclass(slots=True)
-class CustomScale:
-    """One scale; `attributes` as NI names them, without ``SCALE_ATTRIBUTE_``."""
-
-    attributes: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def pre_scaled_units(self) -> int:
-        return int(self.attributes["PRE_SCALED_UNITS"])
-
-    @property
-    def scaled_units(self) -> str:
-        return str(self.attributes["SCALED_UNITS"])
-
-    def forward(self, values: Values) -> Values:
-        """Pre-scaled values → scaled ones; a table clips at its ends."""
-        a = self.attributes
-        kind = a["TYPE"]
-        if kind == _POLYNOMIAL:
-            return np.asarray(np.polynomial.polynomial.polyval(values, a["POLY_FORWARD_COEFF"]))
-        if kind == _TABLE:
-            return np.asarray(np.interp(values, a["TABLE_PRE_SCALED_VALS"], a["TABLE_SCALED_VALS"]))
-        slope, intercept = self._line()
-        return slope * values + intercept
-
-    def inverse(self, value: float) -> float:
-        """Scaled value → pre-scaled one."""
-        a = self.attributes
-        kind = a["TYPE"]
-        if kind == _POLYNOMIAL:
-            return float(np.polynomial.polynomial.polyval(value, a["POLY_REVERSE_COEFF"]))
-        if kind == _TABLE:
-            return float(np.interp(value, a["TABLE_SCALED_VALS"], a["TABLE_PRE_SCALED_VALS"]))
-        slope, intercept = self._line()
-        return (value - intercept) / slope
-
-    def _line(self) -> tuple[float, float]:
-        a = self.attributes
-        if a["TYPE"] == _LINEAR:
-            return float(a["LIN_SLOPE"]), float(a["LIN_Y_INTERCEPT"])
-        low, high = a["MAP_PRE_SCALED_MIN"], a["MAP_PRE_SCALED_MAX"]
-        slope = (a["MAP_SCALED_MAX"] - a["MAP_SCALED_MIN"]) / (high - low)
-        return slope, a["MAP_SCALED_MIN"] - slope * low
-
+from sim_hardware.daqmx_server.services.attributes import Handler, unsupported
 
 _CREATE: Final[dict[str, tuple[int, dict[str, str]]]] = {
-    "CreateLinScale": (_LINEAR, {"slope": "LIN_SLOPE", "y_intercept": "LIN_Y_INTERCEPT"}),
+    "CreateLinScale": (LINEAR, {"slope": "LIN_SLOPE", "y_intercept": "LIN_Y_INTERCEPT"}),
     "CreateMapScale": (
-        _MAP,
+        MAP,
         {
             "prescaled_min": "MAP_PRE_SCALED_MIN",
             "prescaled_max": "MAP_PRE_SCALED_MAX",
@@ -81,11 +26,11 @@ _CREATE: Final[dict[str, tuple[int, dict[str, str]]]] = {
         },
     ),
     "CreatePolynomialScale": (
-        _POLYNOMIAL,
+        POLYNOMIAL,
         {"forward_coeffs": "POLY_FORWARD_COEFF", "reverse_coeffs": "POLY_REVERSE_COEFF"},
     ),
     "CreateTableScale": (
-        _TABLE,
+        TABLE,
         {"prescaled_vals": "TABLE_PRE_SCALED_VALS", "scaled_vals": "TABLE_SCALED_VALS"},
     ),
 }
@@ -116,15 +61,15 @@ def _create_handler(rpc: str) -> Handler:
 def _check(attributes: dict[str, Any]) -> None:
     """Raise what NI-DAQmx raises for a scale that cannot be turned round."""
     kind = attributes["TYPE"]
-    if kind == _LINEAR and attributes["LIN_SLOPE"] == 0:
+    if kind == LINEAR and attributes["LIN_SLOPE"] == 0:
         raise DaqmxError(Code.SCALE_ZERO_SLOPE)
-    if kind == _MAP and attributes["MAP_PRE_SCALED_MIN"] == attributes["MAP_PRE_SCALED_MAX"]:
+    if kind == MAP and attributes["MAP_PRE_SCALED_MIN"] == attributes["MAP_PRE_SCALED_MAX"]:
         raise DaqmxError(Code.SCALE_PRE_SCALED_EQUAL)
-    if kind == _MAP and attributes["MAP_SCALED_MIN"] == attributes["MAP_SCALED_MAX"]:
+    if kind == MAP and attributes["MAP_SCALED_MIN"] == attributes["MAP_SCALED_MAX"]:
         raise DaqmxError(Code.SCALE_SCALED_EQUAL)
-    if kind == _POLYNOMIAL and not (attributes["POLY_FORWARD_COEFF"] and attributes["POLY_REVERSE_COEFF"]):
+    if kind == POLYNOMIAL and not (attributes["POLY_FORWARD_COEFF"] and attributes["POLY_REVERSE_COEFF"]):
         raise DaqmxError(Code.SCALE_NO_COEFFICIENTS)
-    if kind == _TABLE:
+    if kind == TABLE:
         given, made = attributes["TABLE_PRE_SCALED_VALS"], attributes["TABLE_SCALED_VALS"]
         if len(given) != len(made):
             raise DaqmxError(Code.SCALE_TABLE_LENGTHS)

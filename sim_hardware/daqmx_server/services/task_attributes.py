@@ -16,11 +16,11 @@ from nidaqmx.constants import (
     WaitMode,
 )
 
-from sim_hardware.daqmx_server import triggers
-from sim_hardware.daqmx_server.attributes import unsupported
-from sim_hardware.daqmx_server.bench import Bench
-from sim_hardware.daqmx_server.reading import default_count
-from sim_hardware.daqmx_server.task import Task
+from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.services.attributes import unsupported
+from sim_hardware.daqmx_server.tasks.reading import default_count
+from sim_hardware.daqmx_server.tasks.task import Task, task_named
+from sim_hardware.daqmx_server.timing import triggers
 
 
 class SettingsGroup:
@@ -42,7 +42,7 @@ class SettingsGroup:
         self._while_running = while_running
 
     def get(self, bench: Bench, request: Any, name: str) -> Any:
-        task = bench.task(request.task.name)
+        task = task_named(bench, request.task.name)
         if name in self._derived:
             return self._derived[name](task)
         value = self._settings(task).get(name, self._defaults.get(name))
@@ -59,7 +59,7 @@ class SettingsGroup:
         self._settings(task).pop(name, None)
 
     def _changing(self, bench: Bench, request: Any, name: str) -> Task:
-        task = bench.task(request.task.name)
+        task = task_named(bench, request.task.name)
         if name not in self._defaults:
             raise unsupported(name)
         if name not in self._while_running:
@@ -234,7 +234,7 @@ class BufferGroup:
     """Size of the input buffer."""
 
     def get(self, bench: Bench, request: Any, name: str) -> int:
-        task = bench.task(request.task.name)
+        task = task_named(bench, request.task.name)
         if name == "INPUT_BUF_SIZE":
             return task.buffer_size if task.is_buffered else 0
         if name == "INPUT_ONBRD_BUF_SIZE":
@@ -250,7 +250,7 @@ class BufferGroup:
 
     @staticmethod
     def _changing(bench: Bench, request: Any, name: str) -> Task:
-        task = bench.task(request.task.name)
+        task = task_named(bench, request.task.name)
         if name != "INPUT_BUF_SIZE":
             raise unsupported(f"Buf_{name}")
         task.configure()
@@ -261,7 +261,7 @@ class TaskGroup:
     """Name, channels and devices of a task."""
 
     def get(self, bench: Bench, request: Any, name: str) -> Any:
-        task = bench.task(request.task.name)
+        task = task_named(bench, request.task.name)
         if name == "COMPLETE":
             return task.is_done()
         values: dict[str, Any] = {

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_hardware.daqmx_server.channels import VirtualChannel
-from sim_hardware.daqmx_server.sampling import Input
+from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
+from sim_hardware.daqmx_server.timing.sampling import Input
 
 
 class Scan:

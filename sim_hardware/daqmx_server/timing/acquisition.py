@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.sampling import Sampler, SampleTimes
-from sim_hardware.daqmx_server.triggers import CrossingSearch
+from sim_hardware.daqmx_server.timing.sampling import Sampler, SampleTimes
+from sim_hardware.daqmx_server.timing.triggers import CrossingSearch
 
 
 @dataclass(frozen=True, slots=True)

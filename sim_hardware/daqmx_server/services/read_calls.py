@@ -11,12 +11,12 @@ from nidaqmx._stubs import nidaqmx_pb2 as pb
 from nidaqmx.constants import FillMode
 from numpy.typing import NDArray
 
-from sim_hardware.daqmx_server.attributes import Handler
-from sim_hardware.daqmx_server.bench import Bench
+from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.reading import Reading, read
 from sim_hardware.daqmx_server.requests import fields_of
-from sim_hardware.daqmx_server.task import Task
+from sim_hardware.daqmx_server.services.attributes import Handler
+from sim_hardware.daqmx_server.tasks.reading import Reading, read
+from sim_hardware.daqmx_server.tasks.task import Task, task_named
 
 
 def _varint(value: int) -> bytes:
@@ -48,7 +48,7 @@ def _layout(values: NDArray[Any], fill_mode: int) -> NDArray[Any]:
 
 def read_f64(bench: Bench, request: Any) -> bytes:
     fields = fields_of(request)
-    task = bench.task(request.task.name)
+    task = task_named(bench, request.task.name)
     got = read(task, fields["num_samps_per_chan"], fields["timeout"], fields["array_size_in_samps"])
     values = _layout(task.scan.readings(got.codes, got.rows), fields["fill_mode"])
     spoiled = bench.faults.take("reply_cut_short", task.name)
@@ -61,7 +61,7 @@ def read_f64(bench: Bench, request: Any) -> bytes:
 
 
 def read_scalar(bench: Bench, request: Any) -> Any:
-    task = bench.task(request.task.name)
+    task = task_named(bench, request.task.name)
     got = read(task, 1, request.timeout)
     if got.status or len(got.codes) != 1:
         raise DaqmxError(got.status or Code.SCALAR_OF_MANY)
@@ -73,7 +73,7 @@ def _binary_handler(rpc: str, dtype: str) -> Handler:
 
     def handler(bench: Bench, request: Any) -> Any:
         fields = fields_of(request)
-        task = bench.task(request.task.name)
+        task = task_named(bench, request.task.name)
         got = read(task, fields["num_samps_per_chan"], fields["timeout"], fields["array_size_in_samps"])
         codes = _layout(got.codes.astype(dtype), fields["fill_mode"])
         return reply(read_array=codes.ravel().tolist(), status=got.status, samps_per_chan_read=got.count)
@@ -83,7 +83,7 @@ def _binary_handler(rpc: str, dtype: str) -> Handler:
 
 def read_raw(bench: Bench, request: Any) -> Any:
     """Bytes as the device sends them: scan by scan, each channel in its own width."""
-    task = bench.task(request.task.name)
+    task = task_named(bench, request.task.name)
     width = sum(channel.raw_bytes for channel in task.channels)
     got = read(task, request.num_samps_per_chan, request.timeout)
     types = [
@@ -104,7 +104,7 @@ def _chosen(task: Task, got: Reading) -> list[Any]:
 
 def read_waveforms(bench: Bench, request: Any) -> Any:
     """Readings with the instant of the first sample, the interval, name and unit of each channel."""
-    task = bench.task(request.task.name)
+    task = task_named(bench, request.task.name)
     got = read(task, request.num_samps_per_chan, request.timeout)
     reply = pb.ReadAnalogWaveformsResponse(status=got.status, samps_per_chan_read=got.count)
     for values, channel in zip(task.scan.readings(got.codes, got.rows), _chosen(task, got), strict=True):

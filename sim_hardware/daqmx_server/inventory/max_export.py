@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from daq_app.config.errors import ConfigError, Problem
-from sim_hardware.daqmx_server.inventory import Device, Inventory, cdaq_chassis, module_device
+from sim_hardware.daqmx_server.inventory.devices import Device, Inventory, cdaq_chassis, module_device
 
 _ENCODINGS: Final = ("utf-8-sig", "utf-16", "cp1252")
 _MAX_BYTES: Final = 16 * 1024 * 1024

@@ -9,16 +9,17 @@ import numpy as np
 from nidaqmx.constants import AcquisitionType, OverwriteMode, SampleTimingType, TaskMode
 from numpy.typing import NDArray
 
-from sim_hardware.daqmx_server import triggers
-from sim_hardware.daqmx_server.acquisition import ReferenceSearch, Run, RunPlan
-from sim_hardware.daqmx_server.bench import Bench
-from sim_hardware.daqmx_server.channels import VirtualChannel
+from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.inventory import channel_list
-from sim_hardware.daqmx_server.sampling import Sampler, SampleTimes
-from sim_hardware.daqmx_server.scan import Scan
-from sim_hardware.daqmx_server.tdms_log import TdmsLog
-from sim_hardware.daqmx_server.timing import TaskTiming
+from sim_hardware.daqmx_server.inventory.devices import channel_list
+from sim_hardware.daqmx_server.tasks.tdms_log import TdmsLog
+from sim_hardware.daqmx_server.timing import triggers
+from sim_hardware.daqmx_server.timing.acquisition import ReferenceSearch, Run, RunPlan
+from sim_hardware.daqmx_server.timing.routing import edges_of
+from sim_hardware.daqmx_server.timing.sampling import Sampler, SampleTimes
+from sim_hardware.daqmx_server.timing.scan import Scan
+from sim_hardware.daqmx_server.timing.task_timing import TaskTiming
 
 
 class State(IntEnum):
@@ -32,7 +33,7 @@ class State(IntEnum):
 
 
 class Task:
-    """Everything a client can do with one task, but the reading itself (reads.py)."""
+    """Everything a client can do with one task, but the reading itself (`tasks.reading`)."""
 
     def __init__(self, bench: Bench, name: str) -> None:
         self.bench = bench
@@ -222,7 +223,7 @@ class Task:
             return
         if self.run is not None:
             now = self.bench.clock.now()
-            for other in self.bench.tasks.values():
+            for other in tasks_of(self.bench):
                 if other is not self and other.run is not None and other.timing.source_task() is self:
                     other.run.halt(now)
             self.run.aborted = True
@@ -297,6 +298,10 @@ class Task:
             arrived=lambda now: self.bench.arrived_s(hosts, now),
         )
 
+    def edges_at(self, terminal: str) -> list[float]:
+        """Instants of the task's edges at a (plain) terminal, as far as they have happened."""
+        return edges_of(self, terminal)
+
     def disturbed(self) -> None:
         """The world or its faults have changed: samples ahead of now are made afresh."""
         if self.run is None:
@@ -356,3 +361,16 @@ class Task:
         return ReferenceSearch(
             plan.pretrigger, crossing=triggers.CrossingSearch(condition, plan.pretrigger), readings=readings
         )
+
+
+def tasks_of(bench: Bench) -> list[Task]:
+    """All tasks of the bench."""
+    return [task for task in bench.tasks.values() if isinstance(task, Task)]
+
+
+def task_named(bench: Bench, name: str) -> Task:
+    """−200088 for a name that no task has."""
+    task = bench.tasks.get(name)
+    if not isinstance(task, Task):
+        raise DaqmxError(Code.INVALID_TASK, f"Task Name: {name}")
+    return task

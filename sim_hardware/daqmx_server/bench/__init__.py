@@ -1,0 +1,1 @@
+"""What all tasks share: devices, wiring, clock, faults, reservations, under one lock."""

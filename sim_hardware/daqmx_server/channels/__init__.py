@@ -1,0 +1,1 @@
+"""Virtual channels: what a request makes of a physical channel, and how readings are scaled."""

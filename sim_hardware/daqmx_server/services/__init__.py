@@ -1,0 +1,1 @@
+"""NI's gRPC calls over the bench: attributes, life cycle, reads, events."""

@@ -1,0 +1,1 @@
+"""Tasks: settings, states, reading and logging."""

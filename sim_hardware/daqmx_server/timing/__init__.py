@@ -1,0 +1,1 @@
+"""When samples are taken: clocks, triggers, routes, runs."""
