@@ -1,0 +1,1 @@
+"""NI's own test suite of its Python client, run against the simulated device server."""
