@@ -18,9 +18,10 @@ from benchmarks.figure import Figure
 from daq_app.config import load_rig, plan_tasks
 from daq_app.config.scaling import Scaling
 from daq_app.gap.core import Options, diagnose, fit
-from daq_app.gap.rocking_model.model import RockingModel
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.run_features import extract
+from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun, Sensor, Survey
-from daq_app.gap.rocking_model.run_features import RockingRun, extract
 from daq_app.gap.rocking_model.study import diagnose_runs, model_and_library, prepare
 from sim_hardware.direct import synthesise_test
 

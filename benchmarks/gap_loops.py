@@ -24,9 +24,9 @@ from daq_app.gap.core import CannotDiagnose, Parameter, Prediction, Run, fit
 from daq_app.gap.core.held_out import strain_of
 from daq_app.gap.core.likelihood import Covariance
 from daq_app.gap.core.problem import Problem
-from daq_app.gap.rocking_model.inspection import calibrations
-from daq_app.gap.rocking_model.model import RockingModel
-from daq_app.gap.rocking_model.run_features import RockingRun
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.inspection.inspect_runs import calibrations
+from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.study import prepare
 
 LOOPS = (

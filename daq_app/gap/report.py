@@ -16,9 +16,9 @@ from daq_app.campaign.report.captioned import CaptionedFigure
 from daq_app.gap import report_figures as draw
 from daq_app.gap.core import CannotDiagnose, Diagnosis
 from daq_app.gap.report_figures import ProbeMap
+from daq_app.gap.rocking_model.features.run_features import extract
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.run_features import extract
 from daq_app.gap.traces import Trace, traces
 
 _A4_IN: Final = (8.27, 11.69)

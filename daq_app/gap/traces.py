@@ -21,8 +21,7 @@ from scipy.signal import bessel, bilinear, lfilter
 
 from daq_app.gap.core import CannotDiagnose, Diagnosis
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.records import GapRun, Survey
-from daq_app.gap.rocking_model.rotation import (
+from daq_app.gap.rocking_model.motion.rotation import (
     WireInverse,
     anchors_off,
     joint_rotation,
@@ -30,7 +29,8 @@ from daq_app.gap.rocking_model.rotation import (
     wires_of,
     zeroed,
 )
-from daq_app.gap.rocking_model.swings import Swings, find_swings
+from daq_app.gap.rocking_model.motion.swings import Swings, find_swings
+from daq_app.gap.rocking_model.records import GapRun, Survey
 from sim_hardware.dynamics import Body, Motion, Release, Restitution
 from sim_hardware.dynamics import parameters as par
 from sim_hardware.dynamics.effects import MOTION_EFFECTS

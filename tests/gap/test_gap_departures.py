@@ -10,12 +10,12 @@ from daq_app.gap.core import Library, Options, fit
 from daq_app.gap.core.hypotheses import Hypotheses
 from daq_app.gap.core.other_forms import FreeForm, together
 from daq_app.gap.core.parallel import Workers
-from daq_app.gap.rocking_model.free_forms import with_uneven_loss
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.library import rocking_library
-from daq_app.gap.rocking_model.model import RockingModel
-from daq_app.gap.rocking_model.run_features import RockingRun
+from daq_app.gap.rocking_model.prediction.free_forms import with_uneven_loss
+from daq_app.gap.rocking_model.prediction.model import RockingModel
+from daq_app.gap.rocking_model.prediction.vector import half_cycle_table, kernel_vector, restitution_of
 from daq_app.gap.rocking_model.study import prepare
-from daq_app.gap.rocking_model.vector import half_cycle_table, kernel_vector, restitution_of
 from sim_hardware.dynamics import parameters as par
 
 LEVELS = (0.15, -0.25, 0.35, -0.40)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from simulated_wall import simulate
 
-from daq_app.gap.rocking_model.inspection import found_channels, found_marks
+from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels, found_marks
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import diagnose_runs, model_and_library, prepare
 

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from simulated_wall import simulate
 
-from daq_app.gap.rocking_model.model import RockingModel
-from daq_app.gap.rocking_model.release_speed import release_speed
-from daq_app.gap.rocking_model.run_features import RockingRun, extract
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.run_features import extract
+from daq_app.gap.rocking_model.motion.release_speed import release_speed
+from daq_app.gap.rocking_model.prediction.model import RockingModel
 
 P, RATE_HZ, NOISE_RAD = 2.85, 4000.0, 2.5e-5
 

@@ -8,7 +8,7 @@ import pytest
 from foreign_cases import FOLDER, load_case
 
 from daq_app.gap.core import Diagnosis, Options, fit
-from daq_app.gap.rocking_model.model import RockingModel
+from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare
 
 pytestmark = pytest.mark.skipif(

@@ -9,16 +9,16 @@ import pytest
 from simulated_wall import simulate
 
 from benchmarks.gap_campaign import simulate as longer_held
-from daq_app.gap.rocking_model.inspection import found_channels, found_marks
-from daq_app.gap.rocking_model.model import RockingModel
+from daq_app.gap.rocking_model.features.rings import ring_columns
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.sensor_blocks import Block, first_order
+from daq_app.gap.rocking_model.features.sensor_response import block_coefficients
+from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels, found_marks
+from daq_app.gap.rocking_model.inspection.saturation import saturated
+from daq_app.gap.rocking_model.inspection.wiring import mend
+from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.rings import ring_columns
-from daq_app.gap.rocking_model.run_features import RockingRun
-from daq_app.gap.rocking_model.saturation import saturated
-from daq_app.gap.rocking_model.sensor_blocks import Block, first_order
-from daq_app.gap.rocking_model.sensor_response import block_coefficients
 from daq_app.gap.rocking_model.study import model_and_library, prepare
-from daq_app.gap.rocking_model.wiring import mend
 from sim_hardware.dynamics import parameters as par
 from sim_hardware.sensors.scene import pivots
 

@@ -7,11 +7,11 @@ import pytest
 from simulated_wall import simulate
 
 from daq_app.gap.core import Options
-from daq_app.gap.rocking_model.late_joint import lateness
-from daq_app.gap.rocking_model.model import RockingModel
-from daq_app.gap.rocking_model.run_features import RockingRun
-from daq_app.gap.rocking_model.sensor_blocks import Block
-from daq_app.gap.rocking_model.sensor_response import block_coefficients
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.sensor_blocks import Block
+from daq_app.gap.rocking_model.features.sensor_response import block_coefficients
+from daq_app.gap.rocking_model.motion.late_joint import lateness
+from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare
 
 LEVELS = (0.25, -0.35)

@@ -10,9 +10,9 @@ from simulated_wall import simulate as held_briefly
 
 from benchmarks.gap_campaign import simulate
 from daq_app.gap.core import fit
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.library import rocking_library
-from daq_app.gap.rocking_model.model import RockingModel
-from daq_app.gap.rocking_model.run_features import RockingRun
+from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare
 
 SPEED_RAD_S = 0.012

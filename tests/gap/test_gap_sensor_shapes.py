@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from simulated_wall import simulate
 
-from daq_app.gap.rocking_model.extra_response import bessel
-from daq_app.gap.rocking_model.motion_grid import GRID_HZ, Grid, coarse
-from daq_app.gap.rocking_model.rotation import pivots_off, wire_reading, wires_of
-from daq_app.gap.rocking_model.run_features import RockingRun, examine, extract
-from daq_app.gap.rocking_model.sensor_blocks import UPRIGHT_RAD, moment_shape, side_of, slip_shape
+from daq_app.gap.rocking_model.features.extra_response import bessel
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.run_features import examine, extract
+from daq_app.gap.rocking_model.features.sensor_blocks import UPRIGHT_RAD, moment_shape, side_of, slip_shape
+from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid, coarse
+from daq_app.gap.rocking_model.motion.rotation import pivots_off, wire_reading, wires_of
 
 RATE_HZ = 4000.0
 ALPHA = 0.215

@@ -7,7 +7,7 @@ from simulated_wall import simulate
 
 from daq_app.gap.core import fit
 from daq_app.gap.rocking_model.library import rocking_library
-from daq_app.gap.rocking_model.model import RockingModel
+from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare
 
 LEVELS = (0.15, -0.25, 0.35, -0.40)

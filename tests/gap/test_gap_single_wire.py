@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from simulated_wall import simulate
 
-from daq_app.gap.rocking_model.extra_response import channel
-from daq_app.gap.rocking_model.inspection import found_channels
-from daq_app.gap.rocking_model.sensor_blocks import Block
+from daq_app.gap.rocking_model.features.extra_response import channel
+from daq_app.gap.rocking_model.features.sensor_blocks import Block
+from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels
 from daq_app.gap.rocking_model.study import prepare
 
 LEVEL = (-0.35,)

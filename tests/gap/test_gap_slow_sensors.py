@@ -7,12 +7,13 @@ import pytest
 from scipy.ndimage import maximum_filter1d
 from simulated_wall import simulate
 
-from daq_app.gap.rocking_model.conditions import inspect_channel
-from daq_app.gap.rocking_model.extra_response import transfer
-from daq_app.gap.rocking_model.model import RockingModel
-from daq_app.gap.rocking_model.run_features import RockingRun, extract
-from daq_app.gap.rocking_model.sensor_blocks import Block, first_order
-from daq_app.gap.rocking_model.sensor_response import block_coefficients
+from daq_app.gap.rocking_model.features.extra_response import transfer
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.run_features import extract
+from daq_app.gap.rocking_model.features.sensor_blocks import Block, first_order
+from daq_app.gap.rocking_model.features.sensor_response import block_coefficients
+from daq_app.gap.rocking_model.inspection.conditions import inspect_channel
+from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.study import prepare
 
 _BOTH = ("wires", "accelerometers")

@@ -8,8 +8,8 @@ from simulated_wall import simulate
 
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.run_features import RockingRun
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare
 
 LEVELS = (0.2, -0.28, 0.36)

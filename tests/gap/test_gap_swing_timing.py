@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from simulated_wall import simulate
 
-from daq_app.gap.rocking_model.model import RockingModel
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.run_features import examine, extract
+from daq_app.gap.rocking_model.features.sensor_response import block_coefficients
+from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.run_features import RockingRun, examine, extract
-from daq_app.gap.rocking_model.sensor_response import block_coefficients
 from daq_app.gap.rocking_model.study import diagnose_runs
 
 LEVELS = (0.25, -0.35)

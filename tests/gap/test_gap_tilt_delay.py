@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from simulated_wall import simulate
 
-from daq_app.gap.rocking_model.model import RockingModel
-from daq_app.gap.rocking_model.run_features import RockingRun, extract
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.run_features import extract
+from daq_app.gap.rocking_model.prediction.model import RockingModel
 
 
 def _tilt(run: RockingRun, values: dict[str, float] | None = None) -> np.ndarray:

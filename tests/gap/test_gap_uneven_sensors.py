@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from simulated_wall import simulate
 
-from daq_app.gap.rocking_model.extra_response import bending, turning
+from daq_app.gap.rocking_model.features.extra_response import bending, turning
 from daq_app.gap.rocking_model.study import prepare
 
 ONE_END_OF_THE_TOP = ("WP-4", "AC-5")

@@ -75,7 +75,9 @@ def diagnose(
 
     workers = cores or os.cpu_count() or 1
     if workers > 1:
-        warm_up("daq_app.gap.rocking_model.model")  # while this process imports and reads the files
+        warm_up(
+            "daq_app.gap.rocking_model.prediction.model"
+        )  # while this process imports and reads the files
     from daq_app.gap.core import Options
     from daq_app.gap.core.parallel import Interrupted
     from daq_app.gap.report import write_report

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from daq_app.gap.core import Alike, Confusion, Effect, Library, Parameter
 from daq_app.gap.core.parameters import between, positive, signed
-from daq_app.gap.rocking_model.model import SCATTER_RELEASE
+from daq_app.gap.rocking_model.prediction.model import SCATTER_RELEASE
 from daq_app.gap.rocking_model.probes import departures, probes
 from sim_hardware.dynamics.effects import MOTION_EFFECTS
 from sim_hardware.dynamics.spec import EffectSpec

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from daq_app.gap.core import Confusion, Effect, Parameter
 from daq_app.gap.core.parameters import signed
-from daq_app.gap.rocking_model.vector import PROBE_SPEEDS
+from daq_app.gap.rocking_model.prediction.vector import PROBE_SPEEDS
 
 _LAWS = ("restitution_slope",)
 _LOSSES = ("viscous", "coulomb")

@@ -147,6 +147,18 @@ class GapRun:
         return shifted
 
 
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """What the check found, over all runs."""
+
+    reversed_ids: tuple[str, ...] = ()
+    exchanged: tuple[tuple[str, str], ...] = ()
+    """(channel, channel whose sensor it shows)."""
+    places: int = 0
+    """Places by which the sensors are turned round among the terminals of their kind; 1 for any other
+    exchange, 0 for none."""
+
+
 def load_run(path: Path, rig: Rig | None = None) -> GapRun:
     """A run file of this product; `rig` replaces the rig file that the run carries.
 

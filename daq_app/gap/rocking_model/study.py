@@ -9,9 +9,11 @@ import numpy as np
 
 from daq_app.gap.core import CannotDiagnose, Diagnosis, Library, Options, diagnose
 from daq_app.gap.core.result import Decision, Verdict
-from daq_app.gap.rocking_model.conditions import Mark
-from daq_app.gap.rocking_model.extra_response import MARKS
-from daq_app.gap.rocking_model.inspection import (
+from daq_app.gap.rocking_model.features.extra_response import MARKS
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.run_features import Examined, examine
+from daq_app.gap.rocking_model.inspection.conditions import Mark
+from daq_app.gap.rocking_model.inspection.inspect_runs import (
     calibrations,
     choose_reference,
     completed,
@@ -21,9 +23,8 @@ from daq_app.gap.rocking_model.inspection import (
     without_suspects,
 )
 from daq_app.gap.rocking_model.library import rocking_library
-from daq_app.gap.rocking_model.model import RockingModel, UnscatteredModel
+from daq_app.gap.rocking_model.prediction.model import RockingModel, UnscatteredModel
 from daq_app.gap.rocking_model.records import GapRun, check_consistent
-from daq_app.gap.rocking_model.run_features import Examined, RockingRun, examine
 from daq_app.workers import warm_up
 
 FAR_FROM_SURVEY = 4.0

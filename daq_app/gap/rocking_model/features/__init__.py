@@ -1,0 +1,1 @@
+"""Features of one run, one file per sensor family: observation, prediction, sizes and priors."""

@@ -1,0 +1,155 @@
+"""One channel beside its prediction: in what it differs (gain, lag, curvature, drift), as features.
+
+The same for every family, whoever predicts it: what is left over is regressed on a few shapes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.config.rig import Family
+from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.features.sensor_blocks import Block
+from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ
+from daq_app.gap.rocking_model.motion.rotation import WireInverse
+
+_SHAPES = ("gain", "lag", "curvature", "drift")
+SHAPES: dict[Family, tuple[str, ...]] = {
+    "lvdt": _SHAPES,
+    "wire": (*_SHAPES, "side"),
+    "accelerometer": _SHAPES,
+}
+"""Of wires also half the difference in gain between the two sides: the wall lifts on one side only, and a
+wire whose anchor is not as high as the rig file says slopes and sees it. A joint opens at one face at a time:
+LVDTs have no other side."""
+_UNITS: dict[Family, tuple[str, ...]] = {
+    "lvdt": ("1", "s", "1/m", "m/s"),
+    "wire": ("1", "s", "1/m", "m/s", "1"),
+    "accelerometer": ("1", "s", "s²/m", "m/s³"),
+}
+TOLERANCE: dict[Family, tuple[float, ...]] = {
+    "lvdt": (3.2e-3, 1e-4, 0.06, 4e-6),
+    "wire": (3.2e-3, 1e-4, 0.005, 6e-6, 5e-4),
+    "accelerometer": (8e-3, 2e-3, 2e-3, 1.5e-3),
+}
+"""What healthy channels differ by: calibration, and how well the others predict them. Accelerometers also
+by the place's own ringing, which a hop of the wall carries beyond the mask. An LVDT's lag is as good as what
+its family may be late by: a twelfth of it is in the time across every impact, to one side up and to the other
+down, and those times repeat to some hundredths of a millisecond. A wire is straight to 0.1 % of its travel of
+± 0.45 m; its side is an anchor known to 5 mm."""
+CALIBRATION = 3e-3
+"""Relative tolerance of one channel's calibration."""
+_SOUND = 0.5
+"""Standard deviation of what a sound channel is off by, in those tolerances."""
+STRUCTURE_SD = 0.2
+RINGING: tuple[Family, ...] = ("accelerometer",)
+"""Families whose channels differ in how they ring: what remains of one says nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Others:
+    """A channel beside what the others of its family make of it, on the grid; both (m,), SI."""
+
+    measured: FloatArray
+    expected: FloatArray
+    pick: NDArray[np.bool_]
+    spread: float
+    """How many times one channel's calibration error the relative error of the prediction is."""
+    rough: float = 0.0
+    """Rms of what the steps of these readings make of the difference; 0 where they have none."""
+    repeats: int = 1
+    """Half-cycles, in each of which the same steps come back."""
+    sided: bool = False
+    """Whether its side is among the shapes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Deviation:
+    """Coefficients of one channel in one run (`SHAPES`), with covariance, and what remains over noise."""
+
+    values: FloatArray
+    covariance: FloatArray
+    projection: FloatArray
+    design: FloatArray
+    """Orthonormal basis of the shapes at the samples used."""
+    remains: float
+    """ln of the rms that the shapes leave, over the rms at rest."""
+    noise: float
+
+
+def deviation(beside: Others) -> Deviation:
+    """Regress what a channel shows beyond the others' prediction on the shapes."""
+    e = beside.expected
+    columns = np.column_stack(
+        [
+            e,
+            -np.gradient(e, 1.0 / GRID_HZ),
+            e**2,
+            np.arange(e.size) / GRID_HZ,
+            *([np.abs(e)] if beside.sided else []),
+            np.ones_like(e),
+        ]
+    )[beside.pick]
+    scale = np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
+    inverse = np.linalg.pinv(columns / scale, rcond=1e-9) / scale[:, None]
+    difference = (beside.measured - e)[beside.pick]
+    left = difference - columns @ (inverse @ difference)
+    variance = left_over = float(left @ left) / max(left.size - columns.shape[1], 1)
+    fraction = max(independent_fraction(left), 0.01)
+    rest = (beside.measured - e)[-round(0.4 * GRID_HZ) :]
+    noise = float(np.std(rest - np.linspace(rest[:8].mean(), rest[-8:].mean(), rest.size))) + 1e-12
+    # At rest a reading in steps shows none of them, and in motion the same ones in every half-cycle.
+    noise = float(np.hypot(noise, beside.rough))
+    if beside.rough > 0.0:
+        variance *= max(beside.repeats, 1)
+    kept = slice(0, columns.shape[1] - 1)
+    covariance = variance / fraction * (inverse @ inverse.T)[kept, kept]
+    return Deviation(
+        (inverse @ difference)[kept],
+        covariance,
+        inverse[kept],
+        np.linalg.qr(columns / scale)[0],
+        0.5 * float(np.log(left_over / noise**2)),
+        noise,
+    )
+
+
+def usual_remains(of_channels: Sequence[float]) -> float:
+    """What remains (`Deviation`) of a sound channel: the middle of all, and no less than its noise.
+
+    Readings that go in steps from the same zero step together, and nearly nothing remains of them. One whose
+    calibration is another steps at other places; what its own steps make is noise that it is allowed.
+    """
+    return max(float(np.median(of_channels)), 0.0)
+
+
+def block_of(
+    name: str, family: Family, beside: Others, usual: float, wire: WireInverse | None = None
+) -> Block:
+    """Block of the coefficients of a channel; `usual` is what remains (`Deviation`) of a sound one."""
+    found = deviation(beside)
+    k = len(SHAPES[family])
+    covariance = np.zeros((k + 1, k + 1))
+    covariance[:k, :k] = found.covariance
+    covariance[k, k] = STRUCTURE_SD**2
+    remains = 0.0 if family in RINGING else max(found.remains - usual, 0.0)
+    return Block(
+        name,
+        (*SHAPES[family], "what remains"),
+        (*_UNITS[family], "1"),
+        np.append(found.values, remains),
+        covariance,
+        found.projection,
+        beside.pick,
+        kind="channel",
+        expected=beside.expected,
+        design=found.design,
+        noise=found.noise * float(np.exp(usual)),
+        wire=wire,
+        tags={name: family},
+        levers=(CALIBRATION * beside.spread, *(_SOUND * beside.spread * t for t in TOLERANCE[family][1:])),
+    )

@@ -1,0 +1,164 @@
+"""Does the floor vibrate? A sinusoid that the accelerometers show while the wall is held and after it rests.
+
+The frequency is common to all runs, the phase is each run's own. While the wall is held it may sway;
+what a sway implies at the accelerometers is taken out with the rotation's own record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid, coarse
+from daq_app.gap.rocking_model.motion.rotation import zeroed
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
+
+FREQUENCIES_HZ = np.arange(0.4, 6.0, 0.02)
+SMALLEST_GAIN = 6.0
+"""Gain in log likelihood per run, on average, below which there is no vibration to speak of."""
+_REST_MARGIN_S = 0.3
+_SHORTEST, _ENOUGH = 60, 120
+"""Samples of the grid in a part that is used, and in both."""
+
+
+@dataclass(frozen=True, slots=True)
+class Vibration:
+    """One run's share: amplitude (m/s²) with its error, and the phase at release (rad), of sin(2πft + φ)."""
+
+    frequency_hz: float
+    frequency_sd: float
+    amplitude: float
+    amplitude_sd: float
+    phase: float
+    phase_sd: float
+    found: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Quiet:
+    """Accelerometer record of the held and the resting wall, with what explains it besides the floor."""
+
+    time_s: FloatArray
+    values: FloatArray
+    basis: FloatArray
+    moving: NDArray[np.bool_]
+    """Samples of the swings: used to sharpen the frequency only."""
+
+
+def find_vibration(runs: Sequence[GapRun], grids: Sequence[Grid]) -> list[Vibration | None]:
+    """Vibration of every run at the one frequency that explains most; None where nothing can be said."""
+    data = [_quiet(run, grid) for run, grid in zip(runs, grids, strict=True)]
+    usable = [d for d in data if d is not None]
+    if not usable:
+        return [None] * len(runs)
+    gain = np.sum([_gain(d, FREQUENCIES_HZ) for d in usable], axis=0)
+    best = float(FREQUENCIES_HZ[int(np.argmax(gain))])
+    found = float(gain.max()) > SMALLEST_GAIN * len(usable)
+    fine = best + np.linspace(-0.03, 0.03, 31)
+    sharp = np.sum([_gain(d, fine) for d in usable], axis=0)
+    best = float(fine[int(np.argmax(sharp))])
+    bend = float(np.gradient(np.gradient(sharp, fine[1] - fine[0]), fine[1] - fine[0]).min())
+    sd = float(1.0 / np.sqrt(max(-bend, 1.0)))
+    return [None if d is None else _share(d, best, sd, found) for d in data]
+
+
+def without_vibration(run: GapRun, grid: Grid, found: Vibration) -> GapRun:
+    """The run whose accelerometers show the wall alone: beside inertia a floor's wave looks like a gain."""
+    count = run.channels.shape[1]
+    time_s = grid.time_s[0] + (np.arange(count) + 0.5) / run.rate_hz - 0.5 / GRID_HZ
+    angle = 2.0 * np.pi * found.frequency_hz * time_s + found.phase
+    wave = found.amplitude * np.sin(angle) * np.cos(np.interp(time_s, grid.time_s, grid.theta))
+    channels = run.channels.copy()
+    for i in run.indices("accelerometer", "x"):
+        if not run.sensors[i].ac_coupled:
+            channels[i] -= wave
+    return replace(run, channels=channels)
+
+
+def _quiet(run: GapRun, grid: Grid) -> _Quiet | None:
+    chosen = run.steady_accelerometers("x")
+    if not chosen:
+        return None
+    measured = np.mean([coarse(zeroed(run, i), run.rate_hz) for i in chosen], axis=0)
+    height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))
+    calm = quiet(run, grid)
+    held, resting = calm & (grid.time_s < -0.05), calm & (grid.time_s > grid.rest_s + _REST_MARGIN_S)
+    # Too short a part says nothing, but the other may: a quick pull leaves a swaying wall.
+    held, resting = held & (held.sum() >= _SHORTEST), resting & (resting.sum() >= _SHORTEST)
+    pick = held | resting
+    if pick.sum() < _ENOUGH:
+        return None
+    # The held wall sways, and a compliant joint does at rest: its own rotation says by how much.
+    before, after = grid.time_s < 0.0, grid.time_s > grid.rest_s
+    sway = [column for part in (before, after) for column in _sway(grid.raw, part, height)]
+    columns = np.column_stack([held, resting, *sway])[pick].astype(float)
+    columns[:, 2:] /= np.abs(columns[:, 2:]).max(axis=0) + 1e-30
+    basis, _ = np.linalg.qr(columns[:, np.any(columns != 0.0, axis=0)])
+    return _Quiet(grid.time_s[pick], measured[pick], basis, resting[pick])
+
+
+def _sway(rotation: FloatArray, part: NDArray[np.bool_], height: float) -> list[FloatArray]:
+    """What a rotation of the wall in one part of the run makes of the accelerometers, and of late ones."""
+    found = np.zeros((3, rotation.size))
+    if part.sum() >= _SHORTEST:
+        low_pass = butter(3, 8.0, fs=GRID_HZ, output="sos")
+        theta = sosfiltfilt(low_pass, rotation[part] - rotation[part].mean())
+        twice = np.gradient(np.gradient(theta, 1 / GRID_HZ), 1 / GRID_HZ)
+        found[:, part] = -GRAVITY_M_S2 * theta, height * twice, np.gradient(height * twice, 1 / GRID_HZ)
+    return list(found)
+
+
+def quiet(run: GapRun, grid: Grid) -> NDArray[np.bool_]:
+    """Samples of the grid at which nothing rings in the accelerometers (steps on the floor, a knock)."""
+    step = round(run.rate_hz / GRID_HZ)
+    spread = np.zeros(grid.time_s.size)
+    for i in run.indices("accelerometer"):
+        if np.all(np.isfinite(run.channels[i])):
+            cells = run.channels[i, : spread.size * step].reshape(spread.size, step)
+            own = cells.std(axis=1)
+            spread = np.maximum(spread, own / max(float(np.median(own[-60:])), 1e-12))
+    loud = np.convolve(spread > 2.5, np.ones(round(0.12 * GRID_HZ)), "same") > 0
+    return np.asarray(~loud)
+
+
+def _gain(data: _Quiet, frequencies: FloatArray) -> FloatArray:
+    """Gain in log likelihood of a sinusoid of each frequency."""
+    values = data.values - data.basis @ (data.basis.T @ data.values)
+    power = float(values @ values)
+    fraction = max(independent_fraction(values), 0.05)
+    gains = np.empty(frequencies.size)
+    for k, frequency in enumerate(frequencies):
+        found = _fit(data, values, frequency)
+        share = min(max(float(found[2]) / power, 0.0), 0.9999)
+        gains[k] = -0.5 * fraction * values.size * np.log1p(-share)
+    return gains
+
+
+def _fit(data: _Quiet, values: FloatArray, frequency: float) -> tuple[float, float, float, FloatArray]:
+    """(sine, cosine, explained power, inverse Gram matrix) of a sinusoid."""
+    angle = 2.0 * np.pi * frequency * data.time_s
+    waves = np.column_stack([np.sin(angle), np.cos(angle)])
+    waves = waves - data.basis @ (data.basis.T @ waves)
+    inverse = np.linalg.inv(waves.T @ waves + 1e-9 * np.eye(2))
+    projected = waves.T @ values
+    sine, cosine = inverse @ projected
+    return float(sine), float(cosine), float(projected @ inverse @ projected), inverse
+
+
+def _share(data: _Quiet, frequency: float, frequency_sd: float, found: bool) -> Vibration:
+    values = data.values - data.basis @ (data.basis.T @ data.values)
+    sine, cosine, explained, inverse = _fit(data, values, frequency)
+    left = max(float(values @ values) - explained, 0.0)
+    fraction = max(independent_fraction(values), 0.05) if not found else 0.3
+    variance = left / values.size / fraction
+    sd = float(np.sqrt(variance * 0.5 * np.trace(inverse)))
+    amplitude = float(np.hypot(sine, cosine))
+    # The phase is read where the wall stands and used where it moves, half a record away.
+    apart = 0.5 * float(np.ptp(data.time_s))
+    phase_sd = float(np.hypot(sd / max(amplitude, sd), 2.0 * np.pi * frequency_sd * apart))
+    return Vibration(frequency, frequency_sd, amplitude, sd, float(np.arctan2(cosine, sine)), phase_sd, found)

@@ -1,0 +1,133 @@
+"""How late the accelerometers are against the reference rotation, from the velocity jumps of the impacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid, coarse
+from daq_app.gap.rocking_model.motion.rotation import zeroed
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
+
+MOST = 14
+"""Impacts used: the first ones are the loudest."""
+WINDOW_S = 0.11
+REACH_S = 0.065
+_SHARP_S = 8e-3
+"""Half width of the misfit's dip up to which it is that of impacts, whatever their form."""
+_NEAR_S = 3e-3
+"""How far from its lowest point the shape of a sharp dip is read."""
+MIDDLE_OF_IMPACT_S = 1.5e-3
+"""By how much the middle of an impact is later than the contact, at sensors that are not late at all."""
+MODEL_ERROR_S = 3e-4
+"""How well the shape of an impact is known at all."""
+
+
+def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
+    """(delay, its variance): shift of the record that fits the rotation's own acceleration best.
+
+    What is compared are averages over 5 ms of z θ̈ − g sin θ with the jump of θ̇ at every impact: any
+    linear response of the accelerometers shifts its centroid by its delay. Of a long and lopsided one the
+    largest value is sooner than that, which the variance says. None without enough impacts.
+    """
+    chosen = run.steady_accelerometers("x")
+    if not chosen or grid.impact_s.size < 3:
+        return None
+    height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))
+    measured = np.mean([coarse(zeroed(run, i), run.rate_hz) for i in chosen], axis=0)
+    windows = _windows(grid)
+    if len(windows) < 3:
+        return None
+    fine = np.arange(grid.speed.size) / run.rate_hz + grid.time_s[0] - 0.5 / GRID_HZ
+    gravity = np.interp(fine, grid.time_s, GRAVITY_M_S2 * np.sin(grid.theta))
+    velocity = height * grid.speed - np.cumsum(gravity) / run.rate_hz
+
+    def misfit(delay: float) -> FloatArray:
+        edges = np.append(grid.time_s - 0.5 / GRID_HZ, grid.time_s[-1] + 0.5 / GRID_HZ) - delay
+        expected = np.diff(np.interp(edges, fine, velocity)) * GRID_HZ
+        return np.array([_left(measured[part] - expected[part], basis) for part, basis in windows])
+
+    delays = np.arange(-REACH_S, REACH_S, 1e-3)
+    curve = np.array([misfit(float(d)).sum() for d in delays])
+    dip = _Dip.of(delays, curve)
+    reach = min(dip.sooner_s, dip.later_s) if dip.broad else _NEAR_S
+    fine_delays = dip.middle_s + np.linspace(-reach, reach, 2 * round(reach / 2.5e-4) + 1)
+    tables = np.array([misfit(float(d)) for d in fine_delays])
+    lowest = _middle if dip.broad else _minimum
+    shift = lowest(fine_delays, tables.sum(axis=1))
+    each = np.array([lowest(fine_delays, tables[:, k]) for k in range(tables.shape[1])])
+    spread = 1.48 * float(np.median(np.abs(each - np.median(each))))
+    form = dip.lopsided_s if dip.broad else 0.0
+    return shift, 1.57 * spread**2 / len(windows) + MODEL_ERROR_S**2 + form**2
+
+
+def _windows(grid: Grid) -> list[tuple[slice, FloatArray]]:
+    """Samples around each impact that stands alone, with the slow shapes that are free there."""
+    found = []
+    gaps = np.diff(grid.impact_s, append=grid.impact_s[-1] + 0.5)
+    for k, (time, gap) in enumerate(zip(grid.impact_s, gaps, strict=True)):
+        before = time - grid.impact_s[k - 1] if k else 1.0
+        if min(gap, before) < 1.6 * WINDOW_S:
+            break
+        centre = int(np.searchsorted(grid.time_s, time))
+        part = slice(centre - round(WINDOW_S * GRID_HZ), centre + round(WINDOW_S * GRID_HZ))
+        if part.start < 0 or part.stop > grid.time_s.size:
+            continue
+        x = np.linspace(-1.0, 1.0, part.stop - part.start)
+        found.append((part, np.linalg.qr(np.vander(x, 2))[0]))
+        if len(found) == MOST:
+            break
+    return found
+
+
+def _left(difference: FloatArray, basis: FloatArray) -> float:
+    left = difference - basis @ (basis.T @ difference)
+    return float(left @ left)
+
+
+@dataclass(frozen=True, slots=True)
+class _Dip:
+    """Where the misfit is least, s, and how broad it is to either side where it has half its depth, s."""
+
+    middle_s: float
+    sooner_s: float
+    later_s: float
+
+    @classmethod
+    def of(cls, delays: FloatArray, curve: FloatArray) -> _Dip:
+        """Of a misfit in steps of 1 ms, smoothed over 5 ms."""
+        smooth = np.convolve(np.pad(curve, 2, mode="edge"), np.full(5, 0.2), "valid")
+        k = int(np.argmin(smooth))
+        out = np.flatnonzero(smooth - smooth[k] > 0.5 * (np.median(smooth) - smooth[k]))
+        left, right = out[out < k].max(initial=0), out[out > k].min(initial=smooth.size - 1)
+        middle, first, last = (float(delays[i]) for i in (k, left, right))
+        return cls(middle, middle - first, last - middle)
+
+    @property
+    def broad(self) -> bool:
+        """Whether the accelerometers' response is longer than an impact: 5 to 6 ms as they are, 17 behind a
+        filter of 20 ms."""
+        return min(self.sooner_s, self.later_s) > _SHARP_S
+
+    @property
+    def lopsided_s(self) -> float:
+        """How far the middle of a response may be from where it is largest."""
+        return 0.5 * abs(self.later_s - self.sooner_s)
+
+
+def _middle(where: FloatArray, values: FloatArray) -> float:
+    """Lowest point of the parabola through all samples: a broad dip is ragged by what rings at 5 ms."""
+    centre = float(where.mean())
+    bend, slope, _ = np.polyfit(where - centre, values, 2)
+    shift = -0.5 * slope / bend if bend > 0 else 0.0
+    return centre + float(np.clip(shift, where[0] - centre, where[-1] - centre))
+
+
+def _minimum(where: FloatArray, values: FloatArray) -> float:
+    """Lowest point of a sampled curve, by a parabola through its lowest sample and both neighbours."""
+    k = min(max(int(np.argmin(values)), 1), values.size - 2)
+    bend = values[k - 1] - 2.0 * values[k] + values[k + 1]
+    shift = 0.5 * (values[k - 1] - values[k + 1]) / bend if bend > 0 else 0.0
+    return float(where[k] + np.clip(shift, -1.0, 1.0) * (where[1] - where[0]))

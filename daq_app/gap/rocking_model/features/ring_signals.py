@@ -1,0 +1,153 @@
+"""Signals in which a ring-down may show: bending and turning of the wall, beyond its rigid rotation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.channel_shapes import CALIBRATION
+from daq_app.gap.rocking_model.features.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
+from daq_app.gap.rocking_model.features.sensor_blocks import Shares
+from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
+from daq_app.gap.rocking_model.motion.rotation import Rotation, sooner, wall_rotation, zeroed
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
+
+DISPLACEMENT_MASK_S = 0.02
+"""A base that gives way takes milliseconds to turn after an impact: a quick decay, but no ring-down."""
+ACCELERATION_MASK_S = 0.035
+LATE_S = 5e-3
+"""Delay of a family from which what an impact leaves in it is looked for that much later."""
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """One signal in which a ring-down may show, on the grid, shape (m,)."""
+
+    family: str
+    values: FloatArray
+    pick: NDArray[np.bool_]
+    shares: Shares
+    undone_s: float = 0.0
+    """Delay that was undone."""
+    unequal: FloatArray | None = None
+    """What calibrations that differ by one sd make of it, (m,)."""
+
+
+def bend_signals(run: GapRun, grid: Grid, height_m: float) -> list[Signal]:
+    """Bending of the wall as wires and accelerometers show it, in metres (m/s²) of its top."""
+    found = []
+    rows, heights, names = wall_rotation(run)
+    if len(rows) >= 3:
+        shape = (heights / height_m) ** 2
+        beyond = np.array([z * coarse(r, run.rate_hz) for z, r in zip(heights, rows, strict=True)])
+        beyond = beyond - heights[:, None] * grid.theta
+        weights = shape / (shape @ shape)
+        shares = _shares(weights, _along(run, names), heights, height_m)
+        found.append(Signal("wire", weights @ beyond, _between_late(grid, beyond, heights), shares))
+    chosen = run.steady_accelerometers("x")
+    if len(chosen) >= 3:
+        z = np.array([run.sensors[i].position_m[2] for i in chosen])
+        shape = (z / height_m) ** 2
+        y = np.array([run.sensors[i].position_m[1] for i in chosen])
+        shares = _shares(shape / (shape @ shape), y, z, height_m)
+        found.append(_of_accelerometers(accelerations(run, grid, chosen), shape, z, shares))
+    return found
+
+
+def _along(run: GapRun, names: Sequence[str]) -> FloatArray:
+    """Places along the length of channels by name, m."""
+    return np.array([next(s.position_m[1] for s in run.sensors if s.id == name) for name in names])
+
+
+def _shares(weights: FloatArray, y: FloatArray, z: FloatArray, height_m: float) -> Shares:
+    """What a weighted sum of channels at (y, z), each (n,), shows of each motion along x."""
+    return Shares(
+        rotation=float(weights @ z),
+        bend=float(weights @ (z / height_m) ** 2),
+        yaw=-float(weights @ y),
+        twist=float(weights @ (y * z)),
+    )
+
+
+def turn_signals(run: GapRun, joint: Rotation, grid: Grid, height_m: float) -> list[Signal]:
+    """Slope along the length of what wires, accelerometers (per metre) and the joint show."""
+    found = []
+    rows, heights, names = wall_rotation(run)
+    y = _along(run, names)
+    if len(rows) >= 3 and float(np.ptp(y)) > 0.2:
+        beyond = np.array([z * coarse(r, run.rate_hz) for z, r in zip(heights, rows, strict=True)])
+        beyond = beyond - heights[:, None] * grid.theta
+        weights = y / (y @ y)
+        shares = _shares(weights, y, heights, height_m)
+        found.append(Signal("wire", weights @ beyond, _between_late(grid, beyond, heights), shares))
+    chosen = run.steady_accelerometers("x")
+    y = np.array([run.sensors[i].position_m[1] for i in chosen])
+    if len(chosen) >= 3 and float(np.ptp(y)) > 0.2:
+        z = np.array([run.sensors[i].position_m[2] for i in chosen])
+        shares = _shares(y / (y @ y), y, z, height_m)
+        found.append(_of_accelerometers(accelerations(run, grid, chosen), y, z, shares))
+    if len(joint.used) >= 8:
+        pick = _between(grid, DISPLACEMENT_MASK_S) & grid.valid
+        found.append(Signal("lvdt", coarse(joint.twist, run.rate_hz), pick, Shares(twist=1.0)))
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Accelerations:
+    """`beyond`: (n, m) beyond those of a rigid wall; `pick`: (m,) the samples between impacts to be used.
+
+    `mean`: (m,) per metre of height, as measured.
+    """
+
+    beyond: FloatArray
+    mean: FloatArray
+    pick: NDArray[np.bool_]
+    undone_s: float
+
+
+def _of_accelerometers(seen: Accelerations, shape: FloatArray, z: FloatArray, shares: Shares) -> Signal:
+    """The share of a shape over the accelerometers; unequal calibrations have some of every motion's."""
+    size = shape @ shape
+    unequal = CALIBRATION * float(np.linalg.norm(shape * z) / size) * seen.mean
+    return Signal("accelerometer", shape @ seen.beyond / size, seen.pick, shares, seen.undone_s, unequal)
+
+
+def accelerations(run: GapRun, grid: Grid, chosen: Sequence[int]) -> Accelerations:
+    """What accelerometers (their places) show beyond a rigid wall, put in step with the rotation.
+
+    Of late accelerometers the shock of an impact would lie beyond the samples that are left out for it.
+    """
+    seen = acceleration_delay(run, grid)
+    late = seen[0] - MIDDLE_OF_IMPACT_S if seen is not None else 0.0
+    late = late if abs(late) > LATE_S else 0.0
+    early = round(late * run.rate_hz)
+    z = np.array([run.sensors[i].position_m[2] for i in chosen])
+    measured = np.array([coarse(sooner(zeroed(run, i), early), run.rate_hz) for i in chosen])
+    beyond = measured - z[:, None] * grid.alpha + GRAVITY_M_S2 * np.sin(grid.theta)
+    pick = _between(grid, ACCELERATION_MASK_S + abs(late))
+    return Accelerations(beyond, z @ measured / (z @ z), pick, early / run.rate_hz)
+
+
+def _between_late(grid: Grid, beyond: FloatArray, heights: FloatArray) -> NDArray[np.bool_]:
+    """Samples to use of wires, (n, m) beyond a rigid wall: the corner of an impact lasts twice their delay.
+
+    What a slow sensor makes of a corner depends on the form of its response, which nobody knows so well.
+    """
+    pick = (grid.time_s > 0.0) & (grid.time_s < grid.rest_s)
+    speed = grid.omega[pick]
+    late = -float(heights @ (beyond[:, pick] @ speed)) / float(heights @ heights) / float(speed @ speed)
+    return _between(grid, DISPLACEMENT_MASK_S + (2.0 * abs(late) if abs(late) > LATE_S else 0.0))
+
+
+def _between(grid: Grid, mask_s: float) -> NDArray[np.bool_]:
+    """Samples between impacts, from the first impact until the swings end."""
+    if grid.impact_s.size < 2:
+        return np.zeros(grid.time_s.size, dtype=bool)
+    after = grid.time_s[:, None] - grid.impact_s[None, :]
+    near = np.any((after > -0.5 * mask_s - 0.005) & (after < mask_s), axis=1)
+    inside = (grid.time_s > grid.impact_s[0]) & (grid.time_s < grid.impact_s[-1])
+    return np.asarray(inside & ~near)

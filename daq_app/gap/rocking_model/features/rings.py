@@ -1,0 +1,286 @@
+"""Ring-down after impacts: does the wall bend or turn as an oscillator that every impact kicks?
+
+One oscillator is fitted to all runs (its frequency and damping, by a scan); each signal then has two
+coefficients per run, of the sine and the cosine of the ring-down per jump of the angular velocity.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.features.ring_signals import Signal
+from daq_app.gap.rocking_model.features.sensor_blocks import Block
+from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid
+
+BEND_HZ = np.geomspace(7.0, 42.0, 36)
+TURN_HZ = np.geomspace(1.5, 14.0, 40)
+DAMPING = (0.01, 0.04)
+FINE_DAMPING = (0.007, 0.012, 0.02, 0.032, 0.05, 0.08)
+_DEGREE = 4
+REPEATABILITY = 0.07
+"""Relative repeatability of a ring-down in one run: kicks differ from impact to impact. It is no free
+scatter, which would grow until an effect that nobody named hides in it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ring:
+    """The oscillator that fits best, and how well: gain in log likelihood over no ring-down."""
+
+    frequency_hz: float
+    zeta: float
+    gain: float
+    frequency_sd: float
+    zeta_sd: float
+    """Relative."""
+
+
+def ring_columns(grid: Grid, frequency_hz: float, zeta: float) -> FloatArray:
+    """Sine and cosine of the ring-down per unit jump of θ̇, shape (m, 2)."""
+    return ring_table(grid, np.array([frequency_hz]), np.array([zeta]))
+
+
+def ring_table(grid: Grid, frequencies_hz: FloatArray, zetas: FloatArray) -> FloatArray:
+    """`ring_columns` of many oscillators, (k,) each, beside one another, shape (m, 2 k)."""
+    natural = 2.0 * np.pi * frequencies_hz
+    rates = -zetas * natural + 1j * natural * np.sqrt(1.0 - zetas**2)
+    last = np.searchsorted(grid.impact_s, grid.time_s, side="right")
+    # What is left of all jumps so far, at each impact; nothing before the first.
+    states = np.zeros((rates.size, grid.impact_s.size + 1), dtype=complex)
+    for k, (jump, pause) in enumerate(
+        zip(grid.jumps, np.diff(grid.impact_s, prepend=grid.impact_s[:1]), strict=True)
+    ):
+        states[:, k + 1] = states[:, k] * np.exp(rates * pause) + jump
+    since = grid.time_s - np.concatenate([grid.time_s[:1], grid.impact_s])[last]
+    waves = states[:, last] * np.exp(rates[:, None] * since)
+    table = np.empty((grid.time_s.size, 2 * rates.size))
+    table[:, 0::2], table[:, 1::2] = waves.imag.T, waves.real.T
+    return table
+
+
+def cleaner(grid: Grid, pick: NDArray[np.bool_], slow: bool) -> list[tuple[NDArray[np.intp], FloatArray]]:
+    """Bases to be removed from a signal: smooth curves between impacts, or the rotation for slow turns."""
+    places = np.flatnonzero(pick)
+    if slow:
+        t = grid.time_s[places]
+        columns = np.column_stack(
+            [np.ones_like(t), t, grid.theta[places], grid.theta[places] ** 2, np.abs(grid.theta[places])]
+        )
+        return [(places, np.linalg.qr(columns / (np.abs(columns).max(axis=0) + 1e-30))[0])]
+    bases = []
+    edges = np.searchsorted(grid.time_s[places], grid.impact_s)
+    for start, stop in itertools.pairwise([*edges, places.size]):
+        part = places[start:stop]
+        if part.size > 2 * _DEGREE + 4:
+            x = np.linspace(-1.0, 1.0, part.size)
+            bases.append((part, np.linalg.qr(np.vander(x, _DEGREE + 1))[0]))
+    return bases
+
+
+def _clean(values: FloatArray, bases: list[tuple[NDArray[np.intp], FloatArray]]) -> FloatArray:
+    """What the bases leave of the columns of `values` (m, k), at their samples."""
+    parts = [values[part] - basis @ (basis.T @ values[part]) for part, basis in bases]
+    return np.concatenate(parts) if parts else np.zeros((0, values.shape[1]))
+
+
+def scan(grids: Sequence[Grid], signals: Sequence[list[Signal]], *, slow: bool) -> Ring | None:
+    """The oscillator that all runs and signals agree on best; None where there is nothing to scan."""
+    coarse_hz = TURN_HZ if slow else BEND_HZ
+    score = _score(grids, signals, coarse_hz, DAMPING, slow=slow)
+    if not np.any(score > 0.0):
+        return None
+    i, _ = np.unravel_index(int(np.argmax(score)), score.shape)
+    # A lightly damped ring is sharper than the first scan's steps.
+    step = float(coarse_hz[1] / coarse_hz[0])
+    fine_hz = coarse_hz[i] * np.geomspace(1.0 / step, step, 25)
+    score = _score(grids, signals, fine_hz, FINE_DAMPING, slow=slow)
+    k, j = np.unravel_index(int(np.argmax(score)), score.shape)
+    spacing = float(np.log(fine_hz[1] / fine_hz[0]))
+    along, bend = _vertex(score[:, j], int(k))
+    frequency = float(fine_hz[0] * np.exp(spacing * along))
+    sd = frequency * spacing / np.sqrt(max(bend, 0.05))
+    # A damping between the steps would leave the ring too small: its size follows the damping.
+    zetas = FINE_DAMPING[int(j)] * np.geomspace(1.0 / 1.7, 1.7, 13)
+    score = _score(grids, signals, np.array([frequency]), list(zetas), slow=slow)[0]
+    across, bend = _vertex(score, int(np.argmax(score)))
+    spacing = float(np.log(zetas[1] / zetas[0]))
+    zeta = float(zetas[0] * np.exp(spacing * np.clip(across, 0.0, zetas.size - 1.0)))
+    zeta_sd = spacing / np.sqrt(max(bend, 1e-9))
+    return Ring(
+        frequency,
+        zeta,
+        float(score.max()),
+        float(min(sd, 0.3 * frequency)),
+        float(np.clip(zeta_sd, 0.02, 0.4)),
+    )
+
+
+def _vertex(values: FloatArray, k: int) -> tuple[float, float]:
+    """(place, −second difference) of the top of a sampled curve near its sample `k`."""
+    inner = min(max(k, 1), values.size - 2)
+    bend = float(values[inner - 1] - 2.0 * values[inner] + values[inner + 1])
+    if bend > -1e-9:
+        return float(k), 0.0
+    shift = 0.5 * float(values[inner - 1] - values[inner + 1]) / bend
+    return inner + float(np.clip(shift, -1.0, 1.0)), -bend
+
+
+def _score(
+    grids: Sequence[Grid],
+    signals: Sequence[list[Signal]],
+    frequencies: FloatArray,
+    damping: Sequence[float],
+    *,
+    slow: bool,
+) -> FloatArray:
+    """Gain in log likelihood over all runs and signals, (frequencies, damping)."""
+    score = np.zeros((frequencies.size, len(damping)))
+    for grid, listed in zip(grids, signals, strict=True):
+        waves = None
+        for signal in listed:
+            if signal.pick.sum() < 100:
+                continue
+            if waves is None:
+                both = np.meshgrid(frequencies, damping, indexing="ij")
+                waves = ring_table(grid, both[0].ravel(), both[1].ravel())
+            cleaned = _clean(np.column_stack([signal.values, waves]), cleaner(grid, signal.pick, slow))
+            if len(cleaned) >= 60:
+                score += _gains(cleaned[:, 0], cleaned[:, 1:]).reshape(score.shape)
+    return score
+
+
+def _gains(values: FloatArray, waves: FloatArray) -> FloatArray:
+    """Gain in log likelihood of each pair of columns; residuals' own correlation is allowed for."""
+    pairs = waves.reshape(waves.shape[0], -1, 2)
+    power = float(values @ values)
+    a, b = pairs[:, :, 0], pairs[:, :, 1]
+    aa, bb, ab = (a * a).sum(0), (b * b).sum(0), (a * b).sum(0)
+    av, bv = a.T @ values, b.T @ values
+    determinant = np.maximum(aa * bb - ab**2, 1e-12 * aa * bb + 1e-300)
+    explained = (bb * av**2 - 2 * ab * av * bv + aa * bv**2) / determinant
+    share = np.clip(explained / max(power, 1e-300), 0.0, 0.9999)
+    fraction = max(independent_fraction(values), 0.2)
+    gains: FloatArray = -0.5 * fraction * values.size * np.log1p(-share)
+    return gains
+
+
+def _colour(
+    grid: Grid,
+    signal: Signal,
+    bases: list[tuple[NDArray[np.intp], FloatArray]],
+    ring: Ring,
+    values: FloatArray,
+) -> float:
+    """Size of chance at frequencies around the ring's, over that of white noise; at least 1."""
+    factors = [f for f in (0.55, 0.62, 0.7, 0.78, 1.28, 1.43, 1.6, 1.8) if ring.frequency_hz * f < 60.0]
+    waves = ring_table(grid, ring.frequency_hz * np.array(factors), np.full(len(factors), 0.03))
+    waves = _clean(waves, bases)
+    own = _clean(ring_columns(grid, ring.frequency_hz, ring.zeta), bases)
+    # The ring itself, if there is one, must not count as its own surroundings.
+    left = values - own @ np.linalg.lstsq(own, values, rcond=None)[0]
+    size = np.sqrt(np.maximum((waves**2).sum(0), 1e-300))
+    z = (waves.T @ left) / size / max(float(np.std(left)), 1e-300)
+    return max(1.0, 1.48 * float(np.median(np.abs(z))))
+
+
+def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, slow: bool) -> Block | None:
+    """Coefficients of sine and cosine of every signal at the common oscillator; accelerations over ω²."""
+    names, units, values, variances, rows, shares, fading, unequal = [], [], [], [], [], [], [], []
+    waves = ring_columns(grid, ring.frequency_hz, ring.zeta)
+    natural = 2.0 * np.pi * ring.frequency_hz
+    for signal in signals:
+        bases = cleaner(grid, signal.pick, slow)
+        both = _clean(np.column_stack([signal.values, waves]), bases)
+        if len(both) < 60:
+            continue
+        places = np.concatenate([part for part, _ in bases])
+        inverse: FloatArray = np.linalg.pinv(both[:, 1:]).astype(np.float64)
+        found = inverse @ both[:, 0]
+        left = both[:, 0] - both[:, 1:] @ found
+        fraction = max(independent_fraction(left), 0.05)
+        variance = float(left @ left) / max(left.size - 2, 1) / fraction * np.diag(inverse @ inverse.T)
+        # What is left of the motion is no white noise: neighbouring frequencies say how large chance is.
+        # And this frequency was chosen for its gain, which doubles it.
+        variance *= 2.0 * _colour(grid, signal, bases, ring, both[:, 0]) ** 2
+        scale = natural**2 if signal.family == "accelerometer" else 1.0
+        full = np.zeros((2, grid.time_s.size))
+        full[:, places] = inverse
+        # Removing the bases is part of the projection.
+        for part, basis in bases:
+            full[:, part] -= (full[:, part] @ basis) @ basis.T
+        slopes = _fading(grid, bases, ring, inverse)
+        for k, word in enumerate(("sine", "cosine")):
+            fading.append(float(slopes[k]))
+            names.append(f"{word} in {signal.family}s")
+            units.append("m s/rad" if not slow else "s")
+            values.append(found[k] / scale)
+            variances.append(variance[k] / scale**2)
+            rows.append(full[k] / scale)
+            shares.append(signal.shares)
+            unequal.append(0.0 if signal.unequal is None else float(rows[-1] @ signal.unequal))
+    if not names:
+        return None
+    names += ["frequency", "damping"]
+    units += ["Hz", "1"]
+    values += [ring.frequency_hz, ring.zeta]
+    variances += [ring.frequency_sd**2, (ring.zeta_sd * ring.zeta) ** 2]
+    rows += [np.zeros(grid.time_s.size)] * 2
+    return Block(
+        name,
+        tuple(names),
+        tuple(units),
+        np.array(values),
+        np.diag(variances),
+        np.array(rows),
+        np.ones(grid.time_s.size, dtype=bool),
+        kind=name,
+        ring=(ring.frequency_hz, ring.zeta, GRID_HZ),
+        shares=tuple(shares),
+        fading=tuple(fading),
+        unequal=np.array([*unequal, 0.0, 0.0]),
+        undone_s=next((s.undone_s for s in signals if s.family == "accelerometer"), 0.0),
+    )
+
+
+def _fading(
+    grid: Grid, bases: list[tuple[NDArray[np.intp], FloatArray]], ring: Ring, inverse: FloatArray
+) -> FloatArray:
+    """d coefficient / d ln ζ of a ring-down of unit size, (2,): what dies sooner looks smaller."""
+    sizes = []
+    for factor in (1.1, 1.0 / 1.1):
+        waves = _clean(ring_columns(grid, ring.frequency_hz, factor * ring.zeta), bases)
+        sizes.append(np.diag(inverse @ waves))
+    slopes: FloatArray = (sizes[0] - sizes[1]) / (2.0 * np.log(1.1))
+    return slopes
+
+
+def with_repeatability(blocks: Sequence[Block]) -> list[Block]:
+    """The blocks of all runs with what the ring-down itself repeats by, a share of its usual size.
+
+    Of its own size in each run it would make the small ones the sure ones. Frequency and damping come
+    from all runs at once: what is said in every run is known only once.
+    """
+    parts = {
+        name: np.array([b.values[b.names.index(name)] for b in blocks if name in b.names])
+        for name in dict.fromkeys(n for b in blocks for n in b.names if " in " in n)
+    }
+    usual = {
+        name.partition(" in ")[2]: float(np.median(np.hypot(values, parts["cosine" + name[4:]])))
+        for name, values in parts.items()
+        if name.startswith("sine")
+    }
+    found = []
+    for block in blocks:
+        covariance = block.covariance.copy()
+        for k, name in enumerate(block.names):
+            if " in " in name:
+                covariance[k, k] += (REPEATABILITY * usual.get(name.partition(" in ")[2], 0.0)) ** 2
+            else:
+                covariance[k, k] *= len(blocks)
+        found.append(replace(block, covariance=covariance))
+    return found

@@ -1,0 +1,121 @@
+"""A run as the core sees it: features with labels, and what their prediction needs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.core import FeatureSet, Label
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.floor_vibration import Vibration
+from daq_app.gap.rocking_model.features.sensor_blocks import Block
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import WireInverse
+from daq_app.gap.rocking_model.motion.swings import Swings
+from daq_app.gap.rocking_model.records import Survey, Wiring
+
+_SMALLEST_LOADING = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class RockingRun:
+    """A run as the core sees it, with what the rocking model needs to predict its features."""
+
+    name: str
+    level: str
+    features: FeatureSet
+    survey: Survey
+    swings: Swings
+    places: NDArray[np.intp]
+    """(T, 4): each time feature is crossing `b` of half-cycle `kb` minus crossing `a` of half-cycle `ka`,
+    as (ka, a, kb, b); crossings below F are of the fall, the others of the rise."""
+    across: NDArray[np.intp]
+    """Time features that span an impact."""
+    peaks: NDArray[np.intp]
+    """Half-cycles whose peak is a feature (all but the first)."""
+    blocks: tuple[Block, ...]
+    grid: Grid
+    reference: str
+    """``lvdt`` or ``wire``: the family whose rotation the dynamics features come from."""
+    impacts_before: float
+    wire_height_m: float
+    """Height at which a displacement of all wires looks like one rotation."""
+    wire_bend_m: float
+    """Height at which an error with the square of a wire's reading looks like one of the rotation."""
+    base_bend_m2: float
+    """What such an error of all wires makes of the base, over the square of the rotation."""
+    base_lever: float
+    """What the base seems to move by, m per rad, for wires whose calibrations are each off by one."""
+    block_loadings: FloatArray
+    """(n, k): measurement covariance of the blocks as loadings."""
+    notes: tuple[str, ...] = ()
+    vibration: Vibration | None = None
+    wires: tuple[WireInverse, ...] = ()
+    """All wires whose geometry is known."""
+    wiring: Wiring = field(default_factory=Wiring)
+    """What was put right in all runs before anything was read from them."""
+    cache: dict[Any, Any] = field(default_factory=dict, compare=False)
+
+    def rotation_alone(self) -> RockingRun:
+        """The run with what θ(t) says only."""
+        n = len(self.places) + self.peaks.size
+        old = self.features
+        features = FeatureSet(old.values[:n], old.sd[:n], old.labels[:n], old.independent_fraction)
+        return replace(self, features=features, blocks=(), block_loadings=np.zeros((n, 0)), cache={})
+
+    def with_blocks(self, more: Sequence[Block]) -> RockingRun:
+        """The run with further blocks of features after those it has."""
+        blocks = (*self.blocks, *more)
+        old = self.features
+        values, sds, labels = list(old.values), list(old.sd), list(old.labels)
+        for block in more:
+            share = 1.0 if block.independent else _SMALLEST_LOADING
+            for name, unit, value, variance in zip(
+                block.names, block.units, block.values, np.diag(block.covariance), strict=True
+            ):
+                values.append(float(value))
+                sds.append(share * float(np.sqrt(variance)) + 1e-15)
+                size = float(abs(self.swings.peak_rad[0]))
+                channel, observable = block.said.get(name, (block.family, name))
+                labels.append(Label(channel, "run", observable, unit, size, 0.5))
+        first = len(self.places) + self.peaks.size
+        loadings = _block_loadings(blocks, first, len(values))
+        features = FeatureSet(np.array(values), np.array(sds), tuple(labels))
+        return replace(self, features=features, blocks=blocks, block_loadings=loadings, cache={})
+
+
+def scalar_block(
+    family: str, entries: Sequence[tuple[str, str, float, float]], grid: Grid, kind: str = ""
+) -> Block:
+    """A block of plain numbers: (name, unit, value, variance) each."""
+    return Block(
+        family,
+        tuple(e[0] for e in entries),
+        tuple(e[1] for e in entries),
+        np.array([e[2] for e in entries]),
+        np.diag([e[3] for e in entries]),
+        np.zeros((len(entries), grid.valid.size)),
+        np.ones(grid.valid.size, dtype=bool),
+        kind=kind,
+    )
+
+
+def _block_loadings(blocks: tuple[Block, ...], first: int, n: int) -> FloatArray:
+    columns = []
+    row = first
+    for block in blocks:
+        k = len(block.names)
+        if block.independent:
+            row += k
+            continue
+        matrix = np.zeros((n, k))
+        sd = np.sqrt(np.diag(block.covariance)) + 1e-30
+        correlation = block.covariance / np.outer(sd, sd)
+        matrix[row : row + k] = sd[:, None] * np.linalg.cholesky(correlation + 1e-9 * np.eye(k))
+        columns.append(matrix)
+        row += k
+    return np.hstack(columns) if columns else np.zeros((n, 0))

@@ -1,0 +1,225 @@
+"""All features of one run, put together for the core."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.core import FeatureSet, Label
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.floor_vibration import quiet
+from daq_app.gap.rocking_model.features.impact_timing import acceleration_delay
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun, scalar_block
+from daq_app.gap.rocking_model.features.sensor_blocks import blocks_of
+from daq_app.gap.rocking_model.features.swing_timing import swing_delay
+from daq_app.gap.rocking_model.motion import swings as sw
+from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, coarse, make_grid
+from daq_app.gap.rocking_model.motion.release_speed import release_speed
+from daq_app.gap.rocking_model.motion.rotation import (
+    Rotation,
+    joint_rotation,
+    sample_noise,
+    wall_rotation,
+    wires_of,
+)
+from daq_app.gap.rocking_model.records import GapRun, Survey
+
+
+@dataclass(frozen=True, slots=True)
+class Examined:
+    """A run cut to its test, its joint, and its features."""
+
+    run: GapRun
+    joint: Rotation
+    features: RockingRun
+    wanted: str = ""
+    """Which rotation was asked for (`examine`)."""
+
+    def after(self, impacts: float) -> Examined:
+        """The same of a run that so many impacts went before; no feature depends on them."""
+        features = replace(self.features, impacts_before=impacts)
+        return replace(self, run=replace(self.run, impacts_before=impacts), features=features)
+
+
+def extract(run: GapRun, reference: str = "") -> RockingRun:
+    """Features of a run. Raises `CannotDiagnose` where it holds no rocking motion."""
+    return examine(run, reference).features
+
+
+def examine(run: GapRun, reference: str = "") -> Examined:
+    """Features of a run with what they were made from.
+
+    `reference` ``wire`` overrides the LVDTs, ``late`` as well, but keeps what their joint shows of itself.
+    """
+    wanted = reference
+    run, joint = _from_hold(run)
+    reference, theta, noise, notes = _reference(run, joint, wanted)
+    swings = sw.find_swings(theta, noise, run.rate_hz, run.name)
+    grid = make_grid(theta, joint.valid, swings, run.rate_hz, run.survey)
+    late_joint = wanted == "late"
+    blocks = tuple(blocks_of(run, joint, grid, swings, reference, quiet(run, grid), late_joint).values())
+    late = acceleration_delay(run, grid)
+    if late is not None:
+        blocks = (*blocks, scalar_block("impact timing", (("delay", "s", late[0], late[1]),), grid))
+    between = swing_delay(run, grid, None if late is None else late[0])
+    if between is not None:
+        blocks = (*blocks, scalar_block("swing timing", (("delay", "s", between[0], between[1]),), grid))
+    let_go = release_speed(theta, noise, swings, run.survey, run.rate_hz)
+    if let_go is not None:
+        entry = ("speed away from upright", "rad/s", let_go[0], let_go[1] ** 2)
+        blocks = (*blocks, scalar_block("release", (entry,), grid))
+    values, sds, labels, places = _times(swings, reference, run.survey)
+    peaks = np.arange(1, swings.peak_s.size)
+    amplitude, order = swings.peak_rad, swings.peak_s / max(swings.peak_s[-1], 1e-9)
+    for k in peaks:
+        values.append(float(np.log(abs(amplitude[k]))))
+        relative = [swings.peak_sd[j] / abs(amplitude[j]) for j in (k, k - 1)]
+        sds.append(float(np.hypot(*relative)))
+        labels.append(
+            Label(reference, "peak", "log peak after impact", "1", float(amplitude[k - 1]), float(order[k]))
+        )
+    features = RockingRun(
+        run.name,
+        run.level,
+        FeatureSet(np.array(values), np.array(sds), tuple(labels)),
+        run.survey,
+        swings,
+        places,
+        np.flatnonzero(places[:, 0] != places[:, 2]),
+        peaks,
+        (),
+        grid,
+        reference,
+        run.impacts_before,
+        *_wire_heights(run),
+        np.zeros((len(values), 0)),
+        notes,
+        wires=wires_of(run),
+    )
+    return Examined(run, joint, features.with_blocks(blocks), wanted)
+
+
+BEFORE_RELEASE_S = 2.0
+
+
+def _from_hold(run: GapRun) -> tuple[GapRun, Rotation]:
+    """The record from two seconds before the release on: the pull and the wait before are no test."""
+    joint = joint_rotation(run)
+    step = max(round(run.rate_hz / GRID_HZ), 1)
+    theta = np.abs(coarse(joint.theta, run.rate_hz))
+    largest = float(theta.max())
+    below = np.flatnonzero(theta < 0.5 * largest)
+    # The release ends the first stay near the largest rotation; a later peak never comes that high.
+    after = below[below > np.flatnonzero(theta > 0.98 * largest)[0]]
+    fall = int(after[0]) if after.size else theta.size
+    # A wall that is pulled quickly overshoots and sways about the rotation at which it is then held.
+    near = np.flatnonzero(theta[:fall] > 0.85 * largest)
+    plateau = float(np.median(theta[near]))
+    release = int(near[theta[near] > 0.98 * plateau][-1])
+    # The pull must not be taken for the hold: at most as long as the wall has been held still.
+    pulled = np.flatnonzero(theta[:release] < 0.93 * plateau)
+    still = release - int(pulled[-1]) if pulled.size else release
+    wanted = min(BEFORE_RELEASE_S * run.rate_hz, max(still * step - 0.1 * run.rate_hz, run.rate_hz))
+    start = int(release * step - wanted)
+    if start < 0.5 * run.rate_hz:
+        return run, joint
+    cut = replace(run, channels=np.ascontiguousarray(run.channels[:, start:]))
+    return cut, joint_rotation(cut)
+
+
+def _reference(run: GapRun, joint: Rotation, wanted: str) -> tuple[str, FloatArray, float, tuple[str, ...]]:
+    """The rotation that the dynamics are read from: LVDTs, or wires where the LVDTs reach their range."""
+    notes = tuple(f"{run.name}: {name} left out, it disagrees with its family." for name in joint.left_out)
+    if joint.whole and not wanted:
+        return "lvdt", joint.theta, joint.noise_rad, notes
+    rows, heights, _ = wall_rotation(run)
+    if len(rows) == 0:
+        limit = () if joint.whole else (f"{run.name}: LVDTs reach their range.",)
+        return "lvdt", joint.theta, joint.noise_rad, (*notes, *limit)
+    theta = np.average(rows, axis=0, weights=heights**2)
+    why = "LVDTs reach their range" if not joint.whole else "the LVDTs are not fit for it"
+    note = f"{run.name}: {why}; its motion is read from the wires."
+    return "wire", theta, sample_noise(theta, run.rate_hz), (*notes, note)
+
+
+def _times(
+    swings: sw.Swings, reference: str, survey: Survey
+) -> tuple[list[float], list[float], list[Label], NDArray[np.intp]]:
+    """Time features of all half-cycles: parts of the fall and rise, over the top, across the impact."""
+    values: list[float] = []
+    sds: list[float] = []
+    labels: list[Label] = []
+    places: list[tuple[int, int, int, int]] = []
+    count = swings.levels.shape[1]
+    last = max(swings.peak_s[-1], 1e-9)
+
+    def crossing(k: int, place: int) -> tuple[float, float]:
+        if place < count:
+            return float(swings.fall_s[k, place]), float(swings.fall_sd[k, place])
+        return float(swings.rise_s[k, place - count]), float(swings.rise_sd[k, place - count])
+
+    def add(observable: str, phase: str, ka: int, a: int, kb: int, b: int) -> None:
+        (ta, sa), (tb, sb) = crossing(ka, a), crossing(kb, b)
+        if not np.isfinite(ta + tb + sa + sb):
+            return
+        values.append(tb - ta)
+        sds.append(float(np.sqrt(sa**2 + sb**2 + _from_peak_error(swings, survey, ka, a, kb, b) ** 2)))
+        labels.append(
+            Label(
+                reference, phase, observable, "s", float(swings.peak_rad[ka]), float(swings.peak_s[ka] / last)
+            )
+        )
+        places.append((ka, a, kb, b))
+
+    for k in range(swings.peak_s.size):
+        used = len(sw.RELEASE_FRACTIONS) if k == 0 else len(sw.FRACTIONS)
+        for j in range(1, used):
+            phase = "release" if k == 0 else "swing"
+            add(f"fall time {j}" if k else f"first fall time {j}", phase, k, j - 1, k, j)
+        if k > 0:
+            for j in range(1, used):
+                add(f"rise time {j}", "swing", k, count + j, k, count + j - 1)
+            add("time over the top", "peak", k, count, k, 0)
+        if k + 1 < swings.peak_s.size:
+            add("time across the impact", "impact", k, used - 1, k + 1, count + len(sw.FRACTIONS) - 1)
+    return values, sds, labels, np.array(places, dtype=np.intp)
+
+
+def _wire_heights(run: GapRun) -> tuple[float, float, float, float]:
+    """How a displacement u of every wire, and κ u² of every wire, act on their mean rotation and base.
+
+    The mean has the weights z²: Σ z² (u/z) / Σ z² for a displacement, Σ z² (κ z² θ²/z) / Σ z² for κ u².
+    The base is where the straight line through the displacements over z ends; last, how far that seems to
+    move with the rotation where each wire has another calibration: the root of the sum of their squares.
+    """
+    z = np.array([run.sensors[i].position_m[2] for i in run.indices("wire")])
+    if not z.size:
+        return 1.0, 1.0, 0.0, 0.0
+    at_base = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
+    return (
+        float(np.sum(z**2) / np.sum(z)),
+        float(np.sum(z**3) / np.sum(z**2)),
+        float(at_base @ z**2),
+        float(np.linalg.norm(at_base * z)),
+    )
+
+
+def _from_peak_error(swings: sw.Swings, survey: Survey, ka: int, a: int, kb: int, b: int) -> float:
+    """What the error of a measured peak does to the time between two crossings of its half-cycle, s.
+
+    Near the top |θ| = φ − ½ c t², so a level h below the peak is passed √(2h/c) from it, and that changes
+    by 1/√(2 h c) per rad of the peak. Over the top both sides add up; in the fall or the rise the level
+    near the peak changes more than the lower one. The held rotation is an unknown of the fit itself.
+    """
+    count = swings.levels.shape[1]
+    if ka != kb or ka == 0:
+        return 0.0
+    peak = abs(float(swings.peak_rad[ka]))
+    curvature = survey.p_rad_s**2 * max(np.sin(survey.alpha_rad - peak), 0.01)
+    below = peak - np.array([float(swings.levels[ka, place % count]) for place in (a, b)])
+    each = 1.0 / np.sqrt(2.0 * np.maximum(below, 1e-6) * curvature)
+    over_the_top = a >= count > b
+    changed = each.sum() if over_the_top else abs(each[1] - each[0])
+    return float(swings.peak_sd[ka] * changed)

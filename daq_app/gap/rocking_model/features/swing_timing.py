@@ -1,0 +1,85 @@
+"""How late the accelerometers are against the reference rotation, from the motion between impacts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.features.impact_timing import MIDDLE_OF_IMPACT_S
+from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
+from daq_app.gap.rocking_model.motion.rotation import sooner, zeroed
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
+
+LATE_S = 2.5e-3
+"""Delay, as the impacts show it, from which the record is put in step before it is looked at closer."""
+FORM_ERROR = 0.02
+"""Share of a delay that a response of another form than a pure delay is told wrong by."""
+SPREAD_M = 0.5
+"""Heights over which accelerometers must be spread to tell rotation from what all of them show."""
+_SOUND = 3.0
+"""Standard deviations by which the delay may change without one accelerometer."""
+_ROUNDS = 3
+
+
+def swing_delay(run: GapRun, grid: Grid, of_impacts_s: float | None) -> tuple[float, float] | None:
+    """(delay, its variance), s, or None where it cannot be told; `of_impacts_s` is what the impacts show.
+
+    At height z the specific force is z θ̈ − g sin θ. Extrapolated to z = 0 it is gravity alone, which
+    changes with g θ̇, while two thirds up the wall (the centre of percussion) inertia takes all of that
+    away. Calibrations, the pivot and a base that gives way do the same on the way up and on the way down; a
+    delay changes sign at every peak. How an impact looks does not enter, and no second derivative either.
+    """
+    chosen = run.steady_accelerometers("x")
+    if not grid.impact_s.size or not chosen:
+        return None
+    late = 0.0 if of_impacts_s is None else of_impacts_s - MIDDLE_OF_IMPACT_S
+    found: tuple[float, float] | None = None
+    for _ in range(_ROUNDS):
+        early = round(late * run.rate_hz) if abs(late) > LATE_S else 0
+        found = _in_step(run, grid, chosen, early)
+        if found is None or abs(found[0] - early / run.rate_hz) < LATE_S:
+            break
+        late = found[0]
+    return found
+
+
+def _in_step(run: GapRun, grid: Grid, chosen: list[int], early: int) -> tuple[float, float] | None:
+    """(delay, variance) from records that are taken `early` samples sooner."""
+    rows = np.array([coarse(sooner(zeroed(run, i), early), run.rate_hz) for i in chosen])
+    places = np.array([run.sensors[i].position_m for i in chosen])
+    whole = _at_the_foot(run, grid, rows, places)
+    if whole is None:
+        return None
+    delay, variance = whole
+    for k in range(len(chosen)):
+        others = np.arange(len(chosen)) != k
+        without = _at_the_foot(run, grid, rows[others], places[others])
+        if without is not None:
+            # The lowest one has most of the say. Where the others do not bear it out, nobody knows better.
+            chance = _SOUND**2 * abs(without[1] - whole[1])
+            variance = max(variance, whole[1] + (without[0] - delay) ** 2 - chance)
+    undone = early / run.rate_hz
+    return undone + delay, variance + (FORM_ERROR * undone) ** 2
+
+
+def _at_the_foot(run: GapRun, grid: Grid, rows: FloatArray, places: FloatArray) -> tuple[float, float] | None:
+    """(delay, variance) of what accelerometers, (k, m) at (k, 3), show when extrapolated to the foot."""
+    z = places[:, 2]
+    if z.size < 3 or np.ptp(z) < SPREAD_M:
+        return None
+    weights = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
+    arm = float(weights @ places[:, 0]) - np.sign(grid.theta) * run.survey.half_base_m
+    gravity = -GRAVITY_M_S2 * np.sin(grid.theta)
+    difference = weights @ rows - (gravity - grid.omega**2 * arm)
+    pick = (grid.time_s > 0.05) & (grid.time_s < grid.impact_s[-1]) & ~grid.near_impact & grid.valid
+    # Unequal calibrations leave some of the inertia.
+    columns = [np.ones_like(gravity), gravity, grid.alpha, GRAVITY_M_S2 * np.cos(grid.theta) * grid.omega]
+    design = np.column_stack(columns)[pick]
+    if len(design) < 20 * len(columns):
+        return None
+    scale = np.sqrt(np.mean(design**2, axis=0)) + 1e-300
+    inverse = np.linalg.pinv(design / scale, rcond=1e-8) / scale[:, None]
+    left = difference[pick] - design @ (inverse @ difference[pick])
+    fraction = max(independent_fraction(left), 0.01)
+    variance = float(left @ left) / (left.size - len(columns)) / fraction
+    return float(inverse[-1] @ difference[pick]), variance * float(inverse[-1] @ inverse[-1])

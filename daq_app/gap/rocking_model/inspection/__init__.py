@@ -1,0 +1,1 @@
+"""Inspection of all runs before anything is fitted: wiring, electronics, single channels, the floor."""

@@ -1,0 +1,106 @@
+"""Channels of a family on the grid, and each as the others of its family predict it, by geometry alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import oaconvolve
+
+from daq_app.config.rig import Family
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.channel_shapes import SHAPES, Others
+from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
+from daq_app.gap.rocking_model.motion.rotation import sooner, wall_rotation, zeroed
+from daq_app.gap.rocking_model.records import GapRun
+
+_SMOOTH_S = 0.04
+"""Window over which accelerations are averaged: with 30 ms of ringing it stays within the mask of 50 ms."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelFamily:
+    """Signals of a family on the grid with their geometry: signals ≈ design @ motion, row by row."""
+
+    ids: tuple[str, ...]
+    signals: FloatArray
+    design: FloatArray
+    pick: NDArray[np.bool_]
+    step: float = 0.0
+    repeats: int = 1
+    sided: bool = False
+
+
+def channel_family(
+    run: GapRun, grid: Grid, family: Family, step: float = 0.0, include: tuple[str, ...] = ()
+) -> ChannelFamily | None:
+    """A family of one run, with the channels of `include` though they are excluded; None of too few."""
+    whole = run.including(include)
+    moving = (grid.time_s > -0.5) & (grid.time_s < grid.rest_s + 0.2)
+    found: ChannelFamily | None = None
+    match family:
+        case "lvdt":
+            found = _lvdts(whole, moving & grid.valid)
+        case "wire":
+            found = _wires(whole, moving)
+        case "accelerometer":
+            found = _accelerometers(whole, moving & ~grid.near_impact)
+    return found and replace(found, step=step, repeats=grid.impact_s.size, sided="side" in SHAPES[family])
+
+
+def _lvdts(run: GapRun, pick: NDArray[np.bool_]) -> ChannelFamily | None:
+    chosen = [i for i in run.indices("lvdt") if np.all(np.isfinite(run.channels[i]))]
+    if len(chosen) < 8:
+        return None
+    place = np.array([run.sensors[i].position_m for i in chosen])
+    # A face's calibrations that differ along its length look like a twist, of that face alone.
+    twist = -place[:, :1] * place[:, 1:2] * np.column_stack([place[:, 0] < 0, place[:, 0] > 0])
+    design = np.column_stack([np.ones(len(chosen)), -place[:, 0], twist])
+    signals = np.array([coarse(zeroed(run, i), run.rate_hz) for i in chosen])
+    return ChannelFamily(tuple(run.sensors[i].id for i in chosen), signals, design, pick)
+
+
+def _wires(run: GapRun, pick: NDArray[np.bool_]) -> ChannelFamily | None:
+    rows, heights, names = wall_rotation(run)
+    if len(names) < 4:
+        return None
+    signals = np.array([z * coarse(row, run.rate_hz) for z, row in zip(heights, rows, strict=True)])
+    return ChannelFamily(names, signals, np.column_stack([np.ones(len(names)), heights]), pick)
+
+
+def _accelerometers(run: GapRun, pick: NDArray[np.bool_]) -> ChannelFamily | None:
+    chosen = run.steady_accelerometers("x")
+    if len(chosen) < 4:
+        return None
+    heights = np.array([run.sensors[i].position_m[2] for i in chosen])
+    names = tuple(run.sensors[i].id for i in chosen)
+    return ChannelFamily(names, smoothed(run, chosen), np.column_stack([np.ones(len(chosen)), heights]), pick)
+
+
+def beside(data: ChannelFamily, name: str, without: tuple[str, ...]) -> Others:
+    """A channel beside what the others of its family, less some, make of it."""
+    place = data.ids.index(name)
+    others = [i for i, other in enumerate(data.ids) if other != name and other not in without]
+    weights = data.design[place] @ np.linalg.pinv(data.design[others])
+    expected = weights @ data.signals[others]
+    # A channel far from the others is predicted by a difference of them: their errors grow.
+    sizes = np.sqrt(np.mean(data.signals[others] ** 2, axis=1))
+    own = float(np.sqrt(np.mean(expected**2))) + 1e-300
+    spread = float(np.sqrt(1.0 + np.sum((weights * sizes / own) ** 2)))
+    rough = data.step / np.sqrt(12.0) * float(np.sqrt(1.0 + np.sum(weights**2)))
+    return Others(data.signals[place], expected, data.pick, spread, rough, data.repeats, data.sided)
+
+
+def smoothed(run: GapRun, chosen: Sequence[int], late_s: float = 0.0) -> FloatArray:
+    """Averages of accelerometers over 40 ms on the grid, (k, m), m/s², taken sooner by what they are late.
+
+    At the full rate, so that local ringing above 100 Hz does not fold into the grid's own band, and with a
+    window of finite length: each place rings in its own way, and none of it may leave the mask.
+    """
+    window = np.hanning(round(_SMOOTH_S * run.rate_hz))
+    window /= window.sum()
+    early = round(late_s * run.rate_hz)
+    rows = (oaconvolve(sooner(zeroed(run, i), early), window, "same") for i in chosen)
+    return np.array([coarse(row, run.rate_hz) for row in rows])

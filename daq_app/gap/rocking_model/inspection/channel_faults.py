@@ -1,0 +1,248 @@
+"""Channels that disagree with their own family: which, and a lone one as a block of features of its own.
+
+Each channel is predicted from the others of its family by geometry alone, so that whatever the wall or
+the whole family does cancels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from daq_app.config.rig import Family
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.channel_shapes import (
+    RINGING,
+    SHAPES,
+    TOLERANCE,
+    Others,
+    block_of,
+    deviation,
+    usual_remains,
+)
+from daq_app.gap.rocking_model.features.sensor_blocks import Block
+from daq_app.gap.rocking_model.inspection.channel_families import (
+    ChannelFamily,
+    beside,
+    channel_family,
+)
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import WireInverse
+from daq_app.gap.rocking_model.records import GapRun
+
+SUSPECT: dict[Family, float] = {"lvdt": 4.0, "wire": 2.0, "accelerometer": 3.0}
+"""Tolerances by which a channel must be off to be looked at on its own. Each wire is told from few others, so
+its tolerance is wide already."""
+CROWDED: tuple[Family, ...] = ("lvdt", "accelerometer")
+"""Families in which several channels may be wrong and the others still say so."""
+STRUCTURE = 0.5
+"""Excess of the logarithm of what remains over noise from which a channel is suspect for it alone."""
+_POWERS = (1, 1, 2, 0, 1)
+"""Of a wire's shapes: the power of its reading that they go with. The wall's rotation θ adds height × f(θ) to
+every reading, and its base the same to all."""
+_STILL = (3.2e-3, 3e-4, 0.02, 1.2e-5, 5e-4)
+"""How still a base stands, in those shapes, in m and at a reading of one: as far as a wire a metre up is
+right, and a pivot 40 mm further in makes 0.02 of the square, whatever wires do."""
+LOOKED_AT = 6
+"""The channels that are off most, of which any may be the wrong one: at the end of a row it moves what its
+neighbours are predicted by more than they leave of its own fault."""
+SCREENED = 3
+"""Runs that are looked at before all are."""
+
+
+@dataclass(frozen=True, slots=True)
+class Suspects:
+    """Channels that disagree with their family."""
+
+    single: dict[Family, str]
+    """The one channel without which all others of its family agree."""
+    several: dict[Family, tuple[str, ...]]
+    """Channels of one family, two or more, without which the others agree."""
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """All of them."""
+        return (*self.single.values(), *(name for names in self.several.values() for name in names))
+
+    def plus(self, family: Family, name: str | None) -> Suspects:
+        """These with one more of a family; two of a family have no one cause."""
+        if name is None:
+            return self
+        known = {*self.several.get(family, ()), *(n for f, n in self.single.items() if f == family)}
+        if not known:
+            return replace(self, single={**self.single, family: name})
+        left = {f: n for f, n in self.single.items() if f != family}
+        return Suspects(left, {**self.several, family: tuple(sorted({*known, name}))})
+
+
+def suspects(
+    runs: Sequence[GapRun], grids: Sequence[Grid], steps: Mapping[str, float] = MappingProxyType({})
+) -> Suspects:
+    """The channels of each family that disagree with all others, where the others agree.
+
+    `steps` are those of the families, m, whose readings go in steps.
+    """
+    single: dict[Family, str] = {}
+    several: dict[Family, tuple[str, ...]] = {}
+    for family in TOLERANCE:
+        step = steps.get(family, 0.0)
+        data = [channel_family(run, grid, family, step) for run, grid in zip(runs, grids, strict=True)]
+        usable = [d for d in data if d is not None]
+        if len(usable) < len(data) or not usable:
+            continue
+        some = usable[:: max(len(usable) // SCREENED, 1)][:SCREENED]
+        sizes = _sizes(some, family, ())
+        order = [n for n in sorted(sizes, key=lambda n: -sizes[n]) if sizes[n] > 0.5 * SUSPECT[family]]
+        if not order:
+            continue
+        together = _together(usable, family)
+        alone = None if together else _alone(usable, family, order[:LOOKED_AT])
+        if together:
+            several[family] = together
+        elif alone is not None:
+            single[family] = alone
+    return Suspects(single, several)
+
+
+def _alone(usable: Sequence[ChannelFamily], family: Family, order: Sequence[str]) -> str | None:
+    """The one channel without which the others agree, if there is one."""
+    bar = SUSPECT[family]
+    # A bad channel spoils the prediction of the others: right is one without which all agree. Of few
+    # sensors at few heights two may do, of which one asks for a base that moves with the wall.
+    agreed: list[tuple[float, float, str]] = []
+    for name in order:
+        rest = _sizes(usable, family, (name,))
+        own = rest.pop(name)
+        agree = max(bar, 0.4 * own)
+        if own > bar and max(rest.values()) < agree:
+            doubt = _wires_doubt(usable, name) if family == "wire" else max(rest.values())
+            agreed.append((doubt, agree, name))
+    if not agreed:
+        return None
+    _, agree, name = min(agreed)
+    return None if _all_bent(usable, family, name, agree) else name
+
+
+def _all_bent(usable: Sequence[ChannelFamily], family: Family, name: str, agree: float) -> bool:
+    """Whether one curvature of all channels explains their disagreement, and better than one faulty channel.
+
+    It is the one fault of a whole family that does not cancel between its channels; of few channels one that
+    is bent looks much like it, but leaves some in the others.
+    """
+    straight = [_straightened(d) for d in usable]
+    if max(_sizes(straight, family, ()).values()) > agree:
+        return False
+    left = _sizes(usable, family, (name,), "curvature")
+    del left[name]
+    return max(_sizes(straight, family, (), "curvature").values()) < max(left.values())
+
+
+def _together(usable: Sequence[ChannelFamily], family: Family) -> tuple[str, ...]:
+    """Two or more channels, of many at most a quarter, without which the others agree.
+
+    The worst is taken out, then the worst of the others, and so on. It needs a family in which many
+    predict each one: five wires at four heights do not say which two of them are wrong.
+    """
+    if family not in CROWDED:
+        return ()
+    bar, found = SUSPECT[family], list[str]()
+    for _ in range(max(len(usable[0].ids) // 4, 2) + 1):
+        sizes = _sizes(usable, family, tuple(found))
+        rest = {name: size for name, size in sizes.items() if name not in found}
+        worst = max(rest, key=lambda name: rest[name])
+        if rest[worst] <= bar:
+            clear = all(0.4 * sizes[name] > min(rest[worst], bar) for name in found)
+            return tuple(sorted(found)) if len(found) > 1 and clear else ()
+        found.append(worst)
+    return ()
+
+
+def _wires_doubt(data: Sequence[ChannelFamily], without: str) -> float:
+    """How far all wires but one are from what sound ones show of a wall whose base stands still: χ².
+
+    The wall's rotation is free in every shape, and so is the base as far as one that stands still goes. Of
+    four wires at three heights a base that moves takes up most of what a fifth one is off by, so neither what
+    they disagree in nor how little the base moves tells alone which one is wrong.
+    """
+    return float(np.median([_misfit(entry, without) for entry in data]))
+
+
+def _misfit(data: ChannelFamily, without: str) -> float:
+    """The same of one run."""
+    heights = data.design[:, 1]
+    mean = heights @ data.signals / (heights @ heights)
+    powers, tolerance = np.array(_POWERS), np.array(TOLERANCE["wire"])
+    rows: list[FloatArray] = []
+    values: list[FloatArray] = []
+    for i, name in enumerate(data.ids):
+        if name == without:
+            continue
+        found = deviation(Others(data.signals[i], heights[i] * mean, data.pick, 1.0, sided=data.sided))
+        # In units of the errors of this wire, which differ from shape to shape and hang together.
+        whiten = np.linalg.inv(np.linalg.cholesky(np.diag(tolerance**2) + found.covariance))
+        rows.append(
+            whiten @ np.hstack([np.diag(heights[i] ** (1.0 - powers)), np.diag(heights[i] ** -powers)])
+        )
+        values.append(whiten @ found.values)
+    still = np.hstack([np.zeros((powers.size, powers.size)), np.diag(1.0 / np.array(_STILL))])
+    design = np.vstack([*rows, still])
+    seen = np.concatenate([*values, np.zeros(powers.size)])
+    left = seen - design @ np.linalg.lstsq(design, seen, rcond=None)[0]
+    return float(left @ left)
+
+
+def _sizes(
+    data: Sequence[ChannelFamily], family: Family, without: tuple[str, ...], shape: str = ""
+) -> dict[str, float]:
+    """How far off each channel is, in tolerances: the middle of all runs; in one shape, or in any."""
+    rows: dict[str, list[float]] = {}
+    for entry in data:
+        rows_beside = {name: beside(entry, name, without) for name in entry.ids}
+        table = {name: deviation(other) for name, other in rows_beside.items()}
+        usual = usual_remains([found.remains for found in table.values()])
+        for name, found in table.items():
+            tolerance = np.array(TOLERANCE[family]) * rows_beside[name].spread
+            sd = np.hypot(tolerance, np.sqrt(np.diag(found.covariance)))
+            sizes = np.abs(found.values / sd)
+            if shape:
+                rows.setdefault(name, []).append(float(sizes[SHAPES[family].index(shape)]))
+                continue
+            size = float(sizes.max())
+            if family in RINGING:
+                usual = found.remains
+            rows.setdefault(name, []).append(max(size, SUSPECT[family] * (found.remains - usual) / STRUCTURE))
+    return {name: float(np.median(values)) for name, values in rows.items()}
+
+
+def _straightened(data: ChannelFamily) -> ChannelFamily:
+    """The family less the error κ u² that, with one κ for all channels, explains most of its disagreement."""
+    apart = np.eye(len(data.ids)) - data.design @ np.linalg.pinv(data.design)
+    # A zero that is off or drifts is no curvature, though u² would take up most of it on one face; nor are
+    # unequal gains, of which a wall that is let go from one side leaves u² some.
+    moved = data.signals.mean(axis=0)[data.pick]
+    still = np.vander(np.linspace(-1.0, 1.0, data.pick.size)[data.pick], 2)
+    steady = np.linalg.qr(np.column_stack([still, moved / max(float(np.abs(moved).max()), 1e-300)]))[0]
+    seen, bent = (
+        rows - (rows @ steady) @ steady.T
+        for rows in ((apart @ data.signals)[:, data.pick], (apart @ data.signals**2)[:, data.pick])
+    )
+    kappa = float(np.sum(bent * seen)) / max(float(np.sum(bent**2)), 1e-300)
+    return replace(data, signals=data.signals - kappa * data.signals**2)
+
+
+def channel_block(run: GapRun, grid: Grid, family: Family, name: str, step: float = 0.0) -> Block | None:
+    """The coefficients of one channel as a block of features; `step` as for `suspects`."""
+    data = channel_family(run, grid, family, step, include=(name,))
+    if data is None or name not in data.ids:
+        return None
+    own = beside(data, name, (name,))
+    usual = usual_remains([deviation(beside(data, n, (name,))).remains for n in data.ids if n != name])
+    return block_of(name, family, own, usual, _wire(run, name) if family == "wire" else None)
+
+
+def _wire(run: GapRun, name: str) -> WireInverse:
+    sensor = next(sensor for sensor in run.sensors if sensor.id == name)
+    return WireInverse.of(sensor, run.survey.half_base_m)

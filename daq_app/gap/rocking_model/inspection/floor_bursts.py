@@ -1,0 +1,136 @@
+"""Does the floor shake for a while only? What accelerometers show together beyond rotation and ring-down.
+
+A floor that vibrates evenly is looked for where the wall stands still (`floor_vibration`). A burst that
+comes and goes while the wall rocks is seen in no part at rest. A rigid wall on a floor with acceleration a
+turns by θ̈ = −(p²/g) cos(α − |θ|) a (Housner 1963 with base excitation), so that a place at the height z
+shows (1 − z (p²/g) cos α) a: a shape over the heights that neither bending (z²) nor turning (y z) has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.ring_signals import accelerations
+from daq_app.gap.rocking_model.features.rings import Ring, cleaner, ring_columns
+from daq_app.gap.rocking_model.inspection.conditions import Mark
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
+
+LOUD = 4.0
+"""Power over the usual one, averaged over a second, from which the floor shook: twice the amplitude."""
+WINDOW_S = 0.5
+"""Half-cycles whose middles are this near count together …"""
+_ENOUGH = 60
+"""… if they have as many samples of the grid."""
+_SHORTEST = 40
+"""Samples of the grid that a half-cycle must have: in a shorter one a smooth curve takes up a vibration, and
+the rotation's own second derivative is not known well enough."""
+_USUAL = 3.0
+"""Power over the usual one up to which a half-cycle says what is usual."""
+_ROUNDS = 12
+_SHARE_SD = 0.1
+"""Relative error of the size of a burst."""
+
+
+@dataclass(frozen=True, slots=True)
+class _HalfCycle:
+    """What is left between two impacts of one run after smooth curves."""
+
+    middle_s: float
+    jump: float
+    """Of the angular velocity at the impact before."""
+    columns: FloatArray
+    """What the accelerometers show by the floor's shape, and the ring-down's sine and cosine, (n, 1 or 3)."""
+    free: int
+    """Samples less the coefficients of the curve."""
+
+    def power(self, rings: FloatArray) -> float:
+        """Mean square without the ring-down of those coefficients."""
+        left = self.columns[:, 0] - self.columns[:, 1:] @ rings
+        return float(left @ left) / self.free
+
+
+def floor_bursts(
+    runs: Sequence[GapRun], grids: Sequence[Grid], survey: Survey, ring: Ring | None
+) -> list[list[Mark]]:
+    """Marks of the runs in which the floor shook for a while; no effect explains them.
+
+    What is usual is said by all half-cycles of all runs: noise, and what an impact leaves, which grows with
+    the jump of the speed. `ring` is the wall's bending after impacts, whose shape over the heights is not
+    quite z²: it is the same wall in every run, so that one size of it is taken out of all.
+    """
+    seen = [_half_cycles(run, grid, survey, ring) for run, grid in zip(runs, grids, strict=True)]
+    known = [cycle for cycles in seen for cycle in cycles]
+    marks: list[list[Mark]] = [[] for _ in runs]
+    if not known:
+        return marks
+    together = np.concatenate([cycle.columns for cycle in known])
+    rings = np.linalg.lstsq(together[:, 1:], together[:, 0], rcond=None)[0]
+    floor, per_jump = _usual(
+        np.array([cycle.jump for cycle in known]), np.array([cycle.power(rings) for cycle in known])
+    )
+    for row, cycles in zip(marks, seen, strict=True):
+        power = np.array([cycle.power(rings) for cycle in cycles])
+        usual = floor + per_jump * np.array([cycle.jump for cycle in cycles]) ** 2
+        excess, loud = _loudest(cycles, power, usual)
+        if loud > LOUD:
+            size = float(np.sqrt(max(excess, 0.0)))
+            row.append(Mark("shaking@floor", "burst of shaking", "m/s²", size, _SHARE_SD * size))
+    return marks
+
+
+def _loudest(cycles: Sequence[_HalfCycle], power: FloatArray, usual: FloatArray) -> tuple[float, float]:
+    """(excess, ratio) of the power over the usual one in the second in which it is loudest."""
+    if not cycles:
+        return 0.0, 0.0
+    middle = np.array([cycle.middle_s for cycle in cycles])
+    samples = np.array([len(cycle.columns) for cycle in cycles])
+    weights = (np.abs(middle[:, None] - middle[None, :]) < WINDOW_S) * samples
+    loud = (weights @ power) / (weights @ usual)
+    loud[weights.sum(axis=1) < _ENOUGH] = 0.0
+    worst = int(np.argmax(loud))
+    excess = float(weights[worst] @ (power - usual)) / float(weights[worst].sum())
+    return excess, float(loud[worst])
+
+
+def _half_cycles(run: GapRun, grid: Grid, survey: Survey, ring: Ring | None) -> list[_HalfCycle]:
+    chosen = run.steady_accelerometers("x")
+    if len(chosen) < 3:
+        return []
+    places = np.array([run.sensors[i].position_m for i in chosen])
+    y, z = places[:, 1], places[:, 2]
+    follows = survey.p_rad_s**2 / GRAVITY_M_S2 * np.cos(survey.alpha_rad)
+    shapes = [1.0 - follows * z, z**2, *([y * z] if np.ptp(y) > 0.2 else [])]
+    if z.size <= len(shapes):
+        return []
+    seen = accelerations(run, grid, chosen)
+    columns = (np.linalg.pinv(np.column_stack(shapes))[0] @ seen.beyond)[:, None]
+    if ring is not None:
+        columns = np.column_stack([columns, ring_columns(grid, ring.frequency_hz, ring.zeta)])
+    found = []
+    for part, basis in cleaner(grid, seen.pick, slow=False):
+        if part.size < _SHORTEST:
+            continue
+        before = int(np.searchsorted(grid.impact_s, grid.time_s[part[0]])) - 1
+        left = columns[part] - basis @ (basis.T @ columns[part])
+        middle = float(grid.time_s[part].mean())
+        found.append(_HalfCycle(middle, float(grid.jumps[before]), left, part.size - basis.shape[1]))
+    return found
+
+
+def _usual(jump: FloatArray, power: FloatArray) -> tuple[float, float]:
+    """Power that half-cycles usually leave: a part of its own, and one per square of the jump before."""
+    columns = np.column_stack([np.ones_like(jump), jump**2])
+    usual, kept = np.full(jump.size, float(np.median(power))), np.ones(jump.size, dtype=bool)
+    found = np.zeros(2)
+    for _ in range(_ROUNDS):
+        found, _ = nnls((columns / usual[:, None])[kept], (power / usual)[kept])
+        usual = np.maximum(columns @ found, 1e-3 * float(np.median(power)))
+        ratio = power / usual
+        kept = ratio < _USUAL * float(np.median(ratio))
+    return float(found[0]), float(found[1])

@@ -1,0 +1,336 @@
+"""Before anything is fitted: wiring, electronics, single channels, ring-downs and the floor, over all runs.
+
+What is found is taken out of the families where it would spoil them, and comes back as blocks of
+features of its own, so that it competes with everything else for the explanation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from daq_app.config.rig import Family
+from daq_app.gap.core import CannotDiagnose
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features import swing_timing
+from daq_app.gap.rocking_model.features.extra_response import MARKS
+from daq_app.gap.rocking_model.features.floor_vibration import Vibration, find_vibration, without_vibration
+from daq_app.gap.rocking_model.features.impact_timing import MIDDLE_OF_IMPACT_S
+from daq_app.gap.rocking_model.features.ring_signals import Signal, bend_signals, turn_signals
+from daq_app.gap.rocking_model.features.rings import Ring, ring_block, scan, with_repeatability
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun, scalar_block
+from daq_app.gap.rocking_model.features.run_features import Examined, examine
+from daq_app.gap.rocking_model.features.sensor_blocks import Block
+from daq_app.gap.rocking_model.inspection.channel_faults import channel_block, suspects
+from daq_app.gap.rocking_model.inspection.conditions import (
+    Mark,
+    conditions_of,
+    marks_of,
+    without_hum,
+)
+from daq_app.gap.rocking_model.inspection.floor_bursts import floor_bursts
+from daq_app.gap.rocking_model.inspection.saturation import saturated
+from daq_app.gap.rocking_model.inspection.second_axis import second_axis
+from daq_app.gap.rocking_model.inspection.stairs import beside_stairs
+from daq_app.gap.rocking_model.inspection.vertical import odd_vertical, vertical_block
+from daq_app.gap.rocking_model.inspection.wiring import mend
+from daq_app.gap.rocking_model.records import GapRun, Wiring
+
+LATE_S = 2.5e-3
+"""Lag between LVDTs and wires from which it matters which of them the motion is read from."""
+_SPOILING = ("quantisation", "dropout", "saturation", "spikes")
+_COUNT_SD = 0.05
+_FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer", "tiltmeter")
+
+
+@dataclass(frozen=True, slots=True)
+class Inspected:
+    """Runs in which wiring and electronics are put right as far as they can be."""
+
+    runs: list[GapRun]
+    marks: list[list[Mark]]
+    reference: str
+    """``wire`` where the LVDTs are not fit to read the motion from, else empty."""
+    wiring: Wiring
+
+
+def inspect(runs: Sequence[GapRun]) -> Inspected:
+    """Mend and mark. Raises nothing: what cannot be judged is left as it is."""
+    mended, wiring = mend(list(runs))
+    mended = [run.excluding(wiring.reversed_ids) for run in mended]
+    found = conditions_of(mended)
+    marks = marks_of(mended, found)
+    # Readings that stand still or go in steps must be seen as they were; all else is put on one clock.
+    clean = [without_hum(run, c).at_clock() for run, c in zip(mended, found, strict=True)]
+    families: dict[str, Family] = {s.id: s.family for s in runs[0].sensors}
+    single = {
+        mark.key.partition("@")[2]
+        for row in marks
+        for mark in row
+        if mark.value > 0 and _spoils(mark, families)
+    }
+    clean = [run.excluding(single) for run in clean]
+    clean, limits = saturated(clean, _steps(marks))
+    marks = [[*row, *more] for row, more in zip(marks, limits, strict=True)]
+    clipped = {
+        mark.key.partition("@")[2]
+        for row in limits
+        for mark in row
+        if mark.value > 0 and mark.key.partition("@")[2] in families
+    }
+    clean = [run.excluding(clipped) for run in clean]
+    marks = [[*row, *_wiring_marks(wiring, families)] for row in marks]
+    coarse_lvdts = any(m.key == "quantisation@lvdt" and m.value > 0 for row in marks for m in row)
+    return Inspected(clean, marks, "wire" if coarse_lvdts else "", wiring)
+
+
+def _spoils(mark: Mark, families: dict[str, Family]) -> bool:
+    name, _, target = mark.key.partition("@")
+    return name in _SPOILING and target in families
+
+
+def _wiring_marks(wiring: Wiring, families: dict[str, Family]) -> list[Mark]:
+    """Counts of reversed and exchanged channels; the name says which, where there is one."""
+    turned, crossed = wiring.reversed_ids, wiring.exchanged
+    first = f"polarity@{turned[0]}" if len(turned) == 1 else "polarity"
+    second = f"swap@{families[crossed[0][0]]}" if crossed else "swap"
+    shown = dict(crossed)
+    words = [
+        f"{a} and {b} exchanged" if shown[b] == a else f"{a} shows {b}"
+        for a, b in crossed
+        if shown[b] != a or a < b
+    ]
+    return [
+        Mark(first, f"{', '.join(turned) or 'channels'} reversed", "1", float(len(turned)), _COUNT_SD),
+        Mark(second, ", ".join(words) or "channels exchanged", "1", float(wiring.places), _COUNT_SD),
+    ]
+
+
+def choose_reference(inspected: Inspected) -> tuple[str, dict[int, Examined]]:
+    """What the motion is read from (`examine`): the prompter family where LVDTs and wires differ in time.
+
+    With it what was examined that way on the way to it, by the place of the run.
+    """
+    if inspected.reference:
+        return inspected.reference, {}
+    if not inspected.runs[0].indices("lvdt"):
+        return "", {}  # what can be said without them, the examination says
+    sizes = [float(np.nanmax(np.abs(r.channels[r.indices("lvdt")[0]]))) for r in inspected.runs]
+    place = sizes.index(max(sizes))
+    run = inspected.runs[place]
+    try:
+        first = examine(run)
+    except (CannotDiagnose, IndexError):
+        return "", {}
+    lag = _coefficient(first.features, "wire", "lag")
+    if first.features.reference != "lvdt" or lag is None or abs(lag) < LATE_S:
+        return "", {place: first}
+    try:
+        second = examine(run, "late")
+    except (CannotDiagnose, IndexError):
+        return "", {place: first}
+    delays = [_coefficient(f.features, "impact timing", "delay") for f in (first, second)]
+    if delays[0] is None or delays[1] is None or second.features.reference != "wire":
+        return "", {place: first}
+    late = [abs(delay - MIDDLE_OF_IMPACT_S) for delay in delays if delay is not None]
+    return ("late", {place: second}) if late[1] < late[0] else ("", {place: first})
+
+
+def _coefficient(run: RockingRun, family: str, name: str) -> float | None:
+    for block in run.blocks:
+        if block.family == family and name in block.names:
+            return float(block.values[block.names.index(name)])
+    return None
+
+
+def _late(run: RockingRun) -> float:
+    """How late the accelerometers are, s, where that is more than their timing leaves open."""
+    delay = _coefficient(run, "swing timing", "delay") or 0.0
+    return delay if abs(delay) > swing_timing.LATE_S else 0.0
+
+
+def without_suspects(
+    examined: Sequence[Examined], marks: Sequence[Sequence[Mark]], reference: str
+) -> tuple[list[Examined], dict[str, Family], list[list[Mark]]]:
+    """The runs less the channels that disagree with their family; single ones; marks with the several.
+
+    What a single one shows, an effect may explain. Several of one family have no one cause that the
+    library knows: that they disagree is a finding that nothing explains, and not a reason to forget them.
+    """
+    grids = [e.features.grid for e in examined]
+    runs = [e.run for e in examined]
+    along_z = odd_vertical(runs, grids, [_late(e.features) for e in examined])
+    found = suspects(runs, grids, _steps(marks)).plus("accelerometer", along_z)
+    again = list(examined)
+    if found.ids:
+        again = []
+        for entry in examined:
+            run = replace(entry.run.excluding(found.ids), impacts_before=entry.features.impacts_before)
+            again.append(examine(run, reference))
+    odd = dict(found.several)
+    gross = _left_out(again)
+    if gross:
+        odd["lvdt"] = tuple(sorted({*odd.get("lvdt", ()), *gross}))
+    more = [
+        Mark(
+            f"disagreement@{family}", f"disagreement ({', '.join(names)})", "1", float(len(names)), _COUNT_SD
+        )
+        for family, names in odd.items()
+    ]
+    turned = second_axis([e.run for e in again], [e.features.grid for e in again])
+    rows = [[*row, *more, *own] for row, own in zip(marks, turned, strict=True)]
+    return again, {name: family for family, name in found.single.items()}, rows
+
+
+def _left_out(examined: Sequence[Examined]) -> set[str]:
+    """LVDTs that read and that the plane of the joint was made without, in half of the runs or more."""
+    seen: list[str] = []
+    for entry in examined:
+        whole = {s.id for s, row in zip(entry.run.sensors, entry.run.channels, strict=True) if _reads(row)}
+        seen += [name for name in entry.joint.left_out if name in whole]
+    return {name for name in seen if 2 * seen.count(name) >= len(examined)}
+
+
+def _reads(values: FloatArray) -> bool:
+    return bool(np.all(np.isfinite(values)))
+
+
+def _steps(marks: Sequence[Sequence[Mark]]) -> dict[str, float]:
+    """Step of the reading, m, of the families and channels that go in steps."""
+    seen: dict[str, list[float]] = {}
+    for mark in (mark for row in marks for mark in row):
+        if mark.key.startswith("quantisation") and mark.value > 0:
+            seen.setdefault(mark.key.partition("@")[2], []).append(mark.value)
+    return {target: float(np.median(values)) for target, values in seen.items()}
+
+
+def completed(
+    examined: Sequence[Examined],
+    marks: Sequence[Sequence[Mark]],
+    channels: dict[str, Family],
+    wiring: Wiring,
+) -> tuple[list[RockingRun], list[list[Mark]]]:
+    """Features of all runs with the blocks of what was inspected over all of them, and the marks of the last.
+
+    Those are of the floor, which is looked at once its even vibration is out of the accelerometers.
+    """
+    grids = [e.features.grid for e in examined]
+    height = examined[0].features.survey.height_m
+    more: list[list[Block]] = [[] for _ in examined]
+    steps = _steps(marks)
+    for row, entry in zip(more, examined, strict=True):
+        for name, family in channels.items():
+            grid = entry.features.grid
+            block = channel_block(entry.run, grid, family, name, steps.get(family, 0.0))
+            if block is None and family == "accelerometer":
+                block = vertical_block(entry.run, grid, name, _late(entry.features))
+            if block is not None:
+                row.append(block)
+    bends = [bend_signals(e.run, e.features.grid, height) for e in examined]
+    turns = [turn_signals(e.run, e.joint, e.features.grid, height) for e in examined]
+    bending = _add_rings(more, examined, bends, "bending", slow=False)
+    _add_rings(more, examined, turns, "turning", slow=True)
+    vibrations = find_vibration([e.run for e in examined], grids)
+    examined = [_on_still_floor(e, v) for e, v in zip(examined, vibrations, strict=True)]
+    bursts = floor_bursts(
+        [e.run for e in examined],
+        [e.features.grid for e in examined],
+        examined[0].features.survey,
+        bending,
+    )
+    marks = [[*row, *own] for row, own in zip(marks, bursts, strict=True)]
+    runs = []
+    known = beside_stairs(examined, steps)
+    for row, entry, vibration, seen, read in zip(more, examined, vibrations, marks, known, strict=True):
+        grid = entry.features.grid
+        if vibration is not None:
+            shown = vibration.amplitude if vibration.found else 0.0
+            sd = vibration.amplitude_sd * (1.0 if vibration.found else 3.0)
+            entries = (
+                ("amplitude", "m/s²", shown, sd**2),
+                # It was found from all runs at once: what is said in every run is known only once.
+                ("frequency", "Hz", vibration.frequency_hz, len(examined) * vibration.frequency_sd**2),
+            )
+            row.append(scalar_block("floor", entries, grid))
+        row.append(_mark_block(seen, entry))
+        features = replace(read, vibration=vibration, wiring=wiring)
+        runs.append(features.with_blocks(row))
+    return runs, bursts
+
+
+def _on_still_floor(entry: Examined, vibration: Vibration | None) -> Examined:
+    """The same without the floor's part in the accelerometers; what it does to the wall stays."""
+    if vibration is None or not vibration.found:
+        return entry
+    still = without_vibration(entry.run, entry.features.grid, vibration)
+    return examine(still, entry.wanted)
+
+
+def _mark_block(marks: Sequence[Mark], entry: Examined) -> Block:
+    families: dict[str, str] = {s.id: s.family for s in entry.run.sensors}
+    families |= {family: family for family in _FAMILIES}
+    block = scalar_block(
+        "conditions",
+        [(m.key, m.unit, m.value, m.sd**2) for m in marks],
+        entry.features.grid,
+        kind="conditions",
+    )
+    # What no effect explains is spoken of in words: there is no effect whose name says it.
+    said = {
+        m.key: (m.key.partition("@")[2], m.observable) for m in marks if m.key.partition("@")[0] not in MARKS
+    }
+    return replace(block, said=said, tags={m.key: families.get(m.key.partition("@")[2], "") for m in marks})
+
+
+def _add_rings(
+    more: list[list[Block]],
+    examined: Sequence[Examined],
+    signals: Sequence[list[Signal]],
+    name: str,
+    *,
+    slow: bool,
+) -> Ring | None:
+    """Blocks of the ring-down that fits best; that oscillator."""
+    grids = [e.features.grid for e in examined]
+    ring = scan(grids, signals, slow=slow)
+    if ring is None:
+        return None
+    found: list[Block] = []
+    rows: list[list[Block]] = []
+    for row, entry, listed in zip(more, examined, signals, strict=True):
+        block = ring_block(name, entry.features.grid, listed, ring, slow=slow)
+        if block is not None:
+            found.append(block)
+            rows.append(row)
+    for row, block in zip(rows, with_repeatability(found), strict=True):
+        row.append(block)
+    return ring
+
+
+def found_channels(runs: Sequence[RockingRun]) -> dict[str, str]:
+    """Channels with a block of their own, and their families."""
+    return {b.family: b.tags[b.family] for run in runs for b in run.blocks if b.kind == "channel"}
+
+
+def calibrations(runs: Sequence[RockingRun]) -> dict[str, dict[str, float]]:
+    """Of those channels: what a sound one may be off by in each shape, as the others predict it."""
+    return {
+        b.family: dict(zip(b.names, b.levers, strict=False))
+        for run in runs
+        for b in run.blocks
+        if b.kind == "channel"
+    }
+
+
+def found_marks(runs: Sequence[RockingRun]) -> dict[str, str]:
+    """Conditions of the electronics that are there in any run, with the family of their channels."""
+    return {
+        name: block.tags[name]
+        for run in runs
+        for block in run.blocks
+        if block.kind == "conditions"
+        for name, value in zip(block.names, block.values, strict=True)
+        if value > 0.0
+    }

@@ -1,0 +1,46 @@
+"""The axis of a tiltmeter across the motion: a wall that rocks on its long edges does not turn about it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.sensor_blocks import first_order
+from daq_app.gap.rocking_model.inspection.conditions import Mark
+from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
+from daq_app.gap.rocking_model.motion.rotation import zeroed
+from daq_app.gap.rocking_model.records import GapRun
+
+TURNED = 0.03
+"""Share of the rotation in the second axis up to which the instrument is turned on its mount, by 1.7°."""
+_MOUNT_SD = 0.01
+"""Standard deviation of that share for an instrument mounted with care."""
+
+
+def second_axis(runs: Sequence[GapRun], grids: Sequence[Grid]) -> list[list[Mark]]:
+    """Marks of the second axes that follow the rotation by more than a mount is turned, run by run.
+
+    No effect explains them: another signal gets into that channel, or the instrument is badly mounted.
+    """
+    marks: list[list[Mark]] = [[] for _ in runs]
+    for place in runs[0].indices("tiltmeter", "y"):
+        shares = [_share(run, grid, place) for run, grid in zip(runs, grids, strict=True)]
+        if abs(float(np.median(shares))) <= TURNED:
+            continue
+        key = f"crossed@{runs[0].sensors[place].id}"
+        for row, share in zip(marks, shares, strict=True):
+            row.append(Mark(key, "share of the rotation", "1", abs(share), _MOUNT_SD))
+    return marks
+
+
+def _share(run: GapRun, grid: Grid, place: int) -> float:
+    """Share of the rotation, as the sensor's own response shows it, in the second axis."""
+    values = zeroed(run, place)
+    if not np.all(np.isfinite(values)):
+        return 0.0
+    slow: FloatArray = first_order(grid.theta, run.sensors[place].time_constant_s)
+    columns = np.column_stack([slow, np.ones_like(slow), grid.time_s])
+    measured = coarse(values, run.rate_hz)
+    return float(np.linalg.lstsq(columns, measured, rcond=None)[0][0])

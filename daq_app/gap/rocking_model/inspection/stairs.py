@@ -1,0 +1,118 @@
+"""What readings in steps do to the coefficients that are read from them.
+
+Steps are no noise: the same ones come back in every half-cycle, and from the same zero in every run, so that
+no regression sees what they do to it. So the rounding is done again, on the motion as it was, with the zero
+anywhere within a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from daq_app.gap.core import FeatureSet
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.channel_shapes import CALIBRATION
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.run_features import Examined
+from daq_app.gap.rocking_model.features.sensor_blocks import Block
+from daq_app.gap.rocking_model.motion.rotation import wall_rotation
+from daq_app.gap.rocking_model.records import GapRun
+
+DRAWS = 40
+"""Zeros and calibrations that are tried."""
+WITHIN = 6
+"""Instants in each interval of the grid: a wire passes a step of some millimetres in one interval."""
+
+
+def beside_stairs(examined: Sequence[Examined], steps: Mapping[str, float]) -> list[RockingRun]:
+    """The features of all runs with what steps, m, of whole families add to the errors of their blocks."""
+    runs = [entry.features for entry in examined]
+    for family in ("wire", "lvdt"):
+        if family in steps:
+            found = [_rounded(entry, family, steps[family]) for entry in examined]
+            runs = [_widened(run, more) for run, more in zip(runs, _known_once(found), strict=True)]
+    return runs
+
+
+def _rounded(entry: Examined, family: str, step: float) -> dict[str, FloatArray]:
+    """Coefficients, (DRAWS, k), that rounding alone makes in each block that a family's readings enter."""
+    grid, run = entry.features.grid, entry.run
+    chosen = _channels(entry, family)
+    weights = _weights(run, family, chosen)
+    blocks = [block for block in entry.features.blocks if block.family in weights]
+    if not chosen or not blocks:
+        return {}
+    # Beyond the ends of the intervals the motion goes on straight.
+    inside = (np.arange(WITHIN) + 0.5) / WITHIN - 0.5
+    theta = grid.raw[:, None] + inside * np.gradient(grid.raw)[:, None]
+    places = np.array([run.sensors[i].position_m for i in chosen])
+    if family == "wire":
+        readings = places[:, 2, None, None] * theta
+    else:
+        readings = run.survey.half_base_m * np.abs(theta) - places[:, 0, None, None] * theta
+    # One seed for all runs: a channel keeps its zero and its calibration from run to run.
+    chance = np.random.default_rng(1)
+    # All zeros alike: where they are not, less remains of the steps of sensors that move alike.
+    zeros = chance.uniform(-0.5, 0.5, DRAWS)
+    gains = 1.0 + CALIBRATION * chance.standard_normal((DRAWS, len(run.sensors)))[:, chosen]
+    rows: dict[str, list[FloatArray]] = {block.family: [] for block in blocks}
+    for zero, gain in zip(zeros, gains, strict=True):
+        exact = gain[:, None, None] * readings / step
+        # At rest the reading is a whole number of steps, whatever the zero.
+        errors = step * (np.round(exact + zero) - exact).mean(axis=2)
+        for block in blocks:
+            rows[block.family].append(block.coefficients(weights[block.family] @ errors))
+    return {name: np.array(found) for name, found in rows.items()}
+
+
+def _channels(entry: Examined, family: str) -> list[int]:
+    """Places of the channels that a family's rotation was made from."""
+    run = entry.run
+    if family == "wire":
+        names = wall_rotation(run)[2]
+        return [i for i in run.indices("wire") if run.sensors[i].id in names]
+    return [i for i in run.indices("lvdt") if run.sensors[i].id in entry.joint.used]
+
+
+def _weights(run: GapRun, family: str, chosen: Sequence[int]) -> dict[str, FloatArray]:
+    """What each block makes of the readings of a family, sample by sample: a weight for each channel."""
+    x, y, z = np.array([run.sensors[i].position_m for i in chosen]).reshape(-1, 3).T
+    if family == "wire":
+        at_base = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
+        return {"wire": z / (z @ z), "base": at_base}
+    lift, theta, twist = np.linalg.pinv(np.column_stack([np.ones_like(x), -x, -x * y]))
+    return {"wire": -theta, "joint": lift, "twist": twist}
+
+
+def _known_once(found: Sequence[Mapping[str, FloatArray]]) -> list[dict[str, FloatArray]]:
+    """Covariances, (k, k), of those coefficients in each run.
+
+    What the same zero does alike in all runs is known only once, however many runs there are; the likelihood
+    takes the errors of runs for independent, so each bears its share of what is not.
+    """
+    rows: list[dict[str, FloatArray]] = [{} for _ in found]
+    for name in dict.fromkeys(name for run in found for name in run):
+        having = [(row, run[name]) for row, run in zip(rows, found, strict=True) if name in run]
+        sds = [np.sqrt(np.mean(errors**2, axis=0)) + 1e-300 for _, errors in having]
+        together = np.sum([errors / sd for (_, errors), sd in zip(having, sds, strict=True)], axis=0)
+        share = np.sqrt(np.maximum(np.mean(together**2, axis=0) / len(having), 1.0))
+        for row, errors in having:
+            row[name] = np.outer(share, share) * (errors.T @ errors) / DRAWS
+    return rows
+
+
+def _widened(run: RockingRun, more: Mapping[str, FloatArray]) -> RockingRun:
+    """The run with these covariances on top of those of its blocks."""
+    if not more:
+        return run
+
+    def wider(block: Block) -> Block:
+        return replace(block, covariance=block.covariance + more[block.family])
+
+    kept = tuple(wider(b) if b.family in more else b for b in run.blocks)
+    first = len(run.features) - sum(len(b.names) for b in run.blocks)
+    features = FeatureSet(run.features.values[:first], run.features.sd[:first], run.features.labels[:first])
+    return replace(run, features=features, blocks=()).with_blocks(kept)

@@ -1,0 +1,83 @@
+"""Accelerometers that look along z: what those along x and the rotation make of each of them.
+
+A place at (x, z) of a wall that rocks about the edge b sgn θ shows −θ̈ (x − b sgn θ) − ω² z + g (cos θ − 1)
+along its own upright: the specific force on a point of a rigid body. θ̈ is read from the accelerometers
+along x, so that a gain of their whole family cancels here too. A delay of all does not: on which edge the
+wall stands and how it leans is read from other sensors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from daq_app.gap.rocking_model.features.channel_shapes import (
+    TOLERANCE,
+    Others,
+    block_of,
+    deviation,
+    usual_remains,
+)
+from daq_app.gap.rocking_model.features.sensor_blocks import Block
+from daq_app.gap.rocking_model.inspection.channel_families import smoothed
+from daq_app.gap.rocking_model.inspection.channel_faults import SUSPECT
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
+
+_SOUND_SHARE = 0.4
+"""Share of the worst one's size that the others may show: what the wall does differently (an edge that is not
+where the survey has it) is in all of them."""
+
+
+def odd_vertical(runs: Sequence[GapRun], grids: Sequence[Grid], late_s: Sequence[float]) -> str | None:
+    """The one accelerometer along z that disagrees with those along x while the others along z do not.
+
+    `late_s`: how late the accelerometers of each run are.
+    """
+    sizes: dict[str, list[float]] = {}
+    for run, grid, late in zip(runs, grids, late_s, strict=True):
+        for name, beside in _vertical(run, grid, late).items():
+            found = deviation(beside)
+            # On one edge such a place hardly moves, so that a gain and a curvature look much alike here:
+            # together they say what neither says alone.
+            tolerance = np.diag((np.array(TOLERANCE["accelerometer"]) * beside.spread) ** 2)
+            square = found.values @ np.linalg.solve(found.covariance + tolerance, found.values)
+            sizes.setdefault(name, []).append(float(np.sqrt(square)))
+    usual = {name: float(np.median(values)) for name, values in sizes.items()}
+    if len(usual) < 2:
+        return None
+    worst = max(usual, key=lambda name: usual[name])
+    others = max(size for name, size in usual.items() if name != worst)
+    odd = usual[worst] > SUSPECT["accelerometer"] and others < _SOUND_SHARE * usual[worst]
+    return worst if odd else None
+
+
+def vertical_block(run: GapRun, grid: Grid, name: str, late_s: float) -> Block | None:
+    """The coefficients of one accelerometer along z as a block of features, as `channel_block` gives them."""
+    beside = _vertical(run.including((name,)), grid, late_s).get(name)
+    if beside is None:
+        return None
+    return block_of(name, "accelerometer", beside, usual_remains([deviation(beside).remains]))
+
+
+def _vertical(run: GapRun, grid: Grid, late_s: float) -> dict[str, Others]:
+    """Every accelerometer along z beside its prediction."""
+    along_x, along_z = run.steady_accelerometers("x"), run.steady_accelerometers("z")
+    if len(along_x) < 4 or not along_z or grid.impact_s.size < 2:
+        return {}
+    heights = np.array([run.sensors[i].position_m[2] for i in along_x])
+    weights = np.linalg.pinv(np.column_stack([np.ones(heights.size), heights]))[1]
+    signals = smoothed(run, along_x, late_s)
+    turning = weights @ signals
+    # Behind the last impact that can be told from its neighbours nobody knows on which edge the wall stands.
+    pick = (grid.time_s > 0.0) & (grid.time_s < grid.impact_s[-1]) & ~grid.near_impact
+    shown = np.sqrt(np.mean(signals**2, axis=1)) / (np.sqrt(np.mean(turning**2)) + 1e-300)
+    spread = float(np.sqrt(1.0 + np.sum((weights * shown) ** 2)))
+    found = {}
+    for i, measured in zip(along_z, smoothed(run, along_z, late_s), strict=True):
+        x, _, z = run.sensors[i].position_m
+        lever = x - run.survey.half_base_m * np.sign(grid.theta)
+        upright = GRAVITY_M_S2 * (np.cos(grid.theta) - 1.0) - grid.omega**2 * z
+        found[run.sensors[i].id] = Others(measured, upright - turning * lever, pick, spread)
+    return found

@@ -1,0 +1,206 @@
+"""Are the channels what the rig file says? Reversed polarity and exchanged plugs, before anything is fitted.
+
+Every channel is compared with what the rotation implies at its place; the rotation is a median over
+many channels, so that a few wrong ones cannot spoil it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.signal import butter, sosfiltfilt
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.sensor_blocks import first_order
+from daq_app.gap.rocking_model.motion.rotation import zeroed
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Wiring
+
+WORK_HZ = 100.0
+LOW_PASS_HZ = 12.0
+"""Impacts ring above this."""
+REVERSED_BELOW = -0.4
+"""Slope of a channel on what it should show, below which it is called reversed."""
+EXCHANGE_GAIN = 0.15
+"""Putting plugs back must leave less than this share of the misfit of the channels …"""
+EXCHANGE_MISFIT = 0.03
+"""… which must be more than this share of a signal."""
+AWAY = 0.25
+"""Share of the largest rotation from which an impact is far enough."""
+_MOVED = 1e-3
+"""Misfit that a channel must lose to be called moved: channels that show the same stay where they are."""
+
+
+def mend(runs: list[GapRun]) -> tuple[list[GapRun], Wiring]:
+    """Runs with reversed channels turned round and exchanged ones put back, and what was done."""
+    found = [_check(run) for run in runs]
+    first = found[0]
+    same = all(w.exchanged == first.exchanged for w in found)
+    kept = Wiring(
+        tuple(name for name in first.reversed_ids if all(name in w.reversed_ids for w in found)),
+        first.exchanged if same else (),
+        min(w.places for w in found) if same else 0,
+    )
+    if kept == Wiring():
+        return runs, kept
+    return [_mended(run, kept) for run in runs], kept
+
+
+def _mended(run: GapRun, wiring: Wiring) -> GapRun:
+    place = {sensor.id: i for i, sensor in enumerate(run.sensors)}
+    channels = run.channels.copy()
+    for name in wiring.reversed_ids:
+        channels[place[name]] *= -1.0
+    for terminal, sensor in wiring.exchanged:
+        channels[place[sensor]] = run.channels[place[terminal]]
+    return replace(run, channels=channels)
+
+
+def _check(run: GapRun) -> Wiring:
+    measured, expected, ids = _compare(run)
+    if not ids:
+        return Wiring()
+    size = np.sum(expected**2, axis=1)
+    slope = np.array([_slope(run, name, y, e) for name, y, e in zip(ids, measured, expected, strict=True)])
+    # A channel that should show next to nothing cannot be judged by its slope.
+    lively = size > 0.05 * np.median(size)
+    exchanged: list[tuple[str, str]] = []
+    places = 0
+    for group in _groups(run, ids):
+        at = [ids.index(name) for name in group]
+        order, turn = _order(np.array([[_misfit(measured[i], expected[j]) for j in at] for i in at]))
+        exchanged += [(group[i], group[j]) for i, j in enumerate(order) if i != j]
+        places = max(places, turn)
+    involved = {name for pair in exchanged for name in pair}
+    turned = tuple(
+        name
+        for name, s, alive in zip(ids, slope, lively, strict=True)
+        if alive and s < REVERSED_BELOW and name not in involved
+    )
+    return Wiring(turned, tuple(exchanged), places)
+
+
+def _slope(run: GapRun, name: str, measured: FloatArray, expected: FloatArray) -> float:
+    """Slope of a channel on what it should show, away from the ends of its range.
+
+    A reversed LVDT runs into its stop at once: only what it shows before that tells its sign.
+    """
+    low, high = next(sensor.range_si for sensor in run.sensors if sensor.id == name)
+    free = (
+        (measured > 0.8 * low) & (measured < 0.8 * high)
+        if np.isfinite([low, high]).all()
+        else measured < np.inf
+    )
+    power = float(expected[free] @ expected[free])
+    return float(measured[free] @ expected[free]) / max(power, 1e-30)
+
+
+def _groups(run: GapRun, ids: list[str]) -> list[list[str]]:
+    """Channels that could be plugged into each other's terminals: one family, one axis."""
+    kinds: dict[tuple[str, str], list[str]] = {}
+    for sensor in run.sensors:
+        if sensor.id in ids:
+            kinds.setdefault((sensor.family, sensor.axis), []).append(sensor.id)
+    return list(kinds.values())
+
+
+def _order(misfit: FloatArray) -> tuple[list[int], int]:
+    """(which sensor each terminal shows, places turned round) from misfits of terminals (rows) as sensors.
+
+    The order with the smallest misfit of all, if it makes sense of what makes no sense as it is. A channel
+    that shows no sensor of its kind says nothing about where the others are plugged.
+    """
+    n = len(misfit)
+    order = list(range(n))
+    known = np.flatnonzero(misfit.min(axis=1) < EXCHANGE_MISFIT)
+    table = misfit[np.ix_(known, known)]
+    if known.size < 2 or float(np.trace(table)) <= EXCHANGE_MISFIT:
+        return order, 0
+    at = np.arange(known.size)
+    _, best = linear_sum_assignment(table + _MOVED * (1.0 - np.eye(known.size)))
+    # Those that stay where they are misfit before and after: they say nothing about the others' plugs.
+    moved = at != best
+    straight, after = float(table[at, at][moved].sum()), float(table[at, best][moved].sum())
+    if straight <= EXCHANGE_MISFIT or after >= EXCHANGE_GAIN * straight:
+        return order, 0
+    left = float(table[at, best].sum())
+    for i, j in zip(known, known[best], strict=True):
+        order[int(i)] = int(j)
+    turned = [float(np.trace(np.roll(misfit, k, axis=1))) for k in range(1, n)]
+    # Sensors that show the same may be exchanged or not: the turn that fits as well is the simpler story.
+    fits = [k for k, total in enumerate(turned, start=1) if known.size == n and total < left + _MOVED]
+    return order, fits[0] if fits else 1
+
+
+def _misfit(measured: FloatArray, expected: FloatArray) -> float:
+    """Share of a signal's power that what is expected, with a gain within 15 % of 1, leaves unexplained."""
+    gain = float(np.clip(measured @ expected / max(float(expected @ expected), 1e-30), 0.85, 1.15))
+    left = measured - gain * expected
+    return float(left @ left / max(float(measured @ measured), float(expected @ expected), 1e-30))
+
+
+def _compare(run: GapRun) -> tuple[FloatArray, FloatArray, list[str]]:
+    """(measured, expected, ids) of all channels that follow the rotation, smoothed and thinned out."""
+    step = max(round(run.rate_hz / WORK_HZ), 1)
+    low_pass = butter(3, LOW_PASS_HZ, fs=WORK_HZ, output="sos")
+    smooth: dict[int, FloatArray] = {
+        i: sosfiltfilt(low_pass, _thin(zeroed(run, i), step))
+        for i in range(len(run.sensors))
+        if np.all(np.isfinite(run.channels[i]))
+    }
+    theta = _median_rotation(run, smooth)
+    if theta is None:
+        return np.zeros((0, 0)), np.zeros((0, 0)), []
+    acceleration = np.gradient(np.gradient(theta, step / run.rate_hz), step / run.rate_hz)
+    away = np.abs(theta) > AWAY * np.max(np.abs(theta))
+    measured, expected, ids = [], [], []
+    for i, values in smooth.items():
+        shape = _expected(run, i, theta, acceleration)
+        if shape is not None:
+            upright = run.sensors[i].family == "accelerometer" and run.sensors[i].axis == "z"
+            # An accelerometer along z shows more of an impact than of all rocking between impacts.
+            seen = away if upright else 1.0
+            measured.append(values * seen)
+            expected.append(shape * seen)
+            ids.append(run.sensors[i].id)
+    return np.array(measured), np.array(expected), ids
+
+
+def _thin(values: FloatArray, step: int) -> FloatArray:
+    m = values.size // step
+    return np.asarray(values[: m * step].reshape(m, step).mean(axis=1), dtype=float)
+
+
+def _median_rotation(run: GapRun, smooth: dict[int, FloatArray]) -> FloatArray | None:
+    """θ from the medians of both faces; from the wires where there are no LVDTs."""
+    faces = [
+        [smooth[i] for i in run.indices("lvdt") if i in smooth and side * run.sensors[i].position_m[0] > 0]
+        for side in (-1.0, 1.0)
+    ]
+    if all(len(face) >= 3 for face in faces):
+        width = 2.0 * run.survey.half_base_m
+        opening = np.median(faces[0], axis=0) - np.median(faces[1], axis=0)
+        return np.asarray(opening / width, dtype=float)
+    wires = [smooth[i] / run.sensors[i].position_m[2] for i in run.indices("wire") if i in smooth]
+    return np.asarray(np.median(wires, axis=0), dtype=float) if len(wires) >= 3 else None
+
+
+def _expected(run: GapRun, i: int, theta: FloatArray, acceleration: FloatArray) -> FloatArray | None:
+    """What a channel shows of a rotation of small size; None for one that sees none of it."""
+    sensor = run.sensors[i]
+    x, _, z = sensor.position_m
+    half = run.survey.half_base_m
+    match sensor.family:
+        case "lvdt":
+            return half * np.abs(theta) - x * theta
+        case "wire":
+            toward = 1.0 if sensor.anchor_m is None or sensor.anchor_m[0] > x else -1.0
+            return toward * z * theta
+        case "accelerometer" if sensor.axis == "x" and not sensor.ac_coupled:
+            return z * acceleration - GRAVITY_M_S2 * theta
+        case "accelerometer" if sensor.axis == "z" and not sensor.ac_coupled:
+            return -acceleration * (x - half * np.sign(theta))
+        case "tiltmeter" if sensor.axis == "x":
+            return first_order(theta, sensor.time_constant_s, WORK_HZ)
+    return None

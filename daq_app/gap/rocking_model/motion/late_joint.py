@@ -1,0 +1,62 @@
+"""The joint of LVDTs that are late, put in step with the wires that the motion is read from instead.
+
+What the joint shows beyond its own rotation (where the wall turns, how long its contact is) does not hang on
+when it shows it: opening and rotation are late alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, MASK_S, Grid, coarse
+from daq_app.gap.rocking_model.motion.rotation import Rotation, sooner
+
+MOST_LATE_S = 0.08
+"""By how much one family may be late against the other."""
+
+
+@dataclass(frozen=True, slots=True)
+class InStep:
+    """A joint as late as the grid's rotation, the grid with the joint's own rotation, and samples to use."""
+
+    joint: Rotation
+    grid: Grid
+    pick: NDArray[np.bool_]
+    late_s: float
+    """By how much it was put sooner."""
+
+
+def lateness(mine: FloatArray, other: FloatArray) -> float:
+    """Samples of the grid by which `mine` comes later than `other`, both (m,).
+
+    It is where the correlation of the rates is largest, to which flat tops add nothing.
+    """
+    most = round(MOST_LATE_S * GRID_HZ)
+    rates = np.gradient(mine), np.gradient(other)
+    shifts = np.arange(-most, most + 1)
+    inner = slice(most, mine.size - most)
+    alike = [float(rates[0][inner] @ np.roll(rates[1], k)[inner]) for k in shifts]
+    k = min(max(int(np.argmax(alike)), 1), shifts.size - 2)
+    bend = alike[k - 1] - 2.0 * alike[k] + alike[k + 1]
+    return float(shifts[k]) + (0.5 * (alike[k - 1] - alike[k + 1]) / bend if bend < 0.0 else 0.0)
+
+
+def in_step(joint: Rotation, grid: Grid, rate_hz: float) -> InStep:
+    """The joint put in step with a grid whose rotation is read from wires.
+
+    Around impacts, where rotation and opening have corners, as much more is left out as the joint is late by.
+    """
+    late_s = lateness(coarse(joint.theta, rate_hz), grid.theta) / GRID_HZ
+    early = round(late_s * rate_hz)
+    moved = replace(
+        joint,
+        theta=sooner(joint.theta, early),
+        lift=sooner(joint.lift, early),
+        twist=sooner(joint.twist, early),
+    )
+    apart = grid.from_impact_s > MASK_S + abs(late_s)
+    return InStep(moved, replace(grid, theta=coarse(moved.theta, rate_hz)), apart, early / rate_hz)

@@ -1,0 +1,93 @@
+"""How fast did the wall move when it was let go? Away from upright or back: what the fall alone cannot tell.
+
+A wall thrown up falls through its held rotation as fast as it left it. The times of the fall therefore
+know the size of the speed at the release and not its sign; the
+hundredth parts of a second around the release know both.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.motion.swings import Swings
+from daq_app.gap.rocking_model.records import Survey
+
+BEFORE_S, AFTER_S = 0.06, 0.10
+SEARCHED_S = 0.05
+_STEPS = 41
+_WORK_HZ = 1000.0
+_PROFILED = 401
+_SPEEDS_RAD_S = np.linspace(-0.08, 0.08, 321)
+TOLERANCE_RAD_S = 1e-3
+"""What the form of the very first motion (a cable that gives way, a slow sensor) may feign."""
+
+
+def release_speed(
+    theta: FloatArray, noise_rad: float, swings: Swings, survey: Survey, rate_hz: float
+) -> tuple[float, float] | None:
+    """(speed away from upright in rad/s, its sd) at the release; None where the record is too short.
+
+    Least squares of θ₀ + v sinh(pτ)/p − a (cosh(pτ) − 1)/p², τ the time since a release that is sought
+    too: the motion of the linearised block, held until then.
+    """
+    step = max(round(rate_hz / _WORK_HZ), 1)
+    first = round((swings.release_s - BEFORE_S - SEARCHED_S) * rate_hz)
+    last = round((swings.release_s + AFTER_S) * rate_hz)
+    if first < 0 or last > theta.size:
+        return None
+    count = (last - first) // step
+    side = float(np.sign(swings.peak_rad[0]))
+    seen = side * theta[first : first + count * step].reshape(count, step).mean(axis=1)
+    time_s = (first + step * (np.arange(count, dtype=np.float64) + 0.5) - 0.5) / rate_hz - swings.release_s
+    starts: FloatArray = np.linspace(-SEARCHED_S, SEARCHED_S, _STEPS, dtype=np.float64)
+    lost = [_fit(seen, time_s, start, survey.p_rad_s)[0] for start in starts]
+    best = int(np.argmin(lost))
+    for _ in range(4):
+        width = starts[1] - starts[0]
+        starts = starts[best] + np.linspace(-width, width, 9, dtype=np.float64)
+        lost = [_fit(seen, time_s, start, survey.p_rad_s)[0] for start in starts]
+        best = int(np.argmin(lost))
+    left, found, _ = _fit(seen, time_s, float(starts[best]), survey.p_rad_s)
+    variance = max(left / max(count - 4, 1), noise_rad**2 / step)
+    told = _told(seen, time_s, survey.p_rad_s, float(found[1]), variance)
+    # Thrown up the wall rises v²/2a above its hold; what the hold sways by is as good as that.
+    swayed = 2.0 * swings.hold_sd * abs(found[2]) / max(abs(found[1]), 1e-6)
+    return float(found[1]), float(np.linalg.norm([told, swayed, TOLERANCE_RAD_S]))
+
+
+def _told(seen: FloatArray, time_s: FloatArray, p: float, speed: float, variance: float) -> float:
+    """Sd of the speed, from its likelihood with every other unknown at its best.
+
+    What is seen is how far the motion turns above the hold, v²/2a, which says little of a small v and of
+    its sign: the curvature at the best speed would promise too much. The sd is that at which no speed
+    at all is as unlikely as it is; where it is likely, how far off others are that are not.
+    """
+    lost = np.full(_SPEEDS_RAD_S.size, np.inf)
+    for start in np.linspace(-SEARCHED_S, SEARCHED_S, _PROFILED, dtype=np.float64):
+        # The speed's column comes last: what the others leave is a parabola in the speed.
+        basis, triangle = np.linalg.qr(_design(time_s, float(start), p)[:, [0, 2, 1]])
+        along = basis.T @ seen
+        rest = float(seen @ seen - along @ along)
+        lost = np.minimum(lost, rest + (along[2] - triangle[2, 2] * _SPEEDS_RAD_S) ** 2)
+    squares = (lost - lost.min()) / variance
+    against_none = float(squares[_SPEEDS_RAD_S.size // 2])
+    if against_none > 1.0:
+        return abs(speed) / float(np.sqrt(against_none))
+    apart = np.abs(_SPEEDS_RAD_S - speed)
+    return float(np.min(apart, where=squares >= 1.0, initial=apart.max()))
+
+
+def _design(time_s: FloatArray, start_s: float, p: float) -> FloatArray:
+    since = p * np.maximum(time_s - start_s, 0.0)
+    return np.column_stack([np.ones_like(time_s), np.sinh(since) / p, -(np.cosh(since) - 1.0) / p**2])
+
+
+def _fit(
+    seen: FloatArray, time_s: FloatArray, start_s: float, p: float
+) -> tuple[float, FloatArray, FloatArray]:
+    """(squares left, coefficients, design) with the release at `start_s`."""
+    design = _design(time_s, start_s, p)
+    found: FloatArray = np.linalg.lstsq(design, seen, rcond=None)[0].astype(np.float64)
+    left = seen - design @ found
+    return float(left @ left), found, design

@@ -1,0 +1,225 @@
+"""Release, peaks and crossing times of one run, each with its measurement error."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from daq_app.gap.core import CannotDiagnose
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.motion.rotation import HOLD_S
+from sim_hardware.dynamics.parameters import REST_AMPLITUDE_RAD
+
+FRACTIONS = (0.85, 0.5, 0.15)
+"""Rotations at which half-cycles are timed, as shares of the peak."""
+RELEASE_FRACTIONS = (0.99, 0.96, 0.85, 0.5, 0.15)
+"""The same for the quarter-cycle after the release, which is watched closer at its start."""
+SMALLEST_RAD = 2e-3
+"""Half-cycles with smaller peaks are not used."""
+MOST = 30
+_LAST = 9
+"""Peaks from which the fall from one to the next is taken, where it no longer depends on the amplitude."""
+_SMOOTH_HZ = 30.0
+_WINDOW_S = 0.015
+
+
+@dataclass(frozen=True, slots=True)
+class Swings:
+    """Half-cycles of a run; the first is the quarter-cycle from the release.
+
+    `release_s`: s from the start of the record. `peak_s`, `peak_rad`, `peak_sd`: shape (n,), times
+    from the release; row 0 is the held rotation. `fall_s`, `rise_s` and their `…_sd`: times from
+    the release at which |θ| crosses the levels, shape (n, F), NaN where it could not be timed.
+    `levels`: shape (n, F), rad.
+    """
+
+    release_s: float
+    peak_s: FloatArray
+    peak_rad: FloatArray
+    peak_sd: FloatArray
+    levels: FloatArray
+    fall_s: FloatArray
+    fall_sd: FloatArray
+    rise_s: FloatArray
+    rise_sd: FloatArray
+    rest_s: float
+    hold_sd: float
+    """How far the held rotation sways, rad: nobody holds five tonnes still."""
+    hold_rate_sd: float
+    """Speed of that sway, rad/s."""
+
+    @property
+    def impacts(self) -> float:
+        """Impacts of the run until the wall rests by the simulator's criterion.
+
+        Those too small to be timed are as many as it takes to come to rest in the ratio of the last peaks:
+        what wears counts them too, and from 2 mrad down to rest they are half of all.
+        """
+        last = np.log(np.abs(self.peak_rad[-_LAST:]))
+        fall = max(float(last[0] - last[-1]) / (last.size - 1), 1e-3)
+        return self.peak_rad.size - 1 + max(float(last[-1]) - math.log(REST_AMPLITUDE_RAD), 0.0) / fall
+
+
+def find_swings(theta: FloatArray, noise_rad: float, rate_hz: float, name: str) -> Swings:
+    """Locate everything in a rotation record (n,), rad. Raises `CannotDiagnose` if nothing rocks."""
+    smooth = sosfiltfilt(butter(4, _SMOOTH_HZ, fs=rate_hz, output="sos"), theta)
+    held = float(np.mean(theta[: int(HOLD_S * rate_hz)]))
+    if abs(held) < max(SMALLEST_RAD, 20 * noise_rad / np.sqrt(HOLD_S * rate_hz)):
+        raise CannotDiagnose(
+            f"Run {name}: the wall is not held at a rotation at the start ({1e3 * held:.2f} mrad).",
+            "A record must begin with the wall pulled and held.",
+        )
+    crossings = np.flatnonzero(np.diff(np.sign(smooth)) != 0)
+    crossings = crossings[
+        np.abs(smooth[np.clip(crossings + int(0.02 * rate_hz), 0, theta.size - 1)]) > 3 * noise_rad
+    ]
+    if crossings.size < 3:
+        raise CannotDiagnose(
+            f"Run {name}: the wall never rocks.", "Check that it was released in this record."
+        )
+    release = _release(smooth, held, noise_rad, int(crossings[0]))
+    held, held_sd, sway, sway_rate = _hold(theta, release, noise_rad, rate_hz)
+    peaks = _peaks(theta, smooth, crossings, noise_rad, rate_hz)
+    if len(peaks) < 3:
+        raise CannotDiagnose(
+            f"Run {name}: only {len(peaks)} half-cycles are larger than {1e3 * SMALLEST_RAD:.0f} mrad.",
+            "Release it from a larger rotation.",
+        )
+    rest = float(np.flatnonzero(np.abs(smooth) > max(5 * noise_rad, 2e-4))[-1]) / rate_hz
+    times = np.array([release / rate_hz, *(p[0] for p in peaks)]) - release / rate_hz
+    values = np.array([held, *(p[1] for p in peaks)])
+    sds = np.array([held_sd, *(p[2] for p in peaks)])
+    count = len(RELEASE_FRACTIONS)
+    levels = np.abs(values)[:, None] * np.array([*FRACTIONS, *[FRACTIONS[-1]] * (count - len(FRACTIONS))])
+    levels[0] = abs(held) * np.array(RELEASE_FRACTIONS)
+    shape = (values.size, count)
+    fall, fall_sd, rise, rise_sd = (np.full(shape, np.nan) for _ in range(4))
+    for k, value in enumerate(values):
+        side = np.sign(value)
+        begin = int(release) if k == 0 else int(peaks[k - 1][3])
+        end = int(peaks[k][3]) if k < len(peaks) else min(begin + int(1.0 * rate_hz), theta.size - 1)
+        for j in range(count if k == 0 else len(FRACTIONS)):
+            if k == 0 and RELEASE_FRACTIONS[j] > 1.0 - 6.0 * sway / abs(held):
+                continue  # the sway alone may keep the wall below this level
+            fall[k, j], fall_sd[k, j] = _crossing(
+                side * theta, side * smooth, levels[k, j], begin, end, noise_rad, rate_hz
+            )
+            if k > 0:
+                before = int(release) if k == 1 else int(peaks[k - 2][3])
+                rise[k, j], rise_sd[k, j] = _crossing(
+                    side * theta, side * smooth, levels[k, j], begin, before, noise_rad, rate_hz
+                )
+    offset = release / rate_hz
+    return Swings(
+        offset,
+        times,
+        values,
+        sds,
+        levels,
+        fall - offset,
+        fall_sd,
+        rise - offset,
+        rise_sd,
+        rest,
+        sway,
+        sway_rate,
+    )
+
+
+def _hold(
+    theta: FloatArray, release: float, noise: float, rate_hz: float
+) -> tuple[float, float, float, float]:
+    """(rotation just before the release, its noise, sway, speed of the sway) while the wall is held."""
+    end = max(int(release - 0.02 * rate_hz), int(0.3 * rate_hz))
+    start = max(int(end - HOLD_S * rate_hz), 0)
+    step = int(0.02 * rate_hz)
+    count = (end - start) // step
+    means = theta[end - count * step : end].reshape(count, step).mean(axis=1)
+    own = noise / np.sqrt(step)
+    sway = float(np.sqrt(max(np.var(means) - own**2, 0.0)))
+    rates = np.diff(means) * rate_hz / step
+    speed = float(np.sqrt(max(np.var(rates) - 2 * (own * rate_hz / step) ** 2, 0.0)))
+    if sway < 0.5 * own:
+        return float(means.mean()), float(noise / np.sqrt(count * step)), 0.0, 0.0
+    last = means[-4:]
+    return float(last.mean()), float(own / 2.0), sway, speed
+
+
+def _release(smooth: FloatArray, held: float, noise: float, first_crossing: int) -> float:
+    """Sample of the release: the fall extrapolated back to the held rotation, |θ₀| − ½ a t²."""
+    moved = abs(held) - np.sign(held) * smooth[:first_crossing]
+    low, high = max(10 * noise * 0.2, 0.01 * abs(held)), 0.1 * abs(held)
+    window = np.flatnonzero((moved > low) & (moved < high))
+    window = window[window > first_crossing // 2] if window.size > 20 else window
+    if window.size < 5:
+        return float(np.flatnonzero(moved < low)[-1])
+    slope, intercept = np.polyfit(window, np.sqrt(moved[window]), 1)
+    return float(-intercept / slope)
+
+
+def _peaks(
+    theta: FloatArray, smooth: FloatArray, crossings: np.ndarray, noise: float, rate_hz: float
+) -> list[tuple[float, float, float, int]]:
+    """(time in s, signed peak, its sd, sample) of each half-cycle after the first impact."""
+    found = []
+    for start, stop in itertools.pairwise(crossings):
+        part = smooth[start:stop]
+        if part.size < 0.04 * rate_hz:
+            continue
+        at = int(start) + int(np.argmax(np.abs(part)))
+        side = np.sign(smooth[at])
+        size = abs(float(smooth[at]))
+        if size < max(SMALLEST_RAD, 15 * noise):
+            break
+        inside = np.flatnonzero(side * part > 0.85 * size) + int(start)
+        inside = np.arange(inside[0], inside[-1] + 1)
+        t = (inside - at) / rate_hz
+        scale = max(float(np.abs(t).max()), 1e-6)
+        design = np.vander(t / scale, 5, increasing=True)
+        coefficients, *_ = np.linalg.lstsq(design, side * theta[inside], rcond=None)
+        slope = np.polynomial.Polynomial(coefficients).deriv()
+        roots = [float(r.real) for r in slope.roots() if abs(r.imag) < 1e-9 and abs(r.real) < 0.7]
+        top = min(roots, key=abs, default=0.0)
+        row = np.vander([top], 5, increasing=True)[0]
+        covariance = np.linalg.inv(design.T @ design)
+        sd = noise * float(np.sqrt(row @ covariance @ row))
+        found.append((at / rate_hz + top * scale, side * float(row @ coefficients), sd, at))
+        if len(found) >= MOST:
+            break
+    return found
+
+
+def _crossing(
+    folded: FloatArray, smooth: FloatArray, level: float, begin: int, end: int, noise: float, rate_hz: float
+) -> tuple[float, float]:
+    """(time in s, sd) at which the folded rotation passes `level` between samples `begin` and `end`.
+
+    A parabola is fitted over a short window that does not reach the impact.
+    """
+    step = 1 if end > begin else -1
+    below = np.flatnonzero(smooth[begin:end:step] < level)
+    if below.size == 0:
+        return np.nan, np.nan
+    at = begin + step * int(below[0])
+    zero = np.flatnonzero(smooth[at:end:step] <= 0)
+    to_zero = int(zero[0]) if zero.size else int(0.05 * rate_hz)
+    half = int(max(min(_WINDOW_S * rate_hz, 0.7 * to_zero), 6))
+    window = np.arange(at - half, at + half + 1)
+    if window[0] < 0 or window[-1] >= folded.size:
+        return np.nan, np.nan
+    t = (window - at) / rate_hz
+    design = np.vander(t, 3, increasing=True)
+    coefficients, *_ = np.linalg.lstsq(design, folded[window] - level, rcond=None)
+    shift = -coefficients[0] / coefficients[1]
+    for _ in range(3):
+        slope = coefficients[1] + 2 * coefficients[2] * shift
+        shift -= (coefficients[0] + coefficients[1] * shift + coefficients[2] * shift**2) / slope
+    if abs(shift) > half / rate_hz:
+        return np.nan, np.nan
+    row = np.array([1.0, shift, shift**2])
+    sd = noise * float(np.sqrt(row @ np.linalg.inv(design.T @ design) @ row)) / abs(float(slope))
+    return at / rate_hz + float(shift), sd

@@ -1,0 +1,256 @@
+"""The rocking wall as a model of the core: the simulator's own half-cycles from the measured peaks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+
+import numpy as np
+
+from daq_app.gap.core import Parameter, Prediction, Run, Scatter
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features import sensor_response as response
+from daq_app.gap.rocking_model.features.extra_response import with_measured_inputs
+from daq_app.gap.rocking_model.features.impact_timing import MIDDLE_OF_IMPACT_S
+from daq_app.gap.rocking_model.features.repeatability import biases
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.prediction.free_forms import free_times, with_uneven_loss
+from daq_app.gap.rocking_model.prediction.true_motion import pause_at_impact, true_rotations
+from daq_app.gap.rocking_model.prediction.vector import (
+    acts_on,
+    half_cycle_table,
+    kernel_vector,
+    restitution_of,
+)
+from daq_app.gap.rocking_model.records import Survey
+from sim_hardware.dynamics import shooting
+
+SCATTER_R = "scatter of r"
+SCATTER_TIME = "scatter of times"
+SCATTER_RELEASE = "scatter of releases"
+SCATTER_SENSOR = "scatter of sensors"
+PUSH_RAD_S = 3e-4
+"""Speed that a clean release may leave; nobody lets go of five tonnes without touching them."""
+_REMEMBERED = 6
+
+
+@lru_cache(maxsize=1024)
+def _acting(part: str, names: tuple[str, ...], reference: str) -> tuple[str, ...]:
+    """Those of the values that a part of the prediction depends on."""
+    return tuple(name for name in names if acts_on(part, name, reference))
+
+
+class RockingModel:
+    """Housner's block with refitted α, p, r, b and sensor calibrations; effects by the simulator's names.
+
+    The peaks of a run are taken as measured. From each, the simulator gives the fall to the next
+    impact and, backwards, the rise since the one before; the speeds on both sides of an impact then
+    say what r was. Scatter of r thus enters one feature per impact and never accumulates.
+    """
+
+    name = "free rocking"
+    scatters = (
+        Scatter(SCATTER_R, 0.004, 0.7, 0.012, "1", "relative scatter of r from impact to impact"),
+        Scatter(SCATTER_TIME, 3e-5, 1.0, 8e-5, "s", "what half-cycle times scatter by beyond sensor noise"),
+        Scatter(
+            SCATTER_RELEASE, 3e-5, 1.0, 1.5e-4, "s", "what the times of the first fall scatter by besides"
+        ),
+        Scatter(
+            SCATTER_SENSOR, 0.7, 0.35, 2.0, "1", "repeatability of sensor coefficients, in their own units"
+        ),
+    )
+
+    def __init__(self, survey: Survey, channels: Mapping[str, Mapping[str, float]] | None = None) -> None:
+        """`channels` are examined on their own: what a sound one may be off by in gain, lag, … (sd)."""
+        self.survey = survey
+        self.channels = dict(channels or {})
+
+    @property
+    def nuisance(self) -> tuple[Parameter, ...]:
+        s = self.survey
+        tolerance = 0.003
+        return (
+            Parameter(
+                "alpha", s.alpha_rad, s.alpha_tolerance * s.alpha_rad, "rad", 0.02, 0.6, meaning="slenderness"
+            ),
+            Parameter(
+                "p", s.p_rad_s, s.p_tolerance * s.p_rad_s, "rad/s", 0.5, 6.0, meaning="frequency parameter"
+            ),
+            Parameter("r", 0.97 * s.r_max, 0.04, "1", 0.5, 1.0, meaning="velocity restitution"),
+            Parameter(
+                "half_base",
+                s.half_base_m,
+                s.half_base_tolerance_m,
+                "m",
+                0.02,
+                2.0,
+                meaning="half width of the base",
+            ),
+            Parameter(
+                "face_a", 0.0, tolerance / math.sqrt(12), "1", meaning="calibration of the LVDTs at x < 0"
+            ),
+            Parameter(
+                "face_b", 0.0, tolerance / math.sqrt(12), "1", meaning="calibration of the LVDTs at x > 0"
+            ),
+            Parameter("cal_wire", 0.0, tolerance / math.sqrt(5), "1", meaning="calibration of the wires"),
+            Parameter(
+                "cal_tiltmeter",
+                0.0,
+                tolerance / math.sqrt(2),
+                "1",
+                meaning="calibration of the tiltmeters",
+                linear=True,
+            ),
+            Parameter(
+                "cal_accelerometer", 0.0, tolerance / 2, "1", meaning="calibration of the accelerometers"
+            ),
+            Parameter(
+                "tilt_response", 0.0, 0.01, "s", meaning="error of the tiltmeters' time constant", linear=True
+            ),
+            Parameter(
+                "onset",
+                MIDDLE_OF_IMPACT_S,
+                1e-3,
+                "s",
+                meaning="middle of the impact after the contact",
+                linear=True,
+            ),
+            Parameter(
+                "base_follow", 0.0, 4e-3, "1", meaning="translation from wire calibrations", linear=True
+            ),
+            Parameter("twist_follow", 0.0, 2e-3, "1/m", meaning="twist from LVDT calibrations", linear=True),
+            Parameter(
+                "mount_height",
+                0.0,
+                self.survey.mount_tolerance_m,
+                "m",
+                meaning="error of the height of the LVDTs' points above the joint",
+                linear=True,
+            ),
+            Parameter("wire_even", 0.0, 5e-3, "1/rad", meaning="even part from wire anchors", linear=True),
+            *(
+                Parameter(f"cal_{name}_{shape}", 0.0, own, meaning=f"{shape} of {name}", linear=True)
+                for name, sound in self.channels.items()
+                for shape, own in sound.items()
+            ),
+            *biases(),
+        )
+
+    def local_nuisance(self, run: Run) -> tuple[Parameter, ...]:
+        assert isinstance(run, RockingRun)
+        swings = run.swings
+        return (
+            Parameter("zero", 0.0, 5e-5, "rad", meaning="rotation at which the wall stands upright"),
+            Parameter("theta0", 0.0, swings.hold_sd + 2e-6, "rad", meaning="sway of the held rotation"),
+            Parameter(
+                "omega0",
+                0.0,
+                swings.hold_rate_sd + PUSH_RAD_S,
+                "rad/s",
+                meaning="speed of the sway at release",
+            ),
+        )
+
+    def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
+        assert isinstance(run, RockingRun)
+        values = with_measured_inputs(run, values)
+        predicted = np.empty(len(run.features))
+        loading_r = np.zeros(len(run.features))
+        count = len(run.places)
+        predicted[:count], peaks, slopes = self._remembered(run, "swings", values, self._swings)
+        last = count + run.peaks.size
+        predicted[count:last] = peaks
+        loading_r[count:last] = 1.0 / slopes
+        predicted[last:], units = response.block_coefficients(run, values)
+        loadings = {SCATTER_R: loading_r, **self._fixed_scatters(run, units)}
+        return Prediction(predicted, loadings, run.block_loadings)
+
+    @staticmethod
+    def _fixed_scatters(run: RockingRun, units: FloatArray) -> dict[str, FloatArray]:
+        """Loadings that no parameter changes, worked out once per run; `units` are those of the blocks."""
+        if "loadings" not in run.cache:
+            times, releases, sensors = (np.zeros(len(run.features)) for _ in range(3))
+            count = len(run.places)
+            times[:count] = 1.0
+            releases[:count] = (run.places[:, 0] == 0) & (run.places[:, 2] == 0)
+            sensors[count + run.peaks.size :] = units
+            run.cache["loadings"] = {SCATTER_TIME: times, SCATTER_RELEASE: releases, SCATTER_SENSOR: sensors}
+        found: dict[str, FloatArray] = run.cache["loadings"]
+        return found
+
+    @staticmethod
+    def _remembered(
+        run: RockingRun,
+        part: str,
+        values: Mapping[str, float],
+        work_out: Callable[[RockingRun, Mapping[str, float]], tuple[FloatArray, ...]],
+    ) -> tuple[FloatArray, ...]:
+        """A part of the prediction, kept for the last few values of what it depends on.
+
+        Differences move one parameter at a time, and most parameters move one part only.
+        """
+        kept: dict[tuple[tuple[str, ...], tuple[float, ...]], tuple[FloatArray, ...]] = run.cache.setdefault(
+            part, {}
+        )
+        chosen = _acting(part, tuple(values), run.reference)
+        key = (chosen, tuple(map(values.__getitem__, chosen)))
+        found = kept.get(key)
+        if found is None:
+            if len(kept) >= _REMEMBERED:
+                del kept[next(iter(kept))]
+            found = kept[key] = work_out(run, values)
+        return found
+
+    def _swings(
+        self, run: RockingRun, values: Mapping[str, float]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Times (T,), log peaks (P,) and d ln speed / d ln peak (P,)."""
+        key, vector, clock = kernel_vector(run, values)
+        true, levels = true_rotations(run, values)
+        table = self._half_cycles(run, vector, true, levels, key)
+        table = with_uneven_loss(run, values, vector, true, levels, table)
+        count = levels.shape[1]
+        first = shooting.FIRST_CROSSING
+        speeds_out, speeds_in = table[:, shooting.SPEED_OUT], table[:, shooting.SPEED_IN]
+        pause = pause_at_impact(values, speeds_out)
+        # Crossings as times from their own peak: positive in the fall, negative in the rise.
+        crossings = table[:, first : first + 2 * count].copy()
+        crossings[:, count:] *= -1.0
+        places = run.places
+        times = crossings[places[:, 2], places[:, 3]] - crossings[places[:, 0], places[:, 1]]
+        across = run.across
+        k = places[across, 0]
+        times[across] += table[k, shooting.FALL_S] + pause[k] + table[k + 1, shooting.RISE_S]
+        times = times / clock + free_times(run, values)
+        k = run.peaks
+        before = k - 1
+        r = restitution_of(run, values, speeds_out[before], np.sign(true[before]), before)
+        excess = (
+            np.log(np.maximum(speeds_in[k], 1e-12))
+            - np.log(np.maximum(speeds_out[before], 1e-12))
+            - np.log(r)
+        )
+        size = np.abs(true[k])
+        stiffness = vector[1] ** 2 * np.sin(np.maximum(vector[0] - size, 0.01))
+        slopes = size * stiffness / np.maximum(speeds_in[k], 1e-9) ** 2
+        measured = np.log(np.abs(run.swings.peak_rad[k]))
+        return times, measured - excess / slopes, slopes
+
+    @staticmethod
+    def _half_cycles(
+        run: RockingRun, vector: FloatArray, true: FloatArray, levels: FloatArray, key: bytes
+    ) -> FloatArray:
+        """The simulator's half-cycles; remembered for the last parameters, since many do not move them."""
+        if run.cache.get("key") == key:
+            known: FloatArray = run.cache["table"]
+            return known
+        table = half_cycle_table(run, vector, true, levels)
+        run.cache["key"], run.cache["table"] = key, table
+        return table
+
+
+class UnscatteredModel(RockingModel):
+    """The same with a likelihood that knows no scatter of r, to see what it is worth."""
+
+    scatters = (Scatter(SCATTER_R, 1e-6, 1e-3, 1.0, "1", "held at nothing"), *RockingModel.scatters[1:])

@@ -1,0 +1,63 @@
+"""The wall behind the reference rotation: what its family's faults hide of peaks, levels and impacts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.motion.rotation import anchors_off
+
+
+def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
+    """(peaks, levels) of the wall behind those that the reference family shows."""
+    peaks = run.swings.peak_rad
+    side = np.sign(peaks)
+    name = run.reference
+    gain = np.full(peaks.shape, 1.0 + values.get(f"gain@{name}.error", 0.0))
+    if name == "lvdt":
+        # The face that opens is the one that measures: x < 0 for a positive rotation.
+        gain = gain * (1.0 + np.where(side > 0, values["face_a"], values["face_b"]))
+    else:
+        gain = gain * (1.0 + values["cal_wire"])
+    rest = run.swings.rest_s - run.swings.release_s
+    drift = values.get("drift@wire.rate", 0.0) / run.wire_height_m if name == "wire" else 0.0
+    offset = values["zero"] + drift * (run.swings.peak_s - rest)
+    levels = side[:, None] * run.swings.levels
+    # A delay moves peaks and crossings alike; what a response rounds beyond it goes with the acceleration.
+    slow = _second_order(values, name) * values["p"] ** 2
+    rounded = [-slow * np.sign(seen) * np.sin(values["alpha"] - np.abs(seen)) for seen in (peaks, levels)]
+    rounded[0][0] = 0.0  # it is held there
+    true = (peaks - offset - _bent(run, values, peaks) - rounded[0]) / gain
+    true[0] += side[0] * values["theta0"]
+    behind = (levels - offset[:, None] - _bent(run, values, levels) - rounded[1]) / gain[:, None]
+    return true, np.abs(behind)
+
+
+def _bent(run: RockingRun, values: Mapping[str, float], theta: FloatArray) -> FloatArray | float:
+    """What wires out of line add to a rotation that is read from them."""
+    found: FloatArray | float = 0.0
+    if bend := values.get(f"wire_cosine@{run.reference}.kappa", 0.0):
+        found = bend * run.wire_bend_m * theta**2
+    if higher := values.get(f"wire_anchor@{run.reference}.height", 0.0):
+        found = found + anchors_off(run.wires, theta, higher)[0]
+    return found
+
+
+def _second_order(values: Mapping[str, float], name: str) -> float:
+    """Second moment of a sensor's response less half the square of its delay, s²: what rounds a peak."""
+    slow = values.get(f"slow_response@{name}.tau", 0.0)
+    delay = values.get(f"filter_delay@{name}.tau", 0.0)
+    return 0.5 * slow**2 + delay**2 / 6.0
+
+
+def pause_at_impact(values: Mapping[str, float], speeds: FloatArray) -> FloatArray:
+    """Time lost at each impact: contact, or the flight of a hop less what it saves on the way up."""
+    pause = np.full(speeds.shape, values.get("dwell.tau", 0.0))
+    flight = values.get("bounce.tau", 0.0)
+    if flight:
+        share = values.get("bounce.share", 0.5)
+        pause = pause + flight * speeds / 0.2 * (1.0 - values["r"] ** (share - 1.0))
+    return pause

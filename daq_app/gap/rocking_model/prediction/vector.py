@@ -1,0 +1,127 @@
+"""From the core's named values to the simulator's parameter vector."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cache, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from sim_hardware.dynamics import parameters as par
+from sim_hardware.dynamics import shooting
+from sim_hardware.dynamics.effects import MOTION_EFFECTS
+
+TOLERANCE = 1e-10
+"""Local error of the integrator, relative to the half-cycle: times good to nanoseconds."""
+_INDEX = {
+    f"{spec.name}.{p.name}": p.index for spec in MOTION_EFFECTS for p in spec.parameters if p.index >= 0
+}
+_DEFAULTS = {
+    spec.name: [(p.index, p.default) for p in spec.parameters if p.default is not None and p.index >= 0]
+    for spec in MOTION_EFFECTS
+}
+PROBE_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45)
+"""Knots of the free r(v), rad/s."""
+_MIDDLE_SPEED = 0.36
+"""Share of p α: the mean speed of the impacts of a run. About it a curvature of r(v) has neither value nor
+slope, so that the priors of r and of its slope say nothing of it."""
+
+
+_BLOCKS_ONLY = frozenset(
+    ("cal_tiltmeter", "cal_accelerometer", "tilt_response", "onset", "base_follow", "twist_follow")
+) | {"mount_height", "wire_even"}
+_STILL = ("bias_", "flexible_wall.", "yaw.", "twist.", "sliding.")
+"""Effects that do not move the rotation of the joint."""
+_SWINGS_ONLY = frozenset(("p", "r", "theta0", "omega0", "viscous.zeta", "coulomb.mu")) | {
+    "slope_power.c",
+    "slope_square.c",
+    "loss_power.mu",
+    "loss_growth.zeta",
+    "loss_side.zeta",
+}
+
+
+@cache
+def acts_on(part: str, key: str, reference: str) -> bool:
+    """Whether a value moves the ``swings`` or the ``blocks`` of a prediction; yes unless known otherwise."""
+    if part == "blocks":
+        return key not in _SWINGS_ONLY
+    if key in _BLOCKS_ONLY or key.startswith(_STILL):
+        return False
+    if key.startswith("cal_") and key != "cal_wire":
+        return False  # of one channel, which is not used with its family
+    return "@" not in key or key.rpartition(".")[0].rpartition("@")[2] == reference
+
+
+@lru_cache(maxsize=1024)
+def _entries(names: tuple[str, ...]) -> tuple[tuple[tuple[str, int], ...], tuple[str, ...]]:
+    """Of the names of values: those with a place in the vector, and those that act on what is measured."""
+    moving = tuple((name, _INDEX[name]) for name in names if name in _INDEX)
+    own = ("zero", "theta0", "cal_wire", "face_a", "face_b")
+    return moving, tuple(name for name in names if name in own or "@" in name)
+
+
+def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> tuple[bytes, FloatArray, float]:
+    """(key, vector, clock factor): the key names everything that the half-cycles depend on."""
+    vector = np.zeros(par.N_PARAMETERS)
+    alpha = values["alpha"]
+    vector[par.ALPHA], vector[par.P] = alpha, values["p"]
+    vector[par.R0] = values["half_base"] / math.sin(alpha)
+    vector[par.RESTITUTION] = values["r"]
+    vector[par.TOLERANCE] = TOLERANCE
+    vector[par.REST_AMPLITUDE] = par.REST_AMPLITUDE_RAD
+    vector[par.DURATION] = 1e9
+    vector[par.IMPACTS_BEFORE] = run.impacts_before
+    moving, measuring = _entries(tuple(values))
+    for key, index in moving:
+        for other, default in _DEFAULTS[key.rpartition(".")[0]]:
+            if vector[other] == 0.0:
+                vector[other] = default
+        vector[index] = values[key]
+    vector[par.OMEGA0] += values["omega0"]
+    vector[par.COULOMB] += values.get("loss_power.mu", 0.0)
+    measured = [values[key] for key in measuring]
+    dynamic = vector.copy()
+    dynamic[[par.RESTITUTION, par.R_SLOPE, par.R_ASYMMETRY, par.CRUSH_R]] = 0.0
+    identity = dynamic.tobytes() + np.asarray(measured, dtype=float).tobytes()
+    return identity, vector, 1.0 + values.get("clock.error", 0.0)
+
+
+def half_cycle_table(run: RockingRun, vector: FloatArray, true: FloatArray, levels: FloatArray) -> FloatArray:
+    """The simulator's half-cycles from the peaks `true` (n,), rad, timed at `levels` (n, F): (n, 5 + 2F)."""
+    table = np.empty((true.size, shooting.FIRST_CROSSING + 2 * levels.shape[1]))
+    side = 1.0 if run.swings.peak_rad[0] > 0 else -1.0
+    shooting.half_cycles(vector, run.swings.peak_s, true, levels, side, True, table)
+    return table
+
+
+def _curvature(run: RockingRun, values: Mapping[str, float], speeds: FloatArray) -> FloatArray:
+    """What the departures from a straight r(v) add."""
+    power, square = values.get("slope_power.c", 0.0), values.get("slope_square.c", 0.0)
+    middle = _MIDDLE_SPEED * run.survey.p_rad_s * run.survey.alpha_rad
+    off = speeds - middle
+    return power * (speeds * np.log(np.maximum(speeds, 1e-6) / middle) - off) + square * off**2
+
+
+def restitution_of(
+    run: RockingRun,
+    values: Mapping[str, float],
+    speeds: FloatArray,
+    sides: FloatArray,
+    impacts: NDArray[np.intp],
+) -> FloatArray:
+    """r of each impact, as the simulator's impact rule has it, plus free forms."""
+    r = values["r"] + values.get("restitution_slope.k", 0.0) * (speeds - 0.2)
+    r = r + _curvature(run, values, speeds)
+    r = r + sides * values.get("restitution_asymmetry.d", 0.0)
+    if "free_restitution.k0" in values:
+        knots = [values[f"free_restitution.k{i}"] for i in range(len(PROBE_SPEEDS))]
+        r = r + np.interp(speeds, PROBE_SPEEDS, knots) + sides * values["free_restitution.side"]
+        r = r + values["free_restitution.order"] * impacts / 10.0
+    r = r * (1.0 - values.get("restitution_wear.loss", 0.0) * 0.01 * (run.impacts_before + impacts))
+    found: FloatArray = np.clip(r, 0.05, 1.2)
+    return found
