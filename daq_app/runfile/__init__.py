@@ -27,11 +27,13 @@ from daq_app.runfile.model import (
     software_versions,
 )
 from daq_app.runfile.source import rig_of
+from daq_app.runfile.test_plan import CheckRecord, TestPlan
 
 __all__ = [
     "JOURNAL_SUFFIX",
     "RUN_SUFFIX",
     "BusyError",
+    "CheckRecord",
     "DerivedData",
     "DerivedSignal",
     "Event",
@@ -47,6 +49,7 @@ __all__ = [
     "Run",
     "RunFileError",
     "RunHeader",
+    "TestPlan",
     "VerifyReport",
     "finalise",
     "host_name",

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from daq_app.config.planning.plan import TaskPlan
+from daq_app.runfile.plain_text import clean_text
+from daq_app.runfile.test_plan import TestPlan
 
 RUN_FORMAT = "rocking-run"
 RUN_FORMAT_VERSION = 1
@@ -25,11 +27,6 @@ MAX_SAMPLES = 2**31
 MAX_GAP_SAMPLES = 2**26
 """Longest total of gaps in a run (4.6 h at 4000 Hz)."""
 _RESERVED_NAMES = frozenset({"time", "chunk"})
-
-
-def clean_text(text: str) -> str:
-    """Text that HDF5 and UTF-8 can hold: no NUL, no half of a surrogate pair."""
-    return text.encode("utf-8", "replace").decode().replace("\0", "\ufffd")
 
 
 def to_json(value: object) -> str:
@@ -92,6 +89,10 @@ class RunHeader(BaseModel):
     host: _Text = ""
     versions: dict[str, _Text] = Field(default_factory=dict)
     notes: _Text = ""
+    test_plan: TestPlan | None = None
+    """What the test was to be; None where nobody planned it (an import, a release that was not armed)."""
+    kept: dict[str, Any] | None = None
+    """For a release that was not armed and kept from the ring: which ring, and the release's sample."""
     truth: dict[str, Any] | None = None
     """What a simulated run was made from; None for a real one."""
     origin: dict[str, Any] | None = None

@@ -13,7 +13,8 @@ from daq_app.runfile.importers.mapping import MappedChannel
 from daq_app.runfile.importers.recording import Findings, Spool
 from daq_app.runfile.importers.timing import Timing
 from daq_app.runfile.importers.unit_text import is_time
-from daq_app.runfile.model import Event, Gap, RunHeader, clean_text
+from daq_app.runfile.model import Event, Gap, RunHeader
+from daq_app.runfile.plain_text import clean_text
 
 _MAX_COMMENTS = 10_000
 

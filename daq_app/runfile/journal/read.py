@@ -19,7 +19,8 @@ from pydantic import ValidationError
 from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.journal.frames import Frame, FrameType
 from daq_app.runfile.journal.scan import Scan, payload_is_good, scan_frames
-from daq_app.runfile.model import MAX_GAP_SAMPLES, MAX_SAMPLES, Event, Gap, RunHeader, clean_text, to_json
+from daq_app.runfile.model import MAX_GAP_SAMPLES, MAX_SAMPLES, Event, Gap, RunHeader, to_json
+from daq_app.runfile.plain_text import clean_text
 
 _MAX_TEXT_BYTES: Final = 2**24
 """Longest event or reason that is read."""
