@@ -31,7 +31,7 @@ from scipy import stats
 from daq_app.acquisition.course.tare import take_tare
 from daq_app.campaign.names import TestName
 from daq_app.campaign.plan import load_campaign
-from daq_app.campaign.report.collect import options_for, summarise
+from daq_app.campaign.report.collect import summarise
 from daq_app.campaign.report.statistics import random_effects_mean
 from daq_app.campaign.report.summary import MethodResult, TestSummary
 from daq_app.campaign.report.tables import METHODS, RestitutionRow, table_4_1
@@ -68,7 +68,7 @@ def analysed(test: PlannedSimulation) -> tuple[TestSummary, dict[str, Interval]]
         label=test.test,
     )
     name = TestName.parse(test.test)
-    analysis = analyse_record(record, options_for(name, AnalysisOptions(bias_runs=BIAS_RUNS)))
+    analysis = analyse_record(record, AnalysisOptions(bias_runs=BIAS_RUNS))
     if not analysis.found:
         raise RuntimeError(f"{test.test}, seed {test.seed}: {[note.text for note in analysis.notes]}")
     recorded = RecordedTest(name, TestVerdict.GOOD, 0, Path(f"{test.test}.h5"))

@@ -10,7 +10,7 @@ import pytest
 
 from daq_app.config import Rig, Scaling, load_rig, plan_tasks
 
-NAMES = ("fr1", "fr2", "fr1-iepe", "fr1-pxie")
+NAMES = ("fr1", "fr2", "fr1-iepe", "fr1-pxie", "original")
 
 
 @pytest.fixture(params=NAMES)
@@ -41,7 +41,11 @@ def test_every_value_without_a_source_is_marked(rig: Rig, configs: Path) -> None
 
 @pytest.mark.parametrize(
     ("name", "weight_kn", "inertia", "r0", "p", "alpha"),
-    [("fr1", 51.3, 16107, 1.525, 2.20, 0.215), ("fr2", 52.8, 17652, 1.574, 2.17, 0.208)],
+    [
+        ("original", 48.2, 15426, 1.535, 2.19, 0.213),
+        ("fr1", 51.3, 16107, 1.525, 2.20, 0.215),
+        ("fr2", 52.8, 17652, 1.574, 2.17, 0.208),
+    ],
 )
 def test_specimen_is_table_3_1(
     configs: Path, name: str, weight_kn: float, inertia: float, r0: float, p: float, alpha: float

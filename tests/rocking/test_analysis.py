@@ -159,11 +159,14 @@ def test_offsets_without_a_tare_are_taken_from_the_rest(made):
     assert analysis.estimates["eav"].r == pytest.approx(0.895, abs=0.002)
     assert analysis.theta0_rad == pytest.approx(-0.35 * 0.215, abs=0.001)
     assert analysis.residuals is None
-    assert any("no zero was taken" in note.text for note in analysis.notes)
+    assert analysis.zero == "rest"
+    assert any("zero is taken from the rest" in note.text for note in analysis.notes)
     kept = analyse_record(
         record_of(test, si, tared=False), AnalysisOptions(bias_runs=0, fit=False, zero_at_rest=False)
     )
     assert kept.residuals is not None
+    assert kept.zero == "certificates"
+    assert any("certificates' offsets" in note.text for note in kept.notes)
 
 
 def test_sliding_and_residual_rotation_are_seen(made):

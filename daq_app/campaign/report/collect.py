@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import zlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -113,7 +112,7 @@ def _analysed(test: RecordedTest, run: Run, options: AnalysisOptions) -> TestSum
     if run.rig is None:
         return _failure(test, "the run does not say which rig it was made with")
     try:
-        analysis = analyse_record(TestRecord.from_run(run, run.rig), options_for(test.name, options))
+        analysis = analyse_record(TestRecord.from_run(run, run.rig), options)
         if not analysis.found:
             return _failure(test, "; ".join(note.text for note in analysis.notes))
         return summarise(test, run.rig, analysis)
@@ -130,11 +129,6 @@ def _journal_only(test: RecordedTest) -> Failure | None:
 
 def _failure(test: RecordedTest, reason: str) -> Failure:
     return Failure(str(test.name), Path(test.path or ""), reason, test.verdict is TestVerdict.BAD)
-
-
-def options_for(name: TestName, options: AnalysisOptions) -> AnalysisOptions:
-    """Noise of its own for each test's simulated bias: corrections must not share one error."""
-    return replace(options, seed=zlib.crc32(str(name).encode()))
 
 
 def summarise(test: RecordedTest, rig: Rig, analysis: TestAnalysis) -> TestSummary:

@@ -34,9 +34,13 @@ def analyse(
         float | None, typer.Option(help="Cut-off of the velocity filter, Hz; the rig's if left out.")
     ] = None,
     zero_at_rest: Annotated[
-        bool,
-        typer.Option(help="Take every sensor's zero from the rest after the test (runs without a tare)."),
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--zero-at-rest/--keep-zero",
+            help="Take every sensor's zero from the rest after the test, or keep the one the run has. "
+            "Left out: from the rest where the run has no tare.",
+        ),
+    ] = None,
     bias_runs: Annotated[
         int, typer.Option(min=0, max=1000, help="Simulated tests behind each method's bias; 0: none.")
     ] = 6,

@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from daq_app.config.wording import plus_minus
+from daq_app.rocking.analysis.results import ZERO_WORDS
 
 if TYPE_CHECKING:
     from daq_app.rocking.analysis.results import Bias, TestAnalysis, ValueWithSigma
@@ -34,6 +35,7 @@ def analysis_tables(analysis: TestAnalysis) -> Iterator[RenderableType]:
     """Heading, θ0, half-cycles, r by method, joint and residuals, notes."""
     yield Text(f"{analysis.label or 'run'}: {_headline(analysis)}", style="bold")
     if analysis.found:
+        yield Text(f"Zero of every sensor: {ZERO_WORDS[analysis.zero]}.")
         yield _theta0_table(analysis)
         yield _cycle_table(analysis)
         yield Text(

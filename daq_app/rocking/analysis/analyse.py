@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -15,7 +16,7 @@ from daq_app.rocking.analysis.joint_summary import summarise_joint
 from daq_app.rocking.analysis.quality import quality_notes
 from daq_app.rocking.analysis.residuals import residuals_after
 from daq_app.rocking.analysis.results import Bias, HalfCycle, Series, TestAnalysis, Theory, ValueWithSigma
-from daq_app.rocking.analysis.signals import Signals, TestTimes, find_phases, read_signals
+from daq_app.rocking.analysis.signals import Signals, TestTimes, find_phases, quiet_end, read_signals
 from daq_app.rocking.estimators import RestitutionEstimate, eav_series, estimate_all
 from daq_app.rocking.geometry.joint import JointMotion
 from daq_app.rocking.motion.filtered_peaks import corrected_peaks, filtered_peaks
@@ -42,7 +43,9 @@ class AnalysisOptions:
     """Fit the whole motion."""
     bias_runs: int = 6
     """Simulated tests behind the methods' bias; 0 leaves it out."""
-    seed: int = 0
+    seed: int | None = None
+    """Of the noise in the simulated tests. None: the record's label decides, so that the corrections of a
+    campaign's tests share no error, and one record has one bias however it is analysed."""
     keep_series: bool = True
 
 
@@ -54,16 +57,34 @@ def analyse_record(record: TestRecord, options: AnalysisOptions | None = None) -
     options = options or AnalysisOptions()
     cutoff = options.velocity_cutoff_hz or record.rig.acquisition.velocity_cutoff_hz
     velocity_filter = VelocityFilter(record.rate_hz, cutoff)
-    signals = read_signals(record)
-    times = find_phases(signals)
     from_rest = not record.tared if options.zero_at_rest is None else options.zero_at_rest
-    if from_rest and times.rest is not None:
-        signals = signals.zeroed(times.rest)
-        times = find_phases(signals)
+    signals, times = _zeroed_at_rest(record) if from_rest else _as_recorded(record)
     velocity = velocity_filter.velocity(signals.bridged_rad)
     if times.release_s is None or not times.impacts_s:
         return _nothing_found(record, signals, times, velocity, velocity_filter, options)
     return _analyse(record, signals, times, velocity, velocity_filter, options)
+
+
+def _as_recorded(record: TestRecord) -> tuple[Signals, TestTimes]:
+    signals = read_signals(record)
+    return signals, find_phases(signals)
+
+
+def _zeroed_at_rest(record: TestRecord) -> tuple[Signals, TestTimes]:
+    """With every sensor's zero from the rest after the test; as recorded where no rest shows a test.
+
+    Offsets of a run without a tare may be so large that no hold is recognised, so the end of the record
+    serves as the first guess of the rest.
+    """
+    signals = read_signals(record)
+    end = quiet_end(signals)
+    times = find_phases(signals if end is None else signals.zeroed(end))
+    if times.rest is None:
+        times = find_phases(signals)
+    if times.rest is None:
+        return signals, times
+    signals = signals.zeroed(times.rest)
+    return signals, find_phases(signals)
 
 
 def _analyse(
@@ -95,7 +116,7 @@ def _analyse(
                 noise_rad=signals.noise_rad,
                 with_fit=options.fit,
                 runs=options.bias_runs,
-                seed=options.seed,
+                seed=zlib.crc32(record.label.encode()) if options.seed is None else options.seed,
             )
         )
     joint = summarise_joint(record, signals, track) if signals.joint is not None else None
@@ -118,6 +139,7 @@ def _analyse(
         joint=joint,
         residuals=residuals,
         noise_rad=signals.noise_rad,
+        zero=signals.zero,
         filter_statement=velocity_filter.statement,
         notes=(),
         series=_series(signals, velocity) if options.keep_series else None,
@@ -321,6 +343,7 @@ def _nothing_found(
         joint=None,
         residuals=None,
         noise_rad=signals.noise_rad,
+        zero=signals.zero,
         filter_statement=velocity_filter.statement,
         notes=quality_notes(record, signals, times, None, None, []),
         series=_series(signals, velocity) if options.keep_series else None,

@@ -48,10 +48,7 @@ def _sensors(record: TestRecord, signals: Signals) -> list[QualityNote]:
     missing = [channel_id for channel_id in record.rig.channel_ids if channel_id not in record.channel_ids]
     if missing:
         notes.append(_warn(f"channels of the rig that the record does not have: {', '.join(missing)}"))
-    if not record.tared:
-        notes.append(
-            _warn("no zero was taken before the test: rotation is counted from the certificates' offsets")
-        )
+    notes += _zero(record, signals)
     for name, share in signals.excluded_share.items():
         notes.append(
             _warn(f"wire {name} disagreed with the others and was left out for {share:.1%} of the record")
@@ -78,6 +75,18 @@ def _sensors(record: TestRecord, signals: Signals) -> list[QualityNote]:
         if joint.clipped:
             notes.append(_info(f"LVDTs that reached the end of their range: {', '.join(joint.clipped)}"))
     return notes
+
+
+def _zero(record: TestRecord, signals: Signals) -> list[QualityNote]:
+    """Which zero the rotation is counted from, where it is not the tare before the test."""
+    if signals.zero == "tare":
+        return []
+    reason = "the tare is not used" if record.tared else "no zero was taken before the test"
+    if signals.zero == "rest":
+        return [_info(f"{reason}: every sensor's zero is taken from the rest after it")]
+    return [
+        _warn(f"{reason}, and none is taken from a rest: rotation is counted from the certificates' offsets")
+    ]
 
 
 def _alignment(record: TestRecord) -> QualityNote:

@@ -15,6 +15,14 @@ from daq_app.rocking.motion.motion_fit import MotionFit
 
 Floats = NDArray[np.float64]
 
+Zero = Literal["tare", "rest", "certificates"]
+"""Taken before the test with the wall upright; from the rest after it; or the certificates' offsets alone."""
+ZERO_WORDS: Mapping[Zero, str] = {
+    "tare": "the tare before the test",
+    "rest": "the rest after the test",
+    "certificates": "the offsets of the certificates (no tare, and no other zero was taken)",
+}
+
 
 @dataclass(frozen=True, slots=True)
 class QualityNote:
@@ -180,6 +188,8 @@ class TestAnalysis:
     residuals: Residuals | None
     noise_rad: float
     """rms of the rotation while held, one sample."""
+    zero: Zero
+    """Where the zero of every sensor comes from."""
     filter_statement: str
     notes: tuple[QualityNote, ...]
     series: Series | None = None

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.rocking.analysis.fusion import Fused, fuse
+from daq_app.rocking.analysis.results import Zero
 from daq_app.rocking.geometry.joint import BaseJoint, JointMotion
 from daq_app.rocking.geometry.kinematics import RotationGeometry
 from daq_app.rocking.motion.phases import PhaseDetector, PhaseEvent, PhaseSettings
@@ -50,6 +51,13 @@ class Signals:
     fused: Fused | None
     zeroed_at_rest: bool = False
     """Whether the zeros were taken from the rest after the test."""
+
+    @property
+    def zero(self) -> Zero:
+        """Where the zeros of these signals come from."""
+        if self.zeroed_at_rest:
+            return "rest"
+        return "tare" if self.record.tared else "certificates"
 
     @property
     def first_s(self) -> float:
@@ -176,7 +184,8 @@ def find_phases(signals: Signals) -> TestTimes:
     start = followed[-1] if followed else (releases[-1] if releases else len(events))
     impacts = tuple(seconds(event.sample) for event in events[start:] if event.kind == "impact")
     rests = [event.sample for event in events[start:] if event.kind == "rest"]
-    first = math.ceil(rests[0]) - record.first_sample if rests else _quiet_end(signals)
+    end = None if rests else quiet_end(signals)
+    first = math.ceil(rests[0]) - record.first_sample if rests else (None if end is None else end.start)
     rest = None
     if first is not None and impacts:
         stop = min(first + round(2.0 * record.rate_hz), record.n_samples)
@@ -191,8 +200,8 @@ def find_phases(signals: Signals) -> TestTimes:
     )
 
 
-def _quiet_end(signals: Signals) -> int | None:
-    """First sample of a quiet end of the record, shorter than the detector asks for; None without one."""
+def quiet_end(signals: Signals) -> slice | None:
+    """Quiet end of the record (samples), maybe shorter than the detector asks for; None without one."""
     size = signals.phase_settings.frame_samples
     frames = signals.bridged_rad[: signals.bridged_rad.size // size * size].reshape(-1, size).mean(axis=1)
     need = round(_SHORTEST_REST_S / signals.phase_settings.frame_s)
@@ -201,7 +210,7 @@ def _quiet_end(signals: Signals) -> int | None:
     level = float(frames[-need:].mean())
     loud = np.flatnonzero(np.abs(frames - level) > signals.phase_settings.quiet_rad / 2.0)
     first = int(loud[-1]) + 1 if loud.size else 0
-    return first * size if frames.size - first >= need else None
+    return slice(first * size, frames.size * size) if frames.size - first >= need else None
 
 
 def _zero(values: Floats, rest: slice) -> Floats:

@@ -1,0 +1,81 @@
+"""One file, one set of numbers: from the command, the campaign's report, the window's data and Python."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from daq_app.acquisition.closing.derive import derive
+from daq_app.campaign.report.collect import collect
+from daq_app.cli.app import build_app
+from daq_app.config import load_rig, plan_tasks
+from daq_app.rocking import TestRecord, analyse_record
+from daq_app.runfile import JournalWriter, RunHeader, finalise, open_run, plan_to_dict, read_journal
+from sim_hardware.direct import synthesise_test
+
+_TEST = "FR1-L3-2"
+
+
+def write_run(folder: Path, configs: Path, *, tared: bool) -> Path:
+    """A simulated test as a run file with its journal beside it, with a tare or without."""
+    text = (configs / "fr1.toml").read_text(encoding="utf-8")
+    rig = load_rig(configs / "fr1.toml")
+    short = {"upright_s": 1.0, "pull_s": 1.0, "hold_s": 3.0}
+    rig = rig.model_copy(update={"simulation": rig.simulation.model_copy(update=short)})
+    plan = plan_tasks(rig)
+    test = synthesise_test(rig, plan, 0.35, 5)
+    upright = test.readings[:, : test.upright_samples].mean(axis=1)
+    zeros = {c.id: float(mean - c.offset) for c, mean in zip(rig.channels, upright, strict=True)}
+    header = RunHeader(
+        run_id="demo",
+        test=_TEST,
+        rig_name=rig.name,
+        rig_text=text,
+        channel_ids=rig.channel_ids,
+        reading_units=tuple(channel.reading_unit for channel in rig.channels),
+        rate_hz=test.rate_hz,
+        plan=plan_to_dict(plan),
+        tare=zeros if tared else {},
+    )
+    with JournalWriter(folder / "demo.journal", header) as journal:
+        journal.append_block(0, np.ascontiguousarray(test.readings))
+    with read_journal(folder / "demo.journal") as contents:
+        derived, trouble = derive(contents)
+    assert not trouble
+    return finalise(folder / "demo.journal", folder / f"{_TEST}.h5", derived)
+
+
+def command(*arguments: object) -> dict[str, Any]:
+    result = CliRunner().invoke(build_app(), ["analyse", *map(str, arguments), "--json"])
+    answer: dict[str, Any] = json.loads(result.stdout)
+    return answer
+
+
+@pytest.mark.parametrize("tared", [True, False])
+def test_every_door_gives_the_same_r_to_the_last_digit(tmp_path: Path, configs: Path, tared: bool) -> None:
+    run = write_run(tmp_path, configs, tared=tared)
+    by_command = command(run)
+    with open_run(run) as opened:
+        assert opened.rig is not None
+        by_python = analyse_record(TestRecord.from_run(opened, opened.rig))
+        in_window = opened.results["analysis"]
+    (summary,) = collect(tmp_path, workers=1).tests
+    for method in ("eav", "crt"):
+        r = by_python.estimates[method].r
+        assert r == by_command["estimates"][method]["r"] == in_window["estimates"][method]["r"]
+        assert r == summary.methods[method.upper()].r
+        assert summary.methods[method.upper()].bias == by_command["bias"][method]["mean"]
+    assert by_python.theta0_rad == by_command["theta0_rad"] == in_window["theta0_rad"]
+    assert by_python.zero == by_command["zero"] == in_window["zero"]
+    assert by_python.zero == ("tare" if tared else "rest")
+
+
+def test_the_zero_of_a_run_without_a_tare_can_be_chosen(tmp_path: Path, configs: Path) -> None:
+    run = write_run(tmp_path, configs, tared=False)
+    assert command(run)["zero"] == command(run, "--zero-at-rest")["zero"] == "rest"
+    assert command(run, "--keep-zero")["zero"] == "certificates"
