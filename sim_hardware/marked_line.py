@@ -3,7 +3,7 @@
 LVDT terminals carry a slow triangle over most of their range, each with a lag of its own: the volts of one
 sample say at which instant, and on which channel, it was taken. The other terminals stand at their
 sensor's zero with a little noise, so that no analysis sees a motion. Used where faults are injected and
-every recorded sample must be shown to be the right one (`tests/faults`, ``benchmarks/soak``).
+every recorded sample must be shown to be the right one (`tests/faults`, `studies/recording`).
 """
 
 from __future__ import annotations

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+pytest.register_assert_rewrite("tests.support")
+
 # No wall clock decides whether a test passes: a busy machine is slow, not wrong. Nor does chance.
 settings.register_profile("patient", deadline=None, derandomize=True)
 settings.load_profile("patient")

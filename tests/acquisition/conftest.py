@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -14,11 +13,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from process_bench import SPEED, Running, quick_rig
-
-from benchmarks.processes import free_the_hardware
 from daq_app.acquisition.closing.finaliser import Finaliser
 from daq_app.acquisition.messages.published import EventMessage, Message, Reply, State, StateMessage
 from daq_app.acquisition.pipeline.reader import Patience
@@ -30,6 +24,8 @@ from daq_app.config import Rig, Scaling, TaskPlan, load_rig, plan_tasks
 from daq_app.rocking import RotationGeometry, free_rocking
 from drivers import Block, DriverError, Opened
 from sim_hardware.control import SimControl
+from tests.support.process_bench import SPEED, Running, quick_rig
+from tests.support.processes import free_the_hardware
 
 RATE_HZ = 4000.0
 UPRIGHT_S, PULL_S, HOLD_S = 4.0, 1.0, 6.0

@@ -10,13 +10,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from process_bench import RESTITUTION, SPEED, Running, whole_test
 
 from daq_app.acquisition import AcquisitionClient
 from daq_app.acquisition.messages.published import State
 from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.runfile import open_run, verify
 from sim_hardware.control import SimControl
+from tests.support.process_bench import RESTITUTION, SPEED, Running, whole_test
 
 
 @pytest.mark.heavy

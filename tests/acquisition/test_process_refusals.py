@@ -8,7 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from process_bench import Running
 
 from daq_app.acquisition import AcquisitionDied, AcquisitionProcess
 from daq_app.acquisition.messages.published import State
@@ -16,6 +15,7 @@ from daq_app.acquisition.process.process import main
 from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.runfile import FolderLock
 from sim_hardware.control import SimControl
+from tests.support.process_bench import Running
 
 
 def test_two_recorders_never_share_a_folder(

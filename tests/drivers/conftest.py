@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -16,8 +15,6 @@ from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.bench.clock import SteppedClock
 from sim_hardware.daqmx_server.inventory.devices import Inventory
 from sim_hardware.daqmx_server.services.server import DaqmxServer
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 
 class KnownVolts:

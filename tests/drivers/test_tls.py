@@ -17,9 +17,9 @@ from typing import Any
 
 import pytest
 import trustme
-from relay import Relay
 
 from drivers import DriverError, open_driver
+from tests.support.relay import Relay
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the stand-in for NI's tool is a script")
 

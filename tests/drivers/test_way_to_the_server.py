@@ -10,10 +10,10 @@ import grpc
 import nidaqmx
 import pytest
 from nidaqmx import errors as ni_errors
-from relay import Relay
 
 from drivers import Driver, DriverError, open_driver
 from drivers.stream import TaskStream
+from tests.support.relay import Relay
 
 SLOW_S = 0.4
 """Names, TCP and TLS over a distance, or a computer with too much to do."""

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from fault_bench import SPEED, Acquisition, Row, RunFacts, Start, Told
-
-from benchmarks.processes import free_the_hardware
 from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.config import Rig, load_rig
 from sim_hardware.control import SimControl
+from tests.support.fault_bench import SPEED, Acquisition, Row, RunFacts, Start, Told
+from tests.support.processes import free_the_hardware
 
 _KEY = "fault row"
 

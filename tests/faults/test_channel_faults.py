@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import pytest
-from fault_bench import Acquisition, Row, another_process, look_at
-from saboteur import view_for_ever
 
 from daq_app.acquisition import AcquisitionClient
 from daq_app.acquisition.messages.published import State
 from daq_app.config import Rig
 from daq_app.runfile import open_run
 from sim_hardware.control import SimControl
+from tests.support.fault_bench import Acquisition, Row, another_process, look_at
+from tests.support.saboteur import view_for_ever
 
 WALL = "commanded"
 

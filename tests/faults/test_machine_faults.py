@@ -10,14 +10,14 @@ import time
 from pathlib import Path
 
 import pytest
-from fault_bench import SPEED, Acquisition, Row, Start, look_at
 
-from benchmarks.processes import free_the_hardware
 from daq_app.acquisition import AcquisitionDied, AcquisitionProcess
 from daq_app.acquisition.messages.published import State
 from daq_app.config import Rig
 from daq_app.runfile import open_run
 from sim_hardware.control import SimControl
+from tests.support.fault_bench import SPEED, Acquisition, Row, Start, look_at
+from tests.support.processes import free_the_hardware
 
 pytestmark = pytest.mark.heavy
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
+
+from tests.support.stand_in import StandIn, write_run
 
 FOLDER = Path(__file__).parent
 try:
@@ -42,15 +41,6 @@ def pytest_pycollect_makemodule(module_path: Path, parent: Any) -> pytest.Module
     return None
 
 
-def _load(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(f"monitor_{name}", FOLDER / f"{name}.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture(scope="session")
 def rig(configs: Path) -> Any:
     from daq_app.config import load_rig
@@ -61,7 +51,7 @@ def rig(configs: Path) -> Any:
 @pytest.fixture
 def stand_in(rig: Any) -> Any:
     """The messages of a whole simulated test, without an acquisition process."""
-    return _load("stand_in").StandIn(rig)
+    return StandIn(rig)
 
 
 @pytest.fixture
@@ -119,7 +109,5 @@ def window(qtbot: Any, settings: Any, rig: Any, clock: Clock) -> Any:
 @pytest.fixture(scope="session")
 def run_file(rig: Any, configs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of the stand-in's test as a finished file, in a folder of its own."""
-    module = _load("stand_in")
     folder = tmp_path_factory.mktemp("runs")
-    path: Path = module.write_run(module.StandIn(rig), configs / "fr1.toml", folder, "FR1-L1-1", 1)
-    return path
+    return write_run(StandIn(rig), configs / "fr1.toml", folder, "FR1-L1-1", 1)

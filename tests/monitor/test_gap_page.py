@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import subprocess
 import sys
 import textwrap
-from pathlib import Path
 
 import psutil
 import pytest
@@ -16,20 +14,17 @@ from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.gap_runner import GapRunner
 from daq_app.monitor.pages.gap_page import GapPage
 from daq_app.monitor.plots.gap_views import closure_bars, evidence_bars, map_cells
+from tests.support.made_diagnosis import diagnosis
 
 LONG_WORK = """
 import threading
 print('{"done": 0, "total": 1, "text": "long"}', flush=True)
 threading.Event().wait()
 """
-MADE = Path(__file__).parents[1] / "gap" / "made_diagnosis.py"
 
 
 def made():
-    spec = importlib.util.spec_from_file_location("made_diagnosis_for_the_window", MADE)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.diagnosis({"viscous.zeta": 0.006}, ("FR1-L1-1", "FR1-L3-1"))
+    return diagnosis({"viscous.zeta": 0.006}, ("FR1-L1-1", "FR1-L3-1"))
 
 
 @pytest.fixture

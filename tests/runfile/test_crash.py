@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.power_loss import one_trial
 from daq_app.runfile import JournalWriter, RunHeader, open_run, recover, verify
+from tests.support.power_loss import one_trial
 
 BLOCK = 40
 CHANNELS = 8

@@ -3,7 +3,7 @@
 A `Model` predicts the features of a run from parameters; a `Library` holds the effects that the
 model may lack; `diagnose` says where model and runs differ, which effect explains it and how much
 of the gap it closes. The same core serves the rocking wall (`daq_app.gap.rocking_model`) and the
-small models of `benchmarks/real_gap`.
+small models of `studies/real_gap`.
 """
 
 from daq_app.gap.core.diagnose import diagnose

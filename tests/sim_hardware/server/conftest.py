@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from server_support import Rig, make_rig
+from tests.support.server_support import Rig, make_rig
 
 
 @pytest.fixture

@@ -16,7 +16,8 @@ from nidaqmx.constants import (
 )
 from nidaqmx.errors import DaqError, DaqReadError
 from nidaqmx.stream_readers import AnalogMultiChannelReader, AnalogSingleChannelReader
-from server_support import Rig, TestSignals, continuous
+
+from tests.support.server_support import Rig, TestSignals, continuous
 
 _PAIRS = "cDAQ1Mod{0}/ai0:7, cDAQ1Mod{0}/ai16:23"
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from nidaqmx.constants import READ_ALL_AVAILABLE, AcquisitionType, Signal
 from nidaqmx.errors import DaqError
-from server_support import Rig, TestSignals, continuous
+
+from tests.support.server_support import Rig, TestSignals, continuous
 
 
 @pytest.mark.parametrize("speed", [float("inf"), 20.0])

@@ -14,12 +14,12 @@ import pytest
 from nidaqmx.constants import AcquisitionType, OverwriteMode, ReadRelativeTo
 from nidaqmx.errors import DaqError, DaqReadError, RpcError
 from nidaqmx.stream_readers import AnalogMultiChannelReader
-from server_support import Rig, TestSignals, continuous
 
 from daq_app.config.errors import ConfigError
 from sim_hardware.control import SimControlError
 from sim_hardware.faults.model import KINDS, fault_from
 from sim_hardware.faults.script import load_faults
+from tests.support.server_support import Rig, TestSignals, continuous
 
 RATE = 1000.0
 

@@ -25,9 +25,9 @@ from nidaqmx.constants import (
 )
 from nidaqmx.errors import DaqError
 from nptdms import TdmsFile
-from server_support import Rig, TestSignals, continuous
 
 from sim_hardware.daqmx_server.errors import Code, error_text
+from tests.support.server_support import Rig, TestSignals, continuous
 
 
 def code_of(call: Callable[[], object]) -> int:

@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nidaqmx._stubs import nidaqmx_pb2 as pb
-from server_support import Rig
 
 from sim_hardware.daqmx_server.channels.converter import Converter
 from sim_hardware.daqmx_server.services.read_calls import encode_f64
 from sim_hardware.daqmx_server.timing.sampling import Input, Sampler, SampleTimes
 from sim_hardware.daqmx_server.timing.triggers import Condition, CrossingSearch
 from sim_hardware.faults.model import ClockChange, fault_from
+from tests.support.server_support import Rig
 
 _steady = settings(max_examples=60)
 

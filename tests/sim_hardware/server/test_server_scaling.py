@@ -9,9 +9,9 @@ import pytest
 from nidaqmx.constants import AcquisitionType, Edge, TaskMode, UnitsPreScaled, VoltageUnits
 from nidaqmx.errors import DaqError
 from nidaqmx.scale import Scale
-from server_support import Rig, TestSignals, continuous
 
 from sim_hardware.daqmx_server.inventory.devices import cdaq_chassis, module_device
+from tests.support.server_support import Rig, TestSignals, continuous
 
 RATE = 1000.0
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from nidaqmx.constants import AcquisitionType, Slope, TriggerType, WindowTriggerCondition1
 from nidaqmx.errors import DaqError, DaqReadError
-from server_support import Rig, TestSignals
+
+from tests.support.server_support import Rig, TestSignals
 
 RATE = 1000.0
 

@@ -1,5 +1,0 @@
-"""The core of the gap diagnosis on real public recordings whose missing effect is known.
-
-``python -m benchmarks.real_gap.emps`` and ``python -m benchmarks.real_gap.pendulum`` print tables;
-with ``--pictures DIR`` they write figures.
-"""

@@ -1,0 +1,145 @@
+"""Effects too weak to be any, and second effects that hide under a first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from daq_app.gap.core import Effect, Library, Options, Parameter, Prediction, diagnose, fit
+from daq_app.gap.core.decision import Thresholds
+from daq_app.gap.core.evidence import strength
+from daq_app.gap.core.hypotheses import Hypotheses
+from daq_app.gap.core.parallel import Workers
+from daq_app.gap.core.parameters import between, positive, signed
+from tests.support.toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
+
+
+class Line:
+    """Nothing but one strength: features = b x."""
+
+    name = "line"
+    scatters = ()
+    nuisance = ()
+
+    def local_nuisance(self, run: object) -> tuple[Parameter, ...]:
+        return ()
+
+    def predict(self, run: object, values: dict[str, float]) -> Prediction:
+        return Prediction(values.get("tilt.b", 0.0) * np.linspace(0, 1, 2 * PEAKS))
+
+
+@pytest.mark.parametrize("make", [positive, signed])
+@pytest.mark.parametrize("true", [0.0, 0.15, 0.3, 1.0])
+def test_evidence_counts_only_strengths_that_are_an_effect(make, true: float) -> None:  # type: ignore[no-untyped-def]
+    """Against quadrature of likelihood times the prior that has nothing below the smallest strength."""
+    rng = np.random.default_rng(3)
+    x, sd = np.linspace(0, 1, 2 * PEAKS), 0.2
+    run = make_runs(1, count=1)[0]
+    values = true * x + sd * rng.normal(size=x.size)
+    run = replace(run, features=replace(run.features, values=values, sd=np.full(x.size, sd)))
+    strength = replace(make("b", 1.0), smallest=0.2)
+    effect = Effect("tilt", "line", (strength,), "b x", "test")
+    null, found = fit(Line(), [run]), fit(Line(), [run], (effect,))  # type: ignore[arg-type]
+
+    def weighed(b: float) -> float:
+        likelihood = np.exp(norm.logpdf(values, b * x, sd).sum() - null.log_likelihood)
+        return float(likelihood * norm.pdf(b, 0.0, strength.sd))
+
+    pieces = [(0.2, 6.0)] if strength.low == 0.0 else [(-6.0, -0.2), (0.2, 6.0)]
+    mass = sum(norm.cdf(high, 0, strength.sd) - norm.cdf(low, 0, strength.sd) for low, high in pieces)
+    exact = np.log(sum(quad(weighed, low, high, limit=200, points=[true])[0] for low, high in pieces) / mass)
+    weight = run.features.independent_fraction
+    assert weight == 1.0
+    assert found.log_evidence - null.log_evidence == pytest.approx(exact, abs=0.02)
+
+
+def test_a_strength_without_a_zero_has_no_smallest() -> None:
+    with pytest.raises(ValueError, match="smallest"):
+        Parameter("t", 1.0, 1.0, low=0.1, scale="log", smallest=0.2)
+
+
+def test_a_bias_far_below_its_range_is_no_effect() -> None:
+    """Eight posterior sd of a change that is a twentieth of what counts: parameters, not physics."""
+    runs = make_runs(2, shift_s=0.005)
+    assert diagnose(DecayModel(), runs, LIBRARY, Options()).which[0].effects == ("shift",)
+    shift = LIBRARY["shift"]
+    least = replace(shift, parameters=(replace(shift.parameters[0], smallest=0.02),))
+    others = [effect for effect in LIBRARY.values() if effect.name != "shift"]
+    result = diagnose(DecayModel(), runs, Library([*others, least]), Options())
+    assert "shift" not in result.which[0].effects
+
+
+def test_a_second_effect_is_found_though_the_first_passes_the_gate() -> None:
+    runs = make_runs(4, slope_k=0.02, shift_s=0.05)
+    with Workers(DecayModel(), runs) as workers:
+        study = Hypotheses(DecayModel(), tuple(runs), LIBRARY, Options(), workers)
+        study.fit_all()
+        assert study.goodness(("shift",)).passed, "this case shall leave nothing that the gate sees"
+    result = diagnose(DecayModel(), runs, LIBRARY, Options())
+    assert result.decision.verdict == "pair"
+    assert set(result.which[0].effects) == {"slope", "shift"}
+
+
+def test_no_second_effect_where_there_is_none() -> None:
+    for seed in range(4):
+        result = diagnose(DecayModel(), make_runs(seed, shift_s=0.05), LIBRARY, Options())
+        assert result.decision.verdict == "effect"
+        assert result.which[0].effects == ("shift",)
+
+
+def test_a_pair_whose_second_effect_is_not_there_is_no_hypothesis() -> None:
+    runs = make_runs(0, shift_s=0.05)
+    with Workers(DecayModel(), runs) as workers:
+        study = Hypotheses(DecayModel(), tuple(runs), LIBRARY, Options(always_pairs=True), workers)
+        study.fit_all()
+        names = {h for h in study.fits if len(h) == 2}
+        assert names
+        weak = {h for h in names if min(study.fits[h].strength(e) for e in h) < 4.9}
+        assert weak
+        assert weak.isdisjoint(r.effects for r in study.ranked())
+
+
+def test_a_second_effect_of_four_sd_is_a_stated_limit_and_no_pair() -> None:
+    runs = make_runs(4, slope_k=0.02, shift_s=0.05)
+    strict = Options(thresholds=Thresholds(second_strength=50.0))
+    result = diagnose(DecayModel(), runs, LIBRARY, strict)
+    assert result.decision.verdict == "effect"
+    assert result.decision.effects == ("shift",)
+    assert any("Perhaps shift + slope" in limit for limit in result.limits)
+
+
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_the_form_of_an_effect_is_not_its_strength(scale: str) -> None:
+    """A force that falls half evenly is no weaker a release: the form's prior has its centre there."""
+    own = between("s", 0.005, 0.2, "s") if scale == "log" else LIBRARY["shift"].parameters[0]
+    form = Parameter("even", 0.5, 0.4, "1", 0.0, 1.0)
+    shift = replace(LIBRARY["shift"], parameters=(own, form))
+    library = Library([LIBRARY["slope"], shift])
+    result = diagnose(DecayModel(), make_runs(4, slope_k=0.02, shift_s=0.05), library, Options())
+    assert result.decision.verdict == "pair"
+    assert set(result.which[0].effects) == {"slope", "shift"}
+
+
+def test_an_effect_that_knows_no_zero_is_as_strong_as_its_value_is_known() -> None:
+    shift = replace(LIBRARY["shift"], parameters=(between("s", 0.005, 0.2, "s"),))
+    found = fit(DecayModel(), make_runs(0, shift_s=0.05), (shift,))
+    value, low, high = found.values["shift.s"]
+    assert strength(found, shift) == pytest.approx(value / ((high - low) / 3.92), rel=0.05)
+    assert strength(found, shift) > 5.0
+
+
+def test_on_its_way_a_strength_may_still_be_too_weak_to_count() -> None:
+    """What is withheld is the evidence of a strength below its smallest, so that screening can go without."""
+    shift = LIBRARY["shift"]
+    least = replace(shift, parameters=(replace(shift.parameters[0], smallest=0.02),))
+    runs = make_runs(2, shift_s=0.005)
+    known = fit(DecayModel(), runs)
+    free = fit(DecayModel(), runs, (shift,), known.known(), known.sigmas)
+    held = fit(DecayModel(), runs, (least,), known.known(), known.sigmas)
+    assert free.withheld == 0.0
+    assert held.withheld > 20.0
+    assert held.log_evidence + held.withheld == pytest.approx(free.log_evidence, abs=1e-3)

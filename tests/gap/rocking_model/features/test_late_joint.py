@@ -1,0 +1,75 @@
+"""LVDTs that are late: the motion is read from the wires, and the joint still says where the wall turns."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from daq_app.gap.core import Options
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.sensor_blocks import Block
+from daq_app.gap.rocking_model.features.sensor_response import block_coefficients
+from daq_app.gap.rocking_model.motion.late_joint import lateness
+from daq_app.gap.rocking_model.prediction.model import RockingModel
+from daq_app.gap.rocking_model.study import diagnose_runs, prepare
+from tests.support.simulated_wall import simulate
+
+LEVELS = (0.25, -0.35)
+WALL = {"pivot_shift": {"a": 0.03}}
+
+
+def _block(run: RockingRun, family: str) -> Block:
+    return next(b for b in run.blocks if b.family == family)
+
+
+@pytest.mark.parametrize("tau", [0.012, 0.03])
+@pytest.mark.parametrize("effect", ["lag@lvdt", "filter_delay@lvdt", "slow_response@lvdt"])
+def test_what_a_late_joint_shows_of_itself_is_what_it_shows_in_time(effect: str, tau: float) -> None:
+    """But for what a slow response smears, which the effect predicts."""
+    prompt = prepare(simulate(WALL, LEVELS))[0]
+    for run, known in zip(prepare(simulate(WALL | {effect: {"tau": tau}}, LEVELS))[0], prompt, strict=True):
+        assert (run.reference, known.reference) == ("wire", "lvdt")
+        for family in ("joint", "twist"):
+            seen, expected = _block(run, family), _block(known, family)
+            assert seen.names == expected.names
+            smeared = _predicted(run, family, {f"{effect}.tau": tau}) - _predicted(run, family, {})
+            sd = np.sqrt(np.diag(seen.covariance) + np.diag(expected.covariance))
+            np.testing.assert_array_less(np.abs(seen.values - smeared - expected.values), 4.0 * sd)
+        assert abs(_block(run, "joint").values[0]) > 0.02, "the wall turns 30 mm further in"
+
+
+def _predicted(run: RockingRun, family: str, effect: dict[str, float]) -> np.ndarray:
+    """What the model makes of the coefficients of a family under an effect."""
+    model = RockingModel(run.survey)
+    usual = {p.name: p.mean for p in (*model.nuisance, *model.local_nuisance(run))}
+    first = 0
+    for block in run.blocks:
+        if block.family == family:
+            break
+        first += len(block.names)
+    return block_coefficients(run, usual | effect)[0][first : first + len(_block(run, family).names)]
+
+
+def test_joints_that_reach_their_limit_or_go_in_steps_say_nothing() -> None:
+    for effect in ({"saturation@lvdt": {"limit": 0.03}}, {"quantisation@lvdt": {"step": 1e-3}}):
+        (run,) = prepare(simulate(effect, (0.4,)))[0]
+        assert run.reference == "wire"
+        assert not {"joint", "twist"} & {block.family for block in run.blocks}
+
+
+def test_lateness_is_that_of_a_record() -> None:
+    time = np.arange(1200) / 200.0
+    after = np.maximum(time - 1.0, 0.0)
+    motion = np.exp(-0.9 * after) * np.cos(2.0 * np.pi * 0.8 * after)
+    late = np.interp(time - 0.013, time, motion)
+    assert lateness(late, motion) / 200.0 == pytest.approx(0.013, abs=3e-4)
+    assert lateness(motion, late) / 200.0 == pytest.approx(-0.013, abs=3e-4)
+
+
+@pytest.mark.heavy
+def test_late_lvdts_do_not_hide_where_the_wall_turns() -> None:
+    """Without the joint a pivot further in and edges worn round have the same dynamics at these levels."""
+    runs = simulate(WALL | {"lag@lvdt": {"tau": 0.012}})
+    result = diagnose_runs(runs, Options(), only=("pivot_shift", "rounded_edge", "lag@lvdt"))
+    assert set(result.decision.effects) == {"pivot_shift", "lag@lvdt"}
+    assert result.decision.confidence > 0.99

@@ -1,0 +1,81 @@
+"""Channels that disagree and that no effect of the library explains are findings, not channels to forget."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels, found_marks
+from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.study import diagnose_runs, model_and_library, prepare
+from tests.support.simulated_wall import simulate
+
+LEVEL = (-0.35,)
+
+
+def _scaled(factors: dict[str, float], levels: tuple[float, ...] = LEVEL) -> list[GapRun]:
+    runs = simulate({}, levels)
+    place = {sensor.id: i for i, sensor in enumerate(runs[0].sensors)}
+    for run in runs:
+        for name, factor in factors.items():
+            run.channels[place[name]] *= factor
+    return runs
+
+
+@pytest.mark.parametrize(
+    "factors",
+    [
+        {"LV-A03": 1.09, "LV-B07": 1.09, "LV-B08": 1.09},
+        {"LV-A03": 1.025, "LV-B07": 0.97},
+        {"AC-3": 1.06, "AC-5": 1.08},
+    ],
+)
+def test_several_channels_of_one_family_that_disagree_are_named_together(factors: dict[str, float]) -> None:
+    prepared, limits = prepare(_scaled(factors))
+    family = "lvdt" if "LV-A03" in factors else "accelerometer"
+    assert found_channels(prepared) == {}
+    assert found_marks(prepared) == {f"disagreement@{family}": family}
+    assert any(all(name in words for name in factors) for words in limits)
+    wires = next(b for b in prepared[0].blocks if b.family == "wire")
+    assert abs(wires.values[wires.names.index("gain")]) < 5e-3
+    _, library = model_and_library(prepared)
+    assert not any(name.startswith("disagreement") for name in library), "nothing may explain it"
+
+
+def test_a_second_axis_that_follows_the_rotation_is_marked() -> None:
+    runs = simulate({}, LEVEL)
+    place = {sensor.id: i for i, sensor in enumerate(runs[0].sensors)}
+    for run in runs:
+        run.channels[place["TL-1Y"]] += 0.08 * run.channels[place["TL-1X"]]
+        run.channels[place["TL-2Y"]] += 0.01 * run.channels[place["TL-2X"]]
+    prepared, limits = prepare(runs)
+    assert found_marks(prepared) == {"crossed@TL-1Y": "tiltmeter"}
+    assert any("TL-1Y" in words for words in limits)
+
+
+def _shaken(amplitude_m_s2: float) -> list[GapRun]:
+    """A floor that shakes at 11 Hz for a second, and the rigid wall on it: θ̈ = −(p²/g) cos α a."""
+    runs = simulate({}, (-0.35, 0.3))
+    for run in runs[:1]:
+        t = np.arange(run.channels.shape[1]) / run.rate_hz
+        floor = amplitude_m_s2 * np.exp(-(((t - 4.0) / 0.5) ** 2)) * np.sin(2 * np.pi * 11.0 * t)
+        follows = run.survey.p_rad_s**2 / 9.81 * np.cos(run.survey.alpha_rad)
+        for i in run.indices("accelerometer", "x"):
+            run.channels[i] += (1.0 - follows * run.sensors[i].position_m[2]) * floor
+    return runs
+
+
+def test_a_burst_of_shaking_is_found_in_the_run_that_has_it() -> None:
+    prepared, limits = prepare(_shaken(0.1))
+    marks = [found_marks([run]) for run in prepared]
+    assert marks == [{"shaking@floor": ""}, {}]
+    assert any("burst of shaking" in words and words.endswith("in 1 run.") for words in limits)
+
+
+@pytest.mark.parametrize("levels", [(-0.35,), (0.25, -0.35), (0.25, -0.35, 0.45)])
+def test_nothing_missing_is_not_said_over_channels_that_disagree(levels: tuple[float, ...]) -> None:
+    result = diagnose_runs(
+        _scaled({"LV-A03": 1.09, "LV-B07": 1.09, "LV-B08": 1.09}, levels), only=("viscous",)
+    )
+    assert result.decision.verdict == "none_of_these"
+    assert "disagreement (LV-A03, LV-B07, LV-B08) of lvdt" in result.decision.sentence

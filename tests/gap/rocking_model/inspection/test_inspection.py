@@ -1,0 +1,371 @@
+"""Faults that show without a fit are found in the runs, named by channel, and taken out of the families."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from daq_app.gap.rocking_model.features.rings import ring_columns
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.sensor_blocks import Block, first_order
+from daq_app.gap.rocking_model.features.sensor_response import block_coefficients
+from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels, found_marks
+from daq_app.gap.rocking_model.inspection.saturation import saturated
+from daq_app.gap.rocking_model.inspection.wiring import mend
+from daq_app.gap.rocking_model.prediction.model import RockingModel
+from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.study import model_and_library, prepare
+from sim_hardware.dynamics import parameters as par
+from sim_hardware.sensors.scene import pivots
+from tests.support.simulated_campaign import simulate as longer_held
+from tests.support.simulated_wall import simulate
+
+LEVELS = (0.25, -0.35)
+ONE = LEVELS[1:]
+
+
+def _exchange(run: GapRun, first: str, second: str) -> None:
+    """Plug two channels into each other's terminals."""
+    at = [next(i for i, sensor in enumerate(run.sensors) if sensor.id == name) for name in (first, second)]
+    run.channels[at] = run.channels[at[::-1]]
+
+
+def _prepared(effects: dict[str, dict[str, float]], levels: tuple[float, ...] = LEVELS) -> list[RockingRun]:
+    return prepare(simulate(effects, levels))[0]
+
+
+def _mark(run: RockingRun, name: str) -> float:
+    block = next(b for b in run.blocks if b.kind == "conditions")
+    return float(block.values[block.names.index(name)])
+
+
+def _value(run: RockingRun, family: str, name: str) -> float:
+    block = next(b for b in run.blocks if b.family == family)
+    return float(block.values[block.names.index(name)])
+
+
+@pytest.fixture(scope="module")
+def healthy() -> list[RockingRun]:
+    return _prepared({})
+
+
+def test_healthy_runs_carry_no_mark_and_no_suspect(healthy: list[RockingRun]) -> None:
+    assert found_marks(healthy) == {}
+    assert found_channels(healthy) == {}
+    _, library = model_and_library(healthy)
+    assert "ambient" not in library, "no vibration of the floor is seen, so none can explain anything"
+
+
+def test_electronics_are_named_by_channel_with_their_size(healthy: list[RockingRun]) -> None:
+    """Four faults on four channels at once; none of them moves the rotation that the fit starts from."""
+    runs = _prepared(
+        {
+            "polarity@LV-B06": {"on": 1.0},
+            "hum@WP-2": {"amplitude": 5e-4},
+            "dropout@LV-A02": {"share": 0.06, "duration": 0.05},
+            "quantisation@LV-A09": {"step": 1e-3},
+        }
+    )
+    assert set(found_marks(runs)) == {
+        "polarity@LV-B06",
+        "hum@WP-2",
+        "dropout@LV-A02",
+        "quantisation@LV-A09",
+    }
+    for run in runs:
+        assert _mark(run, "hum@WP-2") == pytest.approx(5e-4, rel=0.1)
+        assert _mark(run, "dropout@LV-A02") == pytest.approx(0.06, abs=0.06)
+        assert _mark(run, "quantisation@LV-A09") == pytest.approx(1e-3, rel=0.05)
+    # A sound channel never freezes: each run's share counts against how well it is read off that run.
+    block = next(b for b in runs[0].blocks if b.kind == "conditions")
+    place = block.names.index("dropout@LV-A02")
+    assert block.covariance[place, place] ** 0.5 < 0.02 * 0.06 + 1e-3
+    assert [p.per_run for p in model_and_library(runs)[1]["dropout@LV-A02"].parameters] == [True]
+    for run, clean in zip(runs, healthy, strict=True):
+        assert run.swings.peak_rad[1] == pytest.approx(clean.swings.peak_rad[1], rel=1e-3)
+
+
+def test_exchanged_plugs_are_put_back() -> None:
+    plain = simulate({}, LEVELS)
+    for run in plain:
+        _exchange(run, "WP-1", "WP-4")
+    crossed, limits = prepare(plain)
+    assert set(found_marks(crossed)) == {"swap@wire"}
+    assert abs(_value(crossed[0], "wire", "gain")) < 5e-3
+    assert any("WP-1 and WP-4 exchanged" in limit for limit in limits)
+
+
+def test_accelerometers_along_z_that_are_exchanged_are_put_back() -> None:
+    """What impacts leave in these is half of what they show: their places are told between impacts."""
+    plain = simulate({}, LEVELS)
+    for run in plain:
+        _exchange(run, "AC-7", "AC-8")
+    crossed, limits = prepare(plain)
+    assert set(found_marks(crossed)) == {"swap@accelerometer"}
+    assert any("AC-7 and AC-8 exchanged" in limit for limit in limits)
+
+
+@pytest.mark.parametrize(
+    ("target", "places", "words"),
+    [
+        ("wire", 1.0, "WP-2 shows WP-1, WP-3 shows WP-2, WP-4 shows WP-3"),
+        ("lvdt", 1.0, "LV-A01 and LV-B01 exchanged"),
+    ],
+)
+def test_plugs_that_are_all_moved_on_are_put_back(target: str, places: float, words: str) -> None:
+    """Two wires of one height show the same: which of these is which stays open, and needs no answer."""
+    key = f"swap@{target}"
+    crossed, limits = prepare(simulate({key: {"places": places}}, ONE))
+    assert set(found_marks(crossed)) == {key}
+    assert _mark(crossed[0], key) == places
+    assert abs(_value(crossed[0], "wire", "gain")) < 5e-3
+    assert any(words in limit for limit in limits)
+
+
+def test_a_channel_that_shows_no_sensor_of_its_kind_does_not_hide_exchanged_plugs() -> None:
+    runs = simulate({}, ONE)
+    place = {sensor.id: i for i, sensor in enumerate(runs[0].sensors)}
+    for run in runs:
+        _exchange(run, "WP-1", "WP-4")
+        run.channels[place["WP-3"]] *= 4.0
+    crossed, limits = prepare(runs)
+    assert "swap@wire" in found_marks(crossed)
+    assert any("WP-1 and WP-4 exchanged" in limit for limit in limits)
+
+
+def test_exchanged_accelerometers_are_seen_beside_one_that_is_off() -> None:
+    """What the others misfit as they are and as they would be says nothing about the two plugs."""
+    runs = simulate({"gain@AC-1": {"error": 0.3}}, ONE)
+    for run in runs:
+        _exchange(run, "AC-3", "AC-5")
+    _, wiring = mend(runs)
+    assert wiring.exchanged == (("AC-3", "AC-5"), ("AC-5", "AC-3"))
+
+
+def test_curvature_of_all_wires_is_no_fault_of_one() -> None:
+    """The error grows with the square of the travel, which differs from wire to wire."""
+    family = _prepared({"wire_cosine@wire": {"kappa": 0.2}}, ONE)
+    assert found_channels(family) == {}
+    run = family[0]
+    seen = _value(run, "wire", "even harmonic")
+    assert seen == pytest.approx(0.2 * run.wire_bend_m, abs=0.01)
+    assert found_channels(_prepared({"wire_cosine@WP-4": {"kappa": 0.2}}, ONE)) == {"WP-4": "wire"}
+
+
+def test_a_drift_of_one_channel_is_no_curvature_of_its_family() -> None:
+    """u² of the opened face goes with a drift, so that a curvature of all LVDTs takes up much of it."""
+    assert found_channels(_prepared({"drift@LV-B09": {"rate": 3.5e-4}}, ONE)) == {"LV-B09": "lvdt"}
+
+
+def test_steps_of_all_wires_are_no_fault_of_one() -> None:
+    """At rest such a reading shows no step, and in motion the same ones in every half-cycle."""
+    runs = _prepared({"quantisation@wire": {"step": 7e-3}})
+    assert set(found_marks(runs)) == {"quantisation@wire"}
+    assert found_channels(runs) == {}
+
+
+def test_an_lvdt_that_steps_out_of_time_with_its_face_is_no_fault() -> None:
+    """From a common zero all of a face step together and leave nothing; another gain steps elsewhere."""
+    step = 9e-4
+    runs = simulate({}, ONE)
+    for run in runs:
+        for i in run.indices("lvdt"):
+            gain = 1.009 if run.sensors[i].id == "LV-B06" else 1.0
+            zero = run.channels[i, -600:].mean()
+            run.channels[i] = np.round(gain * (run.channels[i] - zero) / step) * step
+    prepared = prepare(runs)[0]
+    assert set(found_marks(prepared)) == {"quantisation@lvdt"}
+    assert found_channels(prepared) == {}
+
+
+def test_a_family_that_stops_short_of_its_range_is_found_and_the_motion_read_elsewhere() -> None:
+    runs = _prepared({"saturation@lvdt": {"limit": 0.04}})
+    assert set(found_marks(runs)) == {"saturation@lvdt"}
+    by_amplitude = sorted(runs, key=lambda run: abs(run.swings.peak_rad[0]))
+    assert 1.0 / _mark(by_amplitude[-1], "saturation@lvdt") == pytest.approx(0.04, rel=0.03)
+    assert by_amplitude[-1].reference == "wire"
+
+
+def test_a_limit_is_found_where_the_other_side_travels_further_from_a_zero_that_is_off() -> None:
+    """A wire stops at a reading: with a zero of 20 mm it clips after 150 mm to one side only."""
+    runs = simulate({}, (0.35,))
+    place = next(i for i, sensor in enumerate(runs[0].sensors) if sensor.id == "WP-4")
+    raw = runs[0].channels[place]
+    other_way = 0.155 / float(np.abs(raw[-400:].mean() - raw.min()))
+    centred = raw - raw[-400:].mean()
+    runs[0].channels[place] = np.minimum(np.where(centred < 0, other_way * centred, centred) + 0.02, 0.17)
+    assert set(found_marks(prepare(runs)[0])) == {"saturation@WP-4"}
+
+
+@pytest.mark.parametrize("fault", [{"lag@lvdt": {"tau": 0.049}}, {"slow_response@wire": {"tau": 0.047}}])
+def test_a_family_that_comes_late_does_not_make_the_other_stop_short(
+    fault: dict[str, dict[str, float]],
+) -> None:
+    """Held against a rotation that has not begun to fall, a channel seems to stand still at its top."""
+    _, marks = saturated(simulate(fault, (0.4,)))
+    assert [mark.value for mark in marks[0]] == [0.0, 0.0]
+
+
+def test_what_ends_one_face_ends_the_other_that_hardly_gets_there() -> None:
+    """A top cut by 2 % does not look flat, yet bends the rotation of whoever reads it."""
+    (plain,) = simulate({}, (0.4,))
+    rest = plain.channels[plain.indices("lvdt"), -400:].mean(axis=1, keepdims=True)
+    tops = (plain.channels[plain.indices("lvdt")] - rest).max(axis=1)
+    second = min(tops[:12].max(), tops[12:].max())
+    (run,), marks = saturated(simulate({"saturation@lvdt": {"limit": 0.98 * second}}, (0.4,)))
+    assert 1.0 / marks[0][0].value == pytest.approx(0.98 * second, rel=0.01)
+    ends = {run.sensors[i].id: run.sensors[i].range_si[1] for i in run.indices("lvdt")}
+    assert len(ends) == 24
+    assert max(ends.values()) < 0.99 * second
+
+
+def test_wires_that_drift_do_not_make_lvdts_stop_short() -> None:
+    """1.3 mrad in all of a record, and a hop of the wall at each impact."""
+    fault = {"drift@wire": {"rate": -2.4e-3}, "bounce": {"tau": 0.0095}}
+    _, marks = saturated(simulate(fault, (0.4,)))
+    assert [mark.value for mark in marks[0]] == [0.0, 0.0]
+
+
+def test_one_channel_with_another_gain_is_examined_on_its_own() -> None:
+    runs = _prepared({"gain@WP-2": {"error": 0.05}})
+    assert found_channels(runs) == {"WP-2": "wire"}
+    assert _value(runs[0], "WP-2", "gain") == pytest.approx(0.05, abs=0.012)
+    model, library = model_and_library(runs)
+    assert "gain@WP-2" in library
+    assert any(parameter.name == "cal_WP-2_gain" for parameter in model.nuisance)
+
+
+def test_one_slow_lvdt_is_examined_on_its_own_before_it_shifts_the_times_of_impacts() -> None:
+    runs = _prepared({"slow_response@LV-B09": {"tau": 8e-4}})
+    assert found_channels(runs) == {"LV-B09": "lvdt"}
+    assert _value(runs[0], "LV-B09", "lag") == pytest.approx(8e-4, abs=1.5e-4)
+
+
+def test_a_very_slow_lvdt_at_the_end_of_its_row_is_told_from_its_neighbours() -> None:
+    """It moves what three others are predicted by more than it leaves of its own fault."""
+    runs = _prepared({"slow_response@LV-A12": {"tau": 0.03}, "base_tilt": {"beta": 0.0024}})
+    assert found_channels(runs) == {"LV-A12": "lvdt"}
+    assert found_marks(runs) == {}
+
+
+def test_a_wire_that_is_half_a_millisecond_late_is_examined_on_its_own() -> None:
+    assert found_channels(_prepared({"lag@WP-5": {"tau": 5e-4}})) == {"WP-5": "wire"}
+
+
+def test_ring_down_and_floor_are_seen_at_their_frequency() -> None:
+    runs = _prepared(
+        {
+            "flexible_wall": {"gain": 0.004, "frequency": 16.0, "zeta": 0.025},
+            "ambient": {"amplitude": 0.08, "frequency": 2.3},
+        }
+    )
+    for run in runs:
+        assert _value(run, "bending", "frequency") == pytest.approx(16.0, rel=0.02)
+        assert _value(run, "bending", "sine in accelerometers") == pytest.approx(-0.004, rel=0.25)
+        assert _value(run, "floor", "amplitude") == pytest.approx(0.08, rel=0.15)
+        assert _value(run, "floor", "frequency") == pytest.approx(2.3, abs=0.05)
+    assert "ambient" in model_and_library(runs)[1]
+
+
+def test_the_phase_of_the_floor_is_read_after_the_rest_where_the_hold_is_spoilt() -> None:
+    """A quick pull or footsteps leave nothing to read while the wall is held."""
+    runs = simulate({"ambient": {"amplitude": 0.08, "frequency": 2.3}}, LEVELS)
+    clean, _ = prepare(runs)
+    shaken = runs[0].channels[runs[0].indices("accelerometer")]
+    before = round((clean[0].swings.release_s - 0.05) * runs[0].rate_hz) + runs[0].channels.shape[1]
+    before -= round((clean[0].grid.time_s[-1] + clean[0].swings.release_s) * runs[0].rate_hz)
+    shaken[:, :before] += 0.8 * np.random.default_rng(5).standard_normal(shaken[:, :before].shape)
+    runs[0].channels[runs[0].indices("accelerometer")] = shaken
+    spoilt = prepare(runs)[0][0].vibration
+    whole = clean[0].vibration
+    assert spoilt is not None
+    assert whole is not None
+    assert abs(spoilt.phase - whole.phase) < 3.0 * spoilt.phase_sd + 0.05
+    assert 0.0 < spoilt.phase_sd < 0.2
+
+
+def test_gravity_is_read_from_a_held_wall_that_still_sways() -> None:
+    """What the winch left swings out during the hold; its mean acceleration is no error of a sensor."""
+    run = prepare(longer_held({}, 11, levels=(0.15, -0.25)))[0][1]
+    block = next(b for b in run.blocks if b.family == "accelerometer")
+    place = block.names.index("gain of gravity")
+    assert abs(block.values[place]) < 2.0 * np.sqrt(block.covariance[place, place])
+
+
+def test_pivots_inside_the_edge_are_no_slip_of_the_base() -> None:
+    """About another pivot the base moves by Δu (1 − cos θ), which comes and goes with the swings."""
+    run = prepare(longer_held({"pivot_shift": {"a": 0.04}}, 11, levels=(0.4,)))[0][0]
+    base = next(b for b in run.blocks if b.family == "base")
+    values = {p.name: p.mean for p in RockingModel(run.survey).nuisance} | {"zero": 0.0, "omega0": 0.0}
+    place = base.names.index("slip per speed")
+    seen = float(base.values[place]) - _predicted(run, values, base, place)
+    explained = float(base.values[place]) - _predicted(run, values | {"pivot_shift.a": 0.04}, base, place)
+    assert abs(explained) < 0.3 * abs(seen)
+
+
+def _predicted(run: RockingRun, values: dict[str, float], block: Block, place: int) -> float:
+    before = list(run.blocks).index(block)
+    first = sum(len(b.names) for b in run.blocks[:before])
+    return float(block_coefficients(run, values)[0][first + place])
+
+
+def test_a_ring_down_is_known_as_well_as_its_damping() -> None:
+    """Its size follows from the damping that it was fitted with; both come from all runs, once."""
+    effects = {"yaw": {"kick": 0.04, "frequency": 5.0, "zeta": 0.03}}
+    runs = _prepared(effects)
+    for run in runs:
+        block = next(b for b in run.blocks if b.rule == "turning")
+        frequency, zeta, _ = block.ring
+        assert zeta == pytest.approx(0.03, rel=0.3)
+        dying = ring_columns(run.grid, frequency, 1.2 * zeta)
+        seen = float(block.projection[0] @ dying[:, 0]), float(block.projection[1] @ dying[:, 1])
+        for size, slope in zip(seen, block.fading, strict=False):
+            assert size == pytest.approx(1.0 + slope * np.log(1.2), abs=0.03)
+            assert size < 0.97
+
+
+def test_worn_edges_are_where_the_simulator_has_them(healthy: list[RockingRun]) -> None:
+    run = replace(healthy[0], impacts_before=120.0, cache={})
+    model = RockingModel(run.survey)
+    values = {p.name: p.mean for p in model.nuisance} | {"zero": 0.0, "omega0": 0.0}
+    vector = np.zeros(par.N_PARAMETERS)
+    alpha = values["alpha"]
+    vector[par.ALPHA], vector[par.R0] = alpha, values["half_base"] / np.sin(alpha)
+    vector[par.CRUSH_ALPHA], vector[par.IMPACTS_BEFORE] = 0.02, 120.0
+    shifted = values["half_base"] - pivots(vector)[0]
+    joint = next(b for b in run.blocks if b.family == "joint")
+    place = joint.names.index("pivot")
+    plain = _predicted(run, values, joint, place)
+    worn = _predicted(run, values | {"crushing.loss": 0.02}, joint, place)
+    assert plain - worn == pytest.approx(shifted, rel=1e-6)
+
+
+def test_a_tiltmeter_with_another_time_constant_is_another_filter_and_no_mere_delay(
+    healthy: list[RockingRun],
+) -> None:
+    run = healthy[0]
+    values = {p.name: p.mean for p in RockingModel(run.survey).nuisance} | {"zero": 0.0, "omega0": 0.0}
+    block = next(b for b in run.blocks if b.family == "tiltmeter")
+    theta = run.grid.theta
+    for changed, time_constant_s in (({"tilt_response": 0.01}, 0.31), ({"clock.error": -0.03}, 0.3 / 0.97)):
+        slower = block.coefficients(first_order(theta, time_constant_s) - first_order(theta, 0.3))
+        for place in range(len(block.names)):
+            plain = _predicted(run, values, block, place)
+            change = _predicted(run, values | changed, block, place) - plain
+            assert change == pytest.approx(float(slower[place]), rel=0.1)
+    assert abs(slower[block.names.index("gain")]) > 1e-3, "a delay alone would leave the gain as it is"
+
+
+def test_a_wall_that_sways_on_its_joint_at_rest_is_no_vibration_of_the_floor() -> None:
+    """A compliant joint makes a pendulum of the wall, which the accelerometers see after the last impact."""
+    runs = _prepared({"winkler": {"theta_c": 8e-4}})
+    assert all(run.vibration is not None and not run.vibration.found for run in runs)
+
+
+def test_a_floors_wave_in_the_accelerometers_is_no_calibration_of_theirs() -> None:
+    """Its share is found while the wall stands and taken out: what is left is the wall's own motion."""
+    for run in _prepared({"ambient": {"amplitude": 0.1, "frequency": 0.9}}):
+        assert run.vibration is not None and run.vibration.found
+        assert abs(_value(run, "accelerometer", "gain of inertia")) < 6e-3

@@ -1,0 +1,101 @@
+"""The one-page report of a diagnosis, and the traces that it shows."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from daq_app.gap.report import write_report
+from daq_app.gap.report_figures import ProbeMap, map_table
+from daq_app.gap.traces import traces
+from tests.support.made_diagnosis import diagnosis
+from tests.support.simulated_wall import simulate
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameter", "value", "shown"),
+    [
+        ("winkler", "theta_c", 3e-4, "lvdt"),
+        ("gain@wire", "error", 0.03, "wire"),
+        ("lag@lvdt", "tau", 0.006, "lvdt"),
+        ("wire_cosine@wire", "kappa", 0.8, "wire"),
+        ("wire_anchor@wire", "height", 0.3, "wire"),
+    ],
+)
+def test_the_trace_with_the_effect_lies_on_the_record_and_the_one_without_does_not(
+    effect, parameter, value, shown
+):
+    (run,) = simulate({effect: {parameter: value}}, (0.25,))
+    (trace,) = traces(diagnosis({f"{effect}.{parameter}": value}, ("0",)), [run])
+    without, with_it = trace.rms_rad
+    assert trace.shown == shown
+    assert with_it < 3e-4
+    assert without > 2.0 * with_it
+    assert trace.time_s.shape == trace.measured_rad.shape == trace.augmented_rad.shape
+    assert np.nanmax(np.abs(trace.measured_rad)) == pytest.approx(0.25 * run.survey.alpha_rad, rel=0.15)
+
+
+def test_each_impact_gets_the_r_that_meets_the_next_peak():
+    """Scatter of r is no effect: the trace of the true model stays on the record to its end."""
+    runs = simulate({}, (0.15, -0.35))
+    shown = traces(diagnosis({}, ("0", "1")), runs)
+    assert [trace.run for trace in shown] == ["1", "0"]
+    for trace in shown:
+        peak = np.nanmax(np.abs(trace.measured_rad))
+        late = trace.time_s > 0.7 * trace.time_s[-1]
+        left = np.abs(trace.measured_rad - trace.augmented_rad)[late]
+        assert np.nanmax(left) < 0.02 * peak
+
+
+def test_the_page_holds_everything_and_says_it_safely(tmp_path):
+    runs = simulate({"viscous": {"zeta": 0.006}}, (0.15,))
+    dead = replace(runs[0], name="dead", channels=np.zeros_like(runs[0].channels))
+    html, pdf = write_report(
+        diagnosis({"viscous.zeta": 0.006}, ("0", "dead")), tmp_path / "gap.html", [*runs, dead]
+    )
+    page = html.read_text(encoding="utf-8")
+    assert "viscous &lt;explains&gt; the gap &amp; more" in page
+    assert "falls from 9.10 to" in page and "viscous.zeta" in page
+    assert "Measure next: Repeat at another level" in page
+    assert "<stated>" not in page
+    headings = re.findall("<h2>(.*?)</h2>", page)
+    assert [h.split(":")[0] for h in headings] == [
+        "Where",
+        "Which",
+        "Measured and simulated rotation",
+        "How far",
+        "Maps of the free forms",
+        "Parameters",
+        "What remains",
+    ]
+    assert page.count("<svg") == 5
+    assert "http://" not in re.sub(r"http://(www\.w3\.org|purl\.org|creativecommons\.org)", "", page)
+    content = pdf.read_bytes()
+    assert content.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type /Page\b", content)) == 1
+
+
+def test_a_report_without_the_recordings_has_no_traces_and_one_without_held_out_runs_no_closure(tmp_path):
+    bare = replace(diagnosis({}, ("0",)), gap=None, probe_shapes={}, limits=())
+    html, _ = write_report(bare, tmp_path / "gap.html")
+    page = html.read_text(encoding="utf-8")
+    assert page.count("<svg") == 2
+    assert "Measured and simulated" not in page and "How far" not in page
+
+
+def test_the_map_has_the_largest_gap_of_each_channel_and_phase():
+    channels, phases, table = map_table(diagnosis({}, ()).where)
+    assert (channels, phases) == (["lvdt", "wire"], ["swing", "peak", "run"])
+    np.testing.assert_array_equal(table, [[9.0, 4.0, np.nan], [np.nan, np.nan, 0.9]])
+
+
+def test_knots_become_curves_and_the_rest_bars():
+    shape = {"p.a": (0.1, 0.0, 0.2), "p.b": (0.3, 0.2, 0.4), "p.side": (0.01, 0.0, 0.02)}
+    meanings = {"p.a": "change of r at 0.1 rad/s", "p.b": "change of r at 0.3 rad/s", "p.side": "left"}
+    probe = ProbeMap("r(v)", shape, meanings, "1")
+    assert probe.curves == {"change of r": [(0.1, 0.1, 0.0, 0.2), (0.3, 0.3, 0.2, 0.4)]}
+    assert probe.axis == "rad/s"
+    assert probe.bars == [("left", 0.01, 0.0, 0.02)]
