@@ -57,7 +57,11 @@ def run_all(
 @contextmanager
 def process_pool(workers: int | None = None) -> Iterator[ProcessPoolExecutor]:
     """A pool whose jobs have one thread each; whatever ends it, no job that waits is begun."""
-    pool = ProcessPoolExecutor(workers, mp_context=worker_context(), initializer=_leave_interrupts)
+    with worker_surroundings():
+        surroundings = {name: os.environ[name] for name in _SURROUNDINGS}
+    pool = ProcessPoolExecutor(
+        workers, mp_context=worker_context(), initializer=_begin, initargs=(surroundings,)
+    )
     try:
         with worker_surroundings():
             yield pool
@@ -85,8 +89,13 @@ def worker_context() -> BaseContext:
     return get_context("forkserver" if _FORK_SERVER else "spawn")
 
 
-def _leave_interrupts() -> None:
-    """Ctrl-C reaches every process of the terminal: the parent decides, the workers do not die noisily."""
+def _begin(surroundings: dict[str, str]) -> None:
+    """Make this process a worker, before it imports what its jobs need.
+
+    The fork server keeps the environment of its own start, which another part of the program may have caused.
+    Ctrl-C reaches every process of the terminal: the parent decides, the workers do not die noisily.
+    """
+    os.environ.update(surroundings)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
