@@ -1,7 +1,7 @@
 """``python -m docs.tools.make_screenshots``: the pictures of the operator's manual, from simulated FR1 tests.
 
 Everything is real but the wall: the acquisition process, the NI-DAQmx client, the simulated device
-server, the window. Pictures go to docs/images, each at 1366×768 (dark) and 1920×1080 (light).
+server, the window. Pictures go to docs/images/window, each at 1366×768 (dark) and 1920×1080 (light).
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def check(studio: Studio) -> None:
 def main() -> None:
     """Take all pictures."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=REPOSITORY / "docs" / "images")
+    parser.add_argument("--out", type=Path, default=REPOSITORY / "docs" / "images" / "window")
     parser.add_argument(
         "--part", choices=("all", "day", "gap"), default="all", help="what to take pictures of"
     )

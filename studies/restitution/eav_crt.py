@@ -2,7 +2,7 @@
 
 Simulated tests go through all sensors and converters and the product's own analysis; only one thing is
 changed at a time: an analysis choice, or one effect of the library at half and at the whole of its
-plausible range. Prints both tables and draws docs/images/eav-crt.svg.
+plausible range. Prints both tables and draws docs/images/analysis/eav-crt.svg.
 """
 
 from __future__ import annotations
@@ -318,7 +318,9 @@ def draw(choices: list[Choice], rows: list[Row]) -> Figure:
 def main() -> None:
     """Measure, print, draw."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--figure", type=Path, default=REPOSITORY / "docs" / "images" / "eav-crt.svg")
+    parser.add_argument(
+        "--figure", type=Path, default=REPOSITORY / "docs" / "images" / "analysis" / "eav-crt.svg"
+    )
     parser.add_argument("--json", type=Path, help="write the figures as JSON")
     options = parser.parse_args()
     console = Console(width=150)
