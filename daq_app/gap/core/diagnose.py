@@ -12,9 +12,11 @@ from daq_app.gap.core.decision import Material, decide
 from daq_app.gap.core.effects import Library
 from daq_app.gap.core.evidence import NULL, Ranked, answers, credible_set, family_of
 from daq_app.gap.core.features import Run
+from daq_app.gap.core.findings import Finding
 from daq_app.gap.core.fit import Fit, effects_of
 from daq_app.gap.core.held_out import GapSize, HeldOutRun, gap_size
 from daq_app.gap.core.hypotheses import Hypotheses, Hypothesis, Options
+from daq_app.gap.core.joined import with_findings
 from daq_app.gap.core.likelihood import Covariance
 from daq_app.gap.core.model import Model
 from daq_app.gap.core.other_forms import with_other_forms
@@ -30,11 +32,13 @@ def diagnose(
     library: Library,
     options: Options | None = None,
     limits: Sequence[str] = (),
+    findings: Sequence[Finding] = (),
 ) -> Diagnosis:
     """Where model and runs differ, which effect of the library explains it, how far the gap shrinks.
 
     Raises `CannotDiagnose` where there is nothing to fit, and `parallel.Interrupted` when
-    `options.cancelled` says so. `limits` are passed on to the result.
+    `options.cancelled` says so. `limits` are passed on to the result; `findings` are what was
+    measured directly about instruments and is out of the runs already: material ones join the answer.
     """
     options = options or Options()
     began = time.perf_counter()
@@ -45,7 +49,7 @@ def diagnose(
     with Workers(model, runs, options.workers, options.progress, options.cancelled) as workers:
         study = _Study(model, tuple(runs), library, options, workers)
         study.fit_all()
-        return study.conclude(stated, began)
+        return with_findings(study.conclude(stated, began), findings)
 
 
 def _refuse(model: Model, runs: Sequence[Run]) -> None:

@@ -1,4 +1,4 @@
-"""The result of a diagnosis, and its JSON (format version 1, see docs/explanation/gap-method.md)."""
+"""The result of a diagnosis, and its JSON (format version 2, see docs/explanation/gap-method.md)."""
 
 from __future__ import annotations
 
@@ -9,15 +9,23 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from daq_app.gap.core.evidence import Ranked
+from daq_app.gap.core.findings import Finding
 from daq_app.gap.core.goodness import Goodness
 from daq_app.gap.core.held_out import GapSize
 from daq_app.gap.core.other_forms import FreeForm
 from daq_app.gap.core.where import GapMap
 
-FORMAT_VERSION: Final = 1
+FORMAT_VERSION: Final = 2
 
 Verdict = Literal[
-    "effect", "pair", "parameters", "nothing_missing", "cannot_tell", "none_of_these", "below_detection"
+    "effect",
+    "pair",
+    "several",
+    "parameters",
+    "nothing_missing",
+    "cannot_tell",
+    "none_of_these",
+    "below_detection",
 ]
 
 
@@ -90,6 +98,8 @@ class Diagnosis:
     """Probe → knot → (value, low, high): the non-parametric shape of what is missing."""
     detection: tuple[Detection, ...]
     next_measurement: str
+    findings: tuple[Finding, ...] = ()
+    """What was measured directly about instruments; material ones are part of the answer."""
     free_forms: tuple[FreeForm, ...] = ()
     """What freer forms of its families gain on top of the best hypothesis."""
     rest_p: float = 1.0
@@ -103,7 +113,9 @@ class Diagnosis:
     def best(self) -> tuple[str, ...]:
         """The most probable hypothesis of the library: what was fitted, simulated and held out."""
         probes = {name for probe in self.probes for name in probe.effects}
-        return next(entry.effects for entry in self.which if not probes.intersection(entry.effects))
+        measured = {finding.name for finding in self.findings}
+        first = next(entry.effects for entry in self.which if not probes.intersection(entry.effects))
+        return tuple(name for name in first if name not in measured)
 
     def in_words(self, effects: tuple[str, ...]) -> str:
         """A hypothesis as people read it: a probe stands for another form of its family."""

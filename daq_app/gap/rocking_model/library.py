@@ -72,13 +72,6 @@ _ONE_CHANNEL: dict[str, tuple[str, ...]] = {
     "accelerometer": ("gain", "drift"),
 }
 _INERTIA_STARTS = {"frequency": (8.0, 14.0, 24.0), "zeta": (0.1, 0.3)}
-_MARK_REACH = {
-    "hum": {"lvdt": 1e-3, "wire": 4e-3, "accelerometer": 1.0},
-    "quantisation": {"lvdt": 2e-3, "wire": 8e-3},
-    "dropout": {"lvdt": 0.2, "wire": 0.2},
-    "polarity": {"": 1.0},
-    "swap": {"": 1.0},
-}
 SMALLEST = {("residual_cable", "slack"): 4e-3}
 """Lower end of a range that the simulator lets begin at zero."""
 _WIDER = {("yaw", "kick"): 0.4, ("twist", "kick"): 0.4, ("flexible_wall", "gain"): 0.02}
@@ -176,21 +169,6 @@ def _sensor_effect(name: str, target: str, family: str, known: set[str]) -> Effe
     )
 
 
-def mark_effect(mark: str, family: str) -> Effect:
-    """The effect behind a mark of the electronics: ``hum@LV-A03``."""
-    name, _, target = mark.partition("@")
-    spec = next(spec for spec in SENSOR_EFFECTS if spec.name == name)
-    strength = spec.strength
-    if name == "saturation":
-        parameter = between(strength.name, strength.low, strength.high, strength.unit, strength.text)
-    else:
-        reach = _MARK_REACH[name].get(family, _MARK_REACH[name].get("", 1.0))
-        # When a channel freezes is chance: how much of a run it loses is each run's own.
-        own = name == "dropout"
-        parameter = positive(strength.name, reach, strength.unit, strength.text, per_run=own)
-    return Effect(mark, "sensor", (parameter,), spec.equation, spec.reference, f"{spec.summary} ({target})")
-
-
 def _sensor_effects(known: set[str]) -> Iterable[Effect]:
     by_name = {spec.name: spec for spec in SENSOR_EFFECTS}
     for name, families in _SENSORS.items():
@@ -233,13 +211,11 @@ def _alike(names: Collection[str]) -> Iterable[Alike]:
             yield Alike(same, *_ALIKE_ON_SENSORS[1:])
 
 
-def rocking_library(
-    channels: Mapping[str, str] | None = None, marks: Mapping[str, str] | None = None
-) -> Library:
+def rocking_library(channels: Mapping[str, str] | None = None) -> Library:
     """All effects, probes and departures.
 
-    `channels` are those that disagree with their family and `marks` the conditions found in these runs
-    (``hum@LV-A03``), each with its family: their effects are added, under the name of the channel.
+    `channels` are those that disagree with their family, each with its family: the effects on a single
+    sensor are added for each, under its name.
     """
     specs = [spec for spec in MOTION_EFFECTS if spec.name in _MOTION]
     known = {spec.name for spec in specs}
@@ -248,11 +224,6 @@ def rocking_library(
         for channel, family in (channels or {}).items()
         for name in _ONE_CHANNEL[family]
     ]
-    if marks is None:
-        marks = {
-            f"{name}@{family}": family for name, reach in _MARK_REACH.items() for family in reach if family
-        } | {"saturation@lvdt": "lvdt", "saturation@wire": "wire", "polarity": "", "swap": ""}
-    conditions = [mark_effect(mark, family) for mark, family in marks.items()]
     motion = (_motion_effect(spec, known) for spec in specs)
-    effects = [*motion, *_sensor_effects(known), *single, *conditions, *probes(), *departures()]
+    effects = [*motion, *_sensor_effects(known), *single, *probes(), *departures()]
     return Library(effects, _alike({effect.name for effect in effects}))

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from daq_app.gap.core import CannotDiagnose, Diagnosis, Library, Options, diagnose
 from daq_app.gap.core.result import Decision, Verdict
-from daq_app.gap.rocking_model.features.extra_response import MARKS
+from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined, examine
-from daq_app.gap.rocking_model.inspection.conditions import Mark
+from daq_app.gap.rocking_model.findings import findings_of
 from daq_app.gap.rocking_model.inspection.inspect_runs import (
     calibrations,
     choose_reference,
     completed,
     found_channels,
-    found_marks,
     inspect,
     without_suspects,
 )
@@ -69,35 +68,15 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
         impacts = entry.features.impacts_before + entry.features.swings.impacts
     if not examined:
         raise CannotDiagnose("None of the runs can be used.", " ".join(limits))
-    examined, channels, findings = without_suspects(examined, marks, reference)
+    examined, channels, marks_of_all = without_suspects(examined, marks, reference)
     for entry in examined:
         limits += entry.features.notes
-    whole, bursts = completed(examined, findings, channels, inspected.wiring)
-    limits += _stated([[*row, *more] for row, more in zip(findings, bursts, strict=True)], channels)
-    return whole, limits
-
-
-def _stated(marks: Sequence[Sequence[Mark]], channels: Mapping[str, str]) -> list[str]:
-    """What the inspection took out of the families, in words."""
-    words = [
+    whole = completed(examined, marks_of_all, channels, inspected.wiring)
+    limits += [
         f"{name} disagrees with the other {family} channels; it is examined on its own."
         for name, family in channels.items()
     ]
-    seen: dict[str, list[Mark]] = {}
-    for row in marks:
-        for mark in row:
-            if mark.value > 0.0:
-                seen.setdefault(mark.key, []).append(mark)
-    for key, found in seen.items():
-        if key.startswith("disagreement@"):
-            family = key.partition("@")[2]
-            words.append(f"{found[0].observable} of {family} channels: left out, and nothing explains it.")
-            continue
-        middle = float(np.median([m.value for m in found]))
-        unit = "" if found[0].unit == "1" else f" {found[0].unit}"
-        count = "1 run" if len(found) == 1 else f"{len(found)} runs"
-        words.append(f"{key}: {found[0].observable} {middle:.3g}{unit} in {count}.")
-    return words
+    return whole, limits
 
 
 def _without_gaps(run: GapRun) -> GapRun:
@@ -152,7 +131,7 @@ def diagnose_runs(
     if only:
         library = library.without(*(name for name in library if name not in only))
         limits.append(f"Only {', '.join(sorted(only))} were considered.")
-    result = diagnose(model, prepared, library, options, limits)
+    result = diagnose(model, prepared, library, options, limits, findings_of(prepared))
     wiring = prepared[0].wiring
     result.notes["wiring"] = {"reversed": list(wiring.reversed_ids), "exchanged": dict(wiring.exchanged)}
     return _doubt_the_survey(result)
@@ -163,9 +142,7 @@ def model_and_library(prepared: Sequence[RockingRun]) -> tuple[RockingModel, Lib
 
     Effects that these runs cannot show at all are left out: vibration of the floor where none is seen.
     """
-    channels, marks = found_channels(prepared), found_marks(prepared)
-    named = {key: family for key, family in marks.items() if key.partition("@")[0] in MARKS}
-    library = rocking_library(channels, named)
+    library = rocking_library(found_channels(prepared))
     if not any(run.vibration is not None and run.vibration.found for run in prepared):
         library = library.without("ambient")
     return RockingModel(prepared[0].survey, calibrations(prepared)), library

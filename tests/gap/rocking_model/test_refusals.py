@@ -96,7 +96,7 @@ def test_one_run_says_what_one_run_cannot(wall: GapRun) -> None:
 def _result(effects: dict[str, float], decision: str = "effect") -> dict[str, object]:
     nuisance = {"alpha": 0.21, "p": 2.19, "r": 0.9, "half_base": 0.3255}
     return {
-        "format": 1,
+        "format": 2,
         "decision": decision,
         "effect_parameters": [{"name": k, "value": v} for k, v in effects.items()],
         "parameters": [{"name": k, "value": v} for k, v in nuisance.items()],

@@ -1,4 +1,4 @@
-"""What effects do to the blocks beyond the families: one channel, ring-downs, marks, the floor."""
+"""What effects do to the blocks beyond the families: one channel, ring-downs, the floor."""
 
 from __future__ import annotations
 
@@ -15,16 +15,6 @@ from daq_app.gap.rocking_model.features.sensor_blocks import Block, Shares, firs
 from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ
 from daq_app.gap.rocking_model.motion.rotation import TAIL_S, WireInverse
 from daq_app.gap.rocking_model.records import Sensor
-
-MARKS: dict[str, str] = {
-    "hum": "amplitude",
-    "quantisation": "step",
-    "dropout": "share",
-    "saturation": "limit",
-    "polarity": "on",
-    "swap": "places",
-}
-"""Effect behind a mark, and its parameter."""
 
 
 def bessel(values: FloatArray, delay_s: float) -> FloatArray:
@@ -91,8 +81,6 @@ def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
     total: FloatArray | None = None
     for key in {k.rpartition(".")[0] for k in values if k.rpartition(".")[0].endswith("@" + block.family)}:
         effect = key.partition("@")[0]
-        if effect in MARKS:
-            continue
         given = {k.rpartition(".")[2]: v for k, v in values.items() if k.rpartition(".")[0] == key}
         if effect == "wire_anchor":
             assert block.wire is not None
@@ -293,18 +281,6 @@ def _in_wires(block: Block, series: FloatArray | None) -> FloatArray:
         for k, name in enumerate(block.names):
             if name.endswith("in wires"):
                 found[k] = block.shares[k].rotation * float(block.projection[k] @ series)
-    return found
-
-
-def conditions(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
-    """Marks: each follows from the one effect of its name."""
-    found = np.zeros(len(block.names))
-    for k, name in enumerate(block.names):
-        effect = name.partition("@")[0]
-        parameter = MARKS.get(effect)
-        value = values.get(f"{name}.{parameter}") if parameter else None
-        if value is not None:
-            found[k] = 1.0 / value if effect == "saturation" else value
     return found
 
 

@@ -56,7 +56,7 @@ _NONE = Size(0.0)
 def repeatability(block: Block, i: int) -> float:
     """Unit in which a coefficient scatters from run to run; 0 for what does not."""
     match block.rule:
-        case "conditions" | "floor" | "bending" | "turning" | "release":
+        case "floor" | "bending" | "turning" | "release":
             return 0.0
         case "channel":
             return 0.1 * float(np.sqrt(block.covariance[i, i])) if i == len(block.names) - 1 else 0.0

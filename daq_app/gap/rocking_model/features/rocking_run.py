@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from daq_app.gap.core import FeatureSet, Label
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.floor_vibration import Vibration
+from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.features.sensor_blocks import Block
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import WireInverse
@@ -58,6 +59,8 @@ class RockingRun:
     """All wires whose geometry is known."""
     wiring: Wiring = field(default_factory=Wiring)
     """What was put right in all runs before anything was read from them."""
+    marks: tuple[Mark, ...] = ()
+    """What the run shows of conditions of the electronics."""
     cache: dict[Any, Any] = field(default_factory=dict, compare=False)
 
     def rotation_alone(self) -> RockingRun:

@@ -347,7 +347,6 @@ _PREDICT = {
     "channel": extra.channel,
     "bending": _bending,
     "turning": _turning,
-    "conditions": extra.conditions,
     "floor": extra.floor,
     "joint": _joint,
     "base": _base,

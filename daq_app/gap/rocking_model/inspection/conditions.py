@@ -6,6 +6,7 @@ healthy channel, and which only the effect of that name predicts to be anything 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,6 +15,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.records import GapRun
 
 MAINS_HZ = 50.0
@@ -37,18 +39,6 @@ _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer")
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
-    """One condition of one channel or family in one run: 0 ± sd on a healthy one."""
-
-    key: str
-    """``hum@LV-A03``: the effect that explains it; or a plain word that no effect explains."""
-    observable: str
-    unit: str
-    value: float
-    sd: float
-
-
-@dataclass(frozen=True, slots=True)
 class Condition:
     """What the samples of one channel in one run say."""
 
@@ -61,6 +51,8 @@ class Condition:
     frozen_share: float
     frozen_sd: float
     spikes_per_s: float
+    noise_si: float = 0.0
+    """Rms noise of one reading: that of this record or the declared one, whichever is larger."""
 
 
 def inspect_channel(run: GapRun, index: int) -> Condition:
@@ -71,13 +63,14 @@ def inspect_channel(run: GapRun, index: int) -> Condition:
     rate, accelerometer = run.rate_hz, run.sensors[index].family == "accelerometer"
     noise = _white_noise(values, rate)
     hum, hum_sd, wave = _hum(values, rate)
+    usual = max(noise, run.sensors[index].noise_si)
     if accelerometer:
-        return Condition(hum, hum_sd, wave, 0.0, 1.0, 0.0, 1e-3, 0.0)
+        return Condition(hum, hum_sd, wave, 0.0, 1.0, 0.0, 1e-3, 0.0, usual)
     clean = values if wave is None else values - wave
     step, step_sd = _stairs(values, run.sensors[index].noise_si)
     frozen, frozen_sd = _frozen(values, rate, step, run.sensors[index].range_si)
     spikes = _spikes(clean, noise, rate) if step == 0.0 and frozen == 0.0 else 0.0
-    return Condition(hum, hum_sd, wave, step, step_sd, frozen, frozen_sd, spikes)
+    return Condition(hum, hum_sd, wave, step, step_sd, frozen, frozen_sd, spikes, usual)
 
 
 def _white_noise(values: FloatArray, rate_hz: float) -> float:
@@ -218,6 +211,7 @@ def marks_of(runs: Sequence[GapRun], conditions: Sequence[dict[str, Condition]])
         rows = [[found[name] for name in ids] for found in conditions]
         if not ids:
             continue
+        noise = float(np.median([[c.noise_si for c in row] for row in rows]))
         table = {
             "hum": [[(c.hum_si, c.hum_sd, c.hum_si > 0.0) for c in row] for row in rows],
             "quantisation": [[(c.step_si, c.step_sd, c.step_si > 0) for c in row] for row in rows],
@@ -230,7 +224,8 @@ def marks_of(runs: Sequence[GapRun], conditions: Sequence[dict[str, Condition]])
             key, chosen = _who(family, ids, [[cell[2] for cell in row] for row in cells])
             for run_marks, row in zip(marks, cells, strict=True):
                 value, sd = _amount(name, [row[k] for k in chosen] if chosen else row)
-                run_marks.append(Mark(f"{name}@{key}", *_WORDS[name][family], value, sd))
+                rms = noise if name in ("hum", "quantisation") else math.nan
+                run_marks.append(Mark(f"{name}@{key}", *_WORDS[name][family], value, sd, family, rms))
     return marks
 
 

@@ -1,7 +1,7 @@
 """Before anything is fitted: wiring, electronics, single channels, ring-downs and the floor, over all runs.
 
-What is found is taken out of the families where it would spoil them, and comes back as blocks of
-features of its own, so that it competes with everything else for the explanation.
+What is found is taken out of the families where it would spoil them. Conditions of the electronics become
+marks of the run; what channels, ring-downs and the floor show becomes blocks of features of its own.
 """
 
 from __future__ import annotations
@@ -15,21 +15,16 @@ from daq_app.config.rig import Family
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features import swing_timing
-from daq_app.gap.rocking_model.features.extra_response import MARKS
 from daq_app.gap.rocking_model.features.floor_vibration import Vibration, find_vibration, without_vibration
 from daq_app.gap.rocking_model.features.impact_timing import MIDDLE_OF_IMPACT_S
+from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.features.ring_signals import Signal, bend_signals, turn_signals
 from daq_app.gap.rocking_model.features.rings import Ring, ring_block, scan, with_repeatability
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun, scalar_block
 from daq_app.gap.rocking_model.features.run_features import Examined, examine
 from daq_app.gap.rocking_model.features.sensor_blocks import Block
 from daq_app.gap.rocking_model.inspection.channel_faults import channel_block, suspects
-from daq_app.gap.rocking_model.inspection.conditions import (
-    Mark,
-    conditions_of,
-    marks_of,
-    without_hum,
-)
+from daq_app.gap.rocking_model.inspection.conditions import conditions_of, marks_of, without_hum
 from daq_app.gap.rocking_model.inspection.floor_bursts import floor_bursts
 from daq_app.gap.rocking_model.inspection.saturation import saturated
 from daq_app.gap.rocking_model.inspection.second_axis import second_axis
@@ -211,10 +206,10 @@ def completed(
     marks: Sequence[Sequence[Mark]],
     channels: dict[str, Family],
     wiring: Wiring,
-) -> tuple[list[RockingRun], list[list[Mark]]]:
-    """Features of all runs with the blocks of what was inspected over all of them, and the marks of the last.
+) -> list[RockingRun]:
+    """Features of all runs with the blocks and marks of what was inspected over all of them.
 
-    Those are of the floor, which is looked at once its even vibration is out of the accelerometers.
+    Bursts of the floor are looked for once its even vibration is out of the accelerometers.
     """
     grids = [e.features.grid for e in examined]
     height = examined[0].features.survey.height_m
@@ -254,10 +249,12 @@ def completed(
                 ("frequency", "Hz", vibration.frequency_hz, len(examined) * vibration.frequency_sd**2),
             )
             row.append(scalar_block("floor", entries, grid))
-        row.append(_mark_block(seen, entry))
-        features = replace(read, vibration=vibration, wiring=wiring)
+        families: dict[str, str] = {s.id: s.family for s in entry.run.sensors}
+        families |= {family: family for family in _FAMILIES}
+        named = tuple(replace(m, family=families.get(m.key.partition("@")[2], "")) for m in seen)
+        features = replace(read, vibration=vibration, wiring=wiring, marks=named)
         runs.append(features.with_blocks(row))
-    return runs, bursts
+    return runs
 
 
 def _on_still_floor(entry: Examined, vibration: Vibration | None) -> Examined:
@@ -266,22 +263,6 @@ def _on_still_floor(entry: Examined, vibration: Vibration | None) -> Examined:
         return entry
     still = without_vibration(entry.run, entry.features.grid, vibration)
     return examine(still, entry.wanted)
-
-
-def _mark_block(marks: Sequence[Mark], entry: Examined) -> Block:
-    families: dict[str, str] = {s.id: s.family for s in entry.run.sensors}
-    families |= {family: family for family in _FAMILIES}
-    block = scalar_block(
-        "conditions",
-        [(m.key, m.unit, m.value, m.sd**2) for m in marks],
-        entry.features.grid,
-        kind="conditions",
-    )
-    # What no effect explains is spoken of in words: there is no effect whose name says it.
-    said = {
-        m.key: (m.key.partition("@")[2], m.observable) for m in marks if m.key.partition("@")[0] not in MARKS
-    }
-    return replace(block, said=said, tags={m.key: families.get(m.key.partition("@")[2], "") for m in marks})
 
 
 def _add_rings(
@@ -326,11 +307,4 @@ def calibrations(runs: Sequence[RockingRun]) -> dict[str, dict[str, float]]:
 
 def found_marks(runs: Sequence[RockingRun]) -> dict[str, str]:
     """Conditions of the electronics that are there in any run, with the family of their channels."""
-    return {
-        name: block.tags[name]
-        for run in runs
-        for block in run.blocks
-        if block.kind == "conditions"
-        for name, value in zip(block.names, block.values, strict=True)
-        if value > 0.0
-    }
+    return {mark.key: mark.family for run in runs for mark in run.marks if mark.value > 0.0}

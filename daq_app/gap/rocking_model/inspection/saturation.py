@@ -10,7 +10,7 @@ import numpy as np
 
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.inspection.conditions import Mark
+from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.motion.late_joint import lateness
 from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, coarse
 from daq_app.gap.rocking_model.motion.rotation import reaches_its_range, wire_reading, zeroed

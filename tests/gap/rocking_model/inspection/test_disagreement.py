@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from daq_app.gap.rocking_model.findings import findings_of
 from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels, found_marks
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import diagnose_runs, model_and_library, prepare
@@ -31,11 +32,12 @@ def _scaled(factors: dict[str, float], levels: tuple[float, ...] = LEVEL) -> lis
     ],
 )
 def test_several_channels_of_one_family_that_disagree_are_named_together(factors: dict[str, float]) -> None:
-    prepared, limits = prepare(_scaled(factors))
+    prepared, _ = prepare(_scaled(factors))
     family = "lvdt" if "LV-A03" in factors else "accelerometer"
     assert found_channels(prepared) == {}
     assert found_marks(prepared) == {f"disagreement@{family}": family}
-    assert any(all(name in words for name in factors) for words in limits)
+    (finding,) = findings_of(prepared)
+    assert all(name in finding.words for name in factors)
     wires = next(b for b in prepared[0].blocks if b.family == "wire")
     assert abs(wires.values[wires.names.index("gain")]) < 5e-3
     _, library = model_and_library(prepared)
@@ -48,9 +50,11 @@ def test_a_second_axis_that_follows_the_rotation_is_marked() -> None:
     for run in runs:
         run.channels[place["TL-1Y"]] += 0.08 * run.channels[place["TL-1X"]]
         run.channels[place["TL-2Y"]] += 0.01 * run.channels[place["TL-2X"]]
-    prepared, limits = prepare(runs)
+    prepared, _ = prepare(runs)
     assert found_marks(prepared) == {"crossed@TL-1Y": "tiltmeter"}
-    assert any("TL-1Y" in words for words in limits)
+    (finding,) = findings_of(prepared)
+    assert "TL-1Y" in finding.words
+    assert finding.size == pytest.approx(0.08, abs=0.01)
 
 
 def _shaken(amplitude_m_s2: float) -> list[GapRun]:
@@ -66,10 +70,12 @@ def _shaken(amplitude_m_s2: float) -> list[GapRun]:
 
 
 def test_a_burst_of_shaking_is_found_in_the_run_that_has_it() -> None:
-    prepared, limits = prepare(_shaken(0.1))
+    prepared, _ = prepare(_shaken(0.1))
     marks = [found_marks([run]) for run in prepared]
     assert marks == [{"shaking@floor": ""}, {}]
-    assert any("burst of shaking" in words and words.endswith("in 1 run.") for words in limits)
+    (finding,) = findings_of(prepared)
+    assert "burst of shaking" in finding.words
+    assert finding.where == "1 of 2 runs"
 
 
 @pytest.mark.parametrize("levels", [(-0.35,), (0.25, -0.35), (0.25, -0.35, 0.45)])
@@ -78,4 +84,4 @@ def test_nothing_missing_is_not_said_over_channels_that_disagree(levels: tuple[f
         _scaled({"LV-A03": 1.09, "LV-B07": 1.09, "LV-B08": 1.09}, levels), only=("viscous",)
     )
     assert result.decision.verdict == "none_of_these"
-    assert "disagreement (LV-A03, LV-B07, LV-B08) of lvdt" in result.decision.sentence
+    assert "disagreement (LV-A03, LV-B07, LV-B08)" in result.decision.sentence

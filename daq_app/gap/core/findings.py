@@ -1,0 +1,54 @@
+"""Findings: what is measured directly about an instrument, before any model is fitted.
+
+A finding is taken out of the data by whoever measured it, so it never competes with a cause for a place
+in a hypothesis; any number can be there at once. Material findings join the answer; the others are listed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that is wrong, or merely ordinary, about an instrument."""
+
+    name: str
+    """``hum@LV-A03``: what it is and of which channel or family."""
+    words: str
+    """For engineers: ``mains hum of 0.03 mm in the LVDTs``."""
+    family: str
+    probability: float
+    """That it is there."""
+    size: float
+    low: float
+    """Lower end of the 95 % interval of the size."""
+    high: float
+    unit: str
+    where: str
+    """Where it shows, e.g. ``5 of 8 runs``."""
+    material: bool
+    """Whether it belongs into the answer; an ordinary one is listed only."""
+    parameter: str = ""
+    """Name of its size in the library's words; empty where no effect of the library does the same."""
+    in_noise: float = math.nan
+    """Size over the rms noise of one reading of its family; NaN where that has no meaning."""
+    closes: float = math.nan
+    """Share of the gap that it alone closes; NaN where it is not known."""
+
+    @property
+    def explained(self) -> bool:
+        """Whether the library has an effect that does the same."""
+        return bool(self.parameter)
+
+
+def material(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Findings that join the answer: material, and with an effect that does the same."""
+    return tuple(f for f in findings if f.material and f.explained)
+
+
+def unexplained(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Material findings that no effect of the library explains."""
+    return tuple(f for f in findings if f.material and not f.explained)

@@ -1,0 +1,67 @@
+"""The answer as a whole: causes and what was measured directly about instruments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from daq_app.gap.core.evidence import Ranked
+from daq_app.gap.core.findings import Finding, material, unexplained
+from daq_app.gap.core.result import Decision, Diagnosis, Estimate, Verdict
+
+_NAMING: tuple[Verdict, ...] = ("effect", "pair", "several")
+_NO_CAUSE: tuple[Verdict, ...] = ("nothing_missing", "parameters", "below_detection")
+
+
+def verdict_of(count: int) -> Verdict:
+    """The verdict that names so many things; 1 or more."""
+    return _NAMING[min(count, len(_NAMING)) - 1]
+
+
+def with_findings(result: Diagnosis, findings: Sequence[Finding]) -> Diagnosis:
+    """The diagnosis with findings about instruments: material ones join each hypothesis and the decision."""
+    if not findings:
+        return result
+    joining = material(findings)
+    names = tuple(finding.name for finding in joining)
+    sizes = tuple(
+        Estimate(f"{f.name}.{f.parameter}", f.size, f.low, f.high, f.unit, 0.0, 0.0, f.words) for f in joining
+    )
+    return replace(
+        result,
+        which=tuple(_joined(entry, names) for entry in result.which),
+        set95=tuple(_joined(entry, names) for entry in result.set95),
+        decision=_decision(result.decision, findings),
+        effect_parameters=(*result.effect_parameters, *sizes),
+        findings=tuple(findings),
+    )
+
+
+def _joined(entry: Ranked, names: tuple[str, ...]) -> Ranked:
+    if not names:
+        return entry
+    families = [family for family in entry.family.split(" + ") if family != "none"]
+    family = " + ".join(dict.fromkeys([*families, "sensor"]))
+    return replace(entry, effects=tuple(sorted((*entry.effects, *names))), family=family)
+
+
+def _decision(decision: Decision, findings: Sequence[Finding]) -> Decision:
+    strange = unexplained(findings)
+    if strange and decision.verdict != "none_of_these":
+        words = "; ".join(f.words for f in strange)
+        sentence = f"None of these explains what was measured directly: {words}. {decision.sentence}"
+        return Decision("none_of_these", (), strange[0].family, sentence, strange[0].probability)
+    joining = material(findings)
+    if not joining or decision.verdict == "none_of_these":
+        return decision
+    names = tuple(finding.name for finding in joining)
+    words = "; ".join(finding.words for finding in joining)
+    sentence = f"Measured directly: {words}. {decision.sentence}"
+    if decision.verdict in _NO_CAUSE:
+        sure = min(finding.probability for finding in joining)
+        return Decision(verdict_of(len(names)), names, "sensor", sentence, sure)
+    effects = tuple(sorted((*decision.effects, *names)))
+    verdict = verdict_of(len(effects)) if decision.verdict in _NAMING else decision.verdict
+    family = _joined(Ranked(decision.effects, decision.family, 0.0, 0.0), names).family
+    others = tuple(tuple(sorted((*other, *names))) for other in decision.alternatives)
+    return Decision(verdict, effects, family, sentence, decision.confidence, others)

@@ -1,0 +1,89 @@
+"""From the marks of all runs to findings about instruments."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import norm
+
+from daq_app.gap.core.findings import Finding
+from daq_app.gap.core.policy import POLICY
+from daq_app.gap.rocking_model.features.marks import EFFECT_SIZES, Mark
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+
+_IN_NOISE = ("hum", "quantisation")
+"""Conditions that every laboratory has a little of: material by their size over the noise."""
+_FAMILY_WORDS = {
+    "lvdt": "the LVDTs",
+    "wire": "the wires",
+    "accelerometer": "the accelerometers",
+    "tiltmeter": "the tiltmeters",
+}
+
+
+def findings_of(runs: Sequence[RockingRun]) -> tuple[Finding, ...]:
+    """One finding per condition that any run shows, in the order in which the runs show them."""
+    seen: dict[str, list[Mark]] = {}
+    for run in runs:
+        for mark in run.marks:
+            if mark.value > 0.0:
+                seen.setdefault(mark.key, []).append(mark)
+    return tuple(_finding(key, marks, len(runs)) for key, marks in seen.items())
+
+
+def _finding(key: str, marks: Sequence[Mark], runs: int) -> Finding:
+    kind, _, target = key.partition("@")
+    size, sd = _median_with_sd(marks)
+    chance = float(np.prod([norm.sf(mark.value / mark.sd) for mark in marks]))
+    unit = marks[0].unit
+    if kind == "saturation":
+        # The mark is the inverse of the limit, so that no limit is 0 ± sd.
+        size, sd, unit = 1.0 / size, sd / size**2, "m"
+    in_noise = size / marks[0].noise if kind in _IN_NOISE and marks[0].noise > 0.0 else math.nan
+    where = f"{len(marks)} of {runs} runs"
+    return Finding(
+        name=key,
+        words=_words(kind, target, marks[0], size, unit) + f" in {where}",
+        family="sensor",
+        probability=1.0 - chance,
+        size=size,
+        low=max(size - 1.96 * sd, 0.0),
+        high=size + 1.96 * sd,
+        unit=unit,
+        where=where,
+        material=kind not in _IN_NOISE or in_noise > POLICY.finding_in_noise,
+        parameter=EFFECT_SIZES.get(kind, ""),
+        in_noise=in_noise,
+    )
+
+
+def _median_with_sd(marks: Sequence[Mark]) -> tuple[float, float]:
+    """Median over the runs, and its standard deviation by reading error and spread."""
+    values = np.array([mark.value for mark in marks])
+    reading = float(np.median([mark.sd for mark in marks]))
+    spread = float(values.std(ddof=1)) if values.size > 1 else 0.0
+    return float(np.median(values)), math.hypot(reading, spread) / math.sqrt(values.size)
+
+
+def _words(kind: str, target: str, mark: Mark, size: float, unit: str) -> str:
+    who = _FAMILY_WORDS.get(target, target)
+    shown, label = (1e3 * size, "mm") if unit == "m" else (size, unit)
+    amount = f"{shown:.3g} {label}"
+    match kind:
+        case "hum":
+            return f"mains hum of {amount} in {who}"
+        case "quantisation":
+            return f"{who} read in steps of {amount}"
+        case "dropout":
+            return f"{who} stands still for {100 * size:.2g} % of the time"
+        case "spikes":
+            return f"{who} has {size:.2g} lone samples a second"
+        case "saturation":
+            return f"{who} goes no further than {amount}"
+        case "polarity" | "swap" | "disagreement":
+            return mark.observable
+        case "crossed":
+            return f"{who} shows {100 * size:.2g} % of the rotation across its axis"
+    return f"{mark.observable} of {amount} ({who})"
