@@ -12,8 +12,8 @@ from daq_app.gap.blind.making.case_files import write_case
 from daq_app.gap.blind.making.make import Order, draw_case
 from daq_app.gap.blind.world.campaign import draw_world
 from daq_app.gap.blind.world.effects.catalogue import Drawn
+from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.features.sensor_blocks import Block
 from daq_app.gap.rocking_model.inspection.inspect_runs import found_marks
 from daq_app.gap.rocking_model.records import load_run
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare

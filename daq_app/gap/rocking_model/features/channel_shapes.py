@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray, independent_fraction
-from daq_app.gap.rocking_model.features.sensor_blocks import Block
+from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ
 from daq_app.gap.rocking_model.motion.rotation import WireInverse
+from daq_app.gap.rocking_model.tolerances import CALIBRATION
 
 _SHAPES = ("gain", "lag", "curvature", "drift")
 SHAPES: dict[Family, tuple[str, ...]] = {
@@ -41,8 +42,6 @@ by the place's own ringing, which a hop of the wall carries beyond the mask. An 
 its family may be late by: a twelfth of it is in the time across every impact, to one side up and to the other
 down, and those times repeat to some hundredths of a millisecond. A wire is straight to 0.1 % of its travel of
 ± 0.45 m; its side is an anchor known to 5 mm."""
-CALIBRATION = 3e-3
-"""Relative tolerance of one channel's calibration."""
 _SOUND = 0.5
 """Standard deviation of what a sound channel is off by, in those tolerances."""
 STRUCTURE_SD = 0.2

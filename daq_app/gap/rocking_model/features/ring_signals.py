@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.channel_shapes import CALIBRATION
-from daq_app.gap.rocking_model.features.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
-from daq_app.gap.rocking_model.features.sensor_blocks import Shares
+from daq_app.gap.rocking_model.features.block import Shares
+from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
 from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
 from daq_app.gap.rocking_model.motion.rotation import Rotation, sooner, wall_rotation, zeroed
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
+from daq_app.gap.rocking_model.tolerances import CALIBRATION
 
 DISPLACEMENT_MASK_S = 0.02
 """A base that gives way takes milliseconds to turn after an impact: a quick decay, but no ring-down."""

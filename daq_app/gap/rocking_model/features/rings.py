@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.ring_signals import Signal
-from daq_app.gap.rocking_model.features.sensor_blocks import Block
 from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid
 
 BEND_HZ = np.geomspace(7.0, 42.0, 36)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core import FeatureSet, Label
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.floor_vibration import Vibration
 from daq_app.gap.rocking_model.features.marks import Mark
-from daq_app.gap.rocking_model.features.sensor_blocks import Block
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import WireInverse
 from daq_app.gap.rocking_model.motion.swings import Swings
@@ -89,22 +89,6 @@ class RockingRun:
         loadings = _block_loadings(blocks, first, len(values))
         features = FeatureSet(np.array(values), np.array(sds), tuple(labels))
         return replace(self, features=features, blocks=blocks, block_loadings=loadings, cache={})
-
-
-def scalar_block(
-    family: str, entries: Sequence[tuple[str, str, float, float]], grid: Grid, kind: str = ""
-) -> Block:
-    """A block of plain numbers: (name, unit, value, variance) each."""
-    return Block(
-        family,
-        tuple(e[0] for e in entries),
-        tuple(e[1] for e in entries),
-        np.array([e[2] for e in entries]),
-        np.diag([e[3] for e in entries]),
-        np.zeros((len(entries), grid.valid.size)),
-        np.ones(grid.valid.size, dtype=bool),
-        kind=kind,
-    )
 
 
 def _block_loadings(blocks: tuple[Block, ...], first: int, n: int) -> FloatArray:

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core import FeatureSet, Label
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.block import scalar_block
+from daq_app.gap.rocking_model.features.families import sensor_families
+from daq_app.gap.rocking_model.features.family import Scene
 from daq_app.gap.rocking_model.features.floor_vibration import quiet
-from daq_app.gap.rocking_model.features.impact_timing import acceleration_delay
-from daq_app.gap.rocking_model.features.rocking_run import RockingRun, scalar_block
-from daq_app.gap.rocking_model.features.sensor_blocks import blocks_of
-from daq_app.gap.rocking_model.features.swing_timing import swing_delay
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion import swings as sw
 from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, coarse, make_grid
 from daq_app.gap.rocking_model.motion.release_speed import release_speed
@@ -58,14 +58,9 @@ def examine(run: GapRun, reference: str = "") -> Examined:
     reference, theta, noise, notes = _reference(run, joint, wanted)
     swings = sw.find_swings(theta, noise, run.rate_hz, run.name)
     grid = make_grid(theta, joint.valid, swings, run.rate_hz, run.survey)
-    late_joint = wanted == "late"
-    blocks = tuple(blocks_of(run, joint, grid, swings, reference, quiet(run, grid), late_joint).values())
-    late = acceleration_delay(run, grid)
-    if late is not None:
-        blocks = (*blocks, scalar_block("impact timing", (("delay", "s", late[0], late[1]),), grid))
-    between = swing_delay(run, grid, None if late is None else late[0])
-    if between is not None:
-        blocks = (*blocks, scalar_block("swing timing", (("delay", "s", between[0], between[1]),), grid))
+    scene = Scene(run, joint, grid, swings, reference, quiet(run, grid), wanted == "late")
+    seen = (block for family in sensor_families() for block in family.observe(scene))
+    blocks = tuple(block for block in seen if block is not None)
     let_go = release_speed(theta, noise, swings, run.survey, run.rate_hz)
     if let_go is not None:
         entry = ("speed away from upright", "rad/s", let_go[0], let_go[1] ** 2)

@@ -14,6 +14,7 @@ import numpy as np
 
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.channel_shapes import (
     RINGING,
     SHAPES,
@@ -23,7 +24,6 @@ from daq_app.gap.rocking_model.features.channel_shapes import (
     deviation,
     usual_remains,
 )
-from daq_app.gap.rocking_model.features.sensor_blocks import Block
 from daq_app.gap.rocking_model.inspection.channel_families import (
     ChannelFamily,
     beside,

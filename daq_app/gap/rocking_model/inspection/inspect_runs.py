@@ -14,15 +14,13 @@ import numpy as np
 from daq_app.config.rig import Family
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features import swing_timing
+from daq_app.gap.rocking_model.features.block import Block, scalar_block
 from daq_app.gap.rocking_model.features.floor_vibration import Vibration, find_vibration, without_vibration
-from daq_app.gap.rocking_model.features.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.features.ring_signals import Signal, bend_signals, turn_signals
 from daq_app.gap.rocking_model.features.rings import Ring, ring_block, scan, with_repeatability
-from daq_app.gap.rocking_model.features.rocking_run import RockingRun, scalar_block
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined, examine
-from daq_app.gap.rocking_model.features.sensor_blocks import Block
 from daq_app.gap.rocking_model.inspection.channel_faults import channel_block, suspects
 from daq_app.gap.rocking_model.inspection.conditions import conditions_of, marks_of, without_hum
 from daq_app.gap.rocking_model.inspection.floor_bursts import floor_bursts
@@ -31,6 +29,8 @@ from daq_app.gap.rocking_model.inspection.second_axis import second_axis
 from daq_app.gap.rocking_model.inspection.stairs import beside_stairs
 from daq_app.gap.rocking_model.inspection.vertical import odd_vertical, vertical_block
 from daq_app.gap.rocking_model.inspection.wiring import mend
+from daq_app.gap.rocking_model.motion import swing_timing
+from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.records import GapRun, Wiring
 
 LATE_S = 2.5e-3

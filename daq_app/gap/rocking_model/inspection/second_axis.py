@@ -8,7 +8,7 @@ import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.marks import Mark
-from daq_app.gap.rocking_model.features.sensor_blocks import first_order
+from daq_app.gap.rocking_model.features.response import first_order
 from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
 from daq_app.gap.rocking_model.motion.rotation import zeroed
 from daq_app.gap.rocking_model.records import GapRun

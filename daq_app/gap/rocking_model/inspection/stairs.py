@@ -14,12 +14,12 @@ import numpy as np
 
 from daq_app.gap.core import FeatureSet
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.channel_shapes import CALIBRATION
+from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined
-from daq_app.gap.rocking_model.features.sensor_blocks import Block
 from daq_app.gap.rocking_model.motion.rotation import wall_rotation
 from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.tolerances import CALIBRATION
 
 DRAWS = 40
 """Zeros and calibrations that are tried."""

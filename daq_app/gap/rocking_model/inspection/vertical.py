@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.channel_shapes import (
     TOLERANCE,
     Others,
@@ -19,7 +20,6 @@ from daq_app.gap.rocking_model.features.channel_shapes import (
     deviation,
     usual_remains,
 )
-from daq_app.gap.rocking_model.features.sensor_blocks import Block
 from daq_app.gap.rocking_model.inspection.channel_families import smoothed
 from daq_app.gap.rocking_model.inspection.channel_faults import SUSPECT
 from daq_app.gap.rocking_model.motion.motion_grid import Grid

@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.sensor_blocks import first_order
+from daq_app.gap.rocking_model.features.response import first_order
 from daq_app.gap.rocking_model.motion.rotation import zeroed
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Wiring
 

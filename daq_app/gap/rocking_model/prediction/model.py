@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
@@ -10,10 +9,8 @@ import numpy as np
 
 from daq_app.gap.core import Parameter, Prediction, Run, Scatter
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features import sensor_response as response
-from daq_app.gap.rocking_model.features.extra_response import with_measured_inputs
-from daq_app.gap.rocking_model.features.impact_timing import MIDDLE_OF_IMPACT_S
-from daq_app.gap.rocking_model.features.repeatability import biases
+from daq_app.gap.rocking_model.features.coefficients import block_coefficients, sensor_priors
+from daq_app.gap.rocking_model.features.floor_response import with_measured_inputs
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.prediction.free_forms import free_times, with_uneven_loss
 from daq_app.gap.rocking_model.prediction.true_motion import pause_at_impact, true_rotations
@@ -69,7 +66,6 @@ class RockingModel:
     @property
     def nuisance(self) -> tuple[Parameter, ...]:
         s = self.survey
-        tolerance = 0.003
         return (
             Parameter(
                 "alpha", s.alpha_rad, s.alpha_tolerance * s.alpha_rad, "rad", 0.02, 0.6, meaning="slenderness"
@@ -87,54 +83,12 @@ class RockingModel:
                 2.0,
                 meaning="half width of the base",
             ),
-            Parameter(
-                "face_a", 0.0, tolerance / math.sqrt(12), "1", meaning="calibration of the LVDTs at x < 0"
-            ),
-            Parameter(
-                "face_b", 0.0, tolerance / math.sqrt(12), "1", meaning="calibration of the LVDTs at x > 0"
-            ),
-            Parameter("cal_wire", 0.0, tolerance / math.sqrt(5), "1", meaning="calibration of the wires"),
-            Parameter(
-                "cal_tiltmeter",
-                0.0,
-                tolerance / math.sqrt(2),
-                "1",
-                meaning="calibration of the tiltmeters",
-                linear=True,
-            ),
-            Parameter(
-                "cal_accelerometer", 0.0, tolerance / 2, "1", meaning="calibration of the accelerometers"
-            ),
-            Parameter(
-                "tilt_response", 0.0, 0.01, "s", meaning="error of the tiltmeters' time constant", linear=True
-            ),
-            Parameter(
-                "onset",
-                MIDDLE_OF_IMPACT_S,
-                1e-3,
-                "s",
-                meaning="middle of the impact after the contact",
-                linear=True,
-            ),
-            Parameter(
-                "base_follow", 0.0, 4e-3, "1", meaning="translation from wire calibrations", linear=True
-            ),
-            Parameter("twist_follow", 0.0, 2e-3, "1/m", meaning="twist from LVDT calibrations", linear=True),
-            Parameter(
-                "mount_height",
-                0.0,
-                self.survey.mount_tolerance_m,
-                "m",
-                meaning="error of the height of the LVDTs' points above the joint",
-                linear=True,
-            ),
-            Parameter("wire_even", 0.0, 5e-3, "1/rad", meaning="even part from wire anchors", linear=True),
             *(
                 Parameter(f"cal_{name}_{shape}", 0.0, own, meaning=f"{shape} of {name}", linear=True)
                 for name, sound in self.channels.items()
                 for shape, own in sound.items()
             ),
-            *biases(),
+            *sensor_priors(s),
         )
 
     def local_nuisance(self, run: Run) -> tuple[Parameter, ...]:
@@ -162,7 +116,7 @@ class RockingModel:
         last = count + run.peaks.size
         predicted[count:last] = peaks
         loading_r[count:last] = 1.0 / slopes
-        predicted[last:], units = response.block_coefficients(run, values)
+        predicted[last:], units = block_coefficients(run, values)
         loadings = {SCATTER_R: loading_r, **self._fixed_scatters(run, units)}
         return Prediction(predicted, loadings, run.block_loadings)
 

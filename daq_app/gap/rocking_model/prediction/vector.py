@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.coefficients import leaves_reference
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from sim_hardware.dynamics import parameters as par
 from sim_hardware.dynamics import shooting
@@ -31,10 +32,7 @@ _MIDDLE_SPEED = 0.36
 slope, so that the priors of r and of its slope say nothing of it."""
 
 
-_BLOCKS_ONLY = frozenset(
-    ("cal_tiltmeter", "cal_accelerometer", "tilt_response", "onset", "base_follow", "twist_follow")
-) | {"mount_height", "wire_even"}
-_STILL = ("bias_", "flexible_wall.", "yaw.", "twist.", "sliding.")
+_STILL = ("flexible_wall.", "yaw.", "twist.", "sliding.")
 """Effects that do not move the rotation of the joint."""
 _SWINGS_ONLY = frozenset(("p", "r", "theta0", "omega0", "viscous.zeta", "coulomb.mu")) | {
     "slope_power.c",
@@ -50,7 +48,7 @@ def acts_on(part: str, key: str, reference: str) -> bool:
     """Whether a value moves the ``swings`` or the ``blocks`` of a prediction; yes unless known otherwise."""
     if part == "blocks":
         return key not in _SWINGS_ONLY
-    if key in _BLOCKS_ONLY or key.startswith(_STILL):
+    if leaves_reference(key) or key.startswith(_STILL):
         return False
     if key.startswith("cal_") and key != "cal_wire":
         return False  # of one channel, which is not used with its family

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from daq_app.gap.core import Options
+from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.coefficients import block_coefficients
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.features.sensor_blocks import Block
-from daq_app.gap.rocking_model.features.sensor_response import block_coefficients
 from daq_app.gap.rocking_model.motion.late_joint import lateness
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from daq_app.gap.rocking_model.features.extra_response import bessel
+from daq_app.gap.rocking_model.features.response import bessel
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import examine, extract
-from daq_app.gap.rocking_model.features.sensor_blocks import UPRIGHT_RAD, moment_shape, side_of, slip_shape
+from daq_app.gap.rocking_model.features.shapes import UPRIGHT_RAD, moment_shape, side_of, slip_shape
 from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid, coarse
 from daq_app.gap.rocking_model.motion.rotation import pivots_off, wire_reading, wires_of
 from tests.support.simulated_wall import simulate

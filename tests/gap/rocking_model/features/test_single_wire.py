@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from daq_app.gap.rocking_model.features.extra_response import channel
-from daq_app.gap.rocking_model.features.sensor_blocks import Block
+from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.channel_response import channel
 from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels
 from daq_app.gap.rocking_model.study import prepare
 from tests.support.simulated_wall import simulate

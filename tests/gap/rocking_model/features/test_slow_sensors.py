@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter1d
 
-from daq_app.gap.rocking_model.features.extra_response import transfer
+from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.coefficients import block_coefficients
+from daq_app.gap.rocking_model.features.response import first_order, transfer
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import extract
-from daq_app.gap.rocking_model.features.sensor_blocks import Block, first_order
-from daq_app.gap.rocking_model.features.sensor_response import block_coefficients
 from daq_app.gap.rocking_model.inspection.conditions import inspect_channel
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.study import prepare

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from daq_app.gap.rocking_model.features.extra_response import bending, turning
+from daq_app.gap.rocking_model.features.ring_response import bending, turning
 from daq_app.gap.rocking_model.study import prepare
 from tests.support.simulated_wall import simulate
 
@@ -27,7 +27,7 @@ def test_what_turns_is_known_where_bending_is_looked_for_and_the_other_way_round
     (run,) = prepare(runs)[0]
     block = next(b for b in run.blocks if b.kind == seen_in)
     values = {f"{motion}.{parameter}": value for parameter, value in given.items()}
-    predicted = {"bending": bending, "turning": turning}[seen_in](run, block, values, None)
+    predicted = {"bending": bending, "turning": turning}[seen_in](run, block, values)
     sd = np.sqrt(np.diag(block.covariance))
     for family in ("wires", "accelerometers"):
         chosen = [k for k, name in enumerate(block.names) if name.endswith(family)]

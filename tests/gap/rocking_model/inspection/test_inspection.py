@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.coefficients import block_coefficients
+from daq_app.gap.rocking_model.features.response import first_order
 from daq_app.gap.rocking_model.features.rings import ring_columns
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.features.sensor_blocks import Block, first_order
-from daq_app.gap.rocking_model.features.sensor_response import block_coefficients
 from daq_app.gap.rocking_model.findings import findings_of
 from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels, found_marks
 from daq_app.gap.rocking_model.inspection.saturation import saturated

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
-from daq_app.gap.rocking_model.features.impact_timing import MIDDLE_OF_IMPACT_S
+from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
 from daq_app.gap.rocking_model.motion.rotation import sooner, zeroed
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun

@@ -1,0 +1,132 @@
+"""A block: coefficients of one family in one run, with the regression that made them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import WireInverse
+
+
+@dataclass(frozen=True, slots=True)
+class Shares:
+    """What a signal put together from several channels shows of each way in which they can move.
+
+    Of bending or turning the sensors that are left may show more than one, where they no longer stand
+    evenly on both sides of the middle.
+    """
+
+    rotation: float = 0.0
+    """Of an error of the family's rotation, m (m/s² of the angular acceleration)."""
+    bend: float = 0.0
+    """Of the bending at the top of the wall; 1/m in signals of turning."""
+    yaw: float = 0.0
+    """Of the angle about the vertical, m; 1 or none in signals of turning."""
+    twist: float = 0.0
+    """Of the rotation's slope along the length, m²; m in signals of turning."""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Coefficients of one family in one run, with the regression that made them.
+
+    `values` (k,), `covariance` (k, k), `projection` (k, m'): coefficients = projection @ series on
+    the samples `pick` of the grid.
+    """
+
+    family: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+    projection: FloatArray
+    pick: NDArray[np.bool_]
+    kind: str = ""
+    """Which rule predicts it; empty where the family's name says so."""
+    expected: FloatArray | None = None
+    """Of a single channel: what the others make of it, on the whole grid."""
+    design: FloatArray | None = None
+    """Of a single channel: the shapes of the regression at the samples of `pick`."""
+    noise: float = 1.0
+    """Of a single channel: rms at rest."""
+    wire: WireInverse | None = None
+    """Of a single wire: how its rotation was made from its length, which is what its faults act on."""
+    ring: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Of a ring-down: frequency in Hz, damping ratio, rate of the grid in Hz."""
+    levers: tuple[float, ...] = ()
+    """Of a single channel: the relative error of its prediction."""
+    shares: tuple[Shares, ...] = ()
+    """Of a ring-down: what the signal of each coefficient shows."""
+    fading: tuple[float, ...] = ()
+    """Of a ring-down: change of each coefficient of unit size per ln of the damping ratio."""
+    undone_s: float = 0.0
+    """Delay of accelerometers (of a ring-down) or LVDTs (of the joint) that was undone before."""
+    unequal: FloatArray | None = None
+    """Of a ring-down, (k,): what calibrations that differ by one sd add to each coefficient in all runs."""
+    tags: Mapping[str, str] = field(default_factory=dict)
+    """Sensor family behind a channel or a mark."""
+    said: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """(channel, observable) under which a coefficient is spoken of, where not the block's and its name."""
+
+    @property
+    def independent(self) -> bool:
+        """Whether its coefficients' errors are independent: then no loadings are needed for them."""
+        return not np.any(self.covariance - np.diag(np.diag(self.covariance)))
+
+    @property
+    def rule(self) -> str:
+        return self.kind or self.family
+
+    def coefficients(self, series: FloatArray) -> FloatArray:
+        """What the regression makes of a difference given on the whole grid."""
+        found: FloatArray = self.projection @ series[self.pick]
+        return found
+
+
+def regress(
+    family: str,
+    difference: FloatArray,
+    columns: dict[str, tuple[FloatArray, str]],
+    pick: NDArray[np.bool_],
+    absorbed: tuple[str, ...] = (),
+) -> Block | None:
+    """Least squares of a difference on named shapes; None with too few samples.
+
+    The shapes `absorbed` are fitted but say nothing about the wall or the sensor, and are dropped.
+    """
+    if pick.sum() < 20 * len(columns):
+        return None
+    design = np.column_stack([column[pick] for column, _ in columns.values()])
+    scale = np.sqrt(np.mean(design**2, axis=0)) + 1e-300
+    scaled = np.linalg.pinv(design / scale, rcond=1e-8)
+    projection = scaled / scale[:, None]
+    values = projection @ difference[pick]
+    residual = difference[pick] - design @ values
+    fraction = max(independent_fraction(residual), 0.01)
+    variance = float(residual @ residual) / max(residual.size - len(columns), 1) / fraction
+    covariance = variance * projection @ projection.T
+    kept = [k for k, name in enumerate(columns) if name not in absorbed]
+    names = tuple(name for name in columns if name not in absorbed)
+    units = tuple(unit for name, (_, unit) in columns.items() if name not in absorbed)
+    return Block(family, names, units, values[kept], covariance[np.ix_(kept, kept)], projection[kept], pick)
+
+
+def scalar_block(
+    family: str, entries: Sequence[tuple[str, str, float, float]], grid: Grid, kind: str = ""
+) -> Block:
+    """A block of plain numbers: (name, unit, value, variance) each."""
+    return Block(
+        family,
+        tuple(e[0] for e in entries),
+        tuple(e[1] for e in entries),
+        np.array([e[2] for e in entries]),
+        np.diag([e[3] for e in entries]),
+        np.zeros((len(entries), grid.valid.size)),
+        np.ones(grid.valid.size, dtype=bool),
+        kind=kind,
+    )

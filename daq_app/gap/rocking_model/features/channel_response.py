@@ -1,0 +1,99 @@
+"""Predicted coefficients of one channel that is examined on its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.response import responded
+from daq_app.gap.rocking_model.features.rings import ring_columns
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ
+from daq_app.gap.rocking_model.motion.rotation import TAIL_S, WireInverse
+from daq_app.gap.rocking_model.records import Sensor
+
+
+def _rotation(block: Block) -> FloatArray:
+    """What the other wires say of the rotation."""
+    assert block.expected is not None
+    assert block.wire is not None
+    return block.expected / block.wire.sensor.position_m[2]
+
+
+def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """Coefficients of one channel against its family, and the logarithm of what they leave over noise."""
+    assert block.expected is not None
+    assert block.design is not None
+    # A wire's faults act on its length, of which its height times the rotation is a curved picture.
+    true = block.expected if block.wire is None else block.wire.shortening(_rotation(block))
+    total: FloatArray | None = None
+    for key in {k.rpartition(".")[0] for k in values if k.rpartition(".")[0].endswith("@" + block.family)}:
+        effect = key.partition("@")[0]
+        given = {k.rpartition(".")[2]: v for k, v in values.items() if k.rpartition(".")[0] == key}
+        if effect == "wire_anchor":
+            assert block.wire is not None
+            series = block.wire.shortening(_rotation(block), given["height"]) - true
+        else:
+            series = responded(true, effect, given) - true
+        total = series if total is None else total + series
+    found = np.zeros(len(block.names))
+    ringing = _ringing(run, block, values)
+    if total is not None or ringing is not None:
+        total = np.zeros_like(true) if total is None else total
+        if block.wire is not None:
+            # The zero of every channel is its rest at the end of the record.
+            total = total - total[-round(TAIL_S * GRID_HZ) :].mean()
+            total = block.wire.sensor.position_m[2] * block.wire.rotation(true + total) - block.expected
+        total = total if ringing is None else total + ringing
+        seen = total[block.pick]
+        found[:-1] = block.projection @ seen
+        left = seen - block.design @ (block.design.T @ seen)
+        found[-1] = 0.5 * np.log1p(float(left @ left) / seen.size / block.noise**2)
+    for k, shape in enumerate(block.names[: len(block.levers)]):
+        found[k] += values.get(f"cal_{block.family}_{shape}", 0.0)
+    return found
+
+
+_RINGS = (("bending", "flexible_wall.gain"), ("turning", "yaw.kick"), ("turning", "twist.kick"))
+
+
+def _ringing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray | None:
+    """What a wall that rings moves one wire by, beyond what the others make of it, m; None for nothing.
+
+    They stand at other heights and on other sides, so it does not cancel as a rotation does.
+    """
+    if block.wire is None:
+        return None
+    parts = []
+    for family, key in _RINGS:
+        ring = next((b for b in run.blocks if b.family == family), None)
+        size = values.get(key, 0.0)
+        if ring is None or size == 0.0:
+            continue
+        if (block.family, key) not in run.cache:
+            run.cache[block.family, key] = _ringing_of_one(run, block.wire, ring, key)
+        parts.append(size * run.cache[block.family, key])
+    return np.asarray(np.sum(parts, axis=0)) if parts else None
+
+
+def _ringing_of_one(run: RockingRun, wire: WireInverse, ring: Block, key: str) -> FloatArray:
+    """The same for a strength of one, at the frequency and damping that the runs show."""
+    frequency, zeta, rate = ring.ring
+    wave = np.sinc(frequency / rate) * ring_columns(run.grid, frequency, zeta)[:, 0]
+
+    def moved(sensor: Sensor) -> float:
+        _, y, z = sensor.position_m
+        if key.startswith("flexible_wall"):
+            return float((z / run.survey.height_m) ** 2)
+        return (y * z if key.startswith("twist") else -y) / (2.0 * np.pi * frequency)
+
+    others = [w.sensor for w in run.wires if w.sensor.id != wire.sensor.id]
+    heights = np.array([sensor.position_m[2] for sensor in others])
+    weights = np.array([1.0, wire.sensor.position_m[2]]) @ np.linalg.pinv(
+        np.column_stack([np.ones_like(heights), heights])
+    )
+    beyond = moved(wire.sensor) - float(weights @ np.array([moved(sensor) for sensor in others]))
+    return np.asarray(beyond * wave)

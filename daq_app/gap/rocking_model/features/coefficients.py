@@ -1,0 +1,141 @@
+"""Predicted coefficients of all blocks of a run, by the rule of each block."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache, partial
+
+import numpy as np
+
+from daq_app.gap.core import Parameter
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.channel_response import channel
+from daq_app.gap.rocking_model.features.families import sensor_families
+from daq_app.gap.rocking_model.features.family import Predict, Size
+from daq_app.gap.rocking_model.features.floor_response import floor
+from daq_app.gap.rocking_model.features.memo import Memo
+from daq_app.gap.rocking_model.features.ring_response import bending, turning
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.records import Survey
+
+BIAS = "bias_"
+"""Prefix of the parameters that say what sound sensors may be off by in all runs."""
+_RINGS = ("bending", "turning")
+
+
+def _release(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """Speed away from upright at the release."""
+    return np.array([values["omega0"] + values.get("initial_velocity.omega", 0.0)])
+
+
+@cache
+def _rules() -> Mapping[str, Predict]:
+    rules: dict[str, Predict] = {
+        "channel": channel,
+        "bending": bending,
+        "turning": turning,
+        "floor": floor,
+        "release": _release,
+    }
+    for family in sensor_families():
+        rules |= family.predict
+    return rules
+
+
+@cache
+def sizes() -> Mapping[tuple[str, str], Size]:
+    """How every coefficient of the sensor families repeats, by (block, coefficient)."""
+    return {key: size for family in sensor_families() for key, size in family.sizes.items()}
+
+
+def block_coefficients(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
+    """Predicted coefficients of all blocks of a run, and the unit of their scatter, each (k,)."""
+    if not run.blocks:
+        return np.zeros(0), np.zeros(0)
+    if "units" not in run.cache:
+        units = [np.array([repeatability(block, i) for i in range(len(block.names))]) for block in run.blocks]
+        run.cache["units"] = units, np.concatenate(units)
+    whole: FloatArray
+    units, whole = run.cache["units"]
+    memos: list[Memo] = run.cache.setdefault("memos", [Memo() for _ in run.blocks])
+    predicted = [
+        memo.of(values, partial(_coefficients, run, block, unit))
+        for block, unit, memo in zip(run.blocks, units, memos, strict=True)
+    ]
+    return np.concatenate(predicted), whole
+
+
+def _coefficients(run: RockingRun, block: Block, unit: FloatArray, values: Mapping[str, float]) -> FloatArray:
+    coefficients = _rules()[block.rule](run, block, values)
+    for i, name in _bias_names(block.family, block.names):
+        coefficients[i] += values.get(name, 0.0)
+    if block.unequal is not None:
+        coefficients = coefficients + values.get(_unequal_name(block.family), 0.0) * block.unequal
+    if f"free_{block.family}.c0" in values:
+        free = [values.get(f"free_{block.family}.c{i}", 0.0) for i in range(unit.size)]
+        coefficients = coefficients + 3.0 * unit * np.array(free)
+    return coefficients
+
+
+def repeatability(block: Block, i: int) -> float:
+    """Unit in which a coefficient scatters from run to run; 0 for what does not."""
+    if block.rule == "channel":
+        return 0.1 * float(np.sqrt(block.covariance[i, i])) if i == len(block.names) - 1 else 0.0
+    size = sizes().get((block.family, block.names[i]))
+    return size.scatter if size is not None else 0.0
+
+
+@cache
+def _bias_names(family: str, coefficients: tuple[str, ...]) -> tuple[tuple[int, str], ...]:
+    """(place, name of the parameter) of those coefficients of a block that have a bias."""
+    return tuple(
+        (i, _bias_name(family, coefficient))
+        for i, coefficient in enumerate(coefficients)
+        if (size := sizes().get((family, coefficient))) is not None and size.bias > 0.0
+    )
+
+
+def _bias_name(family: str, coefficient: str) -> str:
+    return f"{BIAS}{family}_{coefficient}".replace(" ", "_")
+
+
+def _unequal_name(family: str) -> str:
+    """The parameter of what unequal calibrations make of a ring-down, in sd."""
+    return f"{BIAS}{family}_unequal"
+
+
+def sensor_priors(survey: Survey) -> tuple[Parameter, ...]:
+    """Parameters of all sensor families: calibrations, and what sound sensors may be off by in all runs.
+
+    A bias is what a certificate lets pass and a regression cannot avoid, the same in all runs; an effect on a
+    sensor thus counts as far as it exceeds what sound sensors do.
+    """
+    own = (parameter for family in sensor_families() for parameter in family.priors(survey))
+    biases = (
+        Parameter(
+            _bias_name(family, coefficient),
+            0.0,
+            size.bias,
+            size.unit,
+            meaning=f"what sound sensors may be off by: {coefficient} of {family}",
+            linear=True,
+        )
+        for (family, coefficient), size in sizes().items()
+        if size.bias > 0.0
+    )
+    unequal = (
+        Parameter(
+            _unequal_name(name), 0.0, 1.0, "1", meaning=f"{name} from unequal accelerometers", linear=True
+        )
+        for name in _RINGS
+    )
+    return (*own, *biases, *unequal)
+
+
+@cache
+def leaves_reference(name: str) -> bool:
+    """Whether a parameter is one of the sensors' that does not change the reference rotation."""
+    nominal = Survey("", 0.2, 2.0, 0.3, 3.0)
+    kept = frozenset().union(*(family.references for family in sensor_families()))
+    return name not in kept and name in {p.name for p in sensor_priors(nominal)}

@@ -1,0 +1,127 @@
+"""What the effects on a whole sensor family add to the rotation that it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.memo import any_of
+from daq_app.gap.rocking_model.features.response import bessel, first_order, resonator
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape
+from daq_app.gap.rocking_model.motion.rotation import anchors_off
+
+_FAMILY_EFFECTS = (
+    ("gain", "error"),
+    ("lag", "tau"),
+    ("slow_response", "tau"),
+    ("filter_delay", "tau"),
+    ("drift", "rate"),
+    ("wire_cosine", "kappa"),
+    ("wire_anchor", "height"),
+    ("wire_inertia", "frequency"),
+)
+"""Effects on a whole family, and the parameter that says that they are there."""
+
+
+@cache
+def _family_keys(family: str) -> dict[str, None]:
+    """Parameters that say which effects there are on a family."""
+    return dict.fromkeys(f"{name}@{family}.{parameter}" for name, parameter in _FAMILY_EFFECTS)
+
+
+def family_difference(run: RockingRun, family: str, values: Mapping[str, float]) -> FloatArray | None:
+    """What a family's sensor effects add to the rotation it shows, on the grid; None for nothing."""
+    shown = run.grid.theta
+    if family == "wire" and family != run.reference and "sliding.c" in values:
+        # A slip is a step to whatever the wires answer with.
+        if "slips" not in run.cache:
+            run.cache["slips"] = slip_shape(run.grid) / run.wire_height_m
+        shown = shown + values["sliding.c"] * run.cache["slips"]
+    total = _added(run, family, values, shown)
+    if total is None or family != run.reference:
+        return total
+    # The grid's own rotation has the effect already: what is behind it is found by going back twice.
+    for _ in range(2):
+        total = _added(run, family, values, shown - total)
+        assert total is not None
+    return total
+
+
+def _added(run: RockingRun, family: str, values: Mapping[str, float], theta: FloatArray) -> FloatArray | None:
+    """What a family's sensor effects add to the rotation `theta`; None for nothing."""
+    if not any_of(values, _family_keys(family)):
+        return None
+    time_s = run.grid.time_s
+    parts: list[FloatArray] = []
+    for name, parameter in _FAMILY_EFFECTS:
+        value = values.get(f"{name}@{family}.{parameter}")
+        if value is None:
+            continue
+        match name:
+            case "gain":
+                parts.append(value * theta)
+            case "lag":
+                parts.append(np.interp(time_s - value, time_s, theta) - theta)
+            case "slow_response":
+                parts.append(first_order(theta, value) - theta)
+            case "filter_delay":
+                parts.append(bessel(theta, value) - theta)
+            case "wire_inertia":
+                zeta = values.get(f"wire_inertia@{family}.zeta", 0.2)
+                parts.append(resonator(theta, 2.0 * np.pi * value, zeta) - theta)
+            case "drift":
+                scale = {"wire": run.wire_height_m, "lvdt": np.inf}.get(family, 1.0)
+                parts.append(value / scale * (time_s - (run.swings.rest_s - run.swings.release_s)))
+            case "wire_anchor":
+                parts.append(anchors_off(run.wires, theta, value)[0])
+            case "wire_cosine":
+                parts.append(run.wire_bend_m * value * theta**2)
+    total: FloatArray = np.sum(parts, axis=0)
+    return total
+
+
+def difference_of(run: RockingRun, first: str, second: str, values: Mapping[str, float]) -> FloatArray | None:
+    """What one family shows more than another because of sensor effects; None for nothing."""
+    a, b = family_difference(run, first, values), family_difference(run, second, values)
+    if a is None:
+        return None if b is None else -b
+    return a if b is None else a - b
+
+
+def own_gain(run: RockingRun, values: Mapping[str, float]) -> float:
+    """Calibration of the reference family on average of both sides."""
+    return 0.5 * (values["face_a"] + values["face_b"]) if run.reference == "lvdt" else values["cal_wire"]
+
+
+def unit_coefficients(
+    run: RockingRun, block: Block, name: str, shape: Callable[[], FloatArray]
+) -> FloatArray:
+    """Coefficients of a fixed shape, worked out once per run."""
+    key = (block.family, name)
+    if key not in run.cache:
+        run.cache[key] = block.coefficients(shape())
+    found: FloatArray = run.cache[key]
+    return found
+
+
+def base_rotation(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """A base that gives way: in step with the reaction at the edge, or with the overturning moment.
+
+    The reaction keeps its lever arm, the moment of gravity falls with the rotation; `fall` is the share
+    of the second, which is the simulator's form (1 where it is not fitted).
+    """
+    theta, fall = run.grid.theta, values.get("compliance.fall", 1.0)
+    slow = 0.3 if block.family == "tiltmeter" else 0.0
+
+    def seen(shape: FloatArray) -> FloatArray:
+        return first_order(shape, slow)
+
+    moment = unit_coefficients(run, block, "moment", lambda: seen(moment_shape(theta, run.survey.alpha_rad)))
+    reaction = unit_coefficients(run, block, "reaction", lambda: seen(side_of(theta)))
+    found: FloatArray = values["compliance.phi"] * (fall * moment + (1.0 - fall) * reaction)
+    return found

@@ -1,0 +1,143 @@
+"""Accelerometers: gravity and inertia along x, and the instants of impacts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from daq_app.gap.core import Parameter
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.block import Block, regress, scalar_block
+from daq_app.gap.rocking_model.features.differences import (
+    base_rotation,
+    own_gain,
+)
+from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size
+from daq_app.gap.rocking_model.features.response import delay
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
+from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid, coarse
+from daq_app.gap.rocking_model.motion.rotation import (
+    zeroed,
+)
+from daq_app.gap.rocking_model.motion.swing_timing import swing_delay
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, Survey
+from daq_app.gap.rocking_model.tolerances import CALIBRATION
+
+SWAY_HZ = 8.0
+"""Low-pass limit for the sway of a held wall, Hz (assumed); raising it adds noise to its acceleration."""
+
+
+def _acceleration_block(scene: Scene) -> Block | None:
+    run, grid = scene.run, scene.grid
+    last = grid.impact_s[-1] if grid.impact_s.size else 0.0
+    # While the wall is held there is gravity alone: its gain is then known apart from inertia's.
+    pick = (scene.held & (grid.time_s < -0.1)) | (
+        scene.rocking & (grid.time_s > 0.05) & (grid.time_s < last) & ~grid.near_impact
+    )
+    chosen = run.steady_accelerometers("x")
+    if not chosen:
+        return None
+    # Means over 5 ms and no filter: one that rings carries an impact past the samples left out around it.
+    measured = coarse(np.mean([zeroed(run, i) for i in chosen], axis=0), run.rate_hz)
+    height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))
+    x = float(np.mean([run.sensors[i].position_m[0] for i in chosen]))
+    arm = x - np.sign(grid.theta) * run.survey.half_base_m
+    gravity, inertia = -GRAVITY_M_S2 * np.sin(grid.theta), height * grid.alpha
+    expected = gravity + inertia - grid.omega**2 * arm
+    columns = {
+        "zero": (np.ones_like(expected), "m/s²"),
+        "gain of gravity": (gravity, "1"),
+        "gain of inertia": (inertia, "1"),
+    }
+    # The held wall sways: only the mean of that part, less the sway's, says what gravity alone shows.
+    held = pick & (grid.time_s < 0.0)
+    if held.any():
+        swaying = height * float(_sway(grid)[held].mean())
+        measured[held], gravity[held] = measured[held].mean() - swaying, gravity[held].mean()
+        expected = gravity + inertia - grid.omega**2 * arm
+        columns["gain of gravity"], columns["gain of inertia"] = (gravity, "1"), (inertia, "1")
+    # No lag here: between impacts the specific force hardly changes. The impacts themselves tell it.
+    return regress("accelerometer", measured - expected, columns, pick, ("zero",))
+
+
+def _sway(grid: Grid) -> FloatArray:
+    """θ̈ of the held wall on the grid, (m,), rad/s²; 0 after the release.
+
+    Its mean is the change of speed over the hold: 1 % of gravity for a few mrad/s, and well measured.
+    """
+    found = np.zeros_like(grid.raw)
+    before = grid.time_s < 0.0
+    low_pass = butter(3, SWAY_HZ, fs=GRID_HZ, output="sos")
+    theta = sosfiltfilt(low_pass, grid.raw[before] - grid.raw[before].mean())
+    found[before] = np.gradient(np.gradient(theta, 1 / GRID_HZ), 1 / GRID_HZ)
+    return found
+
+
+def _predict(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    own = values["cal_accelerometer"] + values.get("gain@accelerometer.error", 0.0)
+    name = run.reference
+    reference = own_gain(run, values) + values.get(f"gain@{name}.error", 0.0)
+    clock = 1.0 + values.get("clock.error", 0.0)
+    ratio = (1.0 + own) / (1.0 + reference)
+    gains = {"gain of gravity": ratio - 1.0, "gain of inertia": ratio / clock**2 - 1.0}
+    found = np.array([gains.get(name, 0.0) for name in block.names])
+    # The base turns slowly: of its rotation the accelerometers show gravity alone, as in the simulator.
+    return found - GRAVITY_M_S2 * base_rotation(run, block, values) if "compliance.phi" in values else found
+
+
+def _predict_impact_timing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """Accelerometers against the reference rotation: their own delay less that of the reference."""
+    late = delay("accelerometer", values) - delay(run.reference, values)
+    return np.array([values["onset"] + late])
+
+
+def _predict_swing_timing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """The same between impacts, whose form does not matter there."""
+    return np.array([delay("accelerometer", values) - delay(run.reference, values)])
+
+
+def _observe(scene: Scene) -> Iterator[Block | None]:
+    yield _acceleration_block(scene)
+    of_impacts = acceleration_delay(scene.run, scene.grid)
+    if of_impacts is not None:
+        yield scalar_block("impact timing", (("delay", "s", *of_impacts),), scene.grid)
+    of_swings = swing_delay(scene.run, scene.grid, None if of_impacts is None else of_impacts[0])
+    if of_swings is not None:
+        yield scalar_block("swing timing", (("delay", "s", *of_swings),), scene.grid)
+
+
+def _priors(survey: Survey) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "cal_accelerometer", 0.0, CALIBRATION / 2, "1", meaning="calibration of the accelerometers"
+        ),
+        Parameter(
+            "onset",
+            MIDDLE_OF_IMPACT_S,
+            1e-3,
+            "s",
+            meaning="middle of the impact after the contact",
+            linear=True,
+        ),
+    )
+
+
+FAMILY = SensorFamily(
+    _observe,
+    {
+        "accelerometer": _predict,
+        "impact timing": _predict_impact_timing,
+        "swing timing": _predict_swing_timing,
+    },
+    {
+        ("accelerometer", "gain of gravity"): Size(1e-2),
+        ("accelerometer", "gain of inertia"): Size(1e-3, 1e-3, "1"),
+        ("impact timing", "delay"): Size(1e-4),
+        ("swing timing", "delay"): Size(1e-4, 2e-4, "s"),
+    },
+    _priors,
+    probes={"accelerometer": "sensor"},
+)

@@ -1,0 +1,157 @@
+"""LVDTs across the base joint: where the wall turns, how long its contact is, and twist."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.core import Parameter
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.block import Block, regress
+from daq_app.gap.rocking_model.features.differences import (
+    unit_coefficients,
+)
+from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size
+from daq_app.gap.rocking_model.features.pivots import pivots
+from daq_app.gap.rocking_model.features.response import bessel, first_order
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.motion.late_joint import in_step
+from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
+from daq_app.gap.rocking_model.motion.rotation import (
+    Rotation,
+)
+from daq_app.gap.rocking_model.records import GapRun, Survey
+from daq_app.gap.rocking_model.tolerances import CALIBRATION
+
+
+def _lift_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:
+    size = np.abs(grid.theta)
+    expected = run.survey.half_base_m * np.sin(size)
+    columns = {
+        "zero": (np.ones_like(size), "m"),
+        "pivot": (size, "m"),
+        "pivot left against right": (grid.theta, "m"),
+        "pivot with rotation": (size**2, "m/rad"),
+        "contact length": (np.sqrt(size), "m"),
+        "drift": (grid.time_s, "m/s"),
+    }
+    return regress(
+        "joint", coarse(joint.lift, run.rate_hz) - expected, columns, pick & ~grid.near_impact, ("zero",)
+    )
+
+
+def _twist_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:
+    columns = {
+        "zero": (np.ones_like(grid.theta), "rad/m"),
+        "follows rotation": (grid.theta, "1/m"),
+        "drift": (grid.time_s, "rad/m/s"),
+    }
+    return regress("twist", coarse(joint.twist, run.rate_hz), columns, pick, ("zero", "drift"))
+
+
+def _predict_joint(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """Opening at the middle of the base: u_z = (b/2 − a) sin|θ| and what the joint's effects make of it.
+
+    The reference rotation carries the same calibration as the opening, so calibration cancels.
+    """
+    theta = run.grid.theta
+    size = np.abs(theta)
+    inwards, apart = pivots(run, values)
+    curved = 0.5 * (values.get("rounded_edge.rho", 0.0) - values["mount_height"])
+    found: FloatArray = inwards * unit_coefficients(
+        run, block, "size", lambda: size
+    ) + apart * unit_coefficients(run, block, "theta", lambda: theta)
+    found = found + curved * unit_coefficients(run, block, "square", lambda: size**2)
+    # The opening is told against |θ|, whose zero is where the wall came to rest: a wall that rests a
+    # hundredth of a milliradian off upright makes a step from side to side of it.
+    found = found - values["half_base"] * values["zero"] * unit_coefficients(
+        run, block, "sides", lambda: np.sign(theta)
+    )
+    if "winkler.theta_c" in values:
+        theta_c, half = values["winkler.theta_c"], values["half_base"]
+        opened = half * (theta_c - 2.0 * np.sqrt(theta_c * np.maximum(size, theta_c)))
+        found = found + block.coefficients(np.where(size > theta_c, opened, -half * size))
+    if "drift@lvdt.rate" in values:
+        rest = run.swings.rest_s - run.swings.release_s
+        found = found + values["drift@lvdt.rate"] * unit_coefficients(
+            run, block, "time", lambda: run.grid.time_s - rest
+        )
+    smeared = _smeared_opening(run, block.undone_s, values) if block.undone_s else None
+    return found if smeared is None else found + block.coefficients(smeared)
+
+
+def _smeared_opening(run: RockingRun, undone_s: float, values: Mapping[str, float]) -> FloatArray | None:
+    """What slow LVDTs make of an opening beyond that of their own rotation, m, put in step; None for nothing.
+
+    The opening goes with the size of the rotation: after an impact, where that has a corner, a response is
+    still on its way down while the other face opens.
+    """
+    theta, half = run.grid.theta, values["half_base"]
+    turned, opened = theta, half * np.abs(np.sin(theta))
+    for effect, response in (("slow_response", first_order), ("filter_delay", bessel)):
+        if tau := values.get(f"{effect}@lvdt.tau", 0.0):
+            turned, opened = response(turned, tau), response(opened, tau)
+    if turned is theta:
+        return None
+    time_s = run.grid.time_s
+    return np.asarray(np.interp(time_s + undone_s, time_s, opened - half * np.abs(np.sin(turned))))
+
+
+def _predict_twist(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    follow = values["twist_follow"] + values.get("twist.follow", 0.0)
+    found: FloatArray = follow * unit_coefficients(run, block, "theta", lambda: run.grid.theta)
+    return found
+
+
+def _observe(scene: Scene) -> Iterator[Block | None]:
+    run, joint, grid = scene.run, scene.joint, scene.grid
+    if scene.reference == "lvdt":
+        yield _lift_block(run, joint, grid, scene.in_range)
+        yield _twist_block(run, joint, grid, scene.in_range)
+    elif scene.late and joint.whole:
+        own = in_step(joint, grid, run.rate_hz)
+        lifted = _lift_block(run, own.joint, own.grid, scene.in_range & own.pick)
+        yield lifted and replace(lifted, undone_s=own.late_s)
+        yield _twist_block(run, own.joint, own.grid, scene.in_range & own.pick)
+
+
+def _priors(survey: Survey) -> tuple[Parameter, ...]:
+    faces = (("face_a", "x < 0"), ("face_b", "x > 0"))
+    return (
+        *(
+            Parameter(
+                name, 0.0, CALIBRATION / math.sqrt(12), "1", meaning=f"calibration of the LVDTs at {where}"
+            )
+            for name, where in faces
+        ),
+        Parameter("twist_follow", 0.0, 2e-3, "1/m", meaning="twist from LVDT calibrations", linear=True),
+        Parameter(
+            "mount_height",
+            0.0,
+            survey.mount_tolerance_m,
+            "m",
+            meaning="error of the height of the LVDTs' points above the joint",
+            linear=True,
+        ),
+    )
+
+
+FAMILY = SensorFamily(
+    _observe,
+    {"joint": _predict_joint, "twist": _predict_twist},
+    {
+        ("joint", "pivot"): Size(3e-4),
+        ("joint", "pivot left against right"): Size(5e-5, 1e-4, "m"),
+        ("joint", "pivot with rotation"): Size(5e-3),
+        ("joint", "contact length"): Size(5e-5, 3e-5, "m"),
+        ("joint", "drift"): Size(1e-6, 2e-6, "m/s"),
+        ("twist", "follows rotation"): Size(1.5e-4),
+    },
+    _priors,
+    frozenset(("face_a", "face_b")),
+    {"joint": "interface"},
+)

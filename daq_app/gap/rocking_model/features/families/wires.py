@@ -1,0 +1,155 @@
+"""Wire potentiometers: the wall's rotation over its height, and the movement of its base."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import partial
+
+import numpy as np
+
+from daq_app.gap.core import Parameter
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.block import Block, regress
+from daq_app.gap.rocking_model.features.differences import (
+    base_rotation,
+    difference_of,
+    unit_coefficients,
+)
+from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size
+from daq_app.gap.rocking_model.features.pivots import travel
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.shapes import moment_shape, slip_shape
+from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
+from daq_app.gap.rocking_model.motion.rotation import (
+    anchors_off,
+    wall_rotation,
+    wire_reading,
+    zeroed,
+)
+from daq_app.gap.rocking_model.records import Survey
+from daq_app.gap.rocking_model.tolerances import CALIBRATION
+
+_OTHER_WIRES = 2e-3
+"""Difference in calibration between the mean of some wires and that of all."""
+
+
+def _wire_block(scene: Scene) -> Block | None:
+    run, joint, grid, reference = scene.run, scene.joint, scene.grid, scene.reference
+    rows, heights, _ = wall_rotation(run)
+    if len(rows) == 0:
+        return None
+    theta = np.average(rows, axis=0, weights=heights**2)
+    some = len(rows) < len(run.indices("wire"))
+    compared = coarse(theta, run.rate_hz) - (
+        coarse(joint.theta, run.rate_hz) if reference == "wire" else grid.theta
+    )
+    columns = rotation_columns(grid, run.survey.alpha_rad)
+    found = regress("wire", compared, columns, scene.in_range & grid.settled, ("zero",))
+    if found is not None and some:
+        # Other wires than in the other runs: their mean has another calibration.
+        found.covariance[found.names.index("gain"), found.names.index("gain")] += _OTHER_WIRES**2
+    return found
+
+
+def rotation_columns(grid: Grid, alpha: float) -> dict[str, tuple[FloatArray, str]]:
+    """Shapes in which two measures of the rotation can differ."""
+    return {
+        "zero": (np.ones_like(grid.theta), "rad"),
+        "gain": (grid.theta, "1"),
+        "lag": (-grid.omega, "s"),
+        "even harmonic": (grid.theta**2, "1/rad"),
+        "step with moment": (moment_shape(grid.theta, alpha), "rad"),
+        "drift": (grid.time_s, "rad/s"),
+    }
+
+
+def _translation_block(scene: Scene) -> Block | None:
+    """Movement of the base along x, from wires at several heights."""
+    run, grid = scene.run, scene.grid
+    _, heights, names = wall_rotation(run)
+    if len(set(np.round(heights, 2))) < 2 or len(names) < len(run.indices("wire")):
+        return None  # what the base seems to do hangs on the calibration of each wire
+    chosen = [i for i in run.indices("wire") if run.sensors[i].id in names]
+    shift = []
+    for i in chosen:
+        sensor = run.sensors[i]
+        assert sensor.anchor_m is not None
+        ideal = wire_reading(grid.theta, sensor.position_m, sensor.anchor_m, run.survey.half_base_m)
+        shift.append(coarse(zeroed(run, i), run.rate_hz) - ideal)
+    design = np.column_stack([np.ones_like(heights), heights])
+    moved = (np.linalg.pinv(design) @ np.array(shift))[0]
+    columns = {
+        "zero": (np.ones_like(grid.theta), "m"),
+        "slip per speed": (slip_shape(grid), "m s/rad"),
+        "follows rotation": (grid.theta, "m/rad"),
+        "drift": (grid.time_s, "m/s"),
+    }
+    return regress("base", moved, columns, scene.rocking, ("zero", "drift"))
+
+
+def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    theta = run.grid.theta
+    found = values["cal_wire"] * unit_coefficients(run, block, "theta", lambda: theta)
+    found = found - values["face_a"] * unit_coefficients(
+        run, block, "positive", lambda: np.maximum(theta, 0.0)
+    )
+    found = found - values["face_b"] * unit_coefficients(
+        run, block, "negative", lambda: np.minimum(theta, 0.0)
+    )
+    found = found + values["wire_even"] * unit_coefficients(run, block, "even", lambda: theta**2)
+    if "compliance.phi" in values:
+        found = found + base_rotation(run, block, values)
+    if "sliding.c" in values:
+        found = found + values["sliding.c"] / run.wire_height_m * unit_coefficients(
+            run, block, "slip", partial(slip_shape, run.grid)
+        )
+    found = found + travel(run, block, values, of_base=False)
+    series = difference_of(run, "wire", "lvdt", values)
+    return found if series is None else found + block.coefficients(series)
+
+
+def _predict_base(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    follow = values["base_follow"] * run.base_lever
+    found = follow * unit_coefficients(run, block, "theta", lambda: run.grid.theta)
+    total: FloatArray = found + values.get("sliding.c", 0.0) * unit_coefficients(
+        run, block, "slip", partial(slip_shape, run.grid)
+    )
+    total = total + travel(run, block, values, of_base=True)
+    if "wire_cosine@wire.kappa" in values:
+        bend = values["wire_cosine@wire.kappa"] * run.base_bend_m2
+        total = total + bend * unit_coefficients(run, block, "square", lambda: run.grid.theta**2)
+    if higher := values.get("wire_anchor@wire.height", 0.0):
+        total = total + block.coefficients(anchors_off(run.wires, run.grid.theta, higher)[1])
+    return total
+
+
+def _observe(scene: Scene) -> Iterator[Block | None]:
+    yield _wire_block(scene)
+    yield _translation_block(scene)
+
+
+def _priors(survey: Survey) -> tuple[Parameter, ...]:
+    return (
+        Parameter("cal_wire", 0.0, CALIBRATION / math.sqrt(5), "1", meaning="calibration of the wires"),
+        Parameter("base_follow", 0.0, 4e-3, "1", meaning="translation from wire calibrations", linear=True),
+        Parameter("wire_even", 0.0, 5e-3, "1/rad", meaning="even part from wire anchors", linear=True),
+    )
+
+
+FAMILY = SensorFamily(
+    _observe,
+    {"wire": _predict_wire, "base": _predict_base},
+    {
+        ("wire", "gain"): Size(1e-4),
+        ("wire", "lag"): Size(2e-5, 1e-4, "s"),
+        ("wire", "even harmonic"): Size(3e-3),
+        ("wire", "step with moment"): Size(3e-6, 4e-6, "rad"),
+        ("wire", "drift"): Size(2e-6, 5e-6, "rad/s"),
+        ("base", "slip per speed"): Size(5e-5, 1e-4, "m s/rad"),
+        ("base", "follows rotation"): Size(3e-4),
+    },
+    _priors,
+    frozenset(("cal_wire",)),
+    {"wire": "sensor", "base": "contact"},
+)

@@ -1,0 +1,94 @@
+"""Contract of a sensor family: what it observes, how that is predicted, how it repeats, its priors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.core import Parameter
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid
+from daq_app.gap.rocking_model.motion.rotation import Rotation
+from daq_app.gap.rocking_model.motion.swings import Swings
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
+
+Predict = Callable[[RockingRun, Block, Mapping[str, float]], FloatArray]
+"""Predicted coefficients, (k,), of a block of a run at the values of a hypothesis."""
+_SWAY_SHARE = 0.005
+"""Mean acceleration of the sway over that of gravity, up to which the held wall shows gravity alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """How well one coefficient repeats from run to run, and what a sound sensor may be off by in all runs.
+
+    Both in the coefficient's own unit. The model's scatter of sensors multiplies `scatter`; `bias` is the
+    standard deviation of a parameter that all runs share, 0 where a calibration among the priors says it.
+    """
+
+    scatter: float
+    bias: float = 0.0
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """One run with its reference motion: what a sensor family is observed against."""
+
+    run: GapRun
+    joint: Rotation
+    grid: Grid
+    swings: Swings
+    reference: str
+    """``lvdt`` or ``wire``: the family whose rotation is the grid's."""
+    calm: NDArray[np.bool_]
+    """Samples of the grid at which nothing rings, (m,)."""
+    late: bool = False
+    """Whether the LVDTs are sound but for their time."""
+
+    @property
+    def rocking(self) -> NDArray[np.bool_]:
+        """Samples from just before the release until just after the wall comes to rest, (m,)."""
+        time_s = self.grid.time_s
+        return (time_s > -0.2) & (time_s < self.swings.rest_s - self.swings.release_s + 0.2)
+
+    @property
+    def in_range(self) -> NDArray[np.bool_]:
+        """Those at which every LVDT is within its range, (m,)."""
+        return self.rocking & self.grid.valid
+
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """Samples at which the wall is held and nothing rings, (m,).
+
+        A held wall that sways accelerates more than its gravity differs from the model's: it is not used.
+        """
+        grid = self.grid
+        before = grid.time_s < -0.1
+        middle = float(np.median(grid.raw[before])) if before.any() else 0.0
+        held = self.calm & (np.abs(grid.raw - middle) < 0.01 * abs(middle))
+        mean_error = 3.0 * self.swings.hold_rate_sd / max(float(held.sum()) / GRID_HZ, 0.05)
+        still: NDArray[np.bool_] = held & (mean_error < _SWAY_SHARE * GRAVITY_M_S2 * abs(middle))
+        return still
+
+
+@dataclass(frozen=True, slots=True)
+class SensorFamily:
+    """One sensor family in the diagnosis.
+
+    `observe`: blocks of a run. `predict`: by the block's rule (`Block.rule`). `sizes`: by (block,
+    coefficient). `priors`: parameters of the sensors that all runs share. `references`: names of those
+    priors that change the reference rotation as well. `probes`: by block, the effect family of its free form.
+    """
+
+    observe: Callable[[Scene], Iterable[Block | None]]
+    predict: Mapping[str, Predict]
+    sizes: Mapping[tuple[str, str], Size] = field(default_factory=dict)
+    priors: Callable[[Survey], tuple[Parameter, ...]] = lambda survey: ()
+    references: frozenset[str] = frozenset()
+    probes: Mapping[str, str] = field(default_factory=dict)

@@ -1,0 +1,44 @@
+"""Pivots that are not where the survey has them, as wires and the joint show them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.differences import unit_coefficients
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.shapes import side_of
+from daq_app.gap.rocking_model.motion.rotation import pivots_off
+
+
+def pivots(run: RockingRun, values: Mapping[str, float]) -> tuple[float, float]:
+    """(distance of the pivots from the middle beyond the survey's, half its difference right to left), m."""
+    half, alpha = values["half_base"], values["alpha"]
+    tall = half / np.tan(alpha)
+    wear = values.get("crushing.loss", 0.0) * 0.01 * run.impacts_before
+    worn = half - tall * np.tan(alpha * (1.0 - wear))
+    inwards = half - run.survey.half_base_m - values.get("pivot_shift.a", 0.0) - worn
+    inwards -= values.get("rounded_edge.rho", 0.0)
+    return inwards, values.get("alpha_asymmetry.delta", 0.0) * tall / np.cos(alpha) ** 2
+
+
+def travel(run: RockingRun, block: Block, values: Mapping[str, float], of_base: bool) -> FloatArray:
+    """What pivots that are not where the survey has them make of the wires' rotation (rad) or base (m).
+
+    The base travels along x by Δu (1 − cos θ), and the wall rises by Δu sin|θ|, which a wire shows as far
+    as it slopes by then: left out, a shifted pivot looks like some sliding and a gain of the wires.
+    """
+    theta = run.grid.theta
+    inwards, apart = pivots(run, values)
+    if "pivots" not in run.cache:
+        run.cache["pivots"] = pivots_off(run.wires, theta)
+    each: FloatArray = run.cache["pivots"][of_base]
+    found = inwards * unit_coefficients(run, block, "travel", lambda: each)
+    found = found + apart * unit_coefficients(run, block, "lopsided travel", lambda: side_of(theta) * each)
+    if "winkler.theta_c" in values:
+        root = np.sqrt(values["winkler.theta_c"] / np.maximum(np.abs(theta), values["winkler.theta_c"]))
+        found = found + block.coefficients(-2.0 * values["half_base"] * root * each)
+    return found

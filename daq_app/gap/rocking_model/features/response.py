@@ -1,0 +1,98 @@
+"""Responses of sensors on the grid: slow, filtered, resonant or delayed ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+
+import numpy as np
+from scipy.signal import cont2discrete, lfilter
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ
+
+
+def first_order(values: FloatArray, time_constant_s: float, rate_hz: float = GRID_HZ) -> FloatArray:
+    """Response of a slow sensor that starts in balance."""
+    if time_constant_s <= 0:
+        return values
+    a = np.exp(-1.0 / (time_constant_s * rate_hz))
+    # The input is linear between samples: exact discretisation of the ramp response.
+    b0 = 1.0 - (1.0 - a) * time_constant_s * rate_hz
+    b1 = (1.0 - a) * time_constant_s * rate_hz - a
+    state = np.array([values[0] - b0 * values[0]])
+    found: FloatArray = lfilter([b0, b1], [1.0, -a], values, zi=state)[0]
+    return found
+
+
+def bessel(values: FloatArray, delay_s: float) -> FloatArray:
+    """Second-order Bessel low-pass of group delay `delay_s` on the coarse grid."""
+    if delay_s <= 1e-5:
+        # As good as a delay, and not nothing: a fit that starts from none has to see where it leads.
+        return values - delay_s * GRID_HZ * np.gradient(values)
+    return resonator(values, np.sqrt(3.0) / delay_s, np.sqrt(3.0) / 2.0)
+
+
+def resonator(values: FloatArray, natural: float, zeta: float) -> FloatArray:
+    """ÿ/ω² + 2ζẏ/ω + y = x on the coarse grid, for an x that is straight between samples; starts settled.
+
+    A bilinear transform would be off in delay by a fifth where the response is as quick as the grid.
+    """
+    numerator, denominator = _discrete(float(natural), float(zeta))
+    found: FloatArray = lfilter(numerator, denominator, values - values[0]) + values[0]
+    return found
+
+
+@lru_cache(maxsize=64)
+def _discrete(natural: float, zeta: float) -> tuple[FloatArray, FloatArray]:
+    """Filter of the resonator; all runs and blocks of one prediction ask for the same one."""
+    numerator, denominator, _ = cont2discrete(
+        ([natural**2], [1.0, 2.0 * zeta * natural, natural**2]), 1.0 / GRID_HZ, method="foh"
+    )
+    return numerator[0], denominator
+
+
+def responded(values: FloatArray, effect: str, given: Mapping[str, float]) -> FloatArray:
+    """A signal on the grid as a sensor with the effect shows it."""
+    match effect:
+        case "gain":
+            return values * (1.0 + given["error"])
+        case "lag":
+            k = np.arange(values.size, dtype=float)
+            return np.asarray(np.interp(k - given["tau"] * GRID_HZ, k, values))
+        case "slow_response":
+            return first_order(values, given["tau"])
+        case "filter_delay":
+            return bessel(values, given["tau"])
+        case "wire_inertia":
+            return resonator(values, 2.0 * np.pi * given["frequency"], given.get("zeta", 0.2))
+        case "wire_cosine":
+            return values + given["kappa"] * values**2
+        case "drift":
+            return values + given["rate"] * np.arange(values.size) / GRID_HZ
+    raise KeyError(effect)
+
+
+def transfer(rate: complex, family: str, values: Mapping[str, float]) -> complex:
+    """What a family's sensors make of exp(rate · t): the Laplace transform of their response."""
+    found = 1.0 + 0.0j
+    if tau := values.get(f"lag@{family}.tau", 0.0):
+        found *= np.exp(-rate * tau)
+    if tau := values.get(f"slow_response@{family}.tau", 0.0):
+        found /= 1.0 + rate * tau
+    if tau := values.get(f"filter_delay@{family}.tau", 0.0):
+        found *= 3.0 / ((rate * tau) ** 2 + 3.0 * rate * tau + 3.0)
+    if frequency := values.get(f"wire_inertia@{family}.frequency", 0.0):
+        natural, zeta = 2.0 * np.pi * frequency, values.get(f"wire_inertia@{family}.zeta", 0.2)
+        found *= natural**2 / (rate**2 + 2.0 * zeta * natural * rate + natural**2)
+    return complex(found)
+
+
+def delay(family: str, values: Mapping[str, float]) -> float:
+    """By how much a family's sensors are late, s."""
+    late = sum(
+        values.get(f"{effect}@{family}.tau", 0.0) for effect in ("lag", "slow_response", "filter_delay")
+    )
+    if frequency := values.get(f"wire_inertia@{family}.frequency", 0.0):
+        late += values.get(f"wire_inertia@{family}.zeta", 0.2) / (np.pi * frequency)
+    return late

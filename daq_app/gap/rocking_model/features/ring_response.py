@@ -1,0 +1,126 @@
+"""Predicted ring-downs: bending and turning of the wall as every family shows them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.block import Block, Shares
+from daq_app.gap.rocking_model.features.differences import difference_of
+from daq_app.gap.rocking_model.features.response import delay, transfer
+from daq_app.gap.rocking_model.features.rings import ring_columns
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+
+
+def _ring_coefficients(
+    run: RockingRun, block: Block, ring: Block, values: Mapping[str, float]
+) -> list[complex]:
+    """Per coefficient of the block, what its family's readings show of the motion that `ring` is of: the
+    imaginary part of c exp(rate · t) has the sine Re c and the cosine Im c; accelerations over ω².
+    The impacts are where the reference shows them, as late as it is.
+    """
+    frequency, zeta, _ = ring.ring
+    natural = 2.0 * np.pi * frequency
+    rate = natural * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
+    found = []
+    for name, shares in zip(block.names, block.shares, strict=False):
+        family = name.partition(" in ")[2].removesuffix("s")
+        own = _moved(ring, shares, values)
+        undone = block.undone_s if family == "accelerometer" else 0.0
+        early = np.exp(rate * (undone + delay(run.reference, values)))
+        twice = -((1.0 - 2.0 * zeta**2) + 2j * zeta) if family == "accelerometer" else 1.0
+        found.append(own * twice * transfer(rate, family, values) * early if own else 0.0j)
+    return found
+
+
+def _moved(ring: Block, shares: Shares, values: Mapping[str, float]) -> float:
+    """Size of the sine in a signal of these shares, by the wall's bending or turning."""
+    frequency, _, rate = ring.ring
+    mean = float(np.sinc(frequency / rate))
+    if ring.kind == "bending":
+        return shares.bend * mean * values.get("flexible_wall.gain", 0.0)
+    turned = shares.yaw * values.get("yaw.kick", 0.0) + shares.twist * values.get("twist.kick", 0.0)
+    return turned * mean / (2.0 * np.pi * frequency)
+
+
+def _put(
+    run: RockingRun, block: Block, values: Mapping[str, float], frequency: float, zeta: float
+) -> FloatArray:
+    """The coefficients of a ring-down as numbers, with those of the oscillator."""
+    found = np.zeros(len(block.names))
+    for k, c in enumerate(_ring_coefficients(run, block, block, values)):
+        found[k] = c.real if block.names[k].startswith("sine") else c.imag
+    own = {"frequency": frequency, "damping": zeta}
+    for k, name in enumerate(block.names):
+        found[k] = own.get(name, found[k])
+    return found * _faded(block, zeta) + _of_the_other(run, block, values)
+
+
+_EVEN = 1e-9
+"""Share below which sensors stand evenly, and what rounding leaves is none."""
+
+
+def _of_the_other(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """What turns in the signals of bending, what bends in those of turning.
+
+    Sensors on both sides of the middle keep them apart; with one of them left out they do not.
+    """
+    found = np.zeros(len(block.names))
+    other = next((b for b in run.blocks if b.ring[0] and b.kind != block.kind), None)
+    if other is None or not any(abs(_moved(other, s, values)) > _EVEN for s in block.shares):
+        return found
+    frequency, zeta, _ = other.ring
+    key = (block.family, "the other ring")
+    if key not in run.cache:
+        run.cache[key] = block.projection @ ring_columns(run.grid, frequency, zeta)
+    for k, c in enumerate(_ring_coefficients(run, block, other, values)):
+        size = (2.0 * np.pi * frequency) ** 2 if block.names[k].endswith("accelerometers") else 1.0
+        found[k] = size * float(run.cache[key][k] @ (c.real, c.imag))
+    return found
+
+
+def bending(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """Ring-down of a cantilever mode, and what effects on the wires look like in the same columns."""
+    # Bending is told against the rotation of the reference; wires as the reference show none of it.
+    wires = None if run.reference == "wire" else difference_of(run, "wire", "lvdt", values)
+    frequency, zeta, _ = block.ring
+    own = (values.get("flexible_wall.frequency", frequency), values.get("flexible_wall.zeta", zeta))
+    return _put(run, block, values, *own) + _in_wires(block, wires)
+
+
+def turning(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """Ring-down of yaw (the wall turns about the vertical) or of twist (θ differs along the length)."""
+    # Evenly placed wires show nothing of an error of their rotation in what turns.
+    uneven = run.reference != "wire" and _shows_rotation(block)
+    wires = difference_of(run, "wire", "lvdt", values) if uneven else None
+    frequency, zeta, _ = block.ring
+    other = "yaw" if "yaw.kick" in values else "twist"
+    own = (values.get(f"{other}.frequency", frequency), values.get(f"{other}.zeta", zeta))
+    return _put(run, block, values, *own) + _in_wires(block, wires)
+
+
+def _shows_rotation(block: Block) -> bool:
+    """Whether an error of the wires' rotation shows in a ring-down's signals."""
+    return any(
+        n.endswith("in wires") and abs(s.rotation) > _EVEN
+        for n, s in zip(block.names, block.shares, strict=False)
+    )
+
+
+def _faded(block: Block, zeta: float) -> FloatArray:
+    """Size of each coefficient, made with the block's damping, of a ring-down with another damping."""
+    found = np.ones(len(block.names))
+    found[: len(block.fading)] += np.array(block.fading) * np.log(zeta / block.ring[1])
+    return found
+
+
+def _in_wires(block: Block, series: FloatArray | None) -> FloatArray:
+    """What a difference of the wires' rotation, if any, makes of the columns read from wires."""
+    found = np.zeros(len(block.names))
+    if series is not None:
+        for k, name in enumerate(block.names):
+            if name.endswith("in wires"):
+                found[k] = block.shares[k].rotation * float(block.projection[k] @ series)
+    return found

@@ -1,0 +1,44 @@
+"""Shapes on the grid in which the wall and its base differ from a rigid block: side, moment, slip."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid
+
+UPRIGHT_RAD = 1e-4
+"""Rotation over which the reaction goes from one edge to the other."""
+
+
+def side_of(theta: FloatArray) -> FloatArray:
+    """Which edge carries the wall, −1 … 1: the mean of tanh(θ/0.1 mrad) over each interval of the grid.
+
+    In the interval of an impact the wall is on both edges in turn. The sign of its mean rotation would
+    be wrong there, and an explanatory variable with errors makes every coefficient too small.
+    """
+    half = np.maximum(0.5 * np.abs(np.gradient(theta)), 1e-3 * UPRIGHT_RAD)
+
+    def integral(rotation: FloatArray) -> FloatArray:
+        size = np.abs(rotation) / UPRIGHT_RAD
+        found: FloatArray = size + np.log1p(np.exp(-2.0 * size))
+        return found
+
+    mean: FloatArray = 0.5 * UPRIGHT_RAD / half * (integral(theta + half) - integral(theta - half))
+    return mean
+
+
+def moment_shape(theta: FloatArray, alpha: float) -> FloatArray:
+    """Overturning moment over its largest value: sgn θ · sin(α − |θ|)/sin α, rounded at upright."""
+    shape: FloatArray = side_of(theta) * np.sin(alpha - np.abs(theta)) / np.sin(alpha)
+    return shape
+
+
+def slip_shape(grid: Grid) -> FloatArray:
+    """Sum of the signed approach speeds of the impacts so far, less its last value (the zero is at rest).
+
+    The mean over each interval of the grid: in that of an impact only a part of it is after the slip.
+    """
+    after = (grid.time_s[:, None] - grid.impact_s[None, :]) * GRID_HZ + 0.5
+    shape: FloatArray = np.clip(after, 0.0, 1.0) @ grid.approach - float(np.sum(grid.approach))
+    return shape
