@@ -30,9 +30,14 @@ _WithoutOption = Annotated[
     typer.Option(help="Part of the method to leave out: scatter, channels, probes or multistart."),
 ]
 _EngineOption = Annotated[
-    Literal["events", "contact"],
-    typer.Option(help="What moves the wall: own equations, from event to event, or a contact engine."),
+    Literal["events", "contact"] | None,
+    typer.Option(help="What moves the wall: own equations or a contact engine; else the laboratory's."),
 ]
+_LaboratoryOption = Annotated[
+    str, typer.Option(help="Whose ordinary imperfections: own, ordinary, rough, contact or one for judging.")
+]
+_AloneOption = Annotated[str, typer.Option(help="Switch on only this imperfection of the laboratory.")]
+_HiddenOption = Annotated[str, typer.Option(help="Effect that every case hides, or `nothing`; else a mix.")]
 _WorkersOption = Annotated[int, typer.Option(min=0, help="Processes; 0 takes one for each core.")]
 
 
@@ -79,7 +84,10 @@ def make(
     labels: _LabelsOption = None,
     rig: Annotated[list[Path] | None, typer.Option(help="Rig files; the cases take turns.")] = None,
     runs: Annotated[int, typer.Option(min=1, max=36, help="Runs in each case.")] = 6,
-    engine: _EngineOption = "events",
+    engine: _EngineOption = None,
+    laboratory: _LaboratoryOption = "own",
+    alone: _AloneOption = "",
+    hidden: _HiddenOption = "",
     workers: _WorkersOption = 0,
 ) -> None:
     """Simulate release tests with hidden effects, and seal their labels. An interrupted making goes on.
@@ -95,7 +103,7 @@ def make(
         for file in files:
             load_rig(file)
         texts = tuple(file.read_text(encoding="utf-8") for file in files)
-        order = Order(seed, out, kept, texts, runs, engine)
+        order = Order(seed, out, kept, texts, runs, engine, laboratory, alone, hidden)
         with _progress("making", cases) as advance:
             before = sum((out / f"case_{k + 1:04d}" / "seal.json").exists() for k in range(cases))
             advance(before)

@@ -22,6 +22,7 @@ from daq_app.gap.blind.world.effects.catalogue import Drawn
 from daq_app.gap.blind.world.events.motion import Followed
 from daq_app.gap.blind.world.sensors.chain import CALIBRATION_TOLERANCE, Place, quiet_signals
 from daq_app.gap.blind.world.sensors.faults import ELECTRONICS, Bench
+from daq_app.gap.blind.world.surroundings import Surroundings
 from daq_app.gap.blind.world.wall import Wall
 
 FloatArray = NDArray[np.float64]
@@ -42,7 +43,11 @@ def detectability(world: World, effect: Drawn) -> float:
     if effect.name == "clock":
         return abs(effect.parameters["error"]) / _CLOCK_SD
     alone = replace(
-        world, effects=(effect,), wall=replace(world.wall, restitution_scatter=0.0), runs=_extremes(world)
+        world,
+        effects=(effect,),
+        wall=replace(world.wall, restitution_scatter=0.0),
+        runs=_extremes(world),
+        surroundings=Surroundings(),
     )
     square = 0.0
     for index in range(len(alone.runs)):
@@ -55,7 +60,7 @@ def detectability(world: World, effect: Drawn) -> float:
 
 def _extremes(world: World) -> tuple[PlannedRun, PlannedRun]:
     runs = sorted(world.runs, key=lambda run: abs(run.theta0))
-    return (runs[0], runs[-1])
+    return (replace(runs[0], sway=None), replace(runs[-1], sway=None))
 
 
 def block_swing(theta: float, alpha: float, p: float) -> tuple[float, float]:

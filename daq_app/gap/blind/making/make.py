@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
@@ -15,12 +16,13 @@ from daq_app.config import Rig, parse_rig
 from daq_app.gap.blind.layout import CASE_PREFIX, SEAL_FILE
 from daq_app.gap.blind.making.case_files import write_case
 from daq_app.gap.blind.making.detectability import detectability
-from daq_app.gap.blind.making.mix import case_generator, category_of, draw_effects
+from daq_app.gap.blind.making.mix import Category, case_generator, category_of, draw_effects, draw_named
 from daq_app.gap.blind.names import accepted_names
 from daq_app.gap.blind.seal import seal_case
-from daq_app.gap.blind.world.campaign import MadeRun, World, draw_world
+from daq_app.gap.blind.world.campaign import MadeRun, World, draw_world, in_laboratory
 from daq_app.gap.blind.world.contact.motion import require_engine
-from daq_app.gap.blind.world.course import Engine
+from daq_app.gap.blind.world.laboratories.numerics import Engine
+from daq_app.gap.blind.world.laboratories.table import Laboratory, laboratory
 
 _EPOCH_UTC_NS: Final = 1_767_225_600 * 10**9
 """2026-01-01: campaigns start within the hundred days after it."""
@@ -36,7 +38,23 @@ class Order:
     rig_texts: tuple[str, ...]
     """Rig files, letter by letter; the cases take turns."""
     n_runs: int = 6
-    engine: Engine = "events"
+    engine: Engine | None = None
+    """None for the laboratory's own engines."""
+    laboratory: str = "own"
+    alone: str = ""
+    """The one imperfection of the laboratory that is switched on; all if empty."""
+    hidden: str = ""
+    """The effect that every case hides, or `mix.NOTHING`; the mix if empty."""
+
+    def place(self) -> Laboratory:
+        """Raises `ValueError` for a laboratory or an imperfection that does not exist."""
+        found = laboratory(self.laboratory)
+        return found.alone(self.alone) if self.alone else found
+
+    def engine_of(self, index: int) -> Engine:
+        """What moves the wall of case `index`."""
+        engines = laboratory(self.laboratory).engines
+        return self.engine or engines[index % len(engines)]
 
 
 def case_name(index: int) -> str:
@@ -51,7 +69,8 @@ def make_cases(order: Order, indices: Sequence[int], workers: int) -> Iterator[s
     Raises `ValueError` for labels within reach, `EngineMissing` where a contact engine is wanted.
     """
     check_apart(order.out, order.labels)
-    if order.engine == "contact":
+    order.place()
+    if any(order.engine_of(index) == "contact" for index in indices):
         require_engine()
     todo = [index for index in indices if not (order.out / case_name(index) / SEAL_FILE).exists()]
     if workers <= 1:
@@ -81,27 +100,52 @@ def make_case(order: Order, index: int) -> str:
     world, rig_text, rng = draw_case(order, index)
     start = _EPOCH_UTC_NS + int(rng.integers(100 * 86_400)) * 10**9
     made = write_case(order.out / name, name, world, rig_text, start)
-    label = _label(name, order.seed, category_of(order.seed, index), world, made)
+    label = _label(name, order.seed, _category(order, index, world), world, made)
     seal_case(order.out / name, label, order.labels / f"{name}.json")
     return name
 
 
 def draw_case(order: Order, index: int) -> tuple[World, str, np.random.Generator]:
     """The world of a case and the text of its rig file."""
-    rig_text = order.rig_texts[index % len(order.rig_texts)]
-    rig: Rig = parse_rig(rig_text, "rig file of the blind check")
+    place, engine = order.place(), order.engine_of(index)
     rng = case_generator(order.seed, index)
-    effects = draw_effects(order.seed, index, rig, rng, order.engine)
-    return draw_world(rig, effects, order.n_runs, rng, order.engine), rig_text, rng
+    rig_text = order.rig_texts[index % len(order.rig_texts)]
+    if place.rates_hz:
+        rig_text = _sampled_at(rig_text, place.rates_hz[index // len(order.rig_texts) % len(place.rates_hz)])
+    rig: Rig = parse_rig(rig_text, "rig file of the blind check")
+    effects = (
+        draw_named(order.hidden, rig, rng, engine)
+        if order.hidden
+        else draw_effects(order.seed, index, rig, rng, engine, place.wide)
+    )
+    world = draw_world(rig, effects, order.n_runs, rng, engine)
+    return in_laboratory(world, place, order.seed, index), rig_text, rng
+
+
+def _sampled_at(rig_text: str, rate_hz: float) -> str:
+    """The rig file with another sampling rate."""
+    return re.sub(r"(?m)^rate_hz = [\d.]+", f"rate_hz = {rate_hz:.1f}", rig_text, count=1)
+
+
+def _category(order: Order, index: int, world: World) -> Category:
+    if not order.hidden:
+        return category_of(order.seed, index, order.place().wide)
+    if not world.effects:
+        return "null"
+    return "single" if world.effects[0].kind == "library" else "outside"
 
 
 def _label(name: str, seed: int, category: str, world: World, made: Sequence[MadeRun]) -> dict[str, Any]:
-    wall = world.wall
+    wall, around = world.wall, world.surroundings
     return {
         "case": name,
         "seed": seed,
         "category": category,
         "engine": world.engine,
+        "laboratory": around.laboratory,
+        "imperfections": dict(around.sizes),
+        "numerics": asdict(around.numerics),
+        "shock": asdict(around.shock),
         "effects": [
             {**asdict(e), "targets": list(e.targets), "accept": list(accepted_names(e.name))}
             for e in world.effects

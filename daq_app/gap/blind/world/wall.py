@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,4 +78,17 @@ def draw_wall(specimen: Specimen, rng: np.random.Generator) -> Wall:
         length=surveyed.length,
         restitution=float(r_max * rng.uniform(0.95, 1.025)),
         restitution_scatter=float(np.exp(rng.uniform(math.log(0.002), math.log(0.008)))),
+    )
+
+
+def off_survey(wall: Wall, specimen: Specimen, sizes: Mapping[str, float]) -> Wall:
+    """The wall with errors of its survey `survey` times larger, and with an impact scatter of its own."""
+    surveyed = Wall.nominal(specimen, 1.0)
+    times = sizes.get("survey", 1.0)
+    height = surveyed.centroid_height
+    return replace(
+        wall,
+        centroid_height=height + times * (wall.centroid_height - height),
+        inertia_cg=surveyed.inertia_cg + times * (wall.inertia_cg - surveyed.inertia_cg),
+        restitution_scatter=sizes.get("impact_scatter", wall.restitution_scatter),
     )

@@ -18,18 +18,21 @@ from numpy.typing import NDArray
 from daq_app.gap.blind.world.contact.feet import Foot, feet, plastic_restitution
 from daq_app.gap.blind.world.events.mechanics import Effects, Release
 from daq_app.gap.blind.world.events.motion import LONGEST_S, REST_RAD, ImpactRecord
+from daq_app.gap.blind.world.laboratories.numerics import Numerics
 from daq_app.gap.blind.world.wall import GRAVITY_M_S2, Wall
 
 FloatArray = NDArray[np.float64]
 
-_STEP_S: Final = 1e-4
-_STONE: Final = 'solref="0.0005 1" solimp="0.99 0.999 0.0001 0.5 2"'
-"""Stone on stone: contact settles in 2 ms, critically damped."""
+_AS_OWN: Final = Numerics()
+_STONE: Final = 'solimp="0.99 0.999 0.0001 0.5 2"'
+"""Stone on stone, critically damped: settled after four time constants of its contact."""
+_SETTLED: Final = 8.0
+"""Time constants of a contact after which an impact is over."""
 _SOFT_SHARE: Final = 0.02
 """Impedance of a spring: so low that the engine adds next to no inertia of its own to it."""
 _SETTLE_S, _PULL_S, _HOLD_S = 0.3, 0.6, 0.4
 _IMPACT_S: Final = 0.004
-"""From upright until an impact is over."""
+"""From upright until an impact is over, at least."""
 _LONGEST_HALF_CYCLE_S: Final = 4.0
 _CHUNK: Final = 1000
 
@@ -68,7 +71,7 @@ class ContactMotion:
         return np.asarray(np.interp(time_s, self.time_s, self.states[row], left=0.0, right=0.0))
 
 
-def rock(wall: Wall, effects: Effects, release: Release) -> ContactMotion:
+def rock(wall: Wall, effects: Effects, release: Release, numerics: Numerics = _AS_OWN) -> ContactMotion:
     """Pull, hold and let go, and follow the wall to rest (at most 40 s).
 
     What contact itself takes at an impact is Housner's for sharp edges. A wall's own r and its scatter come
@@ -77,16 +80,16 @@ def rock(wall: Wall, effects: Effects, release: Release) -> ContactMotion:
     Raises `EngineMissing` where MuJoCo is not installed.
     """
     engine = require_engine()
-    model = _model(engine, wall, effects)
+    model = _model(engine, wall, effects, numerics)
     crushing = _Crushing(model, wall, effects, release)
     data = engine.MjData(model)
-    upright = _pull(engine, model, data, release)
+    upright = _pull(engine, model, data, release, numerics.step_s)
     arm = math.copysign(wall.half_width, release.theta0)
     turn = release.theta0
     data.qvel[:] = release.omega0 * np.array([arm * math.sin(turn), arm * math.cos(turn), 1.0])
-    watch = _Watch(wall, release)
+    watch = _Watch(wall, release, max(_IMPACT_S, _SETTLED * numerics.settle_s))
     blocks: list[FloatArray] = []
-    while not watch.ended and len(blocks) * _CHUNK * _STEP_S < LONGEST_S:
+    while not watch.ended and len(blocks) * _CHUNK * numerics.step_s < LONGEST_S:
         block = np.empty((_CHUNK, 9))
         for row in block:
             if watch.look(data):
@@ -96,7 +99,7 @@ def rock(wall: Wall, effects: Effects, release: Release) -> ContactMotion:
             row[6:] = data.qacc
         blocks.append(block)
     states = np.concatenate(blocks).T
-    time_s = _STEP_S * np.arange(states.shape[1], dtype=np.float64)
+    time_s = numerics.step_s * np.arange(states.shape[1], dtype=np.float64)
     rest_s = watch.time_s if watch.ended else float(time_s[-1])
     return ContactMotion(release, time_s, states, upright, tuple(watch.impacts), tuple(watch.peaks), rest_s)
 
@@ -108,7 +111,8 @@ class _Watch:
     done its part, the wall would have gone on for that long at another speed.
     """
 
-    def __init__(self, wall: Wall, release: Release) -> None:
+    def __init__(self, wall: Wall, release: Release, impact_s: float) -> None:
+        self._impact_s = impact_s
         self._share = wall.restitution / plastic_restitution(wall)
         self._slows = wall.p**2 * math.sin(wall.alpha)
         self._scatter_sd = wall.restitution_scatter
@@ -130,7 +134,7 @@ class _Watch:
         struck = False
         self.time_s, theta = self._last
         if self._struck is not None:
-            if self.time_s >= self._struck[0] + _IMPACT_S:
+            if self.time_s >= self._struck[0] + self._impact_s:
                 self._leave(data)
         elif theta * self._side < 0.0:
             share = before[1] / (before[1] - theta)
@@ -144,7 +148,7 @@ class _Watch:
         return struck
 
     def _strike(self, time: float, omega: float) -> None:
-        if self._peak[0] > _IMPACT_S:  # else it was let go there
+        if self._peak[0] > self._impact_s:  # else it was let go there
             self.peaks.append(self._peak)
         self.ended = abs(self._peak[1]) < REST_RAD
         self._struck, self._peak = (time, omega), (time, 0.0)
@@ -179,12 +183,12 @@ class _Crushing:
         self._places[:] = self._arms * (1.0 - self._loss * self._impacts)
 
 
-def _pull(engine: ModuleType, model: Any, data: Any, release: Release) -> FloatArray:
+def _pull(engine: ModuleType, model: Any, data: Any, release: Release, step_s: float) -> FloatArray:
     """Stand, be pulled to θ0 by a moment, be held, be let go; returns x, z, θ of the wall that stood."""
     upright = np.zeros(3)
-    steps = round((_SETTLE_S + _PULL_S + _HOLD_S) / _STEP_S)
+    steps = round((_SETTLE_S + _PULL_S + _HOLD_S) / step_s)
     for k in range(steps):
-        share = min(max((k * _STEP_S - _SETTLE_S) / _PULL_S, 0.0), 1.0)
+        share = min(max((k * step_s - _SETTLE_S) / _PULL_S, 0.0), 1.0)
         if share == 0.0:
             upright = np.array(data.qpos)
         model.eq_data[0, 0] = release.theta0 * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
@@ -194,33 +198,34 @@ def _pull(engine: ModuleType, model: Any, data: Any, release: Release) -> FloatA
     return upright
 
 
-def _model(engine: ModuleType, wall: Wall, effects: Effects) -> Any:
+def _model(engine: ModuleType, wall: Wall, effects: Effects, numerics: Numerics) -> Any:
     """The wall as MuJoCo wants it: three joints in its plane, feet, and a hold on its rotation."""
-    model = engine.MjModel.from_xml_string(_text(wall, effects, 1.0))
+    model = engine.MjModel.from_xml_string(_text(wall, effects, numerics, 1.0))
     # The engine counts stiffness against what it takes for the mobility of the body.
-    return engine.MjModel.from_xml_string(_text(wall, effects, float(model.body_invweight0[1, 0])))
+    return engine.MjModel.from_xml_string(_text(wall, effects, numerics, float(model.body_invweight0[1, 0])))
 
 
-def _text(wall: Wall, effects: Effects, mobility: float) -> str:
+def _text(wall: Wall, effects: Effects, numerics: Numerics, mobility: float) -> str:
     tilt = effects.get("base_tilt", {}).get("beta_rad", 0.0)
     along, down = GRAVITY_M_S2 * math.sin(tilt), GRAVITY_M_S2 * math.cos(tilt)
     off = effects.get("eccentric_mass", {}).get("e_m", 0.0)
     standing = feet(wall, effects)
     inertia = " ".join(3 * [f"{wall.inertia_cg:.17g}"])
     return f"""<mujoco>
-<option timestep="{_STEP_S}" gravity="{along:.17g} 0 {-down:.17g}" cone="elliptic" integrator="implicitfast"
-  impratio="1000" iterations="200" tolerance="1e-14"/>
+<option timestep="{numerics.step_s:.9g}" gravity="{along:.17g} 0 {-down:.17g}"
+  cone="{numerics.cone}" solver="{numerics.constraint_solver}"
+  integrator="implicitfast" impratio="1000" iterations="200" tolerance="1e-14"/>
 <worldbody><geom type="plane" size="10 10 1"/>
 <body><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>
 <joint name="turn" type="hinge" axis="0 1 0"/>
 <inertial pos="{off:.17g} 0 {wall.centroid_height:.17g}" mass="{wall.mass_kg:.17g}" diaginertia="{inertia}"/>
-{"".join(_geom(foot, mobility) for foot in standing)}</body></worldbody>
+{"".join(_geom(foot, numerics.settle_s, mobility) for foot in standing)}</body></worldbody>
 <equality><joint joint1="turn" polycoef="0 0 0 0 0" solref="0.001 1" solimp="0.999 0.9999 0.0001"/></equality>
 </mujoco>"""
 
 
-def _geom(foot: Foot, mobility: float) -> str:
-    contact = _STONE
+def _geom(foot: Foot, settle_s: float, mobility: float) -> str:
+    contact = f'solref="{settle_s:.9g} 1" {_STONE}'
     if foot.spring is not None:
         # Force = (stiffness r + damping v) / ((1 − d) × mobility) at an impedance of d.
         stiffness, damping = ((1.0 - _SOFT_SHARE) * mobility * value for value in foot.spring)

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.blind.world.contact.motion import ContactMotion
-from daq_app.gap.blind.world.events.scene import Scene
+from daq_app.gap.blind.world.events.mechanics import Effects
+from daq_app.gap.blind.world.events.scene import Scene, corner_twist
 from daq_app.gap.blind.world.wall import Wall
 
 FloatArray = NDArray[np.float64]
 
 
-def contact_stage(motion: ContactMotion, wall: Wall, time_s: FloatArray) -> Scene:
+def contact_stage(motion: ContactMotion, wall: Wall, effects: Effects, time_s: FloatArray) -> Scene:
     """Evaluate a run at rising times: the wall turns about the middle of its base, and that moves."""
     theta, omega, theta_dd = motion.sample(time_s)
     x, z, x_dd, z_dd = motion.base(time_s)
@@ -26,7 +27,7 @@ def contact_stage(motion: ContactMotion, wall: Wall, time_s: FloatArray) -> Scen
         pivot_x=zero,
         lift=z,
         slip=x,
-        yaw=zero,
+        yaw=zero + corner_twist(effects, time_s, motion.impacts),
         yaw_dd=zero,
         bend=zero,
         bend_dd=zero,

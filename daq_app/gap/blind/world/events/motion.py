@@ -1,6 +1,6 @@
 """Event integration of one run: released, swing by swing, impact by impact, to rest.
 
-SciPy's DOP853 with events for θ = 0 (impact) and ω = 0 (peak): every right-hand side is smooth within
+A solver of SciPy with events for θ = 0 (impact) and ω = 0 (peak): every right-hand side is smooth within
 a piece, also with friction that changes sign at the peak.
 """
 
@@ -15,14 +15,17 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from daq_app.gap.blind.world.events.mechanics import Impact, Mechanics, Release
+from daq_app.gap.blind.world.laboratories.numerics import Numerics
 
 FloatArray = NDArray[np.float64]
 
 REST_RAD = 4e-5
 """A swing smaller than this is rest: half of what an LVDT's noise amounts to."""
 LONGEST_S = 40.0
-_RTOL, _ATOL = 1e-8, 1e-11
+_ABSOLUTE_TO_RELATIVE = 1e-3
+"""Absolute tolerance per relative one, rad: rotations of interest are 1e-3 and more."""
 _DERIVATIVE_STEP_S = 2e-5
+_AS_OWN = Numerics()
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +97,7 @@ class Motion:
         return theta, omega, alpha
 
 
-def integrate(mechanics: Mechanics, release: Release) -> Motion:
+def integrate(mechanics: Mechanics, release: Release, numerics: Numerics = _AS_OWN) -> Motion:
     """Let the wall go at t = 0 and follow it to rest (at most 40 s)."""
     scatter = np.random.default_rng([release.seed, 1])
     pieces: list[Piece] = []
@@ -105,7 +108,7 @@ def integrate(mechanics: Mechanics, release: Release) -> Motion:
     mechanics.impacts_done = 0
     inward = omega * side <= 0.0
     while t < LONGEST_S:
-        piece, t, theta, omega, reached = _half_swing(mechanics, t, theta, omega, side, inward)
+        piece, t, theta, omega, reached = _half_swing(mechanics, numerics, t, theta, omega, side, inward)
         pieces.append(piece)
         if not reached:
             break
@@ -122,7 +125,13 @@ def integrate(mechanics: Mechanics, release: Release) -> Motion:
 
 
 def _half_swing(
-    mechanics: Mechanics, t: float, theta: float, omega: float, side: int, inward: bool
+    mechanics: Mechanics,
+    numerics: Numerics,
+    t: float,
+    theta: float,
+    omega: float,
+    side: int,
+    inward: bool,
 ) -> tuple[Piece, float, float, float, bool]:
     """Integrate to upright (`inward`) or to the turning point; also says whether it was reached."""
 
@@ -140,11 +149,11 @@ def _half_swing(
         slope,
         (t, t + 5.0),
         (theta, omega),
-        method="DOP853",
+        method=numerics.solver,
         events=event,
         dense_output=True,
-        rtol=_RTOL,
-        atol=_ATOL,
+        rtol=numerics.relative_tolerance,
+        atol=_ABSOLUTE_TO_RELATIVE * numerics.relative_tolerance,
     )
     reached = solved.status == 1
     stop = float(solved.t[-1])

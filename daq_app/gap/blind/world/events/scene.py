@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,14 @@ from scipy.signal import lfilter
 
 from daq_app.gap.blind.world.events.joint import Parameters
 from daq_app.gap.blind.world.events.mechanics import Effects, Mechanics, ground_acceleration
-from daq_app.gap.blind.world.events.motion import Followed
+from daq_app.gap.blind.world.events.motion import Followed, ImpactRecord
+from daq_app.gap.blind.world.shock import Shock
 
 FloatArray = NDArray[np.float64]
 
 _SETTLE_S = 0.003
+_TURN_S = 0.02
+"""Time in which a wall slides into its new place about a corner."""
 _FADE = 7.0
 """A ring-down is followed for this many time constants (0.1 %)."""
 
@@ -47,6 +51,7 @@ class Scene:
     pivot_dd: tuple[FloatArray, FloatArray] | None = None
     """(x, z) acceleration of the turning point where impacts are resolved in time, so that `theta_dd` has
     their pulses; None where the turning point rests and an impact is a jump of ω."""
+    shock: Shock = field(default_factory=Shock)
 
 
 def stage(mechanics: Mechanics, motion: Followed, effects: Effects, time_s: FloatArray) -> Scene:
@@ -71,7 +76,7 @@ def stage(mechanics: Mechanics, motion: Followed, effects: Effects, time_s: Floa
         pivot_x=np.broadcast_to(pivot_x * (1.0 - worn), theta.shape),
         lift=np.broadcast_to(lift, theta.shape),
         slip=_slip(mechanics, motion, time_s),
-        yaw=yaw / (mechanics.wall.length / 2.0),
+        yaw=yaw / (mechanics.wall.length / 2.0) + corner_twist(effects, time_s, motion.impacts),
         yaw_dd=yaw_dd / (mechanics.wall.length / 2.0),
         bend=bend,
         bend_dd=bend_dd,
@@ -103,6 +108,18 @@ def _slip(mechanics: Mechanics, motion: Followed, time_s: FloatArray) -> FloatAr
         for impact in motion.impacts:
             slip[np.searchsorted(time_s, impact.time) :] += mechanics.slip_s * impact.before
     return slip
+
+
+def corner_twist(effects: Effects, time_s: FloatArray, impacts: Sequence[ImpactRecord]) -> FloatArray | float:
+    """Rotation about the vertical, rad: impacts from the + side turn the wall a little about a corner."""
+    if "corner_twist" not in effects:
+        return 0.0
+    per_speed = effects["corner_twist"]["turn_s"]
+    turned = np.zeros_like(time_s)
+    for impact in impacts:
+        if impact.side > 0:
+            turned -= per_speed * impact.before * -np.expm1(-np.maximum(time_s - impact.time, 0.0) / _TURN_S)
+    return turned
 
 
 def _ringing(

@@ -45,10 +45,12 @@ class Calibration:
     """What the operator found upright before the first run."""
 
 
-def draw_calibration(rig: Rig, rng: np.random.Generator) -> Calibration:
-    """Gain errors of 0.3 % and zeros of half a per cent of the range, with the tare that was taken."""
+def draw_calibration(
+    rig: Rig, rng: np.random.Generator, tolerance: float = CALIBRATION_TOLERANCE
+) -> Calibration:
+    """Gain errors of `tolerance` and zeros of half a per cent of the range, with the tare that was taken."""
     n = len(rig.channels)
-    gain = CALIBRATION_TOLERANCE * rng.standard_normal(n)
+    gain = tolerance * rng.standard_normal(n)
     span = np.array([c.range_si[1] - c.range_si[0] for c in rig.channels])
     noise = np.array([c.noise_si for c in rig.channels])
     zero = 0.005 * span * rng.uniform(-1.0, 1.0, n)
@@ -102,11 +104,14 @@ def readings(
             if fault.name in ELECTRONICS and channel.id in fault.targets:
                 signal = ELECTRONICS[fault.name](signal, fault.parameters, bench)
         rows[row] = np.clip(signal, *channel.range_si) + calibration.zero_si[row]
-    volts = scaling.to_readings(rows)
-    limits = np.array([_limits(c.input_range_v, c.measurement) for c in rig.channels])
     steps = np.array([ADC_STEP_V if c.measurement == "voltage" else 1e-7 for c in rig.channels])[:, None]
-    clipped = np.clip(volts, limits[:, :1], limits[:, 1:])
-    return np.asarray(np.round(clipped / steps) * steps)
+    return np.asarray(np.round(clipped_readings(rig, scaling.to_readings(rows)) / steps) * steps)
+
+
+def clipped_readings(rig: Rig, volts: FloatArray) -> FloatArray:
+    """(channels, n) readings within what each module converts."""
+    limits = np.array([_limits(c.input_range_v, c.measurement) for c in rig.channels])
+    return np.asarray(np.clip(volts, limits[:, :1], limits[:, 1:]))
 
 
 def _limits(range_v: tuple[float, float], measurement: str) -> tuple[float, float]:

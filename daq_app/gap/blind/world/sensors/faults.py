@@ -16,7 +16,7 @@ from scipy.signal import lfilter
 
 from daq_app.config.rig import Channel
 from daq_app.gap.blind.world.events.scene import Scene
-from daq_app.gap.blind.world.sensors.instruments import first_order
+from daq_app.gap.blind.world.sensors.instruments import first_order, ideal
 
 FloatArray = NDArray[np.float64]
 Parameters = dict[str, float]
@@ -162,7 +162,17 @@ def _spikes(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
     return out
 
 
+def _turned_mount(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
+    """A mount that is turned by `angle_rad` measures a share of its cross axis."""
+    channel = bench.channel
+    across = {"x": "z", "z": "x"} if channel.family == "accelerometer" else {"x": "y", "y": "x"}
+    other = channel.model_copy(update={"axis": across.get(channel.axis, "x")})
+    turn = q["angle_rad"]
+    return np.asarray(math.cos(turn) * signal + math.sin(turn) * ideal(other, bench.scene))
+
+
 RESPONSES: dict[str, Apply] = {
+    "turned_mount": _turned_mount,
     "gain": _gain,
     "drift": _drift,
     "lag": _delayed,

@@ -18,8 +18,6 @@ from daq_app.gap.blind.world.events.scene import Scene
 FloatArray = NDArray[np.float64]
 
 _BEND_EXPONENT = 1.5
-_PULSE_S = 0.002
-_RING_DECAY_S = 0.006
 
 
 def ideal(channel: Channel, scene: Scene, anchor_shift_m: float = 0.0) -> FloatArray:
@@ -95,16 +93,15 @@ def first_order(signal: FloatArray, constant_s: float, step_s: float) -> FloatAr
 
 
 def _shocks(channel: Channel, scene: Scene, lever: float) -> FloatArray:
-    """At an impact: the velocity jump as a half-sine of 2 ms (unless it is in the motion already), and local
-    ringing of the masonry."""
+    """At an impact: the velocity jump as a pulse (unless it is in the motion already), and local ringing of
+    the masonry."""
     value = np.zeros_like(scene.time_s)
-    frequency = 140.0 + 37.0 * (sum(map(ord, channel.id)) % 7)
+    shock = scene.shock
     for start, jump in zip(scene.impact_times, scene.impact_jumps, strict=True):
-        low, high = np.searchsorted(scene.time_s, [start, start + 8.0 * _RING_DECAY_S])
+        low, high = np.searchsorted(scene.time_s, [start, start + shock.window_s])
         t = scene.time_s[low:high] - start
-        step = lever * jump
-        jumps = scene.pivot_dd is None
-        pulse = np.where(jumps & (t < _PULSE_S), np.sin(math.pi * t / _PULSE_S), 0.0)
-        ring = np.exp(-t / _RING_DECAY_S) * np.sin(2.0 * math.pi * frequency * t)
-        value[low:high] += step * math.pi / (2.0 * _PULSE_S) * pulse + 300.0 * step * ring
+        acceleration = shock.ringing(t, channel.id)
+        if scene.pivot_dd is None:
+            acceleration = acceleration + shock.pulse(t)
+        value[low:high] += lever * jump * acceleration
     return value

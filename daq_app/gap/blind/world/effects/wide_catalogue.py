@@ -1,0 +1,45 @@
+"""What walls on real bases also do: ring slowly or fast, twist about a corner.
+
+The laboratories beside `own` hide these too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+from daq_app.gap.blind.world.effects.catalogue import ENTRIES, LIBRARY, OUTSIDE, Entry, uniform
+from daq_app.gap.blind.world.effects.contact_catalogue import (
+    CONTACT_ENTRIES,
+    CONTACT_LIBRARY,
+    CONTACT_OUTSIDE,
+)
+
+_RING: Final = ENTRIES["flexible_wall"]
+_FAST_RING: Final = replace(_RING, others=uniform(frequency_hz=(7.0, 42.0), zeta=(0.005, 0.05)))
+_SLOW_RING: Final = replace(
+    _RING, low=0.03, high=0.3, others=uniform(frequency_hz=(2.0, 7.0), zeta=(0.005, 0.05))
+)
+_CORNER_TWIST: Final = Entry("corner_twist", "structure", "near", "turn_s", 3e-4, 6e-3, True)
+
+WIDE_ENTRIES: Final[Mapping[str, Entry]] = {
+    **ENTRIES,
+    "flexible_wall": _FAST_RING,
+    "slow_flexible_wall": _SLOW_RING,
+    "corner_twist": _CORNER_TWIST,
+}
+WIDE_LIBRARY: Final = (*LIBRARY, "slow_flexible_wall")
+WIDE_OUTSIDE: Final = (*OUTSIDE, "corner_twist")
+
+WIDE_CONTACT_ENTRIES: Final[Mapping[str, Entry]] = {**CONTACT_ENTRIES, "corner_twist": _CORNER_TWIST}
+WIDE_CONTACT_LIBRARY: Final = (
+    *CONTACT_LIBRARY,
+    "gain",
+    "lag",
+    "slow_response",
+    "drift",
+    "wire_inertia",
+    "quantisation",
+)
+WIDE_CONTACT_OUTSIDE: Final = (*CONTACT_OUTSIDE, "corner_twist")

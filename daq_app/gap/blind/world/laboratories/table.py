@@ -1,0 +1,208 @@
+"""The laboratories: one table of ranges.
+
+What is set by looking at cases (thresholds, priors, discrepancy of the diagnosis) is set on laboratories that
+are not `left_out`; those are for judging: nobody looks into their cases before a diagnosis is frozen.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal
+
+import numpy as np
+
+from daq_app.gap.blind.world.laboratories.imperfections import IMPERFECTIONS
+from daq_app.gap.blind.world.laboratories.numerics import Engine, NumericsRanges, Range, log_uniform
+from daq_app.gap.blind.world.shock import ShockForm
+
+Chain = Literal["own", "bench", "field"]
+"""Which code makes readings of signals: noise, filter, converter."""
+
+
+@dataclass(frozen=True, slots=True)
+class Laboratory:
+    """Ranges from which a case draws the sizes of its imperfections (log-uniform)."""
+
+    name: str
+    meaning: str
+    chain: Chain
+    engines: tuple[Engine, ...]
+    """Cases take turns."""
+    ranges: Mapping[str, Range]
+    """Imperfection → range of its size; one that is not named is as in `own`."""
+    shocks: tuple[ShockForm, ...] = ("half_sine",)
+    rates_hz: tuple[float, ...] = ()
+    """Sampling rates that cases take turns with; the rig file's if empty."""
+    numerics: NumericsRanges = field(default_factory=NumericsRanges)
+    wide: bool = True
+    """Whether its walls also ring from 2 to 42 Hz, twist about a corner and hide three effects."""
+    left_out: bool = False
+
+    def alone(self, imperfection: str) -> Laboratory:
+        """This laboratory with one imperfection only, the others as in `own`; the sizes drawn are the same.
+
+        Raises `ValueError` for one that it does not have.
+        """
+        if imperfection not in self.ranges:
+            raise ValueError(
+                f"laboratory {self.name} has no imperfection {imperfection}; it has {', '.join(self.ranges)}"
+            )
+        return replace(
+            self,
+            ranges={imperfection: self.ranges[imperfection]},
+            shocks=self.shocks if imperfection == "impact_shock" else ("half_sine",),
+            rates_hz=(),
+            numerics=NumericsRanges(),
+            wide=False,
+        )
+
+
+def draw_sizes(laboratory: Laboratory, seed: int, index: int) -> dict[str, float]:
+    """Sizes of the imperfections of case `index`: each depends on its own name, seed and place only."""
+    return {
+        name: log_uniform(limits, np.random.default_rng([seed, index, zlib.crc32(name.encode())]))
+        for name, limits in laboratory.ranges.items()
+    }
+
+
+def laboratory(name: str) -> Laboratory:
+    """The laboratory of a name. Raises `ValueError` for one that does not exist."""
+    try:
+        return LABORATORIES[name]
+    except KeyError:
+        raise ValueError(f"there is no laboratory {name}; there are {', '.join(LABORATORIES)}") from None
+
+
+_ORDINARY: Final[Mapping[str, Range]] = {
+    "mains_pick_up": (0.02, 1.0),
+    "slow_noise": (0.1, 0.7),
+    "pink_noise": (0.05, 0.3),
+    "unequal_noise": (1.2, 2.0),
+    "zero_walk": (0.05, 0.4),
+    "zero_start": (0.05, 0.3),
+    "crosstalk": (2e-4, 2e-3),
+    "coarse_steps": (0.5, 1.5),
+    "skew": (1e-5, 1e-4),
+    "calibration": (0.001, 0.003),
+    "mount_angle": (0.002, 0.01),
+    "anchor_error": (0.001, 0.004),
+    "tilt_constant": (0.03, 0.15),
+    "impact_shock": (0.002, 0.006),
+    "sway": (1e-5, 6e-5),
+    "release_scatter": (0.01, 0.03),
+    "impact_scatter": (0.001, 0.006),
+    "survey": (1.0, 2.5),
+    "record_length": (2.0, 4.0),
+}
+_ROUGH: Final[Mapping[str, Range]] = {
+    **_ORDINARY,
+    "pink_noise": (0.1, 0.8),
+    "zero_walk": (0.1, 0.8),
+    "zero_start": (0.05, 0.5),
+    "cable_shake": (0.3, 4.0),
+    "cable_step": (0.05, 0.5),
+    "spikes": (0.01, 0.2),
+    "crosstalk": (0.001, 0.01),
+    "coarse_steps": (1.0, 4.0),
+    "skew": (5e-5, 5e-4),
+    "calibration": (0.0015, 0.004),
+    "mount_angle": (0.01, 0.035),
+    "anchor_error": (0.003, 0.010),
+    "tilt_constant": (0.1, 0.5),
+    "wire_backlash": (2e-5, 3e-4),
+    "wire_sag": (0.001, 0.01),
+    "impact_shock": (0.002, 0.015),
+    "sway": (3e-5, 3e-4),
+}
+_MIXED: Final[Mapping[str, Range]] = {
+    **_ROUGH,
+    "pink_noise": (0.05, 0.6),
+    "cable_shake": (0.1, 2.0),
+    "cable_step": (0.02, 0.3),
+    "crosstalk": (5e-4, 5e-3),
+    "coarse_steps": (0.5, 3.0),
+    "mount_angle": (0.005, 0.035),
+    "tilt_constant": (0.05, 0.5),
+    "wire_backlash": (1e-5, 2e-4),
+    "sway": (1e-5, 2e-4),
+}
+_EVERY_SHOCK: Final[tuple[ShockForm, ...]] = ("half_sine", "two_lobed", "ringing")
+_EVENT_NUMERICS: Final = NumericsRanges(("DOP853", "RK45", "LSODA"), (1e-9, 1e-7))
+_CONTACT_NUMERICS: Final = NumericsRanges(
+    step_s=(0.6e-4, 1.2e-4),
+    settle_s=(3e-4, 1.2e-3),
+    cones=("elliptic", "pyramidal"),
+    constraint_solvers=("Newton", "CG"),
+)
+
+LABORATORIES: Final[dict[str, Laboratory]] = {
+    one.name: one
+    for one in (
+        Laboratory(
+            "own",
+            "white noise, calibration and zeros only; effects of the design's table",
+            "own",
+            ("events",),
+            {},
+            wide=False,
+        ),
+        Laboratory(
+            "ordinary",
+            "what every laboratory has: pick-up, slow noise, walking zeros, calibration, survey",
+            "bench",
+            ("events",),
+            _ORDINARY,
+            rates_hz=(4000.0, 4000.0, 2500.0),
+            numerics=_EVENT_NUMERICS,
+        ),
+        Laboratory(
+            "rough",
+            "also turned mounts, tiltmeter constants, shocks, shaken cables, sway, backlash, coarse steps",
+            "bench",
+            ("events",),
+            _ROUGH,
+            shocks=_EVERY_SHOCK,
+            rates_hz=(4000.0, 2000.0, 5000.0),
+            numerics=_EVENT_NUMERICS,
+        ),
+        Laboratory(
+            "contact",
+            "the imperfections of `ordinary` on walls that a contact engine moves, hard or soft",
+            "bench",
+            ("contact",),
+            _ORDINARY,
+            shocks=_EVERY_SHOCK,
+            numerics=_CONTACT_NUMERICS,
+        ),
+        Laboratory(
+            "held_out_event",
+            "imperfections of `ordinary` to `rough` through another sensor chain; for judging only",
+            "field",
+            ("events",),
+            _MIXED,
+            shocks=("gamma", "two_lobed", "ringing"),
+            rates_hz=(4000.0, 3200.0, 2000.0),
+            numerics=NumericsRanges(("Radau", "RK45", "LSODA"), (3e-9, 3e-7)),
+            left_out=True,
+        ),
+        Laboratory(
+            "held_out_contact",
+            "the same chain on walls that a contact engine moves; for judging only",
+            "field",
+            ("contact",),
+            _MIXED,
+            shocks=("gamma", "ringing"),
+            numerics=NumericsRanges(
+                step_s=(0.5e-4, 0.8e-4),
+                settle_s=(2e-4, 1e-3),
+                cones=("pyramidal",),
+                constraint_solvers=("CG", "Newton"),
+            ),
+            left_out=True,
+        ),
+    )
+}
+
+assert all(name in IMPERFECTIONS for one in LABORATORIES.values() for name in one.ranges)
