@@ -38,6 +38,9 @@ _LaboratoryOption = Annotated[
 ]
 _AloneOption = Annotated[str, typer.Option(help="Switch on only this imperfection of the laboratory.")]
 _HiddenOption = Annotated[str, typer.Option(help="Effect that every case hides, or `nothing`; else a mix.")]
+_ResultsOption = Annotated[
+    str, typer.Option(help="Folder of the results within DIR, so that several diagnoses keep their own.")
+]
 _WorkersOption = Annotated[int, typer.Option(min=0, help="Processes; 0 takes one for each core.")]
 
 
@@ -51,6 +54,7 @@ def register(app: typer.Typer) -> None:
     blind.command(
         "score", epilog="Example: daq-app gap blind score check --labels kept/check --html check.html"
     )(score)
+    blind.command("table", epilog="Example: daq-app gap blind table ordinary rough contact")(table)
     group = next((g.typer_instance for g in app.registered_groups if g.name == "gap"), None)
     if group is None:
         group = typer.Typer(no_args_is_help=True, help="The gap between simulator and recordings.")
@@ -117,6 +121,7 @@ def run(
     diagnoser: Annotated[str, typer.Option(help="module:function that diagnoses a case.")] = _PRODUCT,
     without: _WithoutOption = "",
     scheduler: Annotated[str, typer.Option(help="Address of a dask scheduler, tcp://HOST:PORT.")] = "",
+    results: _ResultsOption = "",
     workers: _WorkersOption = 0,
     timeout: Annotated[float, typer.Option(min=1, help="Longest time for one case, seconds.")] = 1800.0,
 ) -> None:
@@ -131,7 +136,7 @@ def run(
     from daq_app.gap.blind.running.scheduler import run_on_scheduler
 
     with _refusals():
-        kept = results_without(_part(without))
+        kept = results or results_without(_part(without))
         diagnoser = ABLATIONS.get(without, diagnoser)
         load_diagnoser(diagnoser)
         total, todo = len(case_folders(folder)), len(pending(folder, diagnoser, kept))
@@ -159,6 +164,7 @@ def score(
     folder: Annotated[Path, typer.Argument(help="Folder of the cases.", metavar="DIR")],
     labels: _LabelsOption = None,
     without: _WithoutOption = "",
+    results: _ResultsOption = "",
     html: Annotated[Path | None, typer.Option(help="Write a page with pictures.")] = None,
     page: Annotated[Path | None, typer.Option(help="The same as Markdown, pictures in images/.")] = None,
     json_out: Annotated[Path | None, typer.Option("--json", help="Write all numbers as JSON.")] = None,
@@ -168,7 +174,8 @@ def score(
     from daq_app.gap.blind.scoring.score import score_folder
 
     with _refusals():
-        found = score_folder(folder, labels or _beside(folder), results_without(_part(without)))
+        kept = results or results_without(_part(without))
+        found = score_folder(folder, labels or _beside(folder), kept)
         _print_score(found)
         if json_out:
             json_out.write_text(json.dumps(found.to_dict(), ensure_ascii=False, indent=1), encoding="utf-8")
@@ -182,6 +189,35 @@ def score(
             write_markdown(found, page)
         if not found.passed:
             raise typer.Exit(EXIT_FAILED)
+
+
+def table(
+    folders: Annotated[list[Path], typer.Argument(help="Folders of cases, labels beside.", metavar="DIR…")],
+    results: _ResultsOption = "results",
+    misses: Annotated[bool, typer.Option("--misses", help="Also list what was not right.")] = False,
+) -> None:
+    """Scores of all cases that have a result, a column for each laboratory. Always exit code 0."""
+    from daq_app.gap.blind.scoring.laboratories import by_laboratory
+    from daq_app.gap.blind.scoring.score import score_folder
+
+    with _refusals():
+        scores = [score_folder(folder, _beside(folder), results) for folder in folders]
+    judged = [one for score in scores for one in score.judged]
+    rows = by_laboratory(judged)
+    shown = Table("score", *(f"{row.laboratory} ({row.cases})" for row in rows))
+    for name in dict.fromkeys(name for row in rows for name in row.columns):
+        shown.add_row(name, *(row.columns.get(name, "–") for row in rows))
+    console = Console()
+    console.print(shown)
+    if misses:
+        for one in judged:
+            if not one.answered_rightly:
+                answer = f"{one.decision} {' + '.join(one.named)}, p = {one.claimed:.3f}"
+                truth = " + ".join(one.truth) or "nothing"
+                console.print(f"{one.laboratory} {one.case}: {truth} ({one.strength:.1f} sd) → {answer}")
+    waiting = sum(len(score.waiting) for score in scores)
+    if waiting:
+        console.print(f"{waiting} cases have no result yet")
 
 
 def _print_score(found: Score) -> None:

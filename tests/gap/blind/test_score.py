@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from daq_app.gap.blind.names import COMPARABLE, accepted_names, base_name, class
 from daq_app.gap.blind.running.runner import Outcome, save_outcome
 from daq_app.gap.blind.scoring.confusion import confusion
 from daq_app.gap.blind.scoring.judge import Judged, judge
+from daq_app.gap.blind.scoring.laboratories import by_laboratory
 from daq_app.gap.blind.scoring.report import write_markdown, write_report
 from daq_app.gap.blind.scoring.score import Row, Score, score_folder, table
 from daq_app.gap.blind.scoring.statistics import auroc, calibration_error, reliability, share
@@ -223,6 +225,67 @@ def test_a_slow_release_is_compared_by_the_mean_time_of_its_force(tau_s: float, 
 def test_what_the_diagnosis_calls_alike_the_scorer_does_too() -> None:
     for group in rocking_library({"WP-1": "wire"}).alike:
         assert len({class_of([name]) for name in group.names}) == 1
+
+
+def judged_with(
+    truth: list[str], answer: dict[str, Any], category: str = "", strength: float = 9.0
+) -> Judged:
+    """A diagnosis of a case that hides `truth`, each effect of this many sd."""
+    label = {
+        "case": "c",
+        "category": ("null", "single", "pair", "triple")[len(truth)],
+        "effects": [
+            {
+                "name": n,
+                "family": ENTRIES[n].family,
+                "accept": list(accepted_names(n)),
+                "parameters": {"x": 1.0},
+            }
+            for n in truth
+        ],
+        "detectability": [strength for _ in truth],
+    }
+    return judge(label, Outcome("c", "d", "s", 1.0, answer))
+
+
+HUM = {"name": "hum@wire", "material": True}
+
+
+def test_what_is_measured_about_an_instrument_is_no_cause() -> None:
+    for truth in ([], ["viscous"]):
+        answer = claim([*truth, "hum@wire"], 0.99, "pair" if truth else "effect", findings=[HUM])
+        assert judged_with(truth, answer).answered_rightly
+    assert not judged_with([], claim(["viscous", "hum@wire"], 0.99, "pair", findings=[HUM])).answered_rightly
+
+
+def test_a_hidden_fault_that_was_measured_is_right_if_it_belongs_into_the_answer() -> None:
+    assert judged_with(["hum"], claim(["hum@wire"], 0.99, "effect", findings=[HUM])).answered_rightly
+    listed = claim([], 0.99, "nothing_missing", findings=[{**HUM, "material": False}])
+    assert not judged_with(["hum"], listed).answered_rightly
+    both = claim(["hum@wire", "viscous"], 0.99, "pair", findings=[HUM])
+    assert judged_with(["viscous", "hum"], both).exact
+    assert not judged_with(["hum"], both).answered_rightly
+
+
+def test_three_effects_are_right_in_any_order_and_only_together() -> None:
+    truth = ["viscous", "gain", "base_tilt"]
+    assert judged_with(truth, claim(["gain@WP-1", "eccentric_mass", "viscous"], 0.9, "several")).exact
+    assert not judged_with(truth, claim(["gain@WP-1", "viscous"], 0.9, "pair")).exact
+
+
+def test_below_detection_is_right_for_what_cannot_be_seen_and_for_nothing_else() -> None:
+    answer = claim([], 0.6, "below_detection")
+    assert judged_with(["viscous"], answer, strength=2.0).answered_rightly
+    assert not judged_with(["viscous"], answer, strength=12.0).answered_rightly
+
+
+def test_laboratories_have_a_row_each_and_one_together() -> None:
+    right = judged_with(["viscous"], claim(["viscous"], 0.99, "effect"))
+    wrong = replace(judged_with(["viscous"], claim(["coulomb"], 0.99, "effect")), laboratory="rough")
+    rows = {row.laboratory: row for row in by_laboratory([right, wrong])}
+    assert list(rows) == ["own", "rough", "all"]
+    assert [rows[name].columns["singles"] for name in rows] == ["1/1", "0/1", "1/2"]
+    assert rows["rough"].columns["wrong at p > 0.95"] == "1/1"
 
 
 def test_cannot_tell_is_right_only_with_the_truth_in_the_set_and_a_measurement() -> None:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 from daq_app.gap.blind.names import base_name
 from daq_app.gap.blind.scoring.judge import Judged
+
+_SEVERAL_OR_NONE: Final = {"pair": "(pair)", "triple": "(triple)", "null": "(nothing)"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,10 +22,10 @@ class Confusion:
 
 
 def confusion(judged: Sequence[Judged]) -> Confusion:
-    """Truth (effect, ``pair`` or ``null``) against answer (effect, or the decision that names none)."""
+    """Truth (effect, or how many there are) against answer (effect, or the decision that names none)."""
     counts: dict[tuple[str, str], int] = {}
     for one in judged:
-        truth = {"pair": "(pair)", "null": "(nothing)"}.get(one.category) or one.truth[0]
+        truth = _SEVERAL_OR_NONE.get(one.category) or one.truth[0]
         answer = f"({one.decision})"
         if one.decision == "effect" and len(one.named) == 1:
             name = base_name(one.named[0])

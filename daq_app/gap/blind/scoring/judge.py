@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import permutations
 from typing import Any, Final
 
 from daq_app.gap.blind.names import COMPARABLE, base_name, class_of, comparable, families_of
@@ -13,13 +14,15 @@ from daq_app.gap.blind.running.runner import Outcome
 DECISIONS: Final = (
     "effect",
     "pair",
+    "several",
     "parameters",
     "nothing_missing",
     "cannot_tell",
     "none_of_these",
     "below_detection",
 )
-_BLAMING: Final = ("effect", "pair")
+_BLAMING: Final = ("effect", "pair", "several")
+_NO_CAUSE: Final = ("nothing_missing", "parameters", "below_detection")
 _CLEARLY_VISIBLE: Final = 4.0
 """Standard deviations from which an effect must be found."""
 
@@ -64,7 +67,8 @@ class Judged:
     next_measurement: str
     seconds: float
     known: bool
-    """Whether the truth was among the hypotheses (an effect of the library)."""
+    """Whether the truth was among the hypotheses (an effect of the library) or what was measured directly."""
+    laboratory: str = "own"
     failure: str = ""
 
     @property
@@ -76,27 +80,38 @@ class Judged:
         return self.decision in _BLAMING
 
     @property
+    def exact(self) -> bool:
+        """Whether the decision names what was hidden, all of it and nothing else."""
+        return self.blames and self.first_right
+
+    @property
     def answered_rightly(self) -> bool:
         """Whether the decision as a whole was right, for the confusion matrix of decisions."""
         match self.category:
             case "null":
-                return self.decision in ("nothing_missing", "parameters", "below_detection")
+                return self.decision in _NO_CAUSE
             case "outside" if not self.known:
                 return self.decision == "none_of_these"
             case _:
                 if self.decision == "cannot_tell":
                     return self.in_set and bool(self.next_measurement)
-                return self.blames and self.first_right
+                return self.exact or (self.decision == "below_detection" and not self.visible)
 
 
 def judge(label: dict[str, Any], outcome: Outcome) -> Judged:
-    """Compare. A diagnosis that failed counts as one that said nothing."""
+    """Compare. A diagnosis that failed counts as one that said nothing.
+
+    What a result measured directly about instruments (`findings`) is no cause and counts neither for nor
+    against one; where such a fault is what was hidden, a material finding of it is the right answer.
+    """
     result = outcome.result or {}
-    which = _hypotheses(result.get("which"))
-    set95 = _hypotheses(result.get("set95"))
-    decision = str(result.get("decision", "")) if result else "failed"
+    findings = _findings(result.get("findings"))
+    which = _hypotheses(result.get("which"), findings)
+    set95 = _hypotheses(result.get("set95"), findings)
     effects = label["effects"]
     accept = [tuple(effect["accept"]) for effect in effects]
+    sought = [names for names in accept if not _measured(names, findings)]
+    decision = _decision(result, which, measured=len(sought) < len(accept))
     named, family, claimed = _answer(decision, result, which)
     gap = result.get("gap") or {}
     error, covered = _parameter(label, result, decision)
@@ -106,13 +121,13 @@ def judge(label: dict[str, Any], outcome: Outcome) -> Judged:
         truth=tuple(effect["name"] for effect in effects),
         families=tuple(effect["family"] for effect in effects),
         strength=min(label["detectability"], default=math.inf),
-        decision=decision if decision in DECISIONS else "failed",
+        decision=decision,
         named=named,
         named_family=family,
         claimed=claimed,
-        first_right=bool(which) and _matches(_first(which)[0].effects, accept),
+        first_right=bool(which) and _matches(_first(which)[0].effects, sought),
         family_right=set(families_of(family)) == {effect["family"] for effect in effects},
-        in_set=any(_matches(hypothesis.effects, accept) for hypothesis in set95),
+        in_set=any(_matches(hypothesis.effects, sought) for hypothesis in set95),
         set_size=len({class_of(hypothesis.effects) for hypothesis in set95}),
         outside_score=_outside_score(decision, result, which),
         closure=_number(gap, "closure"),
@@ -121,15 +136,44 @@ def judge(label: dict[str, Any], outcome: Outcome) -> Judged:
         parameter_covered=covered,
         next_measurement=str(result.get("next_measurement") or ""),
         seconds=outcome.seconds,
-        known=any(_matches(hypothesis.effects, accept) for hypothesis in which),
+        known=any(_matches(hypothesis.effects, sought) for hypothesis in which),
+        laboratory=str(label.get("laboratory", "own")),
         failure=outcome.failure,
     )
 
 
-def _hypotheses(entries: Any) -> list[Hypothesis]:
+def _findings(entries: Any) -> dict[str, bool]:
+    """Name of what was measured directly → whether it belongs into the answer."""
+    return {str(entry.get("name", "")): bool(entry.get("material")) for entry in entries or []}
+
+
+def _measured(names: Sequence[str], findings: Mapping[str, bool]) -> bool:
+    """Whether a fault is among the material findings, under one of these names."""
+    return any(material and base_name(name) in names for name, material in findings.items())
+
+
+def _decision(result: dict[str, Any], which: Sequence[Hypothesis], measured: bool) -> str:
+    """What was decided about causes: to name instruments' findings alone is to say that none is missing.
+
+    Where such a finding is what was hidden (`measured`), the answer names an effect.
+    """
+    if not result:
+        return "failed"
+    decision = str(result.get("decision", ""))
+    if decision not in DECISIONS:
+        return "failed"
+    if decision in _BLAMING and not measured and which and not _first(which)[0].effects:
+        return "nothing_missing"
+    if measured and decision in (*_NO_CAUSE, "none_of_these") and which and not _first(which)[0].effects:
+        return "effect"
+    return decision
+
+
+def _hypotheses(entries: Any, findings: Collection[str]) -> list[Hypothesis]:
+    """Hypotheses about causes; what was measured directly is left out of them."""
     found = []
     for entry in entries or []:
-        names = tuple(str(name) for name in entry.get("effects", ()))
+        names = tuple(str(name) for name in entry.get("effects", ()) if str(name) not in findings)
         found.append(Hypothesis(names, str(entry.get("family", "")), float(entry.get("probability") or 0.0)))
     return sorted(found, key=lambda hypothesis: -hypothesis.probability)
 
@@ -162,20 +206,20 @@ def _matches(claimed: Sequence[str], accept: Sequence[tuple[str, ...]]) -> bool:
     if len(claimed) != len(accept):
         return False
     names = [base_name(name) for name in claimed]
-    if len(names) < 2:
-        return all(name in accepted for name, accepted in zip(names, accept, strict=True))
-    straight = names[0] in accept[0] and names[1] in accept[1]
-    return straight or (names[0] in accept[1] and names[1] in accept[0])
+    return any(
+        all(name in accepted for name, accepted in zip(names, order, strict=True))
+        for order in permutations(accept)
+    )
 
 
 def _outside_score(decision: str, result: dict[str, Any], which: Sequence[Hypothesis]) -> float:
     """How strongly a result speaks for "none of these", in [0, 2]; 1 and more where it decides so.
 
     Within a decision the chance of what it leaves ranks (``rest_p``, else the p-value of its goodness of
-    fit), and without one the probability that the first hypothesis leaves over. A result may give
-    ``notes.outside_score`` in [0, 1] instead.
+    fit), and without one the probability that the first hypothesis leaves over. A result may give its
+    probability of an unknown cause (``p_unknown``, or ``notes.outside_score``) instead.
     """
-    given = (result.get("notes") or {}).get("outside_score")
+    given = result.get("p_unknown", (result.get("notes") or {}).get("outside_score"))
     p_value = result.get("rest_p", (result.get("goodness") or {}).get("p_value"))
     if isinstance(given, int | float):
         inner = min(1.0, max(0.0, float(given)))

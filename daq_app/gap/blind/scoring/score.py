@@ -26,6 +26,7 @@ from daq_app.gap.blind.seal import SealBroken, file_sha256, open_label
 
 _SURE = 0.95
 _FALSE_ALARMS = 0.05
+_HIDDEN = ("single", "pair", "triple")
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,9 +110,10 @@ def table(judged: Sequence[Judged]) -> list[Row]:
     singles = [j for j in judged if j.category == "single"]
     visible = [j for j in singles if j.visible]
     weak = [j for j in singles if not j.visible]
-    known = [j for j in judged if j.category in ("single", "pair", "null") or j.known]
+    known = [j for j in judged if j.category != "outside" or j.known]
     nulls = [j for j in judged if j.category == "null"]
     pairs = [j for j in judged if j.category == "pair"]
+    triples = [j for j in judged if j.category == "triple"]
     unsure = [j for j in judged if j.decision == "cannot_tell"]
     speaking = [j for j in judged if j.decision != "failed"]
     return [
@@ -120,13 +122,14 @@ def table(judged: Sequence[Judged]) -> list[Row]:
         Row("first answer right, effect < 4 sd", share([j.first_right for j in weak])),
         Row("95 % set holds the truth", share([j.in_set for j in known]), 0.93, 0.98),
         Row("95 % set: mean size", _mean([float(j.set_size) for j in known if j.set_size]), high=1.5),
-        Row("wrong at p > 0.95", share([_wrong_and_sure(j) for j in speaking]), high=0.01),
+        Row("wrong at p > 0.95", share([wrong_and_sure(j) for j in speaking]), high=0.01),
         Row("expected calibration error", _calibration(judged), high=0.05),
         *_outside_rows(judged),
         Row("nothing hidden, yet blamed on an effect", share([j.blames for j in nulls]), high=0.05),
         *_closure_rows(judged),
         *_parameter_rows(singles),
-        Row("pairs exact", share([j.first_right and j.decision == "pair" for j in pairs]), low=0.80),
+        Row("pairs exact", share([j.exact for j in pairs]), low=0.80),
+        *([Row("triples exact", share([j.exact for j in triples]), low=0.75)] if triples else []),
         Row(
             "cannot tell: truth in the set, measurement named",
             share([j.in_set and bool(j.next_measurement) for j in unsure]),
@@ -172,7 +175,7 @@ def _outside_rows(judged: Sequence[Judged]) -> list[Row]:
 
 
 def _closure_rows(judged: Sequence[Judged]) -> list[Row]:
-    found = [j for j in judged if j.category in ("single", "pair") and j.visible and j.blames]
+    found = [j for j in judged if j.category in _HIDDEN and j.visible and j.blames]
     closures = [j.closure for j in found if math.isfinite(j.closure)]
     return [
         Row("closure, median", bootstrap(closures), low=0.97),
@@ -198,7 +201,8 @@ def _parameter_rows(singles: Sequence[Judged]) -> list[Row]:
     ]
 
 
-def _wrong_and_sure(j: Judged) -> bool:
+def wrong_and_sure(j: Judged) -> bool:
+    """Whether an answer stands by a wrong first hypothesis with more than 95 %."""
     return j.decision != "none_of_these" and j.claimed > _SURE and not j.first_right
 
 

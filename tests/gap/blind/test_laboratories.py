@@ -1,0 +1,197 @@
+"""Laboratories: what each ordinary imperfection does to a recording, alone, and that all of it is data."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from daq_app.config import Scaling
+from daq_app.gap.blind.making.make import Order, draw_case
+from daq_app.gap.blind.world.campaign import World
+from daq_app.gap.blind.world.laboratories.imperfections import IMPERFECTIONS
+from daq_app.gap.blind.world.laboratories.table import LABORATORIES, draw_sizes
+from daq_app.gap.blind.world.shock import Shock
+
+RATE_HZ = 4000.0
+HELD_S = 1.9
+"""Shorter than any wall is held before the release."""
+IN_THE_HELD_PART = {
+    "mains_pick_up",
+    "slow_noise",
+    "pink_noise",
+    "unequal_noise",
+    "zero_walk",
+    "crosstalk",
+    "coarse_steps",
+    "calibration",
+    "mount_angle",
+    "anchor_error",
+    "zero_start",
+    "sway",
+}
+
+
+def order(configs: Path, tmp_path: Path, laboratory: str, alone: str = "") -> Order:
+    text = (configs / "fr1.toml").read_text(encoding="utf-8")
+    return Order(3, tmp_path, tmp_path / "kept", (text,), 1, None, laboratory, alone, "nothing")
+
+
+def one_run(world: World) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(time after release, SI channels without their zeros) of a run that loses much at impacts."""
+    short = dataclasses.replace(world, wall=dataclasses.replace(world.wall, restitution=0.6))
+    made = next(iter(short.make()))
+    channels = world.rig.channels
+    zero = np.array([world.calibration.tare_reading[c.id] for c in channels])[:, None]
+    values = Scaling.of(channels).to_si(made.readings) - zero * Scaling.of(channels).gain
+    time = np.arange(values.shape[1]) / world.rig.acquisition.rate_hz - made.plan.hold_s
+    return time, values
+
+
+def row(world: World, values: NDArray[np.float64], channel: str) -> NDArray[np.float64]:
+    return values[world.rig.channel_ids.index(channel)]
+
+
+def amplitude_at(signal: NDArray[np.float64], hz: float) -> float:
+    t = np.arange(signal.size) / RATE_HZ
+    window = np.hanning(signal.size)
+    return float(2 * abs(np.sum(window * signal * np.exp(-2j * np.pi * hz * t))) / window.sum())
+
+
+@pytest.fixture
+def quiet(configs: Path, tmp_path: Path) -> World:
+    """The same case with an imperfection that shows nowhere: what the others are compared with."""
+    return draw_case(order(configs, tmp_path, "rough", "record_length"), 0)[0]
+
+
+def test_each_imperfection_of_each_laboratory_is_known_and_drawn_within_its_range() -> None:
+    for laboratory in LABORATORIES.values():
+        assert set(laboratory.ranges) <= set(IMPERFECTIONS)
+        for index in range(20):
+            for name, size in draw_sizes(laboratory, 8, index).items():
+                low, high = laboratory.ranges[name]
+                assert low <= size <= high
+
+
+def test_switching_one_imperfection_on_alone_keeps_its_size(configs: Path, tmp_path: Path) -> None:
+    every = draw_case(order(configs, tmp_path, "rough"), 4)[0].surroundings.sizes
+    alone = draw_case(order(configs, tmp_path, "rough", "mains_pick_up"), 4)[0].surroundings.sizes
+    assert alone == {"mains_pick_up": every["mains_pick_up"]}
+
+
+def test_laboratories_and_imperfections_that_do_not_exist_are_refused(configs: Path, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"no laboratory attic.*ordinary"):
+        draw_case(order(configs, tmp_path, "attic"), 0)
+    with pytest.raises(ValueError, match=r"no imperfection wind.*mains_pick_up"):
+        draw_case(order(configs, tmp_path, "rough", "wind"), 0)
+
+
+def test_pick_up_has_its_amplitude_at_the_mains_and_a_phase_of_its_own_in_each_channel(
+    configs: Path, tmp_path: Path
+) -> None:
+    world = draw_case(order(configs, tmp_path, "rough", "mains_pick_up"), 0)[0]
+    around = world.surroundings
+    assert around.installation is not None
+    around = dataclasses.replace(
+        around,
+        installation=dataclasses.replace(
+            around.installation, mains_amplitude=np.full(len(world.rig.channels), 1.0)
+        ),
+    )
+    time, values = one_run(dataclasses.replace(world, surroundings=around))
+    held = values[:, (time > -HELD_S) & (time < -0.1)]
+    found = [amplitude_at(held[k] - held[k].mean(), 50.0) for k in range(24)]
+    noise = world.rig.channels[0].noise_si
+    assert np.median(found) == pytest.approx(noise, rel=0.15)
+    assert np.std(around.installation.mains_phase) > 1.0  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("name", sorted(IN_THE_HELD_PART))
+def test_an_imperfection_of_the_held_part_changes_it_and_is_no_cause(
+    name: str, quiet: World, configs: Path, tmp_path: Path
+) -> None:
+    world = draw_case(order(configs, tmp_path, "rough", name), 0)[0]
+    assert not world.effects
+    time, values = one_run(world)
+    plain_time, plain = one_run(quiet)
+    held, plain_held = values[:, time < -0.1], plain[:, plain_time < -0.1]
+    noise = np.array([c.noise_si for c in world.rig.channels])
+    spread = held.std(axis=1) / noise, plain_held.std(axis=1) / noise
+    level = np.abs(held.mean(axis=1) - plain_held[:, : held.shape[1]].mean(axis=1)) / noise
+    assert np.max(np.abs(spread[0] - spread[1])) > 0.02 or np.max(level) > 0.05
+    assert np.all(np.isfinite(values))
+
+
+def test_a_turned_mount_shows_its_share_of_the_cross_axis(configs: Path, tmp_path: Path) -> None:
+    world = draw_case(order(configs, tmp_path, "rough", "mount_angle"), 0)[0]
+    assert world.surroundings.installation is not None
+    turns = {f.targets[0]: f.parameters["angle_rad"] for f in world.surroundings.installation.faults}
+    time, values = one_run(world)
+    held = time < -0.2
+    tilt = np.array([row(world, values, name)[held].mean() for name in ("TL-1X", "TL-1Y")])
+    assert tilt[1] / tilt[0] == pytest.approx(np.sin(turns["TL-1Y"]), abs=0.01)
+
+
+@pytest.mark.parametrize("form", ["half_sine", "two_lobed", "ringing", "gamma"])
+def test_a_shock_of_any_form_takes_the_velocity_jump_and_is_over_in_its_window(form: str) -> None:
+    for length_s in (0.002, 0.015):
+        shock = Shock(form, length_s)  # type: ignore[arg-type]
+        t = np.linspace(0.0, shock.window_s, 20_001)
+        pulse = shock.pulse(t)
+        assert np.trapezoid(pulse, t) == pytest.approx(1.0, abs=0.01)
+        assert abs(pulse[-1]) < 0.01 * np.max(np.abs(pulse))
+
+
+def test_a_swaying_wall_is_let_go_in_the_state_that_it_swayed_into(configs: Path, tmp_path: Path) -> None:
+    world = draw_case(order(configs, tmp_path, "rough", "sway"), 0)[0]
+    scene = world.course(0).scene(np.arange(-2.0, 0.2, 1e-4))
+    around_release = np.searchsorted(scene.time_s, 0.0)
+    before, after = scene.theta[around_release - 1], scene.theta[around_release + 1]
+    assert np.ptp(scene.theta[:around_release]) > 3e-5
+    assert after - before == pytest.approx(2e-4 * scene.omega[around_release], abs=2e-8)
+
+
+def test_the_left_out_chain_makes_other_readings_of_the_same_signals(configs: Path, tmp_path: Path) -> None:
+    world = draw_case(order(configs, tmp_path, "held_out_event"), 0)[0]
+    same_but_for_the_chain = dataclasses.replace(
+        world, surroundings=dataclasses.replace(world.surroundings, chain="bench")
+    )
+    (time, field), (_, bench) = one_run(world), one_run(same_but_for_the_chain)
+    wire, other = row(world, field, "WP-4"), row(world, bench, "WP-4")
+    assert np.abs(wire - other).max() > 0.0
+    noise = world.rig.channel("WP-4").noise_si
+    assert np.median(np.abs(wire - other)) < 5.0 * noise
+    held = (time > -1.4) & (time < -0.1)
+    assert 0.3 * noise < wire[held].std() < 6.0 * noise
+
+
+def test_a_case_depends_on_its_place_only_in_a_laboratory_too(configs: Path, tmp_path: Path) -> None:
+    first, again = (draw_case(order(configs, tmp_path, "rough"), 2)[0] for _ in range(2))
+    assert first.surroundings.sizes == again.surroundings.sizes
+    assert (first.wall, first.runs, first.surroundings.numerics) == (
+        again.wall,
+        again.runs,
+        again.surroundings.numerics,
+    )
+
+
+def test_three_effects_are_of_three_kinds_in_every_twentieth_case(configs: Path, tmp_path: Path) -> None:
+    mixed = dataclasses.replace(order(configs, tmp_path, "ordinary"), hidden="")
+    counts = [len(draw_case(mixed, index)[0].effects) for index in range(40)]
+    assert counts.count(3) == 2 and counts.count(0) == 4 and counts.count(2) == 6
+
+
+def test_a_slow_ring_and_a_twist_about_a_corner_are_among_what_wide_walls_hide(
+    configs: Path, tmp_path: Path
+) -> None:
+    def world(name: str) -> World:
+        return draw_case(dataclasses.replace(order(configs, tmp_path, "ordinary"), hidden=name), 0)[0]
+
+    slow = world("slow_flexible_wall").effects[0]
+    assert slow.name == "flexible_wall" and 2.0 <= slow.parameters["frequency_hz"] <= 7.0
+    twisted = world("corner_twist")
+    scene = twisted.course(0).scene(np.arange(-0.5, 6.0, 1e-3))
+    assert abs(scene.yaw[-1]) > 0.0 and np.allclose(scene.yaw[scene.time_s < 0.0], 0.0)
