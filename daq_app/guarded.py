@@ -16,13 +16,13 @@ from collections.abc import Sequence
 
 
 def start_guarded(
-    module: str, arguments: Sequence[str], *, reads_input: bool = False
+    module: str, arguments: Sequence[str], *, reads_input: bool = False, quiet: bool = False
 ) -> subprocess.Popen[str]:
     """Start ``python -m module arguments`` as a child that ends with this process.
 
-    Its standard output is a pipe (text, line by line), its standard error is ours. It does not get
-    the terminal's Ctrl-C: who started it ends it. A module that `reads_input` minds the end of its
-    standard input itself.
+    Its standard output is a pipe (text, line by line), its standard error is ours, or nobody's if it is
+    `quiet`. It does not get the terminal's Ctrl-C: who started it ends it. A module that `reads_input`
+    minds the end of its standard input itself.
     """
     guard = [] if reads_input else ["daq_app.guarded"]
     apart = (
@@ -34,6 +34,7 @@ def start_guarded(
         [sys.executable, "-u", "-m", *guard, module, *arguments],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL if quiet else None,
         text=True,
         encoding="utf-8",
         **apart,

@@ -21,7 +21,8 @@ from daq_app.runfile.plain_text import clean_text
 from daq_app.runfile.test_plan import TestPlan
 
 RUN_FORMAT = "rocking-run"
-RUN_FORMAT_VERSION = 1
+RUN_FORMAT_VERSION = 2
+"""Files of version 1 have no seal; they are read all the same."""
 MAX_SAMPLES = 2**31
 """Longest run, samples per channel (six days at 4000 Hz): a longer one is a damaged or hostile file."""
 MAX_GAP_SAMPLES = 2**26

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from daq_app.config import ConfigError, Rig, load_rig
 from daq_app.runfile import JournalWriter, RunFileError, RunHeader, open_run, verify
 from daq_app.runfile.importers import ImportMap, ImportReport, import_file
+from daq_app.runfile.seal.format import MAGIC, Sign, write_seal
 
 Readings = NDArray[np.float64]
 MakeJournal = Callable[..., Readings]
@@ -82,6 +84,35 @@ def make_journal(header: RunHeader) -> MakeJournal:
         return np.concatenate(pieces, axis=1) if pieces else np.empty((header.n_channels, 0))
 
     return make
+
+
+@pytest.fixture(scope="session")
+def without_seal() -> Callable[[Path], Path]:
+    """`without_seal(path)` makes a run one of format version 1, which differs by its seal only."""
+
+    def change(path: Path) -> Path:
+        with h5py.File(path, "r+") as file:
+            del file["integrity"]
+            file.attrs["format_version"] = 1
+        content = path.read_bytes()
+        path.write_bytes(content.replace(MAGIC, bytes(len(MAGIC))))
+        return path
+
+    return change
+
+
+@pytest.fixture(scope="session")
+def with_new_seal() -> Callable[..., Path]:
+    """`with_new_seal(path, sign)` makes the seal anew, as somebody who edits a file could."""
+
+    def change(path: Path, sign: Sign | None = None) -> Path:
+        with h5py.File(path) as file:
+            place = file["integrity/seal"]
+            offset, n_bytes = place.id.get_offset(), place.shape[0]
+        write_seal(path, offset, n_bytes, sign)
+        return path
+
+    return change
 
 
 Bring = Callable[..., ImportReport]

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from daq_app.runfile import JournalWriter, RunFileError, RunHeader, read_journal
-from daq_app.runfile.journal.frames import HEADING_BYTES, FrameType, pack_frame
+from daq_app.runfile import JournalWriter, RunFileError, RunHeader, read_journal, recover, verify
+from daq_app.runfile.journal.frames import HEADING_BYTES, MAX_TEXT_BYTES, FrameType, pack_frame
 
 CHANNELS, BLOCK, BLOCKS, FIRST = 2, 5, 9, 40
 GAP = range(FIRST + 4 * BLOCK, FIRST + 4 * BLOCK + 7)
@@ -269,3 +269,46 @@ def test_the_reference_reader_agrees(tmp_path: Path, sound: bytes, foreign: byte
             for column in range(len(rows[0])):
                 seen[first + column] = tuple(row[column] for row in rows)
         assert seen == expected
+
+
+def test_an_end_of_noise_is_damage_with_a_count_of_what_may_be_missing(tmp_path: Path, sound: bytes) -> None:
+    path = tmp_path / "noise.journal"
+    keep = frame_offsets(sound)[4]
+    noise = np.random.default_rng(1).bytes(len(sound) - keep)
+    path.write_bytes(sound[:keep] + noise)
+    report = verify(path)
+    assert not report.ok
+    (problem,) = report.problems
+    assert f"at least {len(noise)} bytes at its end cannot be read" in problem
+    assert f"up to {len(noise) // (8 * CHANNELS)} samples of each channel may be missing" in problem
+
+
+def test_a_run_made_of_a_journal_with_a_lost_end_says_so_for_ever(tmp_path: Path, sound: bytes) -> None:
+    path = tmp_path / "noise.journal"
+    path.write_bytes(sound[: frame_offsets(sound)[4]] + bytes(len(sound)))
+    (made,) = recover(path)
+    assert made.run is not None
+    assert any("bytes at its end cannot be read" in note for note in verify(made.run).notes)
+
+
+@pytest.mark.parametrize("left", [1, 30, HEADING_BYTES, HEADING_BYTES + 10])
+def test_one_frame_torn_at_the_end_is_no_damage(tmp_path: Path, sound: bytes, left: int) -> None:
+    path = tmp_path / "torn.journal"
+    path.write_bytes(sound[: frame_offsets(sound)[5] + left])
+    report = verify(path)
+    assert report.ok and any("unfinished frame" in note for note in report.notes)
+
+
+def test_bytes_after_the_end_frame_are_damage(tmp_path: Path, sound: bytes) -> None:
+    path = tmp_path / "longer.journal"
+    path.write_bytes(sound + b"x" * 20)
+    assert not verify(path).ok
+
+
+def test_an_event_too_long_to_be_read_is_told(tmp_path: Path, sound: bytes) -> None:
+    path = tmp_path / "long.journal"
+    last = frame_offsets(sound)[-2]
+    number = int.from_bytes(sound[last + 24 : last + 32], "little")
+    long = pack_frame(FrameType.EVENT, sound[16:24], number + 1, b'"' + b"x" * MAX_TEXT_BYTES + b'"')
+    path.write_bytes(sound[:last] + long)
+    assert any("absurdly long" in problem for problem in verify(path).problems)

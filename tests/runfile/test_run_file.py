@@ -113,7 +113,8 @@ def _change(path: Path, dataset: str, index: int, value: float) -> None:
         file[dataset][index] = value
 
 
-def test_changed_readings_are_found_though_every_checksum_is_right(run) -> None:
+def test_changed_readings_are_found_though_every_checksum_is_right(run, without_seal) -> None:
+    without_seal(run[0])
     _change(run[0], "raw/WP-1", 5, 1.5)
     told = pytest.raises(RunFileError, match="WP-1 between samples 1000 and 1010 is damaged")
     with open_run(run[0]) as opened, told:
@@ -127,7 +128,8 @@ def test_changed_readings_are_found_though_every_checksum_is_right(run) -> None:
     assert any("WP-1 are not the ones that were recorded" in problem for problem in report.problems)
 
 
-def test_changed_engineering_units_are_found(run) -> None:
+def test_changed_engineering_units_are_found(run, without_seal) -> None:
+    without_seal(run[0])
     _change(run[0], "si/AC-1", 5, 1.5)
     assert verify(run[0]).problems == (
         "the engineering units of AC-1 do not follow from readings and scaling",
@@ -211,6 +213,6 @@ def test_a_disk_that_changes_what_was_written_is_caught_before_the_run_has_its_n
         real(path)
 
     monkeypatch.setattr(saving, "fsync_file", faulty)
-    with pytest.raises(RunFileError, match="differs from its source near sample"):
+    with pytest.raises(RunFileError, match="differs from what was written"):
         finalise(tmp_path / "a.journal", tmp_path / "a.h5")
     assert [path.name for path in tmp_path.iterdir()] == ["a.journal"]

@@ -20,6 +20,7 @@ from daq_app.runfile import layout
 from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.hdf5.safe import checked_dataset, damage_told, open_hdf5, read_column, read_text
 from daq_app.runfile.model import MAX_SAMPLES, RUN_FORMAT, DerivedData, DerivedSignal, Event, Gap, RunHeader
+from daq_app.runfile.seal.format import Seal
 from daq_app.runfile.source import RunScaling, rig_of
 
 _SMALL_BYTES: Final = 2**28
@@ -31,7 +32,7 @@ class RunAttributes(BaseModel):
     model_config = ConfigDict(frozen=True, extra="ignore")
 
     format: Literal["rocking-run"]
-    format_version: Literal[1]
+    format_version: Literal[1, 2]
     run_id: str
     rate_hz: Annotated[float, Field(gt=0, le=1e7)]
     first_sample: Annotated[int, Field(ge=-(2**62), le=2**62)]
@@ -51,12 +52,14 @@ class Run:
     Not for use by several threads at once. Use as a context manager.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, just_written: bool = False) -> None:
         self.path = path
-        self._file = open_hdf5(path)
+        self._opened = open_hdf5(path, just_written=just_written)
+        self._file = self._opened.file
         try:
             with damage_told(path, "the structure of the file"):
                 self.attributes = self._read_attributes()
+                self._require_seal()
                 self.header = self._read_header()
                 self.rig: Rig | None = rig_of(self.header)
                 """The rig of the run; None if the file holds none that this version understands."""
@@ -65,8 +68,18 @@ class Run:
                 self.events = self._read_events()
                 self.gaps = self._read_gaps()
         except BaseException:
-            self._file.close()
+            self._opened.close()
             raise
+
+    @property
+    def hdf5(self) -> h5py.File:
+        """The opened file itself, for checks that compare its parts."""
+        return self._file
+
+    @property
+    def seal(self) -> Seal | None:
+        """What proves the bytes of the file; None for a run of format version 1."""
+        return self._opened.seal
 
     @property
     def rate_hz(self) -> float:
@@ -198,7 +211,7 @@ class Run:
 
     def close(self) -> None:
         """Close the file; safe twice."""
-        self._file.close()
+        self._opened.close()
 
     def __enter__(self) -> Self:
         return self
@@ -227,6 +240,13 @@ class Run:
                 f"{self.path}: attribute {'.'.join(map(str, first['loc']))}: {first['msg']}"
             ) from error
 
+    def _require_seal(self) -> None:
+        if (self.seal is None) != (self.attributes.format_version == 1):
+            raise RunFileError(
+                f"{self.path}: its seal is missing or does not belong to it: nothing in it is proven",
+                advice="If its journal is still there, `daq-app recover` makes the run anew.",
+            )
+
     def _read_header(self) -> RunHeader:
         try:
             header = RunHeader.model_validate_json(read_text(self.path, self._file, layout.HEADER_JSON))
@@ -239,7 +259,10 @@ class Run:
         return header
 
     def _group(self, name: str) -> h5py.Group:
-        group = self._file.get(name, getlink=False) if name in self._file else None
+        link = self._file.get(name, getlink=True)
+        if link is not None and not isinstance(link, h5py.HardLink):
+            raise RunFileError(f"{self.path}: /{name} is a link to somewhere else, which a run never holds")
+        group = self._file[name] if link is not None else None
         if not isinstance(group, h5py.Group):
             raise RunFileError(f"{self.path}: group {name} is missing")
         return group
@@ -297,9 +320,13 @@ class Run:
 _ADVICE_NAME: Final = "Give the run file itself, for instance runs/FR1-L3-2.h5."
 
 
-def open_run(path: Path | str) -> Run:
-    """Open a run file. Raises `RunFileError` if it is missing, cut short, foreign or inconsistent."""
+def open_run(path: Path | str, *, just_written: bool = False) -> Run:
+    """Open a run file. Raises `RunFileError` if it is missing, cut short, foreign or inconsistent.
+
+    A run that this machine did not seal is walked through by a child process first, unless the caller
+    has `just_written` it.
+    """
     path = Path(path)
     if path.is_dir():
         raise RunFileError(f"{path} is a folder", advice=_ADVICE_NAME)
-    return Run(path)
+    return Run(path, just_written=just_written)

@@ -1,4 +1,4 @@
-"""Reading HDF5 that may come from anybody: bounded memory, and nothing outside the file.
+"""Reading HDF5 that may come from anybody: proven or probed bytes, bounded memory, nothing outside the file.
 
 Refused: external links, soft links, external storage, virtual datasets, filters other than the standard
 ones, and datasets that claim more than their bytes on disk could hold.
@@ -9,12 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import h5py
 
 from daq_app.runfile.errors import RunFileError
+from daq_app.runfile.hdf5.probe import require_harmless
+from daq_app.runfile.seal.format import BrokenSealError, Seal
+from daq_app.runfile.seal.proven_file import ProvenFile, seal_of
+from daq_app.runfile.seal.signing import made_here
 
 _MAX_CHUNK_BYTES: Final = 2**26
 _MAX_DEFLATE_RATIO: Final = 1100
@@ -24,16 +29,43 @@ _MAX_ROWS: Final = 1_000_000
 _FILTERS: Final = frozenset({h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_FLETCHER32})
 
 
-def open_hdf5(path: Path) -> h5py.File:
-    """Open for reading. Raises `RunFileError` in plain words."""
+@dataclass(frozen=True, slots=True)
+class OpenedHdf5:
+    """An HDF5 file opened for reading, and what proves its bytes."""
+
+    file: h5py.File
+    seal: Seal | None
+    """None for a file that was never sealed; it was walked through by a child before it was opened here."""
+
+    def close(self) -> None:
+        """Close the file; safe twice."""
+        self.file.close()
+
+
+def open_hdf5(path: Path, *, just_written: bool = False) -> OpenedHdf5:
+    """Open for reading. Raises `RunFileError` in plain words.
+
+    The HDF5 library sees proven bytes only where the file has a seal.  A file that this machine did not
+    seal itself is given to a child first (`require_harmless`), unless it was `just_written` by the caller.
+    """
     try:
-        size = path.stat().st_size
+        seal = seal_of(path)
+    except BrokenSealError as error:
+        raise RunFileError(f"{path}: {error.message}", advice=error.advice) from error
     except OSError as error:
         raise RunFileError(f"{path} cannot be read ({error.strerror})", advice="Check the name.") from error
     try:
-        return h5py.File(path, "r", locking="best-effort")
-    except (OSError, ValueError, RuntimeError) as error:
-        if size >= 8 and path.open("rb").read(8) == b"\x89HDF\r\n\x1a\n":
+        if not just_written and (seal is None or not made_here(seal)):
+            require_harmless(path)
+        source = path if seal is None else ProvenFile(path, seal)
+        locking = {"locking": "best-effort"} if seal is None else {}
+        return OpenedHdf5(h5py.File(source, "r", **locking), seal)
+    except (OSError, ValueError, RuntimeError, RunFileError) as error:
+        with path.open("rb") as file:
+            is_hdf5 = file.read(8) == b"\x89HDF\r\n\x1a\n"
+        if isinstance(error, RunFileError) and is_hdf5:
+            raise
+        if is_hdf5:
             raise RunFileError(
                 f"{path} is cut short or damaged",
                 advice="If its journal is still there, `daq-app recover` makes the run anew.",

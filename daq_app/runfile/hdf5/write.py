@@ -17,10 +17,14 @@ from daq_app.runfile.hdf5.channels import describe_channels
 from daq_app.runfile.hdf5.chunks import ChunkWriter, chunk_samples, chunk_writer, create_chunked
 from daq_app.runfile.hdf5.guarded_file import guarded_hdf5
 from daq_app.runfile.model import RUN_FORMAT, RUN_FORMAT_VERSION, DerivedData, Event, Gap, to_json
+from daq_app.runfile.seal.format import seal_bytes_for, write_seal
+from daq_app.runfile.seal.signing import sign
 from daq_app.runfile.source import Provenance, RunScaling, RunSource, rig_of
 
 _TEXT = h5py.string_dtype("utf-8")
 _MAX_ATTRIBUTE_CHARACTERS = 8000
+_STORED_BYTES = 8 + 4
+"""A reading and its engineering unit, before they are compressed."""
 
 
 def write_run(
@@ -39,6 +43,7 @@ def write_run(
         guarded_hdf5(path, libver=("v108", "v108")) as (file, guarded),
         chunk_writer(guarded.raise_failure) as writer,
     ):
+        offset, seal_bytes = _reserve_seal(file, header.n_channels * source.n_samples)
         _write_texts(file, source)
         digest = _write_samples(file, source, scaling, writer)
         describe_channels(file, header, scaling)
@@ -47,6 +52,21 @@ def write_run(
         if derived is not None:
             _write_derived(file, derived, header.rate_hz, writer)
         _write_root(file, source, provenance, digest)
+    write_seal(path, offset, seal_bytes, sign)
+
+
+def _reserve_seal(file: h5py.File, n_readings: int) -> tuple[int, int]:
+    """(first byte, number of bytes) of the seal: it is written first, so it lies near the file's start."""
+    seal_bytes = seal_bytes_for(n_readings * _STORED_BYTES)
+    kind = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    kind.set_layout(h5py.h5d.CONTIGUOUS)
+    kind.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    kind.set_obj_track_times(False)
+    group = file.create_group(layout.INTEGRITY)
+    space = h5py.h5s.create_simple((seal_bytes,))
+    seal = h5py.h5d.create(group.id, layout.SEAL.encode(), h5py.h5t.STD_U8LE, space, kind)
+    h5py.Dataset(seal).attrs["long_name"] = "SHA-256 of every block of this file: docs/run-format.md"
+    return seal.get_offset(), seal_bytes
 
 
 def _write_root(file: h5py.File, source: RunSource, provenance: Provenance, digest: str) -> None:

@@ -1,14 +1,14 @@
 """From the journal to the run file, so that at every moment one of the two is whole.
 
-verify the journal → write ``RUN.h5.tmp`` → flush → reopen and compare every sample → rename.
+verify the journal → write ``RUN.h5.tmp`` → seal → flush → reopen and compare every sample → rename.
 """
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from daq_app.runfile import layout
@@ -16,12 +16,14 @@ from daq_app.runfile.durable import fsync_file, replace_durably
 from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.hdf5.chunks import chunk_samples
 from daq_app.runfile.hdf5.read import open_run
+from daq_app.runfile.hdf5.safe import open_hdf5
 from daq_app.runfile.hdf5.write import write_run
 from daq_app.runfile.journal.locks import journal_locked
 from daq_app.runfile.journal.read import JournalContents, read_journal
 from daq_app.runfile.model import DerivedData
 from daq_app.runfile.source import Provenance, RunScaling, RunSource, rig_of
 
+_FAULTY = "The disk or the memory of this machine is faulty; the journal is untouched."
 _SIZE_FACTOR = 1.6
 """Room asked for: raw float64 and SI float32 uncompressed, and a little."""
 
@@ -90,11 +92,23 @@ def require_space(folder: Path, n_bytes: int) -> None:
 
 def compare_run(path: Path, source: RunSource) -> None:
     """Read the file back and compare every sample, bit by bit. Raises `RunFileError` at a difference."""
+    try:
+        _compare_samples(path, source)
+        with open_run(path, just_written=True) as run:
+            same_header = run.header.model_dump_json() == source.header.model_dump_json()
+            same = same_header and (run.events, run.gaps) == (source.events, source.gaps)
+    except (OSError, RunFileError) as error:
+        raise RunFileError(f"{path} differs from what was written ({error})", advice=_FAULTY) from error
+    if not same:
+        raise RunFileError(f"{path}: events, gaps or header differ from the source", advice=_FAULTY)
+
+
+def _compare_samples(path: Path, source: RunSource) -> None:
     header = source.header
     scaling = RunScaling.of(header, rig_of(header))
     chunk = chunk_samples(header.n_channels, source.n_samples)
-    with h5py.File(path, "r") as file:
-        raw, si = file[layout.RAW], file[layout.SI]
+    with contextlib.closing(open_hdf5(path, just_written=True)) as opened:
+        raw, si = opened.file[layout.RAW], opened.file[layout.SI]
         pairs_raw = [(row, raw[channel_id]) for row, channel_id in enumerate(header.channel_ids)]
         pairs_si = [(row, si[channel_id]) for row, channel_id in enumerate(scaling.channels)]
         for first, window in source.windows(chunk):
@@ -108,14 +122,7 @@ def compare_run(path: Path, source: RunSource) -> None:
                 for row, dataset in pairs_si
             )
             if not same:
-                raise RunFileError(
-                    f"{path} differs from its source near sample {first}",
-                    advice="The disk or the memory of this machine is faulty; the journal is untouched.",
-                )
-    with open_run(path) as run:
-        same_header = run.header.model_dump_json() == header.model_dump_json()
-        if not same_header or (run.events, run.gaps) != (source.events, source.gaps):
-            raise RunFileError(f"{path}: events, gaps or header differ from the source")
+                raise RunFileError(f"other samples near {first}")
 
 
 def is_run_of(path: Path, contents: JournalContents) -> bool:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +14,15 @@ from numpy.typing import NDArray
 from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.folder import JOURNAL_SUFFIX, find_journals, find_runs
 from daq_app.runfile.hdf5.chunks import chunk_samples
+from daq_app.runfile.hdf5.copies import copy_problems
 from daq_app.runfile.hdf5.read import Run, open_run
 from daq_app.runfile.hdf5.write import combined_sha256
 from daq_app.runfile.integrity.saving import is_run_of
 from daq_app.runfile.journal.frames import MAGIC
 from daq_app.runfile.journal.read import read_journal
+from daq_app.runfile.seal.format import Seal
+from daq_app.runfile.seal.proven_file import ProvenFile, seal_of
+from daq_app.runfile.seal.signing import made_here, signature_is_good
 from daq_app.runfile.source import RunScaling
 
 
@@ -35,6 +40,8 @@ class VerifyReport:
     lost_samples: int = 0
     duration_s: float = 0.0
     children: tuple[VerifyReport, ...] = ()
+    proven: Literal["every byte", "readings", "frames", ""] = ""
+    """What of the file stands under a checksum; empty where nothing could be read."""
 
     @property
     def ok(self) -> bool:
@@ -102,8 +109,11 @@ def _verify_journal(path: Path) -> VerifyReport:
             notes = []
             if not contents.closed:
                 notes.append("it was not closed: it is being recorded, or the recorder was cut off")
-            if contents.tail_bytes:
-                notes.append(f"its last {contents.tail_bytes} bytes are an unfinished frame")
+            if contents.ends_in_torn_frame:
+                notes.append(
+                    f"its last {contents.tail_bytes} bytes are an unfinished frame: up to "
+                    f"{contents.tail_samples} samples of each channel were being written"
+                )
             notes += _gap_note(contents.lost_samples, len(contents.gaps))
             return VerifyReport(
                 path,
@@ -113,17 +123,28 @@ def _verify_journal(path: Path) -> VerifyReport:
                 contents.n_samples,
                 contents.lost_samples,
                 contents.n_samples / contents.header.rate_hz,
+                proven="frames",
             )
     except RunFileError as error:
         return VerifyReport(path, "journal", (str(error),))
 
 
 def verify_run(path: Path) -> VerifyReport:
-    """Check every sample of a run file. Never raises for a bad file."""
+    """Check every byte and every sample of a run file. Never raises for a bad file."""
+    problems: list[str] = []
+    notes: list[str] = []
     try:
+        seal = seal_of(path)
+        if seal is not None:
+            problems, notes = _seal_findings(path, seal)
+        if problems:
+            return VerifyReport(path, "run", tuple(problems), tuple(notes))
         with open_run(path) as run:
             problems = [*_table_problems(run), *_sample_problems(run)]
-            notes = _gap_note(run.attributes.lost_samples, len(run.gaps))
+            if seal is None:
+                problems += copy_problems(run)
+                notes.append(_UNSEALED)
+            notes += _gap_note(run.attributes.lost_samples, len(run.gaps))
             if not run.attributes.closed_in_good_order:
                 notes.append("it was recovered: the recorder had been cut off")
             notes += [f"its journal was damaged: {line}" for line in run.attributes.damage.splitlines()]
@@ -137,9 +158,40 @@ def verify_run(path: Path) -> VerifyReport:
                 run.n_samples,
                 run.attributes.lost_samples,
                 run.n_samples / run.rate_hz,
+                proven="readings" if seal is None else "every byte",
             )
     except RunFileError as error:
-        return VerifyReport(path, "run", (str(error),))
+        return VerifyReport(path, "run", (*problems, str(error)), tuple(notes))
+    except OSError as error:
+        return VerifyReport(path, "run", (f"{path} cannot be read ({error.strerror or error})",))
+
+
+_UNSEALED: Final = (
+    "it has no seal (format version 1): its readings are proven, and what is stored twice agrees; that "
+    "nothing else in it was changed (events, notes, derived signals) cannot be told"
+)
+
+
+def _seal_findings(path: Path, seal: Seal) -> tuple[list[str], list[str]]:
+    """Problems and notes on the bytes of a sealed file."""
+    with contextlib.closing(ProvenFile(path, seal)) as proven:
+        ranges = proven.damaged_ranges()
+    if ranges:
+        where = ", ".join(f"{start} to {end}" for start, end in ranges[:4]) + (
+            " …" if len(ranges) > 4 else ""
+        )
+        return [
+            f"its bytes {where} are not the ones that were saved (SHA-256): it was damaged or changed"
+        ], []
+    if not seal.signature:
+        return [], [
+            "its seal is not signed: it proves against damage, not against somebody who edits the file"
+        ]
+    if not signature_is_good(seal):
+        return ["the signature of its seal is wrong: somebody changed the file and made a new seal"], []
+    if made_here(seal):
+        return [], []
+    return [], [f"it was sealed by another recorder, key {seal.public_key.hex()}"]
 
 
 def _gap_note(lost: int, gaps: int) -> list[str]:

@@ -19,6 +19,8 @@ _HEADING: Final = struct.Struct("<8sHHI8sQqIII")
 _CRC: Final = struct.Struct("<I")
 HEADING_BYTES: Final = _HEADING.size + _CRC.size
 MAX_PAYLOAD_BYTES: Final = 2**28
+MAX_TEXT_BYTES: Final = 2**24
+"""Longest header, event or reason: more is read by nobody."""
 TAG_BYTES: Final = 8
 
 

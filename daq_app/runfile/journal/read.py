@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Final, Self
@@ -17,13 +18,13 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from daq_app.runfile.errors import RunFileError
-from daq_app.runfile.journal.frames import Frame, FrameType
+from daq_app.runfile.journal.frames import HEADING_BYTES, MAX_TEXT_BYTES, Frame, FrameType, unpack_heading
 from daq_app.runfile.journal.scan import Scan, payload_is_good, scan_frames
 from daq_app.runfile.model import MAX_GAP_SAMPLES, MAX_SAMPLES, Event, Gap, RunHeader, to_json
 from daq_app.runfile.plain_text import clean_text
 
-_MAX_TEXT_BYTES: Final = 2**24
-"""Longest event or reason that is read."""
+_MAX_EVENT_BYTES: Final = 2**26
+"""All events of a run together: a test of half an hour has some hundred kilobytes."""
 _LOST: Final = "lost: the journal is damaged here"
 
 
@@ -61,11 +62,16 @@ class JournalContents:
 
     @property
     def tail_bytes(self) -> int:
-        """Bytes after the last good frame: what was being written when the recorder died."""
+        """Bytes after the last good frame: what was being written when the recorder died, or damage."""
         ranges = self._scan.bad_ranges
         if ranges and ranges[-1][1] == self._scan.file_bytes:
             return ranges[-1][1] - ranges[-1][0]
         return 0
+
+    @property
+    def tail_samples(self) -> int:
+        """How many samples of each channel the unreadable end may have held, at most."""
+        return self.tail_bytes // (8 * self.header.n_channels)
 
     @property
     def lost_samples(self) -> int:
@@ -119,6 +125,8 @@ class JournalContents:
 
     def _read_header(self, scan: Scan) -> RunHeader:
         frame = next((frame for frame in scan.frames if frame.type is FrameType.HEADER), None)
+        if frame is not None and frame.payload_bytes > MAX_TEXT_BYTES:
+            raise RunFileError(f"{self.path}: its header is absurdly long")
         if frame is None:
             raise RunFileError(f"{self.path}: the header of this journal is lost")
         try:
@@ -149,8 +157,13 @@ class JournalContents:
 
     def _read_events(self) -> tuple[Event, ...]:
         events: list[Event] = []
+        budget = _MAX_EVENT_BYTES
         for frame in self.frames:
-            if frame.type is not FrameType.EVENT or frame.payload_bytes > _MAX_TEXT_BYTES:
+            if frame.type is not FrameType.EVENT:
+                continue
+            budget -= frame.payload_bytes
+            if frame.payload_bytes > MAX_TEXT_BYTES or budget < 0:
+                self.damage.append("an event that is absurdly long was left out")
                 continue
             try:
                 content = json.loads(self._payload(frame))
@@ -188,9 +201,27 @@ class JournalContents:
         return first, tuple(_explained(holes, said, self._reason))
 
     def _reason(self, frame: Frame) -> str:
-        if frame.payload_bytes > _MAX_TEXT_BYTES:
+        if frame.payload_bytes > MAX_TEXT_BYTES:
             return "reason not readable"
         return clean_text(self._payload(frame).decode("utf-8", "replace"))
+
+    @cached_property
+    def ends_in_torn_frame(self) -> bool:
+        """Whether the unreadable end is no more than the one frame that was being written at the end.
+
+        Where not even its heading is whole, it is one frame if it is no longer than those before it.
+        """
+        if self.closed or not self.tail_bytes:
+            return False  # nothing is written after the end frame
+        start = self._scan.file_bytes - self.tail_bytes
+        self._file.seek(start)
+        torn = unpack_heading(self._file.read(HEADING_BYTES), start)
+        if torn is not None:
+            return torn.end_offset >= self._scan.file_bytes
+        longest = max(
+            (frame.payload_bytes for frame in self.frames if frame.type is FrameType.DATA), default=0
+        )
+        return self.tail_bytes <= HEADING_BYTES + longest
 
     def _describe_damage(self) -> None:
         scan = self._scan
@@ -198,6 +229,11 @@ class JournalContents:
         if inner:
             lost = sum(end - start for start, end in scan.bad_ranges[:inner])
             self.damage.append(f"{lost} bytes in {inner} places are damaged")
+        if self.tail_bytes and not self.ends_in_torn_frame:
+            self.damage.append(
+                f"at least {self.tail_bytes} bytes at its end cannot be read: up to {self.tail_samples} "
+                "samples of each channel may be missing there"
+            )
         for count, what in (
             (scan.foreign, "frames of another journal were left out"),
             (scan.duplicates, "repeated frames were left out"),

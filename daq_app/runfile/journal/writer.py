@@ -27,7 +27,7 @@ from daq_app.runfile.errors import (
     JournalSlowDisk,
     RunFileError,
 )
-from daq_app.runfile.journal.frames import MAX_PAYLOAD_BYTES, TAG_BYTES, FrameType, pack_frame
+from daq_app.runfile.journal.frames import MAX_PAYLOAD_BYTES, MAX_TEXT_BYTES, TAG_BYTES, FrameType, pack_frame
 from daq_app.runfile.journal.locks import lock_file
 from daq_app.runfile.journal.scan import scan_frames
 from daq_app.runfile.model import MAX_GAP_SAMPLES, RunHeader, to_json
@@ -69,7 +69,7 @@ class JournalWriter:
         self.last_sync_s = 0.0
         """How long the last flush took."""
         self._header_payload = header.model_dump_json().encode()
-        if len(self._header_payload) > MAX_PAYLOAD_BYTES:
+        if len(self._header_payload) > MAX_TEXT_BYTES:
             raise RunFileError(f"{path}: the run's header is too long", advice="Shorten notes or truth.")
         self._fd = _create(path)
         try:

@@ -86,7 +86,8 @@ class Mat73Reader:
     def __init__(self, path: Path, source: SourceMap) -> None:
         self._path = path
         self.findings = Findings()
-        self._file = open_hdf5(path)
+        self._opened = open_hdf5(path)
+        self._file = self._opened.file
         try:
             with damage_told(path, "the structure of the file"):
                 self._vectors = {
@@ -96,7 +97,7 @@ class Mat73Reader:
                 }
                 rates = {name: self._file[name][()] for name in _RATES if self._is_scalar(name)}
         except BaseException:
-            self._file.close()
+            self._opened.close()
             raise
         self.channels = _described(self._vectors, {}, _increment(rates))
         self.time_channel = _time(self._vectors, source)
@@ -114,7 +115,7 @@ class Mat73Reader:
                     spool.append(name, np.asarray(part, dtype=np.float64))
 
     def close(self) -> None:
-        self._file.close()
+        self._opened.close()
 
     def _is_plain(self, name: str, dataset: h5py.Dataset) -> bool:
         """A real vector whose bytes are in this file."""
