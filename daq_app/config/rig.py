@@ -112,6 +112,14 @@ class Acquisition(Table):
     """Longest time from release to the automatic stop."""
     velocity_cutoff_hz: Positive = 25.0
     """Cut-off of the stated low-pass differentiator (daq_app.rocking)."""
+    ring_s: Annotated[float, Field(ge=20.0, le=3600.0, allow_inf_nan=False, strict=True)] = 180.0
+    """How much of the past lies on disk while nothing is recorded (1.3 MB a second for 41 channels)."""
+    hold_s: Annotated[float, Field(ge=0.0, le=60.0, allow_inf_nan=False, strict=True)] = 3.0
+    """How long the wall is held still at its target before the operator is told to release. Assumed."""
+    warning_ratio: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False, strict=True)] = 0.5
+    """|θ|/α from which the nearness to overturning is a warning. Assumed: above every level of Table 3.2."""
+    alarm_ratio: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False, strict=True)] = 0.65
+    """|θ|/α from which the pull must stop and be eased back. Assumed."""
 
 
 class ExpectedChannels(Table):

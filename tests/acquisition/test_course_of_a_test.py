@@ -127,13 +127,15 @@ def test_an_aborted_arming_is_kept_and_burns_no_test(live: Lives) -> None:
     assert Path(saved.run_path).exists() and Path(other.run_path).exists()
 
 
-def test_an_arming_without_a_sample_leaves_no_run_and_no_trouble(live: Lives) -> None:
+def test_an_arming_that_is_aborted_at_once_keeps_the_seconds_before_it(live: Lives, rig: Any) -> None:
     lab = live()
     lab.zero_and_arm("FR1-L1-1")
     assert lab.ask("abort").ok
     saved = lab.wait_for_state(State.SAVED, State.FAILED)
     assert saved.state is State.SAVED
-    assert saved.run_path == ""
+    assert saved.judgement.word == "Aborted"
+    with open_run(Path(saved.run_path)) as run:
+        assert 0 < run.n_samples <= rig.acquisition.pre_trigger_s * 4000 + 800
     assert not list(lab.folder.glob("*.journal"))
 
 

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,11 @@ import pytest
 
 from daq_app.acquisition.messages.items import Arrived, Begin, End, Item, Lost, Noted, RequestRefused
 from daq_app.acquisition.messages.published import EventMessage
-from daq_app.acquisition.pipeline.recorder import Recorded, Recorder
+from daq_app.acquisition.pipeline.recent import Recent
+from daq_app.acquisition.pipeline.recorder import Recorder
+from daq_app.acquisition.pipeline.ring import Ring
+from daq_app.acquisition.pipeline.run_recording import Recorded
+from daq_app.acquisition.pipeline.unwritten import Unwritten
 from daq_app.runfile import JournalWriter, RunHeader, read_journal
 from drivers import Block
 
@@ -63,15 +68,28 @@ def _is(fd: int, path: Path | bool) -> bool:
 class Bench:
     """A recorder with everything it says and hands over."""
 
-    def __init__(self, folder: Path, spare: Path | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        spare: Path | None = None,
+        ring: Ring | None = None,
+        recent: Recent | None = None,
+    ) -> None:
         self.folder = folder
         self.forwarded: list[Item] = []
         self.said: list[EventMessage] = []
         self.handed: list[Recorded] = []
         self.changed = threading.Condition()
         self.recorder = Recorder(
-            self._note(self.forwarded), self._note(self.said), self._note(self.handed), spare
+            self._note(self.forwarded),
+            self._note(self.said),
+            self._note(self.handed),
+            [spare] if spare is not None else [],
+            ring,
+            recent,
         )
+        if ring is not None:
+            ring.start()
         self.recorder.start()
 
     def _note(self, where: list[Any]) -> Callable[[Any], None]:
@@ -89,15 +107,10 @@ class Bench:
                 assert time.monotonic() < deadline, (self.said, self.recorder.status)
                 self.changed.wait(0.05)
 
-    def begin(self, name: str = "run") -> Path:
-        header = RunHeader(
-            run_id=name,
-            channel_ids=tuple(f"C{n}" for n in range(N_CHANNELS)),
-            reading_units=("V",) * N_CHANNELS,
-            rate_hz=4000.0,
-        )
+    def begin(self, name: str = "run", before_samples: int = 0, kept: bool = False) -> Path:
         done: Future[Path] = Future()
-        self.recorder.inbox.put(Begin(self.folder / f"{name}.journal", header, done))
+        path = self.folder / f"{name}.journal"
+        self.recorder.inbox.put(Begin(path, header(name), done, before_samples, kept))
         return done.result(10.0)
 
     def blocks(self, first: int, count: int) -> None:
@@ -111,6 +124,15 @@ class Bench:
 
     def heard(self, severity: str, words: str) -> bool:
         return any(e.severity == severity and words in e.text for e in self.said)
+
+
+def header(name: str) -> RunHeader:
+    return RunHeader(
+        run_id=name,
+        channel_ids=tuple(f"C{n}" for n in range(N_CHANNELS)),
+        reading_units=("V",) * N_CHANNELS,
+        rate_hz=4000.0,
+    )
 
 
 def readings(first: int) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -137,8 +159,8 @@ def disk(monkeypatch: pytest.MonkeyPatch) -> Disk:
 def bench(tmp_path: Path) -> Iterator[Callable[..., Bench]]:
     made: list[Bench] = []
 
-    def make(spare: Path | None = None) -> Bench:
-        made.append(Bench(tmp_path, spare))
+    def make(spare: Path | None = None, **parts: Any) -> Bench:
+        made.append(Bench(tmp_path, spare, **parts))
         return made[-1]
 
     yield make
@@ -338,20 +360,166 @@ def test_a_folder_deleted_under_the_run_costs_nothing(bench: Callable[..., Bench
     assert contents(recorded.journal) == {n: float(n) for n in range(following * 100)}
 
 
-def test_when_no_disk_takes_it_the_operator_hears_what_was_lost(
-    bench: Callable[..., Bench], disk: Disk
+def test_disks_that_all_fail_for_a_moment_cost_nothing(
+    bench: Callable[..., Bench], disk: Disk, tmp_path: Path
 ) -> None:
+    """The run waits in memory, its file held open, until one of the places takes it again."""
+    lab = bench(tmp_path / "spare")
+    lab.begin()
+    lab.blocks(0, 5)
+    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    disk.broken = True
+    lab.blocks(5, 3)
+    lab.until(lambda: lab.heard("error", "No other place takes the run"))
+    lab.blocks(8, 4)
+    lab.until(lambda: lab.recorder.status.sample == 1200)
+    disk.broken = False
+    recorded = lab.end()
+    assert recorded.end.outcome == "complete" and recorded.journal is not None
+    assert contents(recorded.journal) == {n: float(n) for n in range(1200)}
+    assert lab.recorder.status.lost_samples == 0
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows does not delete a file that is open")
+def test_a_folder_deleted_while_no_other_place_takes_the_run_costs_nothing(
+    bench: Callable[..., Bench], disk: Disk, tmp_path: Path
+) -> None:
+    lab = bench()
+    lab.folder = tmp_path / "runs"
+    lab.folder.mkdir()
+    lab.begin()
+    lab.blocks(0, 5)
+    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    shutil.rmtree(lab.folder)
+    (tmp_path / "runs").write_text("in the way")  # the folder cannot be made again either
+    following = 5
+    while not lab.heard("error", "No other place"):
+        lab.blocks(following, 1)
+        following += 1
+        lab.until(lambda: lab.recorder.status.sample == following * 100)  # noqa: B023
+    (tmp_path / "runs").unlink()
+    recorded = lab.end()
+    assert recorded.journal is not None
+    assert contents(recorded.journal) == {n: float(n) for n in range(following * 100)}
+
+
+def test_when_no_disk_ever_takes_it_what_was_lost_is_counted_truly(
+    bench: Callable[..., Bench], disk: Disk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("daq_app.acquisition.pipeline.recorder._SHUT_S", 0.3)
     lab = bench()
     journal = lab.begin()
     lab.blocks(0, 5)
     lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
     disk.broken = True
     lab.blocks(5, 3)
+    lab.recorder.inbox.put(None)
     lab.until(lambda: bool(lab.handed))
     assert lab.handed[0].end.outcome == "failed"
-    assert "could not be kept" in lab.handed[0].end.text
+    assert "300 of 800 samples could not be kept" in lab.handed[0].end.text
+    assert f"The first 500 are in {journal}" in lab.handed[0].end.text
+    assert lab.recorder.status.lost_samples == 300
     disk.broken = False
     assert contents(journal) == {n: float(n) for n in range(500)}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows does not delete a file that is open")
+def test_of_a_run_whose_file_is_gone_for_good_nothing_is_promised(
+    bench: Callable[..., Bench], disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("daq_app.acquisition.pipeline.recorder._SHUT_S", 0.3)
+    lab = bench()
+    lab.folder = tmp_path / "runs"
+    lab.folder.mkdir()
+    lab.begin()
+    lab.blocks(0, 5)
+    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    shutil.rmtree(lab.folder)
+    disk.broken = True
+    lab.blocks(5, 3)
+    lab.recorder.inbox.put(None)
+    lab.until(lambda: bool(lab.handed))
+    assert lab.handed[0].journal is None
+    assert "800 of 800 samples could not be kept. No file of it is left" in lab.handed[0].end.text
+
+
+def test_memory_that_is_full_makes_a_gap_that_is_counted(
+    bench: Callable[..., Bench], disk: Disk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limit = 4 * 100 * N_CHANNELS * 8
+    monkeypatch.setattr(
+        "daq_app.acquisition.pipeline.run_recording.Unwritten", partial(Unwritten, limit_bytes=limit)
+    )
+    lab = bench()
+    lab.begin()
+    lab.blocks(0, 5)
+    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    disk.broken = True
+    lab.blocks(5, 10)
+    lab.until(lambda: lab.heard("error", "Samples are being lost"))
+    lab.until(lambda: lab.recorder.status.sample == 1500)
+    disk.broken = False
+    lab.until(lambda: lab.heard("info", "500 samples were lost meanwhile"))
+    recorded = lab.end()
+    assert recorded.journal is not None
+    assert sorted(contents(recorded.journal)) == list(range(1000))
+    with read_journal(recorded.journal) as opened:
+        assert sum(gap.n_samples for gap in opened.gaps) == 500
+        assert opened.gaps[0].first_sample == 1000
+    assert lab.recorder.status.lost_samples == 500
+
+
+def test_a_run_begins_with_what_was_in_memory_before_its_order(bench: Callable[..., Bench]) -> None:
+    lab = bench(recent=Recent(1000))
+    lab.blocks(0, 30)
+    lab.until(lambda: lab.recorder.status.sample == 3000)
+    journal = lab.begin(before_samples=450)
+    lab.blocks(30, 5)
+    lab.end()
+    assert sorted(contents(journal)) == list(range(2500, 3500)), "whole blocks"
+
+
+def test_a_release_that_nobody_armed_waits_in_memory_for_a_disk(
+    bench: Callable[..., Bench], disk: Disk
+) -> None:
+    lab = bench(recent=Recent(1000))
+    disk.full = True
+    lab.blocks(0, 5)
+    lab.until(lambda: lab.recorder.status.sample == 500)
+    lab.begin("unarmed", before_samples=1000, kept=True)
+    lab.blocks(5, 5)
+    lab.until(lambda: lab.recorder.status.sample == 1000)
+    disk.full = False
+    recorded = lab.end()
+    assert recorded.journal is not None and recorded.end.outcome == "complete"
+    assert contents(recorded.journal) == {n: float(n) for n in range(1000)}
+
+
+def test_the_ring_holds_the_last_minutes_and_no_more(bench: Callable[..., Bench], tmp_path: Path) -> None:
+    ring = Ring(tmp_path, 1600, lambda run_id: header(run_id))
+    lab = bench(ring=ring)
+    lab.blocks(0, 60)
+    lab.recorder.inbox.put(None)
+    lab.recorder.join()
+    ring.close(keep=True)
+    kept = sorted(sample for path in ring.place.glob("*.journal") for sample in contents(path))
+    assert kept[-1] <= 5999 and len(kept) >= 1600
+    assert len(kept) <= 1600 * 1.25 + 400
+    assert kept == list(range(kept[0], kept[-1] + 1))
+
+
+def test_a_ring_that_cannot_be_written_is_no_trouble_for_a_run(
+    bench: Callable[..., Bench], disk: Disk, tmp_path: Path
+) -> None:
+    ring = Ring(tmp_path / "other", 1600, lambda run_id: header(run_id))
+    (tmp_path / "other").write_text("in the way")
+    lab = bench(ring=ring)
+    lab.blocks(0, 5)
+    lab.until(lambda: bool(ring.trouble))
+    journal = lab.begin()
+    lab.blocks(5, 5)
+    lab.end()
+    assert sorted(contents(journal)) == list(range(500, 1000))
 
 
 def test_a_second_arming_and_a_bad_folder_are_refused(bench: Callable[..., Bench], tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """``python -m daq_app.acquisition.closing.finalise_worker``: makes run files, one JSON line a job.
 
-Jobs: ``{"job": "finalise", "journal": PATH, "out": PATH}`` and ``{"job": "recover", "journal": PATH}``. The
+Jobs: ``{"job": "finalise", "journal": PATH, "out": PATH}``, ``{"job": "recover", "journal": PATH}`` and
+``{"job": "ring", "journal": FOLDER OF A RING'S SESSION, "out": FOLDER OF THE RUNS}``. The
 process ends at once when its standard input closes, that is, when its parent dies: a half-made run
 file is a ``.tmp`` beside an untouched journal, and the next start makes it again.
 """
@@ -64,10 +65,28 @@ def recover_job(journal: Path) -> Finished:
     return Finished(found.outcome != "failed", text, str(found.run or ""))
 
 
+def ring_job(place: Path, out: Path) -> Finished:
+    """Look at a ring that was left behind; a release in it becomes a run."""
+    from daq_app.acquisition.closing.ring_recovery import recover_ring
+
+    found = recover_ring(place, out)
+    if not found.path:
+        return found
+    made = recover_job(Path(found.path))
+    return Finished(made.ok, f"{found.text}. {made.text}", made.path)
+
+
 def _do(job: dict[str, str]) -> Finished:
     match job:
         case {"job": "finalise", "journal": journal, "out": out}:
             return finalise_job(Path(journal), Path(out))
+        case {"job": "ring", "journal": place, "out": out}:
+            try:
+                return ring_job(Path(place), Path(out))
+            except Exception as error:
+                return Finished(
+                    False, f"Looking at the ring {place} failed ({type(error).__name__}: {error})"
+                )
         case {"job": "recover", "journal": journal}:
             try:
                 return recover_job(Path(journal))

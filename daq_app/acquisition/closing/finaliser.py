@@ -57,7 +57,7 @@ class Finaliser(threading.Thread):
             if entry is None:
                 break
             job, done = entry
-            if self._closing and job["job"] == "recover":
+            if self._closing and job["job"] in ("recover", "ring"):
                 done.set_result(Finished(True, ""))  # the next start does it
             else:
                 done.set_result(self._do(job))

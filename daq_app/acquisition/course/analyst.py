@@ -5,20 +5,24 @@ It comes after the recorder: whatever happens here, slow or wrong, the samples a
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from daq_app.acquisition.course.channel_watch import ChannelWatch
+from daq_app.acquisition.course.judgement import PULLED, Situation, judge
 from daq_app.acquisition.course.live import LiveView
 from daq_app.acquisition.course.overload import OverloadWatch
-from daq_app.acquisition.course.sequence import Change, Sequence
-from daq_app.acquisition.course.tare import NotSteady, Tare, take_tare
+from daq_app.acquisition.course.preparation import Preparation, Surroundings
+from daq_app.acquisition.course.sequence import Change
+from daq_app.acquisition.course.sequence import Sequence as Course
+from daq_app.acquisition.course.tare import Tare
 from daq_app.acquisition.messages.items import (
     Arrived,
     Ask,
@@ -33,15 +37,42 @@ from daq_app.acquisition.messages.items import (
     SourceEnded,
     Started,
 )
-from daq_app.acquisition.messages.published import EventMessage, State, StateMessage
+from daq_app.acquisition.messages.published import (
+    CheckMessage,
+    EventMessage,
+    Judgement,
+    State,
+    StateMessage,
+)
 from daq_app.acquisition.messages.publisher import Publisher
 from daq_app.config.rig import Rig
+from daq_app.rocking.motion.phases import PhaseEvent
+from daq_app.runfile import TestPlan
 from drivers import Block, Opened
 
 _REPEAT_STATE_S: Final = 1.0
-_TARE_S: Final = 1.0
 _SAME_RATE: Final = 1e-6
+UNARMED: Final = "unarmed"
+"""Stands for the test's name in the run of a release that nobody armed."""
 _MOVING: Final = frozenset({State.RELEASED, State.ROCKING})
+
+
+@dataclass(frozen=True, slots=True)
+class Surrounding:
+    """What the analyst asks of the session; all of it answers at once."""
+
+    post: Callable[[Item], None]
+    """Into the stream, by way of the recorder."""
+    hurry: Callable[[bool], None]
+    """Ask for samples in small pieces, from the release to the rest."""
+    arm: Callable[[TestPlan, Tare], Future[Path]]
+    """Begin to record a test; raises `RequestRefused`."""
+    keep: Callable[[int, Tare], None]
+    """Record the release at that sample, which nobody armed, from some time before it."""
+    disk_safe: Callable[[], bool]
+    """Whether samples of the run reach a disk."""
+    free_bytes: Callable[[], int]
+    """Room on the disk of the runs."""
 
 
 class Analyst(threading.Thread):
@@ -51,39 +82,43 @@ class Analyst(threading.Thread):
         self,
         rig: Rig,
         publisher: Publisher,
-        post: Callable[[Item], None],
-        hurry: Callable[[bool], None],
+        around: Surrounding,
         *,
         release_within_s: float,
         planned_rate_hz: float = 0.0,
     ) -> None:
-        """`hurry(True)` asks for samples in small pieces, from the release to the rest; it must not block."""
         super().__init__(name="analyst", daemon=True)
         self.inbox: queue.SimpleQueue[Item | None] = queue.SimpleQueue()
         self.state = State.IDLE
         self.state_text = ""
         self.test = ""
         self.run_path = ""
-        self.tare = Tare()
+        self.plan = TestPlan()
+        """The test that is armed, or would be armed now."""
         self.overloaded: tuple[str, ...] = ()
         self._rig = rig
         self._publisher = publisher
-        self._post = post
-        self._hurry = hurry
+        self._around = around
         self._release_within_s = release_within_s
         self._planned_rate_hz = planned_rate_hz
         self._opened: Opened | None = None
         self._live: LiveView | None = None
         self._overload: OverloadWatch | None = None
         self._channels: ChannelWatch | None = None
-        self._sequence: Sequence | None = None
+        self._sequence: Course | None = None
         self._sample = 0
         self._since = 0
         self._last_state_s = 0.0
         self._fault = ""
         self._standing: dict[str, EventMessage] = {}
         """What was wrong before arming and still is: every run must say it."""
-        self._collecting: tuple[Ask, list[NDArray[np.float64]], int] | None = None
+        self._preparation: Preparation | None = None
+        self._tare = Tare()
+        """The zero of the last preparation, for whoever asks while nothing is sampled."""
+        self._off_target = 0
+        """Last sample at which the wall was outside the band of the plan."""
+        self._aborted = False
+        self._judgement = Judgement()
 
     def run(self) -> None:
         """Until None comes."""
@@ -120,7 +155,7 @@ class Analyst(threading.Thread):
             case Arrived(block=block):
                 self._on_block(block)
             case Lost():
-                self._refuse_tare("samples were lost meanwhile; ask again")
+                self._refuse_orders("samples were lost meanwhile; ask again")
             case Begin():
                 self._on_begin(item)
             case Ask():
@@ -131,6 +166,8 @@ class Analyst(threading.Thread):
                 self._on_source_ended(item)
             case Closed():
                 self._sequence = None
+                self._aborted = item.end.outcome == "aborted"
+                self._new_live()
                 self._go(State.SAVING, f"{item.end.text}. The run file is being made")
             case Saved():
                 # The next test may be armed already: then its state is the one that matters.
@@ -147,8 +184,8 @@ class Analyst(threading.Thread):
 
     def _on_block(self, block: Block) -> None:
         self._sample = block.first_sample + block.n_samples
-        if self._collecting is not None:
-            self._collect(block)
+        if self._preparation is not None:
+            self._preparation.take(block)
         if self._overload is not None:
             self.overloaded = self._overload.check(block)
             if text := self._overload.news():
@@ -166,13 +203,31 @@ class Analyst(threading.Thread):
         if self._live.trouble:
             self._note("analysis", self._live.trouble, "error")
         if self._sequence is None:
+            self._keep_unarmed(events)
+        else:
+            self._follow(self._sequence, events)
+        self._judge()
+
+    def _keep_unarmed(self, events: Sequence[PhaseEvent]) -> None:
+        """A release that nobody armed is recorded all the same, from some time before it."""
+        assert self._opened is not None
+        moving = [event for event in events if event.kind in ("release", "impact")]
+        if not moving or self._live is None:
             return
+        self.test, self.run_path = UNARMED, ""
+        course = Course(self._rig.acquisition, self._opened.rate_hz, self._sample, math.inf, armed=False)
+        self._sequence = course
+        self._around.keep(round(moving[0].sample), self.tare)
+        self._follow(course, events[events.index(moving[0]) :])
+
+    def _follow(self, course: Course, events: Sequence[PhaseEvent]) -> None:
         for event in events:
             if event.kind == "impact":
                 self._note("impact", event.text, "info", round(event.sample), {"sample": event.sample})
-        for change in self._sequence.advance(events, self._sample):
+        for change in course.advance(events, self._sample):
             if isinstance(change, Change):
-                self._note(change.state.value, change.text, "info", change.sample)
+                loud = change.state is State.RELEASED and not course.armed
+                self._note(change.state.value, change.text, "error" if loud else "info", change.sample)
                 self._go(change.state, change.text, change.sample)
             else:
                 self._finish(change)
@@ -180,13 +235,20 @@ class Analyst(threading.Thread):
 
     def _finish(self, end: End) -> None:
         self._sequence = None
-        self._post(end)
+        self._around.post(end)
 
     # -- course of a session ---------------------------------------------------------------------
 
     def _on_started(self, opened: Opened) -> None:
         self._opened = opened
         self._sample = 0
+        surroundings = Surroundings(
+            free_bytes=self._around.free_bytes,
+            arm=lambda plan: self._around.arm(plan, self.tare),
+            say=self._note,
+        )
+        self._preparation = Preparation(self._rig, opened, self._planned_rate_hz, surroundings)
+        self._preparation.tare = self._tare
         self._overload = OverloadWatch(self._rig.channel_ids, opened.ranges)
         self._channels = ChannelWatch(self._rig, opened.rate_hz, opened.ranges)
         self._standing = {}
@@ -201,29 +263,46 @@ class Analyst(threading.Thread):
         self._go(State.PREVIEWING, f"Sampling at {opened.rate_hz:g} Hz")
 
     def _new_live(self) -> None:
-        assert self._opened is not None
-        self._live = LiveView(self._rig, self._opened.rate_hz, self.tare.readings, self._publisher)
+        if self._opened is not None:
+            self._live = LiveView(self._rig, self._opened.rate_hz, self.tare.readings, self._publisher)
+            self._off_target = self._sample
 
     def _on_begin(self, begin: Begin) -> None:
         assert self._opened is not None
-        self.test = begin.header.test
         self.run_path = ""
-        self._new_live()
-        self._sequence = Sequence(
+        self._aborted = False
+        if begin.kept:
+            self._tell_standing()
+            return
+        self.test = begin.header.test
+        self.plan = begin.header.test_plan or TestPlan(test=self.test)
+        self._note("armed", f"Armed for {self.test}", "info")
+        self._tell_standing()
+        if self._sequence is not None:
+            # The release came a moment before the order: it is this test's, and the run has it whole.
+            self._sequence.arm(self._sample)
+            self._go(self.state, f"Armed for {self.test} a moment after its release", self._since)
+            return
+        self._sequence = Course(
             self._rig.acquisition, self._opened.rate_hz, self._sample, self._release_within_s
         )
-        self._note("armed", f"Armed for {self.test}", "info")
+        self._go(State.ARMED, f"Armed for {self.test}; recording", self._sample)
+        held = self._live.held_since if self._live is not None else None
+        if held is not None:
+            self._follow(self._sequence, [PhaseEvent("hold", held, self._sample, 0.0, "held still already")])
+
+    def _tell_standing(self) -> None:
+        """Whatever is wrong now has been told before; this run must say it as well."""
         for event in self._standing.values():
             self._note(event.kind, event.text, event.severity, data=event.data)
-        # Whatever is wrong with a channel now has been told before; this run must say it as well.
         for watch in (self._overload, self._channels):
             if watch is not None:
                 watch.forget()
-        self._go(State.ARMED, f"Armed for {self.test}; recording", self._sample)
 
     def _on_source_ended(self, ended: SourceEnded) -> None:
-        self._refuse_tare("the acquisition has stopped")
-        self._opened = self._live = self._overload = self._channels = None
+        self._refuse_orders("the acquisition has stopped")
+        self._tare = self.tare
+        self._opened = self._live = self._overload = self._channels = self._preparation = None
         if ended.error is not None:
             self._note("driver", str(ended.error), "error")
         if self._sequence is not None:
@@ -240,8 +319,8 @@ class Analyst(threading.Thread):
 
     def _on_ask(self, ask: Ask) -> None:
         try:
-            if ask.name == "tare":
-                self._begin_tare(ask)
+            if ask.name in ("tare", "check", "pull", "arm"):
+                self._prepare(ask)
                 return
             ask.done.set_result(self._answer(ask))
         except RequestRefused as error:
@@ -249,6 +328,14 @@ class Analyst(threading.Thread):
 
     def _answer(self, ask: Ask) -> tuple[str, dict[str, Any]]:
         match ask.name:
+            case "plan":
+                if self._sequence is not None:
+                    raise RequestRefused(
+                        f"{self.test} is being recorded: its plan is locked. Choose the next test after it"
+                    )
+                self.plan = ask.arguments["plan"]
+                self._judge(force=True)
+                return f"{self.plan.test or 'No test'} is chosen", {}
             case "stop":
                 sequence = self._recording()
                 self._finish(sequence.end("stopped", self._sample, "Stopped by the operator"))
@@ -267,47 +354,43 @@ class Analyst(threading.Thread):
                 return f"{ask.name} at sample {self._sample}", {"sample": self._sample}
         raise RequestRefused(f"There is no request '{ask.name}'")
 
-    def _recording(self) -> Sequence:
+    def _recording(self) -> Course:
         if self._sequence is None:
             raise RequestRefused("No test is being recorded")
         return self._sequence
 
-    def _begin_tare(self, ask: Ask) -> None:
-        if self._opened is None:
+    @property
+    def tare(self) -> Tare:
+        """The zero in force."""
+        return self._preparation.tare if self._preparation is not None else self._tare
+
+    @property
+    def upright(self) -> bool:
+        """Whether the wall stands upright, as far as is known."""
+        rotation = self._live.rotation_rad if self._live is not None else math.nan
+        return self._judgement.ratio is None or abs(rotation) < PULLED * self._rig.specimen.alpha0_rad
+
+    @property
+    def check_message(self) -> CheckMessage:
+        """The sensor check in force."""
+        return CheckMessage(check=self._preparation.check if self._preparation is not None else None)
+
+    def _prepare(self, ask: Ask) -> None:
+        if self._preparation is None:
             raise RequestRefused("Nothing is being sampled; start the preview first")
-        if self._sequence is not None:
-            raise RequestRefused("A test is being recorded: its zero cannot change now")
-        if self._collecting is not None:
-            raise RequestRefused("The zero is being taken already")
-        seconds = float(ask.arguments.get("seconds", _TARE_S))
-        if not 0.2 <= seconds <= 60.0:
-            raise RequestRefused(f"The zero is taken over 0.2 to 60 s, not {seconds:g} s")
-        self._collecting = (ask, [], round(seconds * self._opened.rate_hz))
+        ask.done.add_done_callback(lambda _done: self._after_preparation(ask.name))
+        self._preparation.order(ask, recording=self._sequence is not None)
 
-    def _collect(self, block: Block) -> None:
-        assert self._collecting is not None and self._opened is not None
-        ask, blocks, wanted = self._collecting
-        blocks.append(block.readings)
-        if sum(part.shape[1] for part in blocks) < wanted:
-            return
-        self._collecting = None
-        readings = np.concatenate(blocks, axis=1)[:, :wanted]
-        resolution = np.array(
-            [(high - low) / 2**16 for low, high in (self._opened.ranges[i] for i in self._rig.channel_ids)]
-        )
-        try:
-            self.tare = take_tare(self._rig, readings, self._sample - readings.shape[1], resolution)
-        except NotSteady as error:
-            ask.done.set_exception(RequestRefused(str(error)))
-            return
-        self._new_live()
-        self._note("tare", f"Zero taken over {wanted} samples", "info")
-        ask.done.set_result(("The zero has been taken", {"tare": self.tare.readings}))
+    def _after_preparation(self, name: str) -> None:
+        """On this thread: an order has been carried out, or refused."""
+        if name == "tare" and self._sequence is None:
+            self._new_live()
+        if name in ("check", "pull"):
+            self._publisher.send("check", self.check_message)
 
-    def _refuse_tare(self, why: str) -> None:
-        if self._collecting is not None:
-            self._collecting[0].done.set_exception(RequestRefused(f"The zero could not be taken: {why}"))
-            self._collecting = None
+    def _refuse_orders(self, why: str) -> None:
+        if self._preparation is not None:
+            self._preparation.refuse_all(why)
 
     # -- saying ----------------------------------------------------------------------------------
 
@@ -329,14 +412,48 @@ class Analyst(threading.Thread):
                 "data": data or {},
             }
         )
-        self._post(Noted(event))
+        self._around.post(Noted(event))
 
     def _go(self, state: State, text: str, since: int | None = None) -> None:
         self.state, self.state_text = state, text
-        self._hurry(state in _MOVING)
+        self._around.hurry(state in _MOVING)
         self._since = self._sample if since is None else since
-        self._last_state_s = 0.0
-        self._repeat_state()
+        self._judge(force=True)
+
+    def _judge(self, *, force: bool = False) -> None:
+        """Publish the judgement where one of its words has changed."""
+        judgement = judge(self._situation(), self._rig.acquisition)
+        before, self._judgement = self._judgement, judgement
+        figures = {"ratio": None, "held_s": 0.0}
+        if force or judgement.model_copy(update=figures) != before.model_copy(update=figures):
+            self._last_state_s = 0.0
+            self._repeat_state()
+
+    def _situation(self) -> Situation:
+        course, live, opened = self._sequence, self._live, self._opened
+        rotation = live.rotation_rad if live is not None else math.nan
+        alpha = self._rig.specimen.alpha0_rad
+        band = self.plan.band or (0.0, math.inf)
+        if not band[0] <= abs(rotation) / alpha <= band[1]:
+            self._off_target = self._sample
+        held_since = live.held_since if live is not None else None
+        steady = held_since is not None and opened is not None
+        held_s = 0.0
+        if held_since is not None and opened is not None:
+            held_s = max(0.0, (self._sample - max(held_since, self._off_target)) / opened.rate_hz)
+        return Situation(
+            state=self.state,
+            sampling=opened is not None,
+            armed=course is not None and course.armed,
+            plan=self.plan,
+            rotation_rad=rotation,
+            alpha_rad=alpha,
+            steady=steady,
+            held_s=held_s,
+            disk_safe=self._around.disk_safe(),
+            aborted=self._aborted,
+            text=self.state_text,
+        )
 
     def _repeat_state(self) -> None:
         """On every change and once a second: a viewer that has just come knows at once."""
@@ -348,6 +465,7 @@ class Analyst(threading.Thread):
 
     def state_message(self) -> StateMessage:
         """The state as viewers see it."""
+        course = self._sequence
         return StateMessage(
             state=self.state,
             test=self.test,
@@ -355,4 +473,8 @@ class Analyst(threading.Thread):
             text=self.state_text,
             since_sample=self._since,
             sample=self._sample,
+            armed=course is not None and course.armed,
+            plan=self.plan,
+            locked=course is not None,
+            judgement=self._judgement,
         )

@@ -9,7 +9,7 @@ from typing import Any
 from daq_app.acquisition.course.tare import Tare
 from daq_app.config.planning.plan import TaskPlan
 from daq_app.config.rig import Rig
-from daq_app.runfile import RunHeader, host_name, plan_to_dict, software_versions
+from daq_app.runfile import RunHeader, TestPlan, host_name, plan_to_dict, software_versions
 from drivers import Opened
 
 
@@ -23,6 +23,7 @@ def make_header(
     test: str,
     notes: str = "",
     truth: dict[str, Any] | None = None,
+    test_plan: TestPlan | None = None,
 ) -> RunHeader:
     """Header of the run that begins now. `run_id` is the test's name and the time, and names the files."""
     now = dt.datetime.now(dt.UTC)
@@ -44,4 +45,5 @@ def make_header(
         versions=software_versions(),
         notes=notes,
         truth=truth,
+        test_plan=test_plan,
     )

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
 
+from daq_app.acquisition.course.unheld_release import UnheldReleaseWatch
 from daq_app.acquisition.messages.published import BlockMessage, EstimateMessage, MotionMessage
 from daq_app.acquisition.messages.publisher import Publisher
 from daq_app.config.rig import Rig
 from daq_app.config.scaling import Scaling
 from daq_app.rocking.live import Estimate, LiveAnalyser, LiveResult
-from daq_app.rocking.motion.phases import PhaseEvent
+from daq_app.rocking.motion.phases import Phase, PhaseEvent
 from drivers import Block
 
 _MOTION_RATE_HZ: Final = 500.0
@@ -28,6 +30,11 @@ class LiveView:
         self._scaling = Scaling.of(rig.channels, tare)
         self._analyser: LiveAnalyser | None = LiveAnalyser(rig, rate_hz, tare)
         self._step = max(1, round(rate_hz / _MOTION_RATE_HZ))
+        self._unheld = UnheldReleaseWatch(rig, rate_hz)
+        self.rotation_rad = math.nan
+        """Of the last block: from the tiltmeters, else from the wires."""
+        self.held_since: int | None = None
+        """Sample from which on the wall has been held still; None while it is not."""
         self.estimate: Estimate | None = None
         """The newest whole estimate of this test."""
         self.trouble = ""
@@ -63,7 +70,28 @@ class LiveView:
             self._excluded = result.excluded_wires
             if self._excluded:
                 self.trouble = f"These wires disagree with the others: {', '.join(self._excluded)}"
-        return result.events
+        self.rotation_rad = result.tilt_rad
+        if not math.isfinite(self.rotation_rad) and result.rotation_rad.size:
+            self.rotation_rad = float(result.rotation_rad[-1])
+        events = result.events + self._follow_unheld(result)
+        for event in events:
+            if event.kind == "hold":
+                self.held_since = round(event.sample)
+            elif event.kind in ("hold_lost", "release"):
+                self.held_since = None
+        return events
+
+    def _follow_unheld(self, result: LiveResult) -> tuple[PhaseEvent, ...]:
+        """A wall that moves freely without having been held: the phase detector knows nothing of it."""
+        if result.phase is not Phase.WAITING:
+            self._unheld.reset()
+            return ()
+        return self._unheld.process(result.first_sample, result.rotation_rad, result.velocity_rad_s)
+
+    @property
+    def over(self) -> bool:
+        """Whether the analyser has seen a test to its end: the next one needs a new one."""
+        return self._analyser is not None and self._analyser.phase is Phase.AT_REST
 
     def _publish_block(self, block: Block, overloaded: tuple[str, ...]) -> None:
         heading = BlockMessage(

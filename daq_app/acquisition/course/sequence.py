@@ -26,12 +26,20 @@ class Sequence:
     """One test, from its arming on. Feed it the phase events of each block, in order."""
 
     def __init__(
-        self, settings: Acquisition, rate_hz: float, armed_sample: int, release_within_s: float
+        self,
+        settings: Acquisition,
+        rate_hz: float,
+        armed_sample: int,
+        release_within_s: float,
+        *,
+        armed: bool = True,
     ) -> None:
+        """`armed` False: the run of a release that nobody armed; it begins with that release."""
+        self.armed = armed
         self._settings = settings
         self._rate_hz = rate_hz
         self._armed_sample = armed_sample
-        self._release_limit = armed_sample + round(release_within_s * rate_hz)
+        self._release_limit = armed_sample + release_within_s * rate_hz
         self.state = State.ARMED
         self.release_sample: int | None = None
         self.rest_sample: int | None = None
@@ -46,6 +54,10 @@ class Sequence:
         if end is not None:
             changes.append(end)
         return changes
+
+    def arm(self, armed_sample: int) -> None:
+        """The order to arm came just after the release: the run counts as armed."""
+        self.armed, self._armed_sample = True, armed_sample
 
     def end(self, outcome: Outcome, sample: int, text: str) -> End:
         """The end that somebody asked for."""
@@ -67,6 +79,8 @@ class Sequence:
             case "release":
                 self.release_sample = sample
                 return [self._go(State.RELEASED, sample, self._release_text(event, sample))]
+            case "caught" if self.state is State.RELEASED and not self.armed:
+                return [End("aborted", sample, f"{event.text}; nobody had armed")]
             case "caught" if self.state is State.RELEASED:
                 self.release_sample = None
                 return [self._go(State.ARMED, sample, f"{event.text}; still armed and recording")]
@@ -80,6 +94,8 @@ class Sequence:
         return []
 
     def _release_text(self, event: PhaseEvent, sample: int) -> str:
+        if not self.armed:
+            return f"{event.text}; nobody had armed: kept from the ring"
         before_s = (sample - self._armed_sample) / self._rate_hz
         if before_s < self._settings.pre_trigger_s:
             return (

@@ -51,6 +51,10 @@ class Begin:
     journal: Path
     header: RunHeader
     done: Future[Path] = field(default_factory=Future)
+    before_samples: int = 0
+    """So many samples from before the order belong to the run, as far as they are in memory."""
+    kept: bool = False
+    """A release that nobody armed: it is never refused for want of a disk."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,9 +92,9 @@ class SourceEnded:
 
 @dataclass(frozen=True, slots=True)
 class Closed:
-    """The recorder has closed the journal of a run; its run file is being made."""
+    """The recorder has ended a run; its run file is being made, unless nothing of it is left."""
 
-    journal: Path
+    journal: Path | None
     end: End
 
 

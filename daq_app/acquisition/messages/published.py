@@ -13,6 +13,9 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict
 
+from daq_app.acquisition.checks.check_model import SensorCheck
+from daq_app.runfile import TestPlan
+
 
 class State(StrEnum):
     """States of the acquisition process, in the order of a test."""
@@ -34,8 +37,55 @@ class Message(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
 
 
+Tone = Literal["muted", "text", "accent", "good", "warning", "bad"]
+"""How urgent words are: the role of the colour they are shown in."""
+
+
+class Call(StrEnum):
+    """What the operator is to do now. Every word on a screen follows from it."""
+
+    START = "start"
+    PREPARE = "prepare"
+    PULL = "pull"
+    EASE_BACK = "ease_back"
+    OTHER_SIDE = "other_side"
+    STOP = "stop"
+    HOLD = "hold"
+    DO_NOT_RELEASE = "do_not_release"
+    RELEASE = "release"
+    ARM_FIRST = "arm_first"
+    KEEP_CLEAR = "keep_clear"
+    WAIT = "wait"
+    LOOK = "look"
+
+
+class Judgement(Message):
+    """What the recorder makes of the moment: state line, gauge, header and sounds show this alone."""
+
+    call: Call = Call.START
+    word: str = ""
+    """The state in a word or two."""
+    do: str = ""
+    """What to do next, in a sentence."""
+    tone: Tone = "muted"
+    gauge: str = ""
+    """What the gauge says beside its figure; empty while nothing is to be pulled."""
+    alarm: str = ""
+    """What must be heeded before anything else; empty when all is well."""
+    ratio: float | None = None
+    """|θ|/α now, from the tiltmeters; None where it is not known."""
+    target: float | None = None
+    low: float | None = None
+    high: float | None = None
+    """Band of |θ|/α that counts."""
+    held_s: float = 0.0
+    """How long the wall has been held still within the band."""
+    hold_s: float = 0.0
+    """How long it is to be held before the release."""
+
+
 class StateMessage(Message):
-    """Topic ``state``: on every change and once a second."""
+    """Topic ``state``: on every change, of a word as well, and once a second."""
 
     state: State
     test: str = ""
@@ -44,6 +94,13 @@ class StateMessage(Message):
     """A plain sentence for the operator."""
     since_sample: int = 0
     sample: int = 0
+    armed: bool = False
+    """False also while a release is recorded that nobody armed."""
+    plan: TestPlan = TestPlan()
+    """The test that is armed, or would be armed now."""
+    locked: bool = False
+    """The plan cannot be changed: a run is being recorded."""
+    judgement: Judgement = Judgement()
 
 
 class BlockMessage(Message):
@@ -113,6 +170,12 @@ class HealthMessage(Message):
     block_to_disk_ms_p99: float = 0.0
 
 
+class CheckMessage(Message):
+    """Topic ``check``: the sensor check in force, when it is taken, and None when it is void."""
+
+    check: SensorCheck | None
+
+
 class EventMessage(Message):
     """Topic ``event``: something that is also written into the journal."""
 
@@ -124,7 +187,10 @@ class EventMessage(Message):
 
 
 class Command(Message):
-    """A request. `name` is one of hello, preview, tare, arm, abort, stop, marker, note, shutdown."""
+    """A request. `name` is one of hello, preview, plan, tare, check, pull, arm, abort, stop, marker, note,
+
+    shutdown.
+    """
 
     name: str
     arguments: dict[str, float | str] = {}

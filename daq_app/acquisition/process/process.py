@@ -11,8 +11,10 @@ import os
 import secrets
 import signal
 import sys
+import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
+from pathlib import Path
 
 from daq_app.acquisition.closing.finaliser import Finaliser
 from daq_app.acquisition.messages.items import RequestRefused
@@ -59,6 +61,7 @@ class Process:
                 make_driver=make_driver,
                 release_within_s=options.release_within,
                 spare_folder=options.spare,
+                last_resorts=(Path(tempfile.gettempdir()) / "rocking-test-recorder",),
                 patience=Patience(reconnect_limit_s=options.reconnect_within),
                 truth=planned_truth(connection, rig, options),
                 speed=time_factor(options.speed),
@@ -138,6 +141,7 @@ class Process:
             "channel_ids": list(self._rig.channel_ids),
             "rate_hz": opened.rate_hz if opened else 0.0,
             "planned_rate_hz": self._plan_rate_hz,
+            "check": self.session.analyst.check_message.model_dump(mode="json")["check"],
             "tare": self.session.analyst.tare.readings,
             "tare_record": self.session.analyst.tare.record,
             "connection": self._connection() if opened else "",

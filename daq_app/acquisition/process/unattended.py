@@ -13,6 +13,7 @@ from typing import Any, Final
 from daq_app.acquisition.messages.items import RequestRefused
 from daq_app.acquisition.messages.published import State
 from daq_app.acquisition.session.session import Session
+from daq_app.runfile import TestPlan
 
 _ZERO_LIMIT_S: Final = 60.0
 
@@ -62,7 +63,7 @@ class Unattended:
         error = self._tare.exception()
         if error is None:
             try:
-                self._arm = self.session.arm(self.test, self.notes)
+                self._arm = self.session.arm(TestPlan(test=self.test, notes=self.notes))
             except RequestRefused as refused:
                 self._fail(str(refused), code=2)
         elif time.monotonic() - self._since_s > _ZERO_LIMIT_S:

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 from daq_app.acquisition.closing.finaliser import Finaliser, Finished
-from daq_app.acquisition.course.analyst import Analyst
+from daq_app.acquisition.course.analyst import UNARMED, Analyst, Surrounding
 from daq_app.acquisition.course.header import make_header
+from daq_app.acquisition.course.plan_order import plan_of
 from daq_app.acquisition.course.preflight import check_name, check_space
+from daq_app.acquisition.course.tare import Tare
 from daq_app.acquisition.messages.items import (
     Ask,
     Begin,
@@ -27,16 +29,24 @@ from daq_app.acquisition.messages.items import (
 from daq_app.acquisition.messages.published import Command, EventMessage, Reply, State
 from daq_app.acquisition.messages.publisher import Publisher
 from daq_app.acquisition.pipeline.reader import Patience, Reader
-from daq_app.acquisition.pipeline.recorder import Recorded, Recorder
+from daq_app.acquisition.pipeline.recent import Recent
+from daq_app.acquisition.pipeline.recorder import Recorder
+from daq_app.acquisition.pipeline.ring import Ring, ring_sessions
+from daq_app.acquisition.pipeline.run_recording import Recorded
 from daq_app.acquisition.session.wakefulness import Wakefulness
 from daq_app.acquisition.session.watchdog import Watchdog
 from daq_app.acquisition.viewers.desk import Answer
 from daq_app.config.planning.plan import TaskPlan
 from daq_app.config.rig import Rig
+from daq_app.runfile import RunFileError, RunHeader, TestPlan
 from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX, find_journals
 from drivers import BackupRecorder, Driver, DriverError, Opened
 
 _T = TypeVar("_T")
+KEPT_BEFORE_S: Final = 60.0
+"""How much lies before a release that nobody armed, in its run, as far as the rig's ring_s allows."""
+_DISK_BEHIND_S: Final = 1.5
+"""When the disk is further behind than this, nobody is told to release."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +60,8 @@ class SessionSettings:
     make_driver: Callable[[], Driver]
     release_within_s: float = 1800.0
     spare_folder: Path | None = None
+    last_resorts: tuple[Path, ...] = ()
+    """Where a run goes on when its own folder and the spare one take nothing."""
     truth: dict[str, Any] | None = None
     """What a simulated wall is made from; goes into every run."""
     patience: Patience = field(default_factory=Patience)
@@ -65,12 +77,30 @@ class Session:
         self._publisher = publisher
         self._finaliser = finaliser
         self._saving: list[Future[Finished]] = []
-        self.recorder = Recorder(self._forward, self._announce, self._hand_over, settings.spare_folder)
+        acquisition, rate_hz = settings.rig.acquisition, settings.plan.rate_hz
+        self.ring = Ring(settings.folder, round(acquisition.ring_s * rate_hz), self._ring_header)
+        self._spares = tuple(
+            place for place in (settings.spare_folder, *settings.last_resorts) if place is not None
+        )
+        self.recorder = Recorder(
+            self._forward,
+            self._announce,
+            self._hand_over,
+            self._spares,
+            self.ring,
+            Recent(round(min(acquisition.ring_s, KEPT_BEFORE_S) * rate_hz)),
+        )
         self.analyst = Analyst(
             settings.rig,
             publisher,
-            self.recorder.inbox.put,
-            self._hurry,
+            Surrounding(
+                post=self.recorder.inbox.put,
+                hurry=self._hurry,
+                arm=self._begin,
+                keep=self._keep,
+                disk_safe=self._disk_safe,
+                free_bytes=lambda: self.watchdog.free_bytes,
+            ),
             release_within_s=settings.release_within_s,
             planned_rate_hz=settings.plan.rate_hz,
         )
@@ -88,10 +118,12 @@ class Session:
     def start(self) -> None:
         """Start the threads, recover what an earlier session left behind, and begin to sample."""
         self.recorder.start()
+        self.ring.start()
         self.analyst.start()
         # Listed now: what this session will record is none of them.
-        folders = [self._settings.folder, self._settings.spare_folder]
-        left = [path for folder in folders if folder and folder.is_dir() for path in find_journals(folder)]
+        rings = [place for place in ring_sessions(self._settings.folder) if place != self.ring.place]
+        folders = [self._settings.folder, *self._spares]
+        left = [path for folder in folders if folder.is_dir() for path in find_journals(folder)]
         if left:
             names = ", ".join(path.stem for path in left[:3]) + (" …" if len(left) > 3 else "")
             text = (
@@ -101,6 +133,9 @@ class Session:
             self._say(EventMessage(kind="recovering", sample=0, text=text, severity="warning"))
         for journal in left:
             job = {"job": "recover", "journal": str(journal)}
+            self._finaliser.submit(job, self._tell_recovery)
+        for ring in rings:
+            job = {"job": "ring", "journal": str(ring), "out": str(self._settings.folder)}
             self._finaliser.submit(job, self._tell_recovery)
         self.preview()
 
@@ -114,6 +149,8 @@ class Session:
             self._reader.join()
         self.recorder.inbox.put(None)
         self.recorder.join()
+        # A wall that is not upright at the end may be falling: the next start looks at what is left.
+        self.ring.close(keep=not self.analyst.upright)
         for job in self._saving:
             job.result()
         self.analyst.inbox.put(None)
@@ -182,6 +219,9 @@ class Session:
         """On the recorder's thread, when a journal is closed."""
         self.analyst.inbox.put(Closed(recorded.journal, recorded.end))
         self._stop_backup()
+        if recorded.journal is None:
+            self._tell_saved(recorded, Finished(False, ""))
+            return
         out = recorded.journal.with_suffix(RUN_SUFFIX)
         job = {"job": "finalise", "journal": str(recorded.journal), "out": str(out)}
         self._saving.append(self._finaliser.submit(job, lambda done: self._tell_saved(recorded, done)))
@@ -189,7 +229,7 @@ class Session:
     def _tell_saved(self, recorded: Recorded, finished: Finished) -> None:
         """On the finaliser's thread."""
         ok = finished.ok and recorded.end.outcome != "failed"
-        text = finished.text if ok else f"{recorded.end.text}. {finished.text}"
+        text = finished.text if ok else f"{recorded.end.text}. {finished.text}".removesuffix(". ")
         self._say(
             EventMessage(
                 kind="saved" if finished.ok else "unsaved",
@@ -232,30 +272,73 @@ class Session:
         self._reader.start()
         return "Sampling begins"
 
-    def arm(self, test: str, notes: str = "") -> Future[Path]:
-        """Record from now on as `test`. Raises `RequestRefused`; the future gives the journal's path."""
-        settings = self._settings
-        check_name(test)
+    def arm(self, plan: TestPlan, *, overrule: bool = False) -> Future[tuple[str, dict[str, Any]]]:
+        """Record from now on as planned, once the orders before are done. Raises `RequestRefused`.
+
+        `overrule`: in spite of a sensor check that says no-go. The future's data has the journal's path.
+        """
+        check_name(plan.test)
         if self.opened is None:
             raise RequestRefused("Nothing is being sampled. Start the preview first")
         if self.recording:
             raise RequestRefused("A run is being recorded already. Stop or abort it before the next one")
-        check_space(settings.folder, settings.rig, self.opened.rate_hz)
+        check_space(self._settings.folder, self._settings.rig, self.opened.rate_hz)
+        return self.ask("arm", {"plan": plan, "overrule": overrule})
+
+    def _begin(self, plan: TestPlan, tare: Tare) -> Future[Path]:
+        """On the analyst's thread, with the zero that is in force."""
+        rate_hz = self._settings.plan.rate_hz
+        before = round(self._settings.rig.acquisition.pre_trigger_s * rate_hz)
+        specimen = plan.specimen or self._settings.rig.specimen.name
+        begin = self._order(plan.test, tare, before, plan.model_copy(update={"specimen": specimen}))
+        self.recorder.inbox.put(begin)
+        return begin.done
+
+    def _keep(self, release_sample: int, tare: Tare) -> None:
+        """On the analyst's thread: record a release that nobody armed."""
+        rate_hz = self._settings.plan.rate_hz
+        before = round(KEPT_BEFORE_S * rate_hz) + max(0, self.recorder.status.sample - release_sample)
+        begin = self._order(UNARMED, tare, before, None)
+        kept = {"ring": self.ring.session, "release_sample": release_sample}
+        header = begin.header.model_copy(update={"kept": kept, "notes": "Not armed: kept from the ring."})
+        self.recorder.inbox.put(replace(begin, header=header, kept=True))
+
+    def _order(self, test: str, tare: Tare, before_samples: int, plan: TestPlan | None) -> Begin:
+        settings = self._settings
+        if self.opened is None:
+            raise RequestRefused("Nothing is being sampled. Start the preview first")
         header = make_header(
             settings.rig,
             settings.rig_text,
             settings.plan,
             self.opened,
-            self.analyst.tare,
+            tare,
             test=test,
-            notes=notes,
+            notes=plan.notes if plan is not None else "",
             truth=settings.truth,
+            test_plan=plan,
         )
-        begin = Begin(settings.folder / f"{header.run_id}{JOURNAL_SUFFIX}", header)
-        self.recorder.inbox.put(begin)
         if self._reader is not None:
             self._reader.ask(lambda driver: self._start_backup(driver, header.run_id))
-        return begin.done
+        path = settings.folder / f"{header.run_id}{JOURNAL_SUFFIX}"
+        return Begin(path, header, before_samples=before_samples)
+
+    def _ring_header(self, run_id: str) -> RunHeader:
+        """On the ring's thread: the header of its next segment."""
+        opened, settings = self.opened, self._settings
+        if opened is None:
+            raise RunFileError("Nothing is being sampled")
+        header = make_header(
+            settings.rig, settings.rig_text, settings.plan, opened, self.analyst.tare, test=UNARMED
+        )
+        return header.model_copy(update={"run_id": run_id, "kept": {"ring": self.ring.session}})
+
+    def _disk_safe(self) -> bool:
+        status = self.recorder.status
+        behind = status.sample - status.acknowledged_sample
+        return status.recording and behind <= _DISK_BEHIND_S * self._settings.plan.rate_hz * max(
+            1.0, min(self._settings.speed, 100.0)
+        )
 
     def _start_backup(self, driver: Driver, stem: str) -> None:
         """On the reader's thread: the second recorder, where it is on. It must never cost the first."""
@@ -290,18 +373,19 @@ class Session:
             case "preview":
                 return Reply(ok=True, text=self.preview())
             case "arm":
-                test, notes = (str(command.arguments.get(name, "")) for name in ("test", "notes"))
-                return _reply_of(self.arm(test, notes[:20_000]), _armed)
-            case "tare" | "abort" | "stop" | "marker" | "note":
+                check_name(str(command.arguments.get("test", self.analyst.plan.test)))
+                plan = plan_of(command.arguments, self.analyst.plan)
+                overrule = bool(command.arguments.get("overrule", 0))
+                return _reply_of(self.arm(plan, overrule=overrule), _answered)
+            case "plan":
+                chosen = plan_of(command.arguments, TestPlan())
+                return _reply_of(self.ask("plan", {"plan": chosen}), _answered)
+            case "tare" | "check" | "pull" | "abort" | "stop" | "marker" | "note":
                 return _reply_of(self.ask(command.name, dict(command.arguments)), _answered)
         raise RequestRefused(
-            f"There is no command '{command.name[:40]}'. There are hello, preview, tare, arm, abort, stop, "
-            "marker, note and shutdown"
+            f"There is no command '{command.name[:40]}'. There are hello, preview, plan, tare, check, "
+            "pull, arm, abort, stop, marker, note and shutdown"
         )
-
-
-def _armed(journal: Path) -> Reply:
-    return Reply(ok=True, text="Armed and recording", data={"journal": str(journal)})
 
 
 def _answered(answer: tuple[str, dict[str, Any]]) -> Reply:

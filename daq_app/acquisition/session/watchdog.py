@@ -32,7 +32,8 @@ class Watchdog:
     _alarms: set[str] = field(default_factory=set)
     _acknowledged: int = 0
     _acknowledged_s: float = 0.0
-    _free_bytes: int = 0
+    free_bytes: int = -1
+    """Room on the disk of the runs when it was last looked at; negative before."""
     _space_s: float = -1e9
 
     def look(self, reader: Reader | None, overloaded: tuple[str, ...]) -> HealthMessage:
@@ -60,7 +61,7 @@ class Watchdog:
             lost_samples=status.lost_samples,
             overloaded=overloaded,
             file_bytes=status.file_bytes,
-            free_bytes=self._free_bytes,
+            free_bytes=max(0, self.free_bytes),
             block_to_disk_ms_p99=self.recorder.latency.percentile_ms(99),
         )
 
@@ -90,13 +91,13 @@ class Watchdog:
             return
         self._space_s = now
         try:
-            self._free_bytes = shutil.disk_usage(self.folder).free
+            self.free_bytes = shutil.disk_usage(self.folder).free
         except OSError:
-            self._free_bytes = 0
+            self.free_bytes = 0
         self._alarm(
             "space",
-            self._free_bytes < LOW_SPACE_BYTES,
-            f"Only {self._free_bytes / 1e6:.0f} MB are free in {self.folder}. Free space now"
+            self.free_bytes < LOW_SPACE_BYTES,
+            f"Only {self.free_bytes / 1e6:.0f} MB are free in {self.folder}. Free space now"
             + ("; the test is still being recorded" if recording else ""),
             "There is room on the disk again",
         )

@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from daq_app.acquisition.messages.published import (
     BlockMessage,
+    CheckMessage,
     Command,
     EstimateMessage,
     EventMessage,
@@ -33,6 +34,7 @@ MODELS: Final[dict[bytes, type[Message]]] = {
     b"estimate": EstimateMessage,
     b"health": HealthMessage,
     b"event": EventMessage,
+    b"check": CheckMessage,
 }
 _RECEIVE_QUEUE: Final = 1000
 
@@ -79,7 +81,7 @@ class AcquisitionClient:
         token: str = "",
         *,
         keys: ViewerKeys | None = None,
-        topics: tuple[str, ...] = ("state", "block", "motion", "estimate", "health", "event"),
+        topics: tuple[str, ...] = ("state", "block", "motion", "estimate", "health", "event", "check"),
         timeout_s: float = 5.0,
     ) -> None:
         """Connect. Raises `AcquisitionUnreachable` if nobody answers within `timeout_s`."""

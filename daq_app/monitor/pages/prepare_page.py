@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
-from daq_app.campaign.checks.check_model import SensorCheck
-from daq_app.campaign.checks.pull_check import PullTooSmall, check_pull
-from daq_app.campaign.checks.sensor_check import Conditions, check_at_rest
+from daq_app.acquisition.checks.check_model import SensorCheck
+from daq_app.acquisition.checks.pull_check import PullTooSmall, check_pull
+from daq_app.acquisition.checks.sensor_check import Conditions, check_at_rest
 from daq_app.config.rig import Rig
 from daq_app.config.scaling import Scaling
 from daq_app.monitor.data.background import Background

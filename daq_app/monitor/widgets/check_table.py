@@ -8,7 +8,7 @@ from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersisten
 from PySide6.QtGui import QColor, QPainter
 from PySide6.QtWidgets import QHeaderView, QStyledItemDelegate, QStyleOptionViewItem, QTableView, QWidget
 
-from daq_app.campaign.checks.check_model import ChannelCheck, SensorCheck, Verdict
+from daq_app.acquisition.checks.check_model import ChannelCheck, SensorCheck, Verdict
 from daq_app.config.rig import Rig
 from daq_app.monitor.data.shown_units import shown_unit
 from daq_app.monitor.widgets.labels import DASH, number

@@ -11,8 +11,8 @@ from typing import Final
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
+from daq_app.acquisition.checks.check_model import Verdict
 from daq_app.acquisition.course.tare import UNZEROED
-from daq_app.campaign.checks.check_model import Verdict
 from daq_app.campaign.plan import Campaign
 from daq_app.campaign.verdicts import give_verdict
 from daq_app.config import ConfigError

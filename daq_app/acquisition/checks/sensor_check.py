@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.campaign.checks.check_model import ChannelCheck, Finding, SensorCheck, Verdict
+from daq_app.acquisition.checks.check_model import ChannelCheck, Finding, SensorCheck, Verdict
 from daq_app.config.rig import Channel, Rig
 from daq_app.config.scaling import Scaling
 

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.campaign.checks.check_model import Finding, SensorCheck, Verdict
+from daq_app.acquisition.checks.check_model import Finding, SensorCheck, Verdict
 from daq_app.config.rig import Channel, Rig
 from daq_app.config.units import G_M_S2
 from daq_app.rocking.geometry.kinematics import RotationGeometry, WireGeometry

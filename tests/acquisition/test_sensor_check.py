@@ -8,9 +8,9 @@ import datetime as dt
 import numpy as np
 import pytest
 
-from daq_app.campaign.checks.check_model import Verdict
-from daq_app.campaign.checks.pull_check import PullTooSmall, check_pull, expected_change
-from daq_app.campaign.checks.sensor_check import Conditions, check_at_rest
+from daq_app.acquisition.checks.check_model import Verdict
+from daq_app.acquisition.checks.pull_check import PullTooSmall, check_pull, expected_change
+from daq_app.acquisition.checks.sensor_check import Conditions, check_at_rest
 from daq_app.config.loader import load_rig
 from daq_app.config.scaling import Scaling
 

@@ -1,0 +1,213 @@
+"""One judgement of the moment: what the operator is told to do, and every word that goes with it.
+
+The call is decided once, from the most urgent condition to the least; word, sentence, gauge and alarm are
+written from the call, so that no two of them can contradict each other.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from daq_app.acquisition.messages.published import Call, Judgement, State, Tone
+from daq_app.config.rig import Acquisition
+from daq_app.runfile import TestPlan
+
+PULLED: Final = 0.03
+"""|θ|/α from which a wall counts as pulled: a zeroed wall leans by less than a hundredth of α."""
+_MOVING: Final = frozenset({State.RELEASED, State.ROCKING})
+_BEFORE_RELEASE: Final = frozenset(
+    {State.PREVIEWING, State.ARMED, State.HOLDING, State.SAVED, State.SAVING, State.FAILED}
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """All that a judgement is made from."""
+
+    state: State
+    sampling: bool
+    armed: bool
+    plan: TestPlan
+    rotation_rad: float
+    """From the tiltmeters; NaN where it is not known."""
+    alpha_rad: float
+    steady: bool
+    """The wall is held still."""
+    held_s: float
+    """Since when, s."""
+    disk_safe: bool
+    """Samples of the run reach a disk."""
+    aborted: bool = False
+    """The last arming was given up before its release."""
+    text: str = ""
+    """What the state says of itself; shown after a test and after a failure."""
+
+
+def judge(situation: Situation, settings: Acquisition) -> Judgement:
+    """The judgement of a situation."""
+    ratio = abs(situation.rotation_rad) / situation.alpha_rad
+    call = _call(situation, settings, ratio)
+    band = situation.plan.band
+    held_s = situation.held_s if call in (Call.HOLD, Call.RELEASE, Call.DO_NOT_RELEASE) else 0.0
+    do = _sentence(call, situation, settings, held_s)
+    return Judgement(
+        call=call,
+        word=_word(call, situation),
+        do=do,
+        tone=_tone(call, situation),
+        gauge=_gauge(call, situation, ratio),
+        alarm=do if call in _ALARMS else "",
+        ratio=round(ratio, 5) if math.isfinite(ratio) else None,
+        target=situation.plan.theta0_over_alpha,
+        low=band[0] if band else None,
+        high=band[1] if band else None,
+        held_s=math.floor(10 * held_s) / 10,
+        hold_s=settings.hold_s,
+    )
+
+
+_ALARMS: Final = frozenset({Call.STOP, Call.ARM_FIRST, Call.DO_NOT_RELEASE, Call.OTHER_SIDE})
+
+
+def _call(now: Situation, settings: Acquisition, ratio: float) -> Call:
+    if now.state in _MOVING:
+        return Call.KEEP_CLEAR
+    if now.state is State.AT_REST:
+        return Call.WAIT
+    if now.sampling and ratio >= settings.alarm_ratio:
+        return Call.STOP
+    if now.armed:
+        return _armed_call(now, settings, ratio)
+    if now.sampling and ratio >= PULLED:
+        return Call.ARM_FIRST
+    if now.state is State.SAVING:
+        return Call.WAIT
+    if now.state in (State.SAVED, State.FAILED) and not now.aborted:
+        return Call.LOOK
+    return Call.PREPARE if now.sampling else Call.START
+
+
+def _armed_call(now: Situation, settings: Acquisition, ratio: float) -> Call:
+    """Between arming and release."""
+    band = now.plan.band
+    if not math.isfinite(ratio):
+        return Call.HOLD if now.steady else Call.PULL
+    if ratio >= PULLED and not now.plan.side_of(now.rotation_rad):
+        return Call.OTHER_SIDE
+    if ratio < (band[0] if band else PULLED):
+        return Call.PULL
+    if band and ratio > band[1]:
+        return Call.EASE_BACK
+    if not now.disk_safe:
+        return Call.DO_NOT_RELEASE
+    return Call.RELEASE if now.steady and now.held_s >= settings.hold_s else Call.HOLD
+
+
+_WORDS: Final[dict[State, str]] = {
+    State.IDLE: "Idle",
+    State.PREVIEWING: "Live view",
+    State.ARMED: "Armed",
+    State.HOLDING: "Holding",
+    State.RELEASED: "Released",
+    State.ROCKING: "Rocking",
+    State.AT_REST: "At rest",
+    State.SAVING: "Saving",
+    State.SAVED: "Saved",
+    State.FAILED: "Failed",
+}
+
+
+def _word(call: Call, now: Situation) -> str:
+    if call is Call.ARM_FIRST:
+        return "Not armed"
+    if now.state in _MOVING and not now.armed:
+        return f"{_WORDS[now.state]}, not armed"
+    if now.aborted and now.state is State.SAVED:
+        return "Aborted"
+    return _WORDS[now.state]
+
+
+def _sentence(call: Call, now: Situation, settings: Acquisition, held_s: float) -> str:
+    match call:
+        case Call.START:
+            return "No sensor is read. Start the live view (F4)."
+        case Call.PREPARE:
+            return "Nothing is recorded but the ring of the last minutes. Choose, zero, check, then arm (F5)."
+        case Call.PULL:
+            return "Pull the wall to its target rotation."
+        case Call.EASE_BACK:
+            return "Too far: ease the wall back into the band."
+        case Call.OTHER_SIDE:
+            return f"Wrong side: this test is planned towards {now.plan.side}. Lower the wall."
+        case Call.STOP:
+            return "STOP: near overturning. Ease the wall back."
+        case Call.HOLD:
+            left_s = math.ceil(max(0.0, settings.hold_s - held_s))
+            return f"On target: hold still{f', {left_s} s more' if now.steady and left_s else ''}."
+        case Call.DO_NOT_RELEASE:
+            return "Do not release: nothing reaches the disk now."
+        case Call.RELEASE:
+            return "Held still on target. Release."
+        case Call.ARM_FIRST:
+            return "Not armed. Do not release: arm first (F5), or lower the wall."
+        case Call.KEEP_CLEAR if not now.armed:
+            return "Keep clear. Nobody had armed: this release is kept from the ring."
+        case Call.KEEP_CLEAR:
+            return "Keep clear. The recording ends by itself."
+        case Call.WAIT:
+            return {
+                State.AT_REST: "Leave the wall alone: its rest is being recorded.",
+                State.SAVING: "The record is being checked and written.",
+            }.get(now.state, "Wait.")
+        case Call.LOOK:
+            return now.text or "Look at the result, then take the next test (F6)."
+
+
+def _tone(call: Call, now: Situation) -> Tone:
+    if call is Call.LOOK:
+        return "bad" if now.state is State.FAILED else "good"
+    tones: dict[Call, Tone] = {
+        Call.START: "muted",
+        Call.PREPARE: "accent",
+        Call.PULL: "text",
+        Call.EASE_BACK: "warning",
+        Call.OTHER_SIDE: "bad",
+        Call.STOP: "bad",
+        Call.HOLD: "good",
+        Call.DO_NOT_RELEASE: "bad",
+        Call.RELEASE: "good",
+        Call.ARM_FIRST: "bad",
+        Call.KEEP_CLEAR: "bad" if not now.armed else "warning",
+        Call.WAIT: "accent",
+    }
+    return tones[call]
+
+
+def _gauge(call: Call, now: Situation, ratio: float) -> str:
+    """Beside the gauge's figure: how far, in words that go with the call."""
+    band, alpha = now.plan.band, now.alpha_rad
+    missing_mrad = 1e3 * alpha * ((now.plan.theta0_over_alpha or 0.0) - ratio)
+    match call:
+        case Call.PULL if not math.isfinite(ratio):
+            return "The rotation is not known"
+        case Call.PULL if band:
+            return f"Pull {missing_mrad:.1f} mrad more"
+        case Call.PULL:
+            return "No target is planned"
+        case Call.EASE_BACK:
+            return f"{-missing_mrad:.1f} mrad too far: ease back"
+        case Call.OTHER_SIDE:
+            return "Wrong side"
+        case Call.STOP:
+            return "STOP: ease back"
+        case Call.HOLD:
+            return "On target: hold" if band else "Hold still"
+        case Call.DO_NOT_RELEASE:
+            return "Hold: do not release"
+        case Call.RELEASE:
+            return "Release"
+        case Call.ARM_FIRST:
+            return "Not armed"
+    return ""
