@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from daq_app.acquisition.messages.published import EventMessage, State
 from daq_app.acquisition.checks.check_model import ChannelCheck, Finding, SensorCheck, Verdict
+from daq_app.acquisition.messages.published import EventMessage, State
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.widgets.actions import ActionBar
 from daq_app.monitor.widgets.notices import NoticeLine

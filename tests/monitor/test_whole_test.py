@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from daq_app.acquisition.checks.check_model import Verdict
 from daq_app.acquisition.messages.published import BlockMessage, State
 from daq_app.acquisition.viewers.launcher import AcquisitionProcess
-from daq_app.acquisition.checks.check_model import Verdict
 from daq_app.runfile import open_run, verify
 
 pytestmark = pytest.mark.heavy
