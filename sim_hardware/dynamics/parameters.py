@@ -71,6 +71,9 @@ SLIDE: Final = 44  # m per (rad/s): base slip at an impact
 RELEASE_EVEN: Final = 45  # 0: the holding force dies away as exp(−t/τ); 1: it falls evenly to nothing
 N_PARAMETERS: Final = 46
 
+ODD_IN_TIME: Final = (ZETA, COULOMB, QUADRATIC, AMBIENT_HZ)
+"""Parameters that change their sign where time runs backwards: losses become gains."""
+
 BOUNCE_SPEED: Final = 0.2
 """Approach speed (rad/s) at which a bounce takes `BOUNCE` seconds; the flight grows with the speed."""
 REST_AMPLITUDE_RAD: Final = 2e-5

@@ -57,12 +57,10 @@ def _crossings(
 
 @part
 def _reverse(vector: NDArray[np.float64], time: float, out: NDArray[np.float64]) -> None:
-    """The vector under which time runs backwards from `time`: losses become gains."""
+    """The vector under which time runs backwards from `time`."""
     out[:] = vector
-    out[par.ZETA] = -vector[par.ZETA]
-    out[par.COULOMB] = -vector[par.COULOMB]
-    out[par.QUADRATIC] = -vector[par.QUADRATIC]
-    out[par.AMBIENT_HZ] = -vector[par.AMBIENT_HZ]
+    for index in par.ODD_IN_TIME:
+        out[index] = -vector[index]
     out[par.AMBIENT_PHASE] = vector[par.AMBIENT_PHASE] + 4.0 * math.pi * vector[par.AMBIENT_HZ] * time
 
 
