@@ -57,7 +57,7 @@ SLOW_RELEASE: Final = 31  # s
 AMBIENT: Final = 32  # m/s², amplitude of the base's acceleration along x
 AMBIENT_HZ: Final = 33
 AMBIENT_PHASE: Final = 34  # rad at release
-# second degrees of freedom, driven by the motion (sim_hardware.dynamics.secondary)
+# second degrees of freedom, driven by the motion (sim_hardware.sensors.scene)
 MODE_HZ: Final = 35
 MODE_ZETA: Final = 36
 MODE_GAIN: Final = 37  # top displacement (m) per (rad/s) of velocity jump, times 2πf
