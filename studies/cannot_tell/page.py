@@ -19,15 +19,14 @@ _WHY: Final = {
     "bounce": "The generator's hop lasts as long at every speed, the library's longer the faster the wall "
     "comes: in all that is read of it, it is the library's dwell (gap-method.md, *What cannot be "
     "separated*). The second mark on the accelerometers, which the library names, is not read.",
-    "pivot_shift": "Measured while the heights of the LVDTs' points were free to 50 mm. Since they are the "
+    "pivot_shift": "Measured with heights of the LVDTs' points that are free to 50 mm. Where they are the "
     "rig file's to 5 mm, this and the rounded edge are named at the first (gap-effects.md).",
     "filter_delay@wire": "The step rules the delay out, as it is said to; a wire that swings on its spring "
-    "(at 5 to 6 %) changes a step too, and stays. Seed 1 was first run with a step that only that filter was "
-    "thought to change: there the filter was resolved, and lag@wire was left with wire_inertia@wire (8 %).",
+    "(at 5 to 6 %) changes a step too, and stays.",
     "ambient": "Without accelerometers nothing shows that the floor moves; the gate refuses every other "
     "explanation.",
 }
-"""Of rows that are no plain ambiguity."""
+"""Reasons for rows that are no plain ambiguity, by the name of the truth."""
 
 
 def outcome(found: Found) -> str:

@@ -7,6 +7,7 @@ as such, or with ``--again`` measured anew.
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import time
 from collections import Counter
@@ -73,10 +74,29 @@ def run_study(
     done = [path for name in cases for path in sorted(given.out.glob(f"{name}-[0-9]*.json"))]
     text = page(_marked([_read(path) for path in done]))
     if given.page:
-        given.page.write_text(text, encoding="utf-8")
+        write_page(text, given.page)
     else:
         print(text)
     return 0
+
+
+def write_page(text: str, path: Path) -> None:
+    """Write a page with one table: its text as Markdown, its rows as a CSV of the same name."""
+    lines = text.splitlines()
+    rows = [line for line in lines if line.startswith("|") and not line.startswith("|---")]
+    table = path.with_suffix(".csv")
+    first = lines.index(rows[0])
+    words = [line for line in lines[:first] if not line.startswith("|")]
+    words += [f"All {len(rows) - 1} rows: [{table.name}]({table.name})."]
+    words += [line for line in lines[first:] if not line.startswith("|")]
+    path.write_text("\n".join(words) + "\n", encoding="utf-8")
+    with table.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerows(_cells(row) for row in rows)
+
+
+def _cells(row: str) -> list[str]:
+    return [cell.strip().replace("**", "") for cell in row.strip().strip("|").split(" | ")]
 
 
 def cpu_s() -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from studies.gap.rows import Found, mark_of, run_study
+from studies.gap.rows import Found, mark_of, run_study, write_page
 
 
 def _run(folder: Path, *arguments: str) -> tuple[list[str], list[Found]]:
@@ -39,3 +39,16 @@ def test_cases_are_done_once_per_seed_and_rows_of_older_code_only_when_asked(tmp
     assert done == ["a"]
     assert [(row["case"], row["seed"]) for row in rows] == [("a", 1), ("a", 2), ("b@c", 1), ("b@c", 2)]
     assert len({row["code"] for row in rows}) == 1
+
+
+def test_a_page_keeps_its_words_and_its_rows_stand_beside_it_as_csv(tmp_path):
+    page = tmp_path / "study.md"
+    text = (
+        "# Study\n\nTwo rows.\n\n| case | found |\n|---|---|\n| a | **yes** |\n| b | 0.1, 0.2 |\n\nThe end.\n"
+    )
+    write_page(text, page)
+    assert (
+        page.read_text(encoding="utf-8")
+        == "# Study\n\nTwo rows.\n\nAll 2 rows: [study.csv](study.csv).\n\nThe end.\n"
+    )
+    assert (tmp_path / "study.csv").read_text(encoding="utf-8") == 'case,found\na,yes\nb,"0.1, 0.2"\n'
