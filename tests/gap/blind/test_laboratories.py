@@ -178,8 +178,11 @@ def test_a_case_depends_on_its_place_only_in_a_laboratory_too(configs: Path, tmp
     )
 
 
-def test_three_effects_are_of_three_kinds_in_every_twentieth_case(configs: Path, tmp_path: Path) -> None:
-    mixed = dataclasses.replace(order(configs, tmp_path, "ordinary"), hidden="")
+@pytest.mark.parametrize("laboratory", ["ordinary", "contact"])
+def test_three_effects_are_hidden_in_every_twentieth_case(
+    laboratory: str, configs: Path, tmp_path: Path
+) -> None:
+    mixed = dataclasses.replace(order(configs, tmp_path, laboratory), hidden="")
     counts = [len(draw_case(mixed, index)[0].effects) for index in range(40)]
     assert counts.count(3) == 2 and counts.count(0) == 4 and counts.count(2) == 6
 

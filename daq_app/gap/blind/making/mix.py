@@ -63,7 +63,11 @@ _DECKS: Final[dict[tuple[Engine, bool], _Decks]] = {
     ("contact", False): _Decks(CONTACT_ENTRIES, CONTACT_LIBRARY, BESIDE_CONTACT, CONTACT_OUTSIDE),
     ("events", True): _Decks(WIDE_ENTRIES, WIDE_LIBRARY, WIDE_LIBRARY, WIDE_OUTSIDE, _WIDE_BLOCK),
     ("contact", True): _Decks(
-        WIDE_CONTACT_ENTRIES, WIDE_CONTACT_LIBRARY, BESIDE_CONTACT, WIDE_CONTACT_OUTSIDE, _WIDE_BLOCK
+        WIDE_CONTACT_ENTRIES,
+        WIDE_CONTACT_LIBRARY,
+        (*CONTACT_LIBRARY, *BESIDE_CONTACT),
+        WIDE_CONTACT_OUTSIDE,
+        _WIDE_BLOCK,
     ),
 }
 """(engine, whether the mix is the wide one) → what is dealt."""
