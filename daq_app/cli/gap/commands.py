@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,7 +18,8 @@ from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED, pr
 from daq_app.config import load_rig
 
 if TYPE_CHECKING:
-    from daq_app.gap.core import Diagnosis
+    from daq_app.gap.core import Diagnosis, Options
+    from daq_app.gap.rocking_model.records import GapRun
 
 
 def register(app: typer.Typer) -> None:
@@ -30,6 +32,7 @@ def register(app: typer.Typer) -> None:
         "diagnose",
         epilog="Example: daq-app gap diagnose FR1-*.h5 --rig fr1.toml --report gap.html --json gap.json",
     )(diagnose)
+    group.command("starter", epilog="Example: daq-app gap starter my_model.py")(starter)
     group.command("effects", epilog="Example: daq-app gap effects --family dissipation")(effects)
     group.command(
         "apply",
@@ -52,7 +55,13 @@ def _refusals() -> Iterator[None]:
 
 
 def diagnose(
-    runs: Annotated[list[Path], typer.Argument(help="Run files (HDF5) of one specimen.", metavar="RUN…")],
+    runs: Annotated[
+        list[Path],
+        typer.Argument(help="Run files (HDF5) of one specimen; with --model any recordings.", metavar="RUN…"),
+    ],
+    model: Annotated[
+        Path | None, typer.Option(help="Python file with a simulator and effects of one's own.")
+    ] = None,
     rig: Annotated[
         Path | None, typer.Option(help="Rig file to compare with; the one kept in each run if left out.")
     ] = None,
@@ -68,49 +77,108 @@ def diagnose(
 ) -> None:
     """Say where simulator and runs differ, which missing effect explains it, and how far the gap shrinks.
 
+    With --model the simulator and the recordings are one's own (docs/how-to/own-model.md).
+
     Exit code 0 when an effect, a pair, parameters or nothing missing was found; 1 when the answer is
     that it cannot be told, none of these, or below detection; 2 for input that cannot be diagnosed.
     """
-    from daq_app.workers import warm_up
-
-    workers = cores or os.cpu_count() or 1
-    if workers > 1:
-        warm_up(
-            "daq_app.gap.rocking_model.prediction.model"
-        )  # while this process imports and reads the files
-    from daq_app.gap.core import Options
-    from daq_app.gap.core.parallel import Interrupted
-    from daq_app.gap.report import write_report
-    from daq_app.gap.rocking_model.records import load_run
-    from daq_app.gap.rocking_model.study import diagnose_runs
-
     if hold_out not in ("level", "repetition"):
-        print_paragraph("Error", f"--hold-out is level or repetition, not {hold_out}.")
-        raise typer.Exit(EXIT_BAD_INPUT)
+        raise _bad_input(f"--hold-out is level or repetition, not {hold_out}.")
+    if model is not None and rig is not None:
+        raise _bad_input("--rig describes a rocking wall; with --model the model file says what is known.")
+    asked = _Asked(pairs, hold_out, cores or os.cpu_count() or 1)
     with _refusals():
-        replacement = load_rig(rig) if rig is not None else None
-        loaded = [load_run(path, replacement) for path in runs]
-        console = Console(stderr=True)
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"))
-        with Progress(*columns, console=console, transient=True) as progress:
-            bar = progress.add_task("reading features", total=1)
-
-            def show(done: int, total: int, text: str) -> None:
-                progress.update(bar, description=text, completed=done, total=total)
-
-            options = Options(always_pairs=pairs, hold_out=hold_out, workers=workers, progress=show)
-            try:
-                result = diagnose_runs(loaded, options)
-            except (KeyboardInterrupt, Interrupted):
-                print_paragraph("Interrupted", "the diagnosis was stopped; nothing was written")
-                raise typer.Exit(EXIT_INTERRUPTED) from None
+        result, loaded = (
+            _diagnose_own(model, runs, asked) if model is not None else _diagnose_walls(runs, rig, asked)
+        )
         if json_out is not None:
             result.save(json_out)
         if report is not None:
+            from daq_app.gap.report import write_report
+
             write_report(result, report, loaded)
     _print(result)
-    good = result.decision.verdict in ("effect", "pair", "parameters", "nothing_missing")
+    good = result.decision.verdict in ("effect", "pair", "several", "parameters", "nothing_missing")
     raise typer.Exit(0 if good else EXIT_FAILED)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What the options of `diagnose` ask for."""
+
+    pairs: bool
+    hold_out: str
+    workers: int
+
+
+def _diagnose_walls(paths: list[Path], rig: Path | None, asked: _Asked) -> tuple[Diagnosis, list[GapRun]]:
+    from daq_app.workers import warm_up
+
+    if asked.workers > 1:  # while this process imports and reads the files
+        warm_up("daq_app.gap.rocking_model.prediction.model")
+    from daq_app.gap.rocking_model.records import load_run
+    from daq_app.gap.rocking_model.study import diagnose_runs
+
+    replacement = load_rig(rig) if rig is not None else None
+    loaded = [load_run(path, replacement) for path in paths]
+    with _options(asked) as options:
+        return diagnose_runs(loaded, options), loaded
+
+
+def _diagnose_own(model: Path, recordings: list[Path], asked: _Asked) -> tuple[Diagnosis, list[GapRun]]:
+    from daq_app.gap.own_model.study import diagnose_own
+
+    with _options(asked) as options:
+        return diagnose_own(model, recordings, options), []
+
+
+@contextmanager
+def _options(asked: _Asked) -> Iterator[Options]:
+    """Options that show their progress; an interrupt ends the command in words."""
+    from daq_app.gap.core import Options
+    from daq_app.gap.core.parallel import Interrupted
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        bar = progress.add_task("reading features", total=1)
+
+        def show(done: int, total: int, text: str) -> None:
+            progress.update(bar, description=text, completed=done, total=total)
+
+        try:
+            yield Options(
+                always_pairs=asked.pairs, hold_out=asked.hold_out, workers=asked.workers, progress=show
+            )
+        except (KeyboardInterrupt, Interrupted):
+            print_paragraph("Interrupted", "the diagnosis was stopped; nothing was written")
+            raise typer.Exit(EXIT_INTERRUPTED) from None
+
+
+def _bad_input(words: str) -> typer.Exit:
+    print_paragraph("Error", words)
+    return typer.Exit(EXIT_BAD_INPUT)
+
+
+def starter(
+    out: Annotated[
+        Path, typer.Argument(help="Model file to write, for instance my_model.py.", metavar="FILE")
+    ],
+) -> None:
+    """Write a model file to begin with: a bouncing ball, to be changed into what is yours.
+
+    Exit code 0; 2 where the file is there already or cannot be written.
+    """
+    from importlib.resources import files
+
+    text = files("daq_app.gap.own_model").joinpath("starter.py").read_text(encoding="utf-8")
+    try:
+        with out.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise _bad_input(f"{out} is there already. Give another name.") from None
+    except OSError as error:
+        raise _bad_input(f"{out} cannot be written: {error.strerror}.") from None
+    typer.echo(f"{out} written. Try it: daq-app gap diagnose --model {out} RECORDING…")
 
 
 def _print(result: Diagnosis) -> None:

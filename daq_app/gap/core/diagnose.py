@@ -57,7 +57,7 @@ def _refuse(model: Model, runs: Sequence[Run]) -> None:
         raise CannotDiagnose("There is no run to diagnose.", "Give at least one recorded run.")
     for run in runs:
         if len(run.features) == 0:
-            raise CannotDiagnose(f"Run {run.name} has no features.", "Check that it was released and rocks.")
+            raise CannotDiagnose(f"Run {run.name} has no features.", "Check its recording.")
     features = sum(len(run.features) for run in runs)
     unknowns = len(Problem(model, runs, ()))
     if features <= unknowns:

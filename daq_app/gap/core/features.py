@@ -23,7 +23,8 @@ class Label:
     """What is measured, e.g. ``half-cycle duration``."""
     unit: str = ""
     amplitude: float = 0.0
-    """Size of the motion where the feature was read (model's choice of unit), for the trend."""
+    """Size of the motion where the feature was read (model's choice of unit), with the sign of its side if it
+    has two: trends with size and differences between the sides are looked for by it."""
     order: float = 0.0
     """Position in time within the run, 0 at the start and 1 at the end."""
     band: str = ""
