@@ -148,3 +148,8 @@ def test_the_starter_never_writes_over_a_file(folder: Path) -> None:
 def test_a_model_file_that_is_not_there_says_where_to_begin(tmp_path: Path) -> None:
     result = run(["gap", "diagnose", "--model", str(tmp_path / "none.py"), str(tmp_path)])
     assert result.exit_code == 2 and "gap starter my_model.py" in told(result)
+
+
+def test_the_page_shows_the_starter_as_the_command_writes_it(folder: Path, repository: Path) -> None:
+    page = (repository / "docs" / "how-to" / "own-model.md").read_text(encoding="utf-8")
+    assert (folder / "my_model.py").read_text(encoding="utf-8") in page
