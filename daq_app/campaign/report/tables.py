@@ -38,9 +38,9 @@ class RestitutionRow:
     specimen: str
     method: str
     mean: GroupMean
-    """Of the tests' values, as in the paper."""
+    """Mean of the tests' values, as in the paper."""
     corrected: GroupMean
-    """Of the values less each method's own bias."""
+    """Mean of the values less each method's own bias."""
     r_max: float
 
     @property
@@ -67,8 +67,8 @@ class RepetitionRow:
     def change_standard_error(self) -> float:
         """Two independent groups; a single test's error includes the scatter of the others."""
         scatter = 0.0 if math.isnan(self.first.scatter) else self.first.scatter
-        own = math.hypot(self.repeated.standard_error, scatter if self.repeated.tests == 1 else 0.0)
-        return math.hypot(self.first.standard_error, own)
+        repeated = math.hypot(self.repeated.standard_error, scatter if self.repeated.tests == 1 else 0.0)
+        return math.hypot(self.first.standard_error, repeated)
 
     @property
     def change_interval95(self) -> tuple[float, float]:

@@ -33,11 +33,6 @@ class RepetitionRow:
     this: bool
 
 
-def is_repetition_of(test: TestSummary, other: TestSummary) -> bool:
-    """Whether two tests were released from the same level of the same specimen."""
-    return other.test != test.test and (other.specimen, other.level) == (test.specimen, test.level)
-
-
 def repetition_rows(test: TestSummary, earlier: Sequence[TestSummary]) -> list[RepetitionRow]:
     """The test and the others of its level, in the order given, the test last."""
     return [
