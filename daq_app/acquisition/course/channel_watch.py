@@ -21,18 +21,23 @@ from drivers import Block
 Floats = NDArray[np.float64]
 
 _STUCK_S: Final = 0.3
+"""Time without any change, s, after which a channel is stuck (assumed); noise moves it within milliseconds."""
 _STEPS: Final = 2**16
 _MAINS_HZ: Final = (50.0, 60.0)
 _HUM_NOISE: Final = 3.0
 """Amplitude at the mains frequency, in the sensor's own noise, from which on it is hum."""
 _HUM_SHARE: Final = 0.5
+"""Share of a block's power at the mains frequency from which on it is hum and not the wall."""
 _HUM_BLOCKS: Final = 3
+"""Blocks in a row that must hum (assumed): a knock may look like it in one."""
 _LEAP_SHARE: Final = 0.1
-"""Of the input range, within one sample; the fastest wall takes a tenth of a second for that."""
+"""Share of the input range that is a leap within one sample. The fastest wall takes 0.1 s for it;
+raising it lets smaller leaps of a loose plug pass."""
 _LEAPING: Final = ("lvdt", "wire", "tiltmeter")
 _TILTED: Final = 0.05
 """Share of α beyond which a tiltmeter and the wires must agree on the side."""
 _CONTRARY_S: Final = 0.3
+"""Time, s, for which a tiltmeter must lean the other way (assumed): it lags behind a wall that rocks."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,7 @@ class LiveView:
         self._step = max(1, round(rate_hz / _MOTION_RATE_HZ))
         self._unheld = UnheldReleaseWatch(rig, rate_hz)
         self.rotation_rad = math.nan
-        """Of the last block: from the tiltmeters, else from the wires."""
+        """Mean rotation of the last block: from the tiltmeters, else from the wires."""
         self.held_since: int | None = None
         """Sample from which on the wall has been held still; None while it is not."""
         self.estimate: Estimate | None = None

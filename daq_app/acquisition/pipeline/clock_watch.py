@@ -207,7 +207,7 @@ class ClockWatch:
 
 
 def _rate_bounds(first: ClockReading, second: ClockReading, lump: float = 0.0) -> tuple[float, float]:
-    """Of the samples per second between two readings of a counter with steps of 1 and lumps."""
+    """(least, most) samples per second between two readings of a counter with steps of 1 and lumps."""
     taken = second.samples - first.samples
     least = max(second.before_s - first.after_s, 1e-9)
     return (taken - 1 - lump) / (second.after_s - first.before_s), (taken + 1 + lump) / least

@@ -34,9 +34,9 @@ class Patience:
     """How long the reader waits before it gives a test up."""
 
     read_timeout_s: float = 0.5
-    """Of one read: several read periods, and short enough that a stop is obeyed at once."""
+    """Limit of one read: several read periods, and short enough that a stop is obeyed at once."""
     silence_limit_s: float = 30.0
-    """Without any sample, though the device answers."""
+    """Limit without any sample, though the device answers."""
     reconnect_limit_s: float = 30.0
     """Without any answer of the device."""
     retry_pause_s: float = 0.2

@@ -162,7 +162,7 @@ class Session:
         if self.recording:
             self._wakefulness.hold()
         else:
-            self._wakefulness.let_go()
+            self._wakefulness.allow_sleep()
         self._publisher.send("health", self.watchdog.look(self._reader, self.analyst.overloaded))
 
     def tell_fault(self, text: str) -> None:

@@ -9,7 +9,7 @@ from wakepy import keep
 
 
 class Wakefulness:
-    """`hold` while recording, `let_go` afterwards; both may be repeated and never raise.
+    """`hold` while recording, `allow_sleep` afterwards; both may be repeated and never raise.
 
     The platform is asked on a thread of its own: a desktop that does not answer must delay nothing.
     """
@@ -29,7 +29,7 @@ class Wakefulness:
             self._wanted.set()
             self._change.set()
 
-    def let_go(self) -> None:
+    def allow_sleep(self) -> None:
         """The machine may sleep again."""
         if self._wanted.is_set():
             self._wanted.clear()
@@ -38,7 +38,7 @@ class Wakefulness:
     def close(self) -> None:
         """End; the machine may sleep again."""
         self._ended = True
-        self.let_go()
+        self.allow_sleep()
         self._change.set()
 
     def _work(self) -> None:
