@@ -59,7 +59,7 @@ class SourceMap(_Table):
     time_column: str = ""
     """Name of the column of times; empty means the one the file marks, if any."""
     delimiter: Literal["", ",", ";", "\t", " "] = ""
-    """Of CSV; empty means found out."""
+    """Delimiter of a CSV file; empty means that it is found out."""
     decimal: Literal["", ".", ","] = ""
     skip_lines: Annotated[int, Field(ge=0, le=10000)] = 0
     """Lines before the CSV's line of names."""

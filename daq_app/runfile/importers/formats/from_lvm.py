@@ -26,7 +26,7 @@ class _Piece:
     """Head of one piece of data."""
 
     names: list[str]
-    """Of every column, the X columns and the comment included."""
+    """Names of all columns, the X columns and the comment included."""
     entries: dict[str, list[str]]
 
     def value(self, key: str, column: int) -> str:

@@ -44,7 +44,7 @@ class Variable:
     is_real: bool
     """A real numeric array (not complex, sparse, a structure, a cell)."""
     offset: int
-    """Of its element in the file."""
+    """Place of its element in the file, bytes."""
 
     @property
     def size(self) -> int:
