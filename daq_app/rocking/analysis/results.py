@@ -85,7 +85,7 @@ class JointSummary:
     """The base joint over the test."""
 
     half_width_m: float
-    """Of the base: its edges are at ± this."""
+    """Half the width of the base: its edges are at ± this."""
     profile_ids: tuple[str, ...]
     """LVDTs, in the order of the profile."""
     profile_x_m: tuple[float, ...]

@@ -104,11 +104,6 @@ def period(phi: ArrayLike, p_rad_s: ArrayLike) -> Floats:
     )
 
 
-def half_cycle_time(phi: ArrayLike, p_rad_s: ArrayLike) -> Floats:
-    """Time from impact to impact in s of the half-cycle whose peak is φ: T/2."""
-    return _out(period(phi, p_rad_s) / 2.0)
-
-
 def impact_speed(phi: ArrayLike, p_rad_s: ArrayLike, alpha_rad: ArrayLike) -> Floats:
     """|θ̇| = p α √E in rad/s with which the half-cycle of peak φ starts and ends, linearised."""
     speed = (

@@ -104,7 +104,7 @@ class FreeRocking:
         return self.restitution * self.speeds_before_rad_s
 
     def locate(self, time_s: ArrayLike) -> tuple[NDArray[np.int_], Floats, Floats]:
-        """Of each time: the half-cycle it lies in, the time from that one's peak, the sign of θ.
+        """(half-cycle, time from its peak in s, sign of θ) at each time, of the shape of `time_s`.
 
         Before the release the time from the peak is 0; beyond the last half-cycle the sign is 0.
         """
