@@ -21,7 +21,7 @@ from drivers import Block
 Floats = NDArray[np.float64]
 
 _STUCK_S: Final = 0.3
-"""Time without any change, s, after which a channel is stuck (assumed); noise moves it within milliseconds."""
+"""Time without any change, s, after which a channel is stuck (assumed); noise moves it in milliseconds."""
 _STEPS: Final = 2**16
 _MAINS_HZ: Final = (50.0, 60.0)
 _HUM_NOISE: Final = 3.0
