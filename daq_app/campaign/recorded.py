@@ -14,6 +14,8 @@ from daq_app.runfile.folder import RUN_SUFFIX, find_journals, find_runs
 
 _BEFORE_RELEASE: Final = frozenset({"armed", "holding"})
 _AFTER_RELEASE: Final = frozenset({"released", "rocking", "at_rest"})
+_VERDICTS: Final = {"good": TestVerdict.GOOD, "bad": TestVerdict.BAD, "repeat": TestVerdict.BAD}
+"""What a run says of itself: whole and as planned, not to be trusted, or whole but another test."""
 _BAD_OUTCOMES: Final = {
     "timeout": "the wall had not come to rest when the recording ended",
     "failed": "the recording failed before the end",
@@ -48,11 +50,11 @@ def recorded_test(path: Path, verdicts: Mapping[str, OperatorVerdict]) -> Record
 
 def test_of(run: Run, verdicts: Mapping[str, OperatorVerdict]) -> RecordedTest | None:
     """The same of an opened run; None where it is no release of a named test."""
-    name = _name(run.header.test)
+    given = verdicts.get(run.header.run_id)
+    name = _name(given.test if given is not None and given.test else run.header.test)
     if name is None or not was_released(run.events):
         return None
-    given = verdicts.get(run.header.run_id)
-    if given is not None:
+    if given is not None and given.verdict is not None:
         verdict, reason = TestVerdict(given.verdict), given.reason
     else:
         verdict, reason = _judged(run)
@@ -77,10 +79,10 @@ def _outcome(events: Sequence[Event]) -> str:
 def _judged(run: Run) -> tuple[TestVerdict, str]:
     """What the run says of itself: its quality check if it has one, else how it ended."""
     quality = run.results.get("quality")
-    if isinstance(quality, dict) and quality.get("verdict") in ("good", "bad"):
+    if isinstance(quality, dict) and quality.get("verdict") in _VERDICTS:
         reasons = quality.get("reasons")
         text = "; ".join(map(str, reasons)) if isinstance(reasons, list) else ""
-        return TestVerdict(quality["verdict"]), text
+        return _VERDICTS[quality["verdict"]], text
     if run.gaps:
         return TestVerdict.BAD, f"{sum(gap.n_samples for gap in run.gaps)} samples are missing"
     outcome = _outcome(run.events)
@@ -105,12 +107,13 @@ def orphans(folder: Path, verdicts: Mapping[str, OperatorVerdict]) -> Iterator[R
             if test is not None:
                 yield test
             continue
-        name = _name(header.test)
+        given = verdicts.get(header.run_id)
+        name = _name(given.test if given is not None and given.test else header.test)
         if name is None or not was_released(events):
             continue
-        given = verdicts.get(header.run_id)
-        verdict = TestVerdict(given.verdict) if given else TestVerdict.UNCHECKED
-        reason = given.reason if given else "only a journal so far: `daq-app recover` makes its run file"
+        verdict, reason = TestVerdict.UNCHECKED, "only a journal so far: `daq-app recover` makes its run file"
+        if given is not None and given.verdict is not None:
+            verdict, reason = TestVerdict(given.verdict), given.reason
         yield RecordedTest(name, verdict, header.start_utc_ns, path, reason)
 
 

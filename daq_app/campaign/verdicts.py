@@ -20,9 +20,12 @@ class OperatorVerdict(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    verdict: Literal["good", "bad", "lost"]
+    verdict: Literal["good", "bad", "lost"] | None = None
+    """None: the run's own verdict holds."""
     reason: str = ""
     given_utc: dt.datetime
+    test: str = ""
+    """Place in the campaign that a release was given afterwards, because nobody had armed it for one."""
 
 
 class _Ledger(BaseModel):
@@ -56,8 +59,23 @@ def give_verdict(
     folder: Path, run_id: str, verdict: Literal["good", "bad", "lost"], reason: str = ""
 ) -> None:
     """Record a verdict on a run, durably; a later one replaces it. Raises `ConfigError`, `OSError`."""
+    before = read_verdicts(folder).get(run_id)
+    test = before.test if before is not None else ""
+    now = dt.datetime.now(dt.UTC)
+    _write(folder, run_id, OperatorVerdict(verdict=verdict, reason=reason, given_utc=now, test=test))
+
+
+def give_place(folder: Path, run_id: str, test: str) -> None:
+    """Give a release that nobody had armed the name of a test. Raises `ConfigError`, `OSError`."""
+    before = read_verdicts(folder).get(run_id)
+    verdict, reason = (before.verdict, before.reason) if before is not None else (None, "")
+    now = dt.datetime.now(dt.UTC)
+    _write(folder, run_id, OperatorVerdict(verdict=verdict, reason=reason, given_utc=now, test=test))
+
+
+def _write(folder: Path, run_id: str, given: OperatorVerdict) -> None:
     runs = read_verdicts(folder)
-    runs[run_id] = OperatorVerdict(verdict=verdict, reason=reason, given_utc=dt.datetime.now(dt.UTC))
+    runs[run_id] = given
     path = folder / FILE_NAME
     temporary = path.with_suffix(f".{os.getpid()}.tmp")
     try:

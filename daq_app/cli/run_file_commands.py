@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -117,11 +117,15 @@ def recover_command(
     """
     with reported():
         with Console(stderr=True).status("recovering …"):
+            rings = _recovered_rings(folder)
             results = recover(folder, thorough=not quick, derive=_derived)
+            unmade = _made_results(results)
         if as_json:
             typer.echo(json.dumps([_recovery_dict(result) for result in results], ensure_ascii=False))
         elif not results:
             typer.echo(f"{folder}: no journals, nothing to recover")
+        for text in () if as_json else (*rings, *unmade):
+            typer.echo(text)
         for result in () if as_json else results:
             if result.outcome == "failed":
                 print_paragraph("Not recovered", result.text)
@@ -129,6 +133,35 @@ def recover_command(
                 typer.echo(f"{result.journal}: {result.outcome}: {result.text}")
     if any(result.outcome == "failed" for result in results):
         raise typer.Exit(EXIT_FAILED)
+
+
+def _recovered_rings(folder: Path) -> list[str]:
+    """Journals of releases that a dead recorder had in its ring; what was found, in words."""
+    if not folder.is_dir():
+        return []
+    from daq_app.acquisition.pipeline.ring import ring_sessions
+
+    if not ring_sessions(folder):
+        return []
+    from daq_app.acquisition.closing.ring_recovery import recover_rings
+
+    return [found.text for found in recover_rings(folder)]
+
+
+def _made_results(results: Sequence[Recovery]) -> list[str]:
+    """Make the result of every run that was recovered; why there is none, where there is none."""
+    runs = [result.run for result in results if result.outcome == "recovered" and result.run is not None]
+    if not runs:
+        return []
+    from daq_app.campaign.result.result import NoResult, make_result
+
+    told = []
+    for run in runs:
+        try:
+            make_result(run)
+        except (NoResult, OSError) as error:
+            told.append(f"{run.name}: no result: {error}")
+    return told
 
 
 def _derived(contents: JournalContents) -> DerivedData | None:

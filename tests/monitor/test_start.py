@@ -7,9 +7,9 @@ from typer.testing import CliRunner
 
 # qtbot: this module needs Qt; tests/monitor/conftest.py skips it where Qt cannot start.
 from daq_app.cli.app import build_app
-from daq_app.config import load_rig
+from daq_app.config import ConfigError, load_rig
 from daq_app.monitor.pages.start_page import StartWindow, known_rigs
-from daq_app.monitor.window.app import campaign_beside
+from daq_app.monitor.window.app import campaign_beside, refuse_other_rig
 
 
 @pytest.fixture
@@ -78,3 +78,19 @@ def test_the_chooser_closes_once_the_window_is_open(qtbot, settings, tmp_path, c
 def test_the_campaign_beside_the_rig_is_found(configs, tmp_path):
     assert campaign_beside(configs / "fr1.toml") == configs / "campaigns" / "costa.toml"
     assert campaign_beside(tmp_path / "fr1.toml") is None
+
+
+def test_a_folder_in_which_another_rig_runs_is_refused_in_words(configs, tmp_path):
+    about = {"rig_text": (configs / "fr1.toml").read_text(encoding="utf-8"), "rig_name": "fr1"}
+    refuse_other_rig(configs / "fr1.toml", tmp_path, about)
+    with pytest.raises(ConfigError, match=r"fr1 is being recorded into .* fr2 was chosen") as refused:
+        refuse_other_rig(configs / "fr2.toml", tmp_path, about)
+    assert "side by side" in str(refused.value)
+
+
+def test_a_rig_file_that_was_changed_since_is_told_from_another_rig(configs, tmp_path):
+    text = (configs / "fr1.toml").read_text(encoding="utf-8")
+    changed = tmp_path / "fr1.toml"
+    changed.write_text(text.replace("post_rest_s = 2.0", "post_rest_s = 3.0"), encoding="utf-8")
+    with pytest.raises(ConfigError, match="changed since"):
+        refuse_other_rig(changed, tmp_path, {"rig_text": text, "rig_name": "fr1"})

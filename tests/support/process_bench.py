@@ -39,7 +39,7 @@ class Running:
 
     def __init__(self, rig: Path, out: Path, *options: str) -> None:
         self.out = out
-        arguments = ["--rig", str(rig), "--out", str(out), "--speed", str(SPEED), *options]
+        arguments = ["--rig", str(rig), "--out", str(out), "--speed", str(SPEED), "--no-results", *options]
         self.process = quick_context().Process(target=run_and_exit, args=(arguments,))
         self.process.start()
         deadline = time.monotonic() + 60

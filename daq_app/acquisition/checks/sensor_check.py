@@ -28,6 +28,8 @@ HUM_DOUBTFUL, HUM_BAD = 2.0, 10.0
 EDGE_SHARE: Final = 0.005
 """Within this share of the module's range from either end a reading is saturated."""
 DRIFT_FACTOR: Final = 5.0
+END_OF_TRAVEL_SHARE: Final = 0.001
+"""Within this share of its range from either end a sensor stands at its stop. Assumed."""
 CALIBRATION_SOON: Final = dt.timedelta(days=30)
 RATE_TOLERANCE: Final = 1e-3
 LEAST_FREE_S: Final = 1800.0
@@ -169,6 +171,10 @@ def _signal(channel: Channel, untared: Floats, readings: Floats, overloaded: boo
         return [Finding("range", Verdict.NO_GO, text)]
     expected = channel.noise_si
     rms = float(untared.std())
+    inset = END_OF_TRAVEL_SHARE * (largest - smallest)
+    if channel.family != "accelerometer" and not smallest + inset < centre < largest - inset:
+        text = f"End of travel: it {dead}, the stop of its range. Set it back, or use a longer sensor."
+        return [Finding("travel", Verdict.NO_GO, text)]
     if spread == 0.0 and expected >= 0.5 * converter_step_si(channel):
         return [
             Finding("stuck", Verdict.NO_GO, f"Stuck: it {dead} and never changes. Check sensor and module.")

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.acquisition.closing.verdict import judge_run
 from daq_app.config.rig import Rig
 from daq_app.config.scaling import Scaling
 from daq_app.rocking.analysis.analyse import AnalysisOptions, analyse_record
-from daq_app.rocking.analysis.results import Series, TestAnalysis
+from daq_app.rocking.analysis.results import Series
 from daq_app.rocking.live import LiveAnalyser
 from daq_app.rocking.record import TestRecord
 from daq_app.runfile import DerivedData, DerivedSignal, JournalContents
@@ -49,7 +49,7 @@ def derive(contents: JournalContents) -> tuple[DerivedData | None, str]:
     except Exception as error:
         return None, f"The analysis failed ({type(error).__name__}: {error}); the readings are complete"
     results: dict[str, Any] = {"analysis": analysis.as_dict(), "online": online}
-    quality = _quality(contents, analysis)
+    quality = judge_run(contents, analysis)
     if quality is not None:
         results["quality"] = quality
     said = ""
@@ -136,40 +136,3 @@ def _signals(series: Series | None) -> dict[str, DerivedSignal]:
         name: DerivedSignal(getattr(series, attribute), unit, long_name)
         for attribute, (name, unit, long_name) in _SIGNALS.items()
     }
-
-
-_SPOILS_TIME: Final = ("stood_still", "rate")
-"""News of the sample clock after which times within the run are wrong."""
-
-
-def _quality(contents: JournalContents, analysis: TestAnalysis) -> dict[str, Any] | None:
-    """Whether this run is a whole test, and every doubt; None for an aborted arming."""
-    ends = [event for event in contents.events if event.kind == "end"]
-    outcome = str(ends[-1].data.get("outcome", "")) if ends else "cut off"
-    if outcome == "aborted":
-        return None
-    hard = []
-    if contents.gaps:
-        hard.append(f"{contents.lost_samples} samples are missing in {len(contents.gaps)} gap(s)")
-    if outcome != "complete":
-        hard.append({"timeout": "the wall did not come to rest in time"}.get(outcome, f"it was {outcome}"))
-    if contents.damage:
-        hard.append(f"the journal is damaged: {contents.damage[0]}")
-    hard += _told(contents, "clock", lambda data: data.get("clock") in _SPOILS_TIME)
-    if not analysis.found:
-        hard.append("no release and impact were found")
-    doubts = [
-        *_told(contents, "clock", lambda data: data.get("clock") not in _SPOILS_TIME),
-        *_told(contents, "channel"),
-        *_told(contents, "overload"),
-        *_told(contents, "alarm", lambda data: data.get("alarm") == "wall_clock"),
-    ]
-    channels = sorted({str(e.data["channel"]) for e in contents.events if e.kind == "channel"})
-    return {"verdict": "bad" if hard else "good", "reasons": hard + doubts, "doubtful_channels": channels}
-
-
-def _told(
-    contents: JournalContents, kind: str, which: Callable[[dict[str, Any]], bool] = lambda data: True
-) -> list[str]:
-    """What was said of that kind while the run was recorded, each sentence once."""
-    return sorted({event.text for event in contents.events if event.kind == kind and which(event.data)})

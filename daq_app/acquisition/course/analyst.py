@@ -188,12 +188,13 @@ class Analyst(threading.Thread):
             self._preparation.take(block)
         if self._overload is not None:
             self.overloaded = self._overload.check(block)
-            if text := self._overload.news():
-                self._note("overload", text, "warning")
+            for kind, text in self._overload.news():
+                self._note(kind, text, "warning")
         if self._channels is not None:
             # Impacts ring and leap by themselves: then only what cannot be motion is looked at.
             moving = self.state in _MOVING
-            for doubt in self._channels.check(block, moving=moving):
+            at_end = self._overload.at_end if self._overload is not None else frozenset()
+            for doubt in self._channels.check(block, moving=moving, at_end=at_end):
                 data: dict[str, float | str] = {"channel": doubt.channel_id, "doubt": doubt.name}
                 self._note("channel", doubt.text, "warning", doubt.sample, data)
         if self._live is None:
@@ -249,7 +250,7 @@ class Analyst(threading.Thread):
         )
         self._preparation = Preparation(self._rig, opened, self._planned_rate_hz, surroundings)
         self._preparation.tare = self._tare
-        self._overload = OverloadWatch(self._rig.channel_ids, opened.ranges)
+        self._overload = OverloadWatch(self._rig.channels, opened.ranges)
         self._channels = ChannelWatch(self._rig, opened.rate_hz, opened.ranges)
         self._standing = {}
         planned = self._planned_rate_hz

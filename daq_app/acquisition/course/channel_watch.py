@@ -7,7 +7,7 @@ sample, a tiltmeter that leans the other way than the wires. Rails are `Overload
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from dataclasses import dataclass
 from typing import Final
 
@@ -90,10 +90,13 @@ class ChannelWatch:
         self._humming[:] = 0
         self._contrary[:] = 0
 
-    def check(self, block: Block, *, moving: bool) -> list[Doubt]:
-        """What is doubted for the first time. `moving`: between release and rest."""
+    def check(self, block: Block, *, moving: bool, at_end: Set[str] = frozenset()) -> list[Doubt]:
+        """What is doubted for the first time. `moving`: between release and rest.
+
+        `at_end`: channels at the end of their travel: they stand still there without being stuck.
+        """
         readings = block.readings
-        found = [*self._stuck(block), *self._leaps(block)]
+        found = [*self._stuck(block, at_end), *self._leaps(block)]
         if not moving:
             found += self._hum(block)
             found += self._contradictions(block)
@@ -109,8 +112,9 @@ class ChannelWatch:
                 doubts.append(Doubt(self._ids[row], name, sample, text.format(id=self._ids[row])))
         return doubts
 
-    def _stuck(self, block: Block) -> list[Doubt]:
-        constant = self._alive & (np.ptp(block.readings, axis=1) == 0.0)
+    def _stuck(self, block: Block, at_end: Set[str]) -> list[Doubt]:
+        free = np.array([name not in at_end for name in self._ids])
+        constant = self._alive & free & (np.ptp(block.readings, axis=1) == 0.0)
         if self._last is not None:
             constant &= block.readings[:, 0] == self._last
         self._still = np.where(constant, self._still + block.n_samples, 0)

@@ -122,6 +122,8 @@ _WORDS: Final[dict[State, str]] = {
 def _word(call: Call, now: Situation) -> str:
     if call is Call.ARM_FIRST:
         return "Not armed"
+    if call is Call.STOP:
+        return "Stop"
     if now.state in _MOVING and not now.armed:
         return f"{_WORDS[now.state]}, not armed"
     if now.aborted and now.state is State.SAVED:

@@ -65,6 +65,7 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
         default=platformdirs.user_data_path("rocking-test-recorder") / "spare",
         help="where to go on if the disk of OUT fails (best on another disk; default: %(default)s)",
     )
+    add("--no-results", action="store_true", help="do not analyse each test when it has been saved")
     add("--backup", type=Path, metavar="DIR", help="let the NI driver write TDMS files there as well")
     add("--speed", type=_speed, default="1", help="time factor of a simulated device or a replay, or max")
     add("--seed", type=int, help="seed of the simulated wall's noise and scatter")

@@ -65,6 +65,7 @@ class Process:
                 patience=Patience(reconnect_limit_s=options.reconnect_within),
                 truth=planned_truth(connection, rig, options),
                 speed=time_factor(options.speed),
+                make_results=not options.no_results,
             ),
             self._desk.publisher,
             finaliser,

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from daq_app.acquisition.closing.finaliser import Finaliser, Finished
+from daq_app.acquisition.closing.result_maker import ResultMaker
 from daq_app.acquisition.course.analyst import UNARMED, Analyst, Surrounding
 from daq_app.acquisition.course.header import make_header
 from daq_app.acquisition.course.plan_order import plan_of
@@ -45,6 +46,8 @@ from drivers import BackupRecorder, Driver, DriverError, Opened
 _T = TypeVar("_T")
 KEPT_BEFORE_S: Final = 60.0
 """How much lies before a release that nobody armed, in its run, as far as the rig's ring_s allows."""
+_RESULT_S: Final = 120.0
+"""How long the end of the process waits for results that are being made."""
 _DISK_BEHIND_S: Final = 1.5
 """When the disk is further behind than this, nobody is told to release."""
 
@@ -65,6 +68,8 @@ class SessionSettings:
     truth: dict[str, Any] | None = None
     """What a simulated wall is made from; goes into every run."""
     patience: Patience = field(default_factory=Patience)
+    make_results: bool = False
+    """Make the result of every test when it has been saved."""
     speed: float = 1.0
     """How much faster than real time the simulated device or the replay runs."""
 
@@ -106,6 +111,7 @@ class Session:
         )
         self.watchdog = Watchdog(self.recorder, settings.folder, self._say)
         self._wakefulness = Wakefulness()
+        self.results = ResultMaker(self._tell_result)
         self.opened: Opened | None = None
         self.error: DriverError | None = None
         """Why sampling ended, if it ended by a fault."""
@@ -119,6 +125,7 @@ class Session:
         """Start the threads, recover what an earlier session left behind, and begin to sample."""
         self.recorder.start()
         self.ring.start()
+        self.results.start()
         self.analyst.start()
         # Listed now: what this session will record is none of them.
         rings = [place for place in ring_sessions(self._settings.folder) if place != self.ring.place]
@@ -153,6 +160,7 @@ class Session:
         self.ring.close(keep=not self.analyst.upright)
         for job in self._saving:
             job.result()
+        self.results.close(_RESULT_S)
         self.analyst.inbox.put(None)
         self.analyst.join()
         self._wakefulness.close()
@@ -240,6 +248,21 @@ class Session:
             )
         )
         self.analyst.inbox.put(Saved(ok, text, finished.path))
+        released = recorded.end.outcome in ("complete", "timeout", "stopped")
+        if self._settings.make_results and ok and finished.path and released and recorded.header.kept is None:
+            self.results.make(Path(finished.path))
+
+    def _tell_result(self, run: Path, ok: bool, said: str) -> None:
+        """On the result maker's thread."""
+        text = f"The result of {run.stem.split('_')[0]} is saved" if ok else said
+        event = EventMessage(
+            kind="result",
+            sample=self.recorder.status.sample,
+            text=text,
+            data={"run": str(run), "ok": float(ok)},
+        )
+        if text:
+            self._say(event)
 
     def _tell_recovery(self, finished: Finished) -> None:
         """On the finaliser's thread."""
@@ -254,6 +277,8 @@ class Session:
                 data={"run": finished.path},
             )
         )
+        if self._settings.make_results and finished.ok and finished.path:
+            self.results.make(Path(finished.path))
 
     # -- requests --------------------------------------------------------------------------------
 

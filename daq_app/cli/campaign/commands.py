@@ -11,15 +11,16 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from daq_app.campaign.names import TestName
 from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.status import CampaignStatus, PlaceState
-from daq_app.campaign.verdicts import give_verdict
+from daq_app.campaign.verdicts import give_place, give_verdict
 from daq_app.cli.campaign.progress import DEFAULT_PLAN, open_plan
 from daq_app.cli.campaign.report import report
 from daq_app.cli.campaign.simulate import simulate
 from daq_app.cli.errors import reported
 from daq_app.config import ConfigError, Problem
-from daq_app.runfile import open_run
+from daq_app.runfile import RunFileError, open_run
 
 _PlanOption = Annotated[Path, typer.Option("--plan", help="Campaign file (TOML).")]
 
@@ -39,6 +40,7 @@ def register(app: typer.Typer) -> None:
         "verdict",
         epilog='Example: daq-app campaign verdict runs/FR1-L3-2.h5 bad --reason "hit a rope"',
     )(verdict)
+    group.command("assign", epilog="Example: daq-app campaign assign runs/unarmed_….h5 FR1-L3-2")(assign)
     group.command("report", epilog="Example: daq-app campaign report runs --out report")(report)
     group.command("simulate", epilog="Example: daq-app campaign simulate runs --r FR1=0.895 --seed 3")(
         simulate
@@ -147,3 +149,24 @@ def verdict(
             run_id, test = run.header.run_id, run.header.test
         give_verdict(run_file.parent, run_id, decision.value, reason)
         typer.echo(f"{test or run_id}: {decision.value}" + (f" ({reason})" if reason else ""))
+
+
+def assign(
+    run_file: Annotated[Path, typer.Argument(help="Run file (.h5).", metavar="RUN")],
+    test: Annotated[str, typer.Argument(help="The test that it is, for instance FR1-L3-2.", metavar="TEST")],
+) -> None:
+    """Give a release that nobody had armed its place in the campaign. The run itself is not changed."""
+    with reported():
+        try:
+            name = TestName.parse(test)
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from error
+        with open_run(run_file) as run:
+            run_id, armed_for = run.header.run_id, run.header.test
+            if run.header.kept is None:
+                raise RunFileError(
+                    f"{run_file.name} was armed for {armed_for}",
+                    advice="Only a release that nobody had armed is given a place afterwards.",
+                )
+        give_place(run_file.parent, run_id, str(name))
+        typer.echo(f"{run_file.name} counts as {name}")

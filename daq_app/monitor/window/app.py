@@ -5,8 +5,9 @@ from __future__ import annotations
 import gc
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
@@ -16,7 +17,7 @@ from daq_app.acquisition.viewers.curve import ViewerKeys
 from daq_app.acquisition.viewers.launcher import AcquisitionProcess
 from daq_app.acquisition.viewers.session_file import read_session_file
 from daq_app.campaign.plan import load_campaign
-from daq_app.config import ConfigError, load_rig, plan_tasks
+from daq_app.config import ConfigError, Problem, load_rig, plan_tasks
 from daq_app.monitor.data.link import Link
 from daq_app.monitor.pages.start_page import StartWindow
 from daq_app.monitor.widgets.settings import WindowSettings
@@ -44,12 +45,32 @@ def reach(rig: Path, out: Path, options: Sequence[str] = ()) -> tuple[str, str, 
     found = read_session_file(out)
     if found is not None:
         try:
-            with AcquisitionClient(found.address, found.token, topics=(), timeout_s=1.0):
+            with AcquisitionClient(found.address, found.token, topics=(), timeout_s=1.0) as client:
+                refuse_other_rig(rig, out, client.about)
                 return found.address, found.token, False
         except AcquisitionUnreachable:
             pass  # the file was left behind by a process that died
     process = AcquisitionProcess(["--rig", str(rig), "--out", str(out), *options])
     return process.address, process.token, True
+
+
+def refuse_other_rig(rig: Path, out: Path, about: Mapping[str, Any]) -> None:
+    """Raise `ConfigError` unless the acquisition that runs in `out` records the rig of the file `rig`."""
+    runs = str(about.get("rig_text", ""))
+    if runs == rig.read_text(encoding="utf-8"):
+        return
+    name, chosen = str(about.get("rig_name", "another rig")), load_rig(rig).name
+    wrong = (
+        f"{name} is being recorded into {out}, by a file that has been changed since"
+        if name == chosen
+        else f"{name} is being recorded into {out}, and {chosen} was chosen"
+    )
+    right = (
+        f"Close the window of {name} and let its recorder end, then open it again"
+        if name == chosen
+        else f"Choose another folder for {chosen}, for instance {out / chosen}: both can run side by side"
+    )
+    raise ConfigError([Problem(str(rig), "the folder of the runs", wrong, right)])
 
 
 def campaign_beside(rig: Path) -> Path | None:

@@ -1,0 +1,120 @@
+"""One voice: whatever the situation, no two words that the recorder says contradict each other."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from daq_app.acquisition.course.judgement import PULLED, Situation, judge
+from daq_app.acquisition.messages.published import Call, Judgement, State
+from daq_app.config.rig import Acquisition
+from daq_app.runfile import TestPlan
+
+ALPHA = 0.215
+SETTINGS = Acquisition()
+plans = st.builds(
+    TestPlan,
+    theta0_over_alpha=st.one_of(st.none(), st.floats(0.05, 0.95)),
+    tolerance=st.floats(0.005, 0.2),
+    side=st.sampled_from(["", "+x", "-x"]),
+)
+situations = st.builds(
+    Situation,
+    state=st.sampled_from(State),
+    sampling=st.booleans(),
+    armed=st.booleans(),
+    plan=plans,
+    rotation_rad=st.one_of(st.floats(-ALPHA, ALPHA), st.just(math.nan)),
+    alpha_rad=st.just(ALPHA),
+    steady=st.booleans(),
+    held_s=st.floats(0.0, 20.0),
+    disk_safe=st.booleans(),
+    aborted=st.booleans(),
+)
+
+
+def situation(**changed: object) -> Situation:
+    known: dict[str, object] = {
+        "state": State.ARMED,
+        "sampling": True,
+        "armed": True,
+        "plan": TestPlan(test="FR1-L3-1", theta0_over_alpha=0.35, tolerance=0.05),
+        "rotation_rad": 0.35 * ALPHA,
+        "alpha_rad": ALPHA,
+        "steady": True,
+        "held_s": 10.0,
+        "disk_safe": True,
+    }
+    return Situation(**{**known, **changed})  # type: ignore[arg-type]
+
+
+def says(judgement: Judgement) -> str:
+    return " ".join((judgement.word, judgement.do, judgement.gauge, judgement.alarm)).lower()
+
+
+@settings(max_examples=1500, deadline=None)
+@given(situations)
+def test_no_two_words_contradict_each_other(now: Situation) -> None:
+    judgement = judge(now, SETTINGS)
+    said = says(judgement)
+    ratio = abs(now.rotation_rad) / ALPHA
+    moving = now.state in (State.RELEASED, State.ROCKING)
+    told_to_release = said.replace("do not release", "").replace("this release", "")
+    told_to_release = told_to_release.replace("released", "").count("release") > 0
+    if moving:
+        assert not re.search(r"\b(pull|hold|ease)\b", said)
+        assert not judgement.gauge
+    if told_to_release:
+        assert now.armed and now.disk_safe and now.steady and not moving
+        assert now.held_s >= SETTINGS.hold_s
+        assert not judgement.alarm and "stop" not in said and "not armed" not in said
+        if now.plan.band is not None and math.isfinite(ratio):
+            assert now.plan.band[0] <= ratio <= now.plan.band[1]
+        assert now.plan.side_of(now.rotation_rad) or not math.isfinite(ratio)
+    if "stop" in said:
+        assert not re.search(r"\b(pull|hold|holding|on target)\b", said)
+    if "on target" in said:
+        assert now.armed and not judgement.alarm
+        assert "pull" not in said and "ease back" not in said
+    if not now.armed and now.sampling and now.state in (State.PREVIEWING, State.SAVED) and ratio >= PULLED:
+        assert judgement.alarm, "a wall in the air that nobody armed is always an alarm"
+    assert (judgement.target, judgement.low) == (
+        now.plan.theta0_over_alpha,
+        now.plan.band[0] if now.plan.band else None,
+    )
+
+
+def test_a_wall_held_on_its_target_long_enough_is_released() -> None:
+    assert judge(situation(), SETTINGS).call is Call.RELEASE
+    waiting = judge(situation(held_s=1.2), SETTINGS)
+    assert (waiting.call, waiting.do) == (Call.HOLD, "On target: hold still, 2 s more.")
+
+
+@pytest.mark.parametrize(
+    ("changed", "call"),
+    [
+        ({"rotation_rad": 0.2 * ALPHA}, Call.PULL),
+        ({"rotation_rad": 0.42 * ALPHA}, Call.EASE_BACK),
+        ({"rotation_rad": 0.7 * ALPHA}, Call.STOP),
+        ({"disk_safe": False}, Call.DO_NOT_RELEASE),
+        ({"armed": False, "state": State.SAVED}, Call.ARM_FIRST),
+        ({"armed": False, "state": State.SAVED, "rotation_rad": 0.0}, Call.LOOK),
+        (
+            {"plan": TestPlan(theta0_over_alpha=0.35, side="-x")},
+            Call.OTHER_SIDE,
+        ),
+        ({"state": State.ROCKING, "rotation_rad": 0.9 * ALPHA}, Call.KEEP_CLEAR),
+    ],
+)
+def test_the_most_urgent_condition_decides(changed: dict[str, object], call: Call) -> None:
+    assert judge(situation(**changed), SETTINGS).call is call
+
+
+def test_an_aborted_arming_is_not_called_saved() -> None:
+    judgement = judge(situation(armed=False, state=State.SAVED, aborted=True, rotation_rad=0.001), SETTINGS)
+    assert judgement.word == "Aborted"
+    assert judgement.tone != "good"

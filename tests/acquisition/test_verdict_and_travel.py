@@ -1,0 +1,97 @@
+"""What a run says of itself: as planned or to be repeated; and sensors at the end of their travel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from daq_app.acquisition.closing.derive import derive
+from daq_app.acquisition.course.channel_watch import ChannelWatch
+from daq_app.acquisition.course.overload import OverloadWatch
+from daq_app.config import Scaling
+from daq_app.runfile import CheckRecord, JournalWriter, RunHeader, TestPlan, read_journal
+from drivers import Block
+
+Judged = Callable[[TestPlan | None], dict[str, Any]]
+
+
+@pytest.fixture
+def judged(tmp_path: Path, rig: Any, rig_text: str, wall_test: Any) -> Judged:
+    """The verdict on the staged test, released at θ0/α = 0.35 towards +x, under a plan."""
+
+    def judge(plan: TestPlan | None) -> dict[str, Any]:
+        header = RunHeader(
+            run_id="x",
+            rig_text=rig_text,
+            channel_ids=rig.channel_ids,
+            reading_units=tuple(channel.reading_unit for channel in rig.channels),
+            rate_hz=4000.0,
+            test_plan=plan,
+        )
+        path = tmp_path / "x.journal"
+        with JournalWriter(path, header) as writer:
+            for start in range(0, wall_test.n_samples, 4000):
+                writer.append_block(start, wall_test.readings[:, start : start + 4000])
+            writer.append_event("released", wall_test.release_sample, "released")
+            writer.append_event("end", wall_test.n_samples, "done", {"outcome": "complete"})
+        with read_journal(path) as contents:
+            derived, said = derive(contents)
+        path.unlink()
+        assert derived is not None, said
+        return dict(derived.results["quality"])
+
+    return judge
+
+
+def test_a_test_as_planned_is_good(judged: Judged) -> None:
+    check = CheckRecord(verdict="go")
+    found = judged(TestPlan(test="FR1-L3-1", theta0_over_alpha=0.35, side="+x", check=check))
+    assert found["verdict"] == "good"
+    assert not any("planned" in reason or "checked" in reason for reason in found["reasons"])
+
+
+@pytest.mark.parametrize(
+    ("plan", "reason"),
+    [
+        (TestPlan(theta0_over_alpha=0.15), "planned 0.150 within 5 %"),
+        (TestPlan(theta0_over_alpha=0.38), "planned 0.380 within 5 %"),
+        (TestPlan(theta0_over_alpha=0.35, side="-x"), "planned towards -x"),
+    ],
+)
+def test_another_test_than_was_planned_is_repeated_with_the_reason(
+    judged: Judged, plan: TestPlan, reason: str
+) -> None:
+    found = judged(plan)
+    assert found["verdict"] == "repeat"
+    assert reason in found["reasons"][0]
+
+
+def test_a_check_that_was_overruled_or_left_out_is_noted(judged: Judged) -> None:
+    no_go = CheckRecord(verdict="no-go", summary="2 of 41 channels must be mended.", overruled=True)
+    found = judged(TestPlan(theta0_over_alpha=0.35, check=no_go))
+    assert found["verdict"] == "good"
+    assert any("in spite of" in reason and "2 of 41" in reason for reason in found["reasons"])
+    assert any("not checked" in reason for reason in judged(TestPlan())["reasons"])
+
+
+def test_a_sensor_at_the_end_of_its_travel_is_called_so_and_not_stuck(rig: Any) -> None:
+    ranges = {channel.id: channel.input_range_v for channel in rig.channels}
+    si = np.random.default_rng(1).normal(size=(len(rig.channels), 8000))
+    si *= np.array([channel.noise_si for channel in rig.channels])[:, None]
+    row = next(n for n, channel in enumerate(rig.channels) if channel.family == "lvdt")
+    si[row, 2000:] = rig.channels[row].range_si[1]
+    readings = Scaling.of(rig.channels).to_readings(si)
+    travel, watch = OverloadWatch(rig.channels, ranges), ChannelWatch(rig, 4000.0, ranges)
+    told, doubts = [], []
+    for first in range(0, 8000, 400):
+        block = Block(first, readings[:, first : first + 400], 0, 0)
+        travel.check(block)
+        told += travel.news()
+        doubts += watch.check(block, moving=False, at_end=travel.at_end)
+    assert [kind for kind, _ in told] == ["travel"]
+    assert told[0][1].startswith(f"End of travel: {rig.channels[row].id}")
+    assert not [doubt for doubt in doubts if doubt.name == "stuck"]
