@@ -10,11 +10,13 @@ import pytest
 from numpy.typing import NDArray
 
 from daq_app.config import Scaling
+from daq_app.gap.blind.making.detectability import detectability, total_noise
 from daq_app.gap.blind.making.make import Order, draw_case
 from daq_app.gap.blind.world.campaign import World
 from daq_app.gap.blind.world.laboratories.imperfections import IMPERFECTIONS
 from daq_app.gap.blind.world.laboratories.table import LABORATORIES, draw_sizes
 from daq_app.gap.blind.world.shock import Shock
+from daq_app.gap.blind.world.surroundings import Surroundings
 
 RATE_HZ = 4000.0
 HELD_S = 1.9
@@ -198,3 +200,13 @@ def test_a_slow_ring_and_a_twist_about_a_corner_are_among_what_wide_walls_hide(
     twisted = world("corner_twist")
     scene = twisted.course(0).scene(np.arange(-0.5, 6.0, 1e-3))
     assert abs(scene.yaw[-1]) > 0.0 and np.allclose(scene.yaw[scene.time_s < 0.0], 0.0)
+
+
+def test_an_effect_is_less_visible_where_a_laboratory_is_noisier(configs: Path, tmp_path: Path) -> None:
+    hidden = dataclasses.replace(order(configs, tmp_path, "rough"), hidden="wire_sag")
+    rough = draw_case(hidden, 1)[0]
+    own = dataclasses.replace(rough, surroundings=Surroundings())
+    assert np.median(total_noise(rough) / total_noise(own)) > 1.0
+    ratio = detectability(rough, rough.effects[0]) / detectability(own, own.effects[0])
+    noise = total_noise(rough) / total_noise(own)
+    assert (ratio < 1.0) == (noise[own.rig.channel_ids.index("WP-4")] > 1.0)

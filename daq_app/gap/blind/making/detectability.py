@@ -49,10 +49,10 @@ def detectability(world: World, effect: Drawn) -> float:
         runs=_extremes(world),
         surroundings=Surroundings(),
     )
-    square = 0.0
+    square, noise = 0.0, total_noise(world)
     for index in range(len(alone.runs)):
         course = alone.course(index, (0, 30 * (len(world.runs) - 1))[index])
-        square += _in_channels(alone, alone.runs[index], course)
+        square += _in_channels(alone, alone.runs[index], course, noise)
         if not effect.targets:
             square += _in_swings(course.motion, world.wall)
     return math.sqrt(square * len(world.runs) / len(alone.runs))
@@ -126,7 +126,17 @@ def _block_with_slopes(peak: float, wall: Wall) -> tuple[float, float, tuple[flo
     return time, speed, slopes
 
 
-def _in_channels(alone: World, run: PlannedRun, course: Course) -> float:
+def total_noise(world: World) -> FloatArray:
+    """Rms noise of each channel (n,), SI: white, slow and 1/f noise, a walking zero, pick-up."""
+    around = world.surroundings
+    if around.installation is None:
+        return np.array([channel.noise_si for channel in world.rig.channels])
+    parts = [1.0, *(around.sizes.get(name, 0.0) for name in ("slow_noise", "pink_noise", "zero_walk"))]
+    mains = around.installation.mains_amplitude / math.sqrt(2.0)
+    return np.asarray(around.installation.noise_si * np.hypot(math.hypot(*parts), mains))
+
+
+def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatArray) -> float:
     """Squared distance of the channels with and without the effect, for one and the same motion."""
     time_s = np.arange(-0.5, course.motion.rest_s + 0.5, 1.0 / _RATE_HZ)
     place = Place(run.campaign_s + 600.0, abs(run.theta0))
@@ -140,12 +150,12 @@ def _in_channels(alone: World, run: PlannedRun, course: Course) -> float:
         if plain.pivot_dd is not scene.pivot_dd and channel.family == "accelerometer":
             continue  # pulses of impacts that take their time are not those of the plain twin
         bench = Bench(channel, scene, _RATE_HZ, place.campaign_s, place.largest_rad, rng)
-        noise = channel.noise_si * rng.standard_normal(time_s.size)
+        noise = noise_si[row] * rng.standard_normal(time_s.size)
         signal = with_effect[row] + noise
         for fault in alone.faults:
             if fault.name in ELECTRONICS and channel.id in fault.targets:
                 signal = ELECTRONICS[fault.name](signal, fault.parameters, bench)
-        total += _distance(signal - noise, without[row], channel.noise_si)
+        total += _distance(signal - noise, without[row], noise_si[row])
     return total
 
 
