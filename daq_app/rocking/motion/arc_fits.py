@@ -78,10 +78,11 @@ def design(x: Floats, kappa: Floats) -> Floats:
     return table
 
 
-def fit_stack(x: Floats, y: Floats, present: Bools, kappa: Floats) -> ArcFits:
+def fit_stack(x: Floats, y: Floats, present: Bools, kappa: Floats, noise_rad: Floats) -> ArcFits:
     """The candidate with the smallest BIC for each arc; the stiffest unless another is clearly better.
 
-    `x`, `y` (arcs, points) with `present` where there is a point: an absent one has x = y = 0.
+    `x`, `y` (arcs, points) with `present` where there is a point: an absent one has x = y = 0. `noise_rad`
+    (arcs,) is the least that a point is uncertain by: noise that is slower than a point leaves small residuals.
     """
     count = present.sum(axis=1)
     table = design(x, kappa) * present[..., None]
@@ -119,7 +120,7 @@ def fit_stack(x: Floats, y: Floats, present: Bools, kappa: Floats) -> ArcFits:
         covariance[np.ix_(own, columns, columns)] = alone[1][among]
     square = squares[arcs, best]
     widths = np.array([STIFF + len(powers) for powers in POWERS])[best]
-    covariance *= (square / (count - widths))[:, None, None]
+    covariance *= np.maximum(square / (count - widths), noise_rad**2)[:, None, None]
     return ArcFits(kappa, coefficients, covariance, best, np.sqrt(square / count))
 
 

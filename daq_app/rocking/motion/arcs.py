@@ -103,8 +103,12 @@ def fit_arcs(
     p_rad_s: float,
     alpha_rad: float,
     zero_sigma_rad: float = 2e-5,
+    slow_noise_rad: float = 0.0,
 ) -> list[Arc | None]:
-    """Fit consecutive half-cycles, as `fit_arc` each: `bounds_s` (arcs + 1,) are where they start and end."""
+    """Fit consecutive half-cycles, as `fit_arc` each: `bounds_s` (arcs + 1,) are where they start and end.
+
+    `slow_noise_rad`: rms of one sample of the white noise whose long means scatter as the recording's do.
+    """
     bounds = np.asarray(bounds_s, dtype=np.float64)
     start, end = bounds[:-1], bounds[1:]
     index = first_index + np.arange(start.size)
@@ -123,7 +127,8 @@ def fit_arcs(
     if not kept.size:
         return found
     left = np.where(index == 0, first, start)[kept]
-    stack = _Stack(index[kept], start[kept], (left + end[kept]) / 2.0, (end[kept] - left) / 2.0)
+    noise = slow_noise_rad / np.sqrt(size[kept])
+    stack = _Stack(index[kept], start[kept], (left + end[kept]) / 2.0, (end[kept] - left) / 2.0, noise)
     arcs = stack.fitted(t, y, present, p_rad_s, alpha_rad, zero_sigma_rad)
     for place, arc in zip(kept.tolist(), arcs, strict=True):
         found[place] = arc
@@ -138,6 +143,8 @@ class _Stack:
     start_s: Floats
     centre_s: Floats
     half_s: Floats
+    noise_rad: Floats
+    """Least uncertainty of a point."""
 
     def fitted(
         self, t: Floats, y: Floats, present: Bools, p_rad_s: float, alpha_rad: float, zero_sigma_rad: float
@@ -147,7 +154,7 @@ class _Stack:
         y = np.where(present, y, 0.0)
         points = present.sum(axis=1)
         middle = np.maximum(alpha_rad - np.abs(y).sum(axis=1) / points, 0.0)
-        fits = fit_stack(x, y, present, p_rad_s * np.sqrt(np.cos(middle)) * self.half_s)
+        fits = fit_stack(x, y, present, p_rad_s * np.sqrt(np.cos(middle)) * self.half_s, self.noise_rad)
         ending = crossings(fits, 1.0, self.half_s, zero_sigma_rad)
         starting = crossings(fits, -1.0, self.half_s, zero_sigma_rad)
         peak = extrema(fits)

@@ -29,6 +29,8 @@ class MotionSettings:
     p_rad_s: float
     alpha_rad: float
     zero_sigma_rad: float = ZERO_SIGMA_RAD
+    slow_noise_rad: float = 0.0
+    """rms of one sample of the white noise whose long means scatter as the rotation's do; 0: not known."""
 
 
 @dataclass
@@ -82,6 +84,7 @@ class MotionTrack:
             p_rad_s=self.settings.p_rad_s,
             alpha_rad=self.settings.alpha_rad,
             zero_sigma_rad=self.settings.zero_sigma_rad,
+            slow_noise_rad=self.settings.slow_noise_rad,
         )
         self.crossings_s.extend(crossings_s)
         self.arcs.extend(arcs)
@@ -92,11 +95,26 @@ class MotionTrack:
         """Impact times: both neighbouring half-cycles' zero crossings, weighted; else as detected."""
         return [self._impact(index) for index in range(len(self.crossings_s))]
 
-    def _impact(self, index: int) -> float:
+    @property
+    def sigma_impacts_s(self) -> list[float]:
+        """Standard uncertainties of `impacts_s`; NaN where neither half-cycle could be fitted.
+
+        Both crossings share the error of the zero: their mean is no better known than the better of them.
+        """
+        return [
+            min((sigma for _, sigma in self._crossings(index)), default=math.nan)
+            for index in range(len(self.crossings_s))
+        ]
+
+    def _crossings(self, index: int) -> list[tuple[float, float]]:
+        """(time, sigma) of impact `index` as the half-cycles before and after it show it."""
         before = self.arcs[index]
         after = self.arcs[index + 1] if index + 1 < len(self.arcs) else None
         known = [(arc.end_s, arc.sigma_end_s) for arc in (before,) if arc is not None]
-        known += [(arc.start_s, arc.sigma_start_s) for arc in (after,) if arc is not None]
+        return known + [(arc.start_s, arc.sigma_start_s) for arc in (after,) if arc is not None]
+
+    def _impact(self, index: int) -> float:
+        known = self._crossings(index)
         if not known:
             return self.crossings_s[index]
         weights = [1.0 / max(sigma, 1e-9) ** 2 for _, sigma in known]

@@ -1,0 +1,118 @@
+"""Simulated tests of laboratories that differ: calibration, noise, hum, zero, body and position, all drawn.
+
+The analysis is given the nominal rig; the wall and its sensors are those of another rig, drawn about it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from daq_app.config import Rig, Scaling, plan_tasks
+from daq_app.config.rig import Channel
+from daq_app.rocking import TestRecord
+from sim_hardware.direct import synthesise_test
+
+Floats = NDArray[np.float64]
+
+_BODY_SHARE = 0.01
+"""Relative standard deviation of α, R and I of the wall about the survey's."""
+_POSITION_SIGMA_M = 0.001
+"""Standard deviation of each coordinate of a sensor about the drawing."""
+_SLOW_SAMPLES = 20
+"""Time constant of the slow part of the noise, samples."""
+
+
+@dataclass(frozen=True)
+class LaboratoryTest:
+    """One test: SI values (channels, n) in rig order, as the analysis gets them, and the truth."""
+
+    rig: Rig
+    rate_hz: float
+    si: Floats
+    offsets_s: dict[str, float]
+    truth: dict[str, Any]
+    """`SynthesisedTest.truth`, times since power-on."""
+
+    def record(self) -> TestRecord:
+        """The recording without a tare, as an imported run has it."""
+        return TestRecord.from_array(
+            self.rig, self.rate_hz, self.si, time_offsets_s=self.offsets_s, tared=False, label="study"
+        )
+
+    def rows(self, family: str) -> list[int]:
+        """Rows of the channels of a family that measure the rocking."""
+        return [
+            row
+            for row, channel in enumerate(self.rig.channels)
+            if channel.family == family and not (family == "tiltmeter" and channel.axis == "y")
+        ]
+
+
+def draw_test(nominal: Rig, seed: int, *, ordinary: bool = True) -> LaboratoryTest:
+    """A test of a laboratory drawn by `seed`; without `ordinary` its sensors are perfect but for noise."""
+    rng = np.random.default_rng(seed)
+    rig = _drawn_rig(nominal, rng) if ordinary else nominal
+    timing = {"upright_s": 1.0, "pull_s": 1.0, "hold_s": float(rng.uniform(4.0, 6.0))}
+    scatter = float(rng.uniform(0.001, 0.006)) if ordinary else 0.0
+    rig = rig.model_copy(
+        update={"simulation": rig.simulation.model_copy(update=timing | {"restitution_scatter": scatter})}
+    )
+    plan = plan_tasks(rig)
+    level = float(rng.uniform(0.15, 0.4)) * float(rng.choice([-1.0, 1.0]))
+    test = synthesise_test(rig, plan, level, seed, restitution=float(rng.uniform(0.82, 0.94)))
+    upright = test.readings[:, : test.upright_samples].mean(axis=1)
+    zeros = {c.id: float(mean - c.offset) for c, mean in zip(rig.channels, upright, strict=True)}
+    si = Scaling.of(rig.channels, zeros).to_si(test.readings)
+    if ordinary:
+        _spoil(si, rig, test.rate_hz, rng)
+    offsets = {c.channel.id: c.time_offset_s for task in plan.tasks for c in task.channels}
+    return LaboratoryTest(nominal, test.rate_hz, si, offsets, test.truth)
+
+
+def _drawn_rig(rig: Rig, rng: np.random.Generator) -> Rig:
+    specimen = rig.specimen
+    share = 1.0 + _BODY_SHARE * rng.standard_normal(3)
+    body = specimen.model_copy(
+        update={
+            "alpha0_rad": specimen.alpha0_rad * share[0],
+            "r0_m": specimen.r0_m * share[1],
+            "rotational_inertia_kg_m2": specimen.rotational_inertia_kg_m2 * share[2] * share[1] ** 2,
+        }
+    )
+    noise = {family: 2.0 ** rng.uniform(-1.0, 1.0) for family in {c.family for c in rig.channels}}
+    channels = tuple(_drawn_channel(channel, noise[channel.family], rng) for channel in rig.channels)
+    return rig.model_copy(update={"specimen": body, "channels": channels})
+
+
+def _drawn_channel(channel: Channel, noise: float, rng: np.random.Generator) -> Channel:
+    def moved(place: tuple[float, float, float]) -> tuple[float, ...]:
+        return tuple((np.asarray(place) + rng.normal(0.0, _POSITION_SIGMA_M, 3)).tolist())
+
+    changes: dict[str, Any] = {"noise_si": channel.noise_si * noise, "position_m": moved(channel.position_m)}
+    if channel.anchor_m is not None:
+        changes["anchor_m"] = moved(channel.anchor_m)
+    return channel.model_copy(update=changes)
+
+
+def _spoil(si: Floats, rig: Rig, rate_hz: float, rng: np.random.Generator) -> None:
+    """Calibration, slow noise, weak hum and a walking zero, in place."""
+    n = si.shape[1]
+    time = np.arange(n) / rate_hz
+    calibration = float(rng.uniform(0.001, 0.003))
+    mains_hz = 50.0 + float(rng.normal(0.0, 0.03))
+    keep = math.exp(-1.0 / _SLOW_SAMPLES)
+    for row, channel in enumerate(rig.channels):
+        noise = channel.noise_si
+        si[row] *= 1.0 + rng.normal(0.0, calibration)
+        slow = lfilter([math.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(n))
+        si[row] += 0.3 * noise * slow
+        hum = noise * float(rng.uniform(0.05, 0.5))
+        si[row] += hum * np.sin(2.0 * np.pi * (mains_hz * time + rng.uniform()))
+        walk = np.cumsum(rng.standard_normal(n)) / math.sqrt(n)
+        si[row] += 0.15 * noise * walk + rng.normal(0.0, 0.1 * noise)
