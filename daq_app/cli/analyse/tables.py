@@ -11,12 +11,23 @@ from rich.table import Table
 from rich.text import Text
 
 from daq_app.config.wording import plus_minus
-from daq_app.rocking.analysis.results import ZERO_WORDS
 
 if TYPE_CHECKING:
     from daq_app.rocking.analysis.results import Bias, TestAnalysis, ValueWithSigma
     from daq_app.rocking.estimators import RestitutionEstimate
+    from daq_app.rocking.families.verdict import RVerdict
 
+_ZERO_WORDS = {
+    "tare": "the tare before the test",
+    "rest": "the rest after the test",
+    "certificates": "the offsets of the certificates (no tare, and no other zero was taken)",
+}
+_TRUST_WORDS = {
+    "good": "good, everything that was recorded agrees",
+    "remarks": "with remarks, see the warnings",
+    "doubtful": "DOUBTFUL, what it rests on disagrees",
+}
+_TRUST_STYLES = {"good": "bold green", "remarks": "bold yellow", "doubtful": "bold red"}
 _METHODS = {
     "eav": "EAV (4.4), one-sided fits",
     "crt": "CRT (4.5)",
@@ -28,6 +39,8 @@ _METHODS = {
     "crt_best": "CRT, wires and LVDTs fused",
     "eav_lvdts": "EAV, LVDTs alone",
     "crt_lvdts": "CRT, LVDTs alone",
+    "eav_wires": "EAV, wires alone",
+    "crt_wires": "CRT, wires alone",
 }
 
 
@@ -35,7 +48,9 @@ def analysis_tables(analysis: TestAnalysis) -> Iterator[RenderableType]:
     """Heading, θ0, half-cycles, r by method, joint and residuals, notes."""
     yield Text(f"{analysis.label or 'run'}: {_headline(analysis)}", style="bold")
     if analysis.found:
-        yield Text(f"Zero of every sensor: {ZERO_WORDS[analysis.zero]}.")
+        yield Text(f"Zero of every sensor: {_ZERO_WORDS[analysis.zero]}.")
+        yield Text(verdict_sentence(analysis.verdict), style=_TRUST_STYLES[analysis.verdict.trust])
+        yield _families_table(analysis)
         yield _theta0_table(analysis)
         yield _cycle_table(analysis)
         yield Text(
@@ -46,6 +61,43 @@ def analysis_tables(analysis: TestAnalysis) -> Iterator[RenderableType]:
     for note in analysis.notes:
         style = "bold yellow" if note.severity == "warning" else "dim"
         yield Text(f"{note.severity}: {note.text}", style=style)
+
+
+def verdict_sentence(verdict: RVerdict) -> str:
+    """r, its interval, what it rests on and how far it is to be believed."""
+    if verdict.r is None or verdict.interval95 is None:
+        return "r: not known, no two half-cycles could be compared"
+    low, high = verdict.interval95
+    left_out = f", left out: {', '.join(verdict.left_out)}" if verdict.left_out else ""
+    return (
+        f"r = {verdict.r:.4f} (95 %: {low:.4f} … {high:.4f}) from {', '.join(verdict.used)}{left_out}: "
+        f"{_TRUST_WORDS[verdict.trust]}"
+    )
+
+
+def _families_table(analysis: TestAnalysis) -> Table:
+    table = _table(
+        "What each family says", "family", "θ0 mrad", "EAV", "CRT", "α rad", "p rad/s", "impacts", "late ms",
+        "remarks",
+    )  # fmt: skip
+    for view in analysis.families:
+        table.add_row(
+            view.family + (" *" if view.used else ""),
+            _value(view.theta0_rad, view.sigma_theta0_rad, 3, 1e3),
+            _value(view.eav, view.sigma_eav, 4),
+            _value(view.crt, view.sigma_crt, 4),
+            _value(view.alpha_rad, view.sigma_alpha_rad, 4),
+            _value(view.p_rad_s, view.sigma_p_rad_s, 4),
+            str(view.impacts or "–"),
+            _number(view.late_s, 2, 1e3),
+            ", ".join(view.remarks),
+        )
+    return table
+
+
+def _value(value: float, sigma: float, digits: int, scale: float = 1.0) -> str:
+    error = f" ± {sigma * scale:.{digits}f}" if math.isfinite(sigma) else ""
+    return _number(value, digits, scale) + error
 
 
 def _headline(analysis: TestAnalysis) -> str:

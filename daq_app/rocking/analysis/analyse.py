@@ -11,17 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.rocking.analysis.bias import BiasSettings, method_bias
-from daq_app.rocking.analysis.fusion import Fused, best_value, level
+from daq_app.rocking.analysis.families_table import families_of, verdict_of
+from daq_app.rocking.analysis.fusion import Fused
+from daq_app.rocking.analysis.half_cycles import half_cycles_of
+from daq_app.rocking.analysis.instruments import Instruments, prepare
 from daq_app.rocking.analysis.joint_summary import summarise_joint
 from daq_app.rocking.analysis.quality import quality_notes
+from daq_app.rocking.analysis.release_rotation import levels_apart, theta0_by_family
 from daq_app.rocking.analysis.residuals import residuals_after
-from daq_app.rocking.analysis.results import Bias, HalfCycle, Series, TestAnalysis, Theory, ValueWithSigma
-from daq_app.rocking.analysis.signals import Signals, TestTimes, find_phases, quiet_end, read_signals
-from daq_app.rocking.estimators import RestitutionEstimate, eav_series, estimate_all
+from daq_app.rocking.analysis.results import Bias, Series, TestAnalysis, Theory
+from daq_app.rocking.analysis.signals import Signals
+from daq_app.rocking.analysis.tracks import decay_series, estimates_of, follow_families
+from daq_app.rocking.estimators import RestitutionEstimate
+from daq_app.rocking.families.verdict import judge
 from daq_app.rocking.geometry.joint import JointMotion
-from daq_app.rocking.motion.filtered_peaks import corrected_peaks, filtered_peaks
+from daq_app.rocking.motion.filtered_peaks import filtered_peaks
 from daq_app.rocking.motion.motion_fit import MotionFit, fit_motion
-from daq_app.rocking.motion.swings import MotionSettings, MotionTrack
+from daq_app.rocking.motion.swings import MotionTrack
 from daq_app.rocking.motion.transients import Onset, find_onsets
 from daq_app.rocking.motion.velocity import VelocityFilter
 from daq_app.rocking.record import TestRecord
@@ -29,6 +35,8 @@ from daq_app.rocking.theory import classic as theory
 from daq_app.rocking.theory.block import RigidBlock
 
 Floats = NDArray[np.float64]
+
+_NO_ESTIMATE = RestitutionEstimate("none", ())
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,50 +66,33 @@ def analyse_record(record: TestRecord, options: AnalysisOptions | None = None) -
     cutoff = options.velocity_cutoff_hz or record.rig.acquisition.velocity_cutoff_hz
     velocity_filter = VelocityFilter(record.rate_hz, cutoff)
     from_rest = not record.tared if options.zero_at_rest is None else options.zero_at_rest
-    signals, times = _zeroed_at_rest(record) if from_rest else _as_recorded(record)
+    instruments = prepare(record, from_rest=from_rest)
+    signals, times = instruments.signals, instruments.times
     velocity = velocity_filter.velocity(signals.bridged_rad)
     if times.release_s is None or not times.impacts_s:
-        return _nothing_found(record, signals, times, velocity, velocity_filter, options)
-    return _analyse(record, signals, times, velocity, velocity_filter, options)
-
-
-def _as_recorded(record: TestRecord) -> tuple[Signals, TestTimes]:
-    signals = read_signals(record)
-    return signals, find_phases(signals)
-
-
-def _zeroed_at_rest(record: TestRecord) -> tuple[Signals, TestTimes]:
-    """With every sensor's zero from the rest after the test; as recorded where no rest shows a test.
-
-    Offsets of a run without a tare may be so large that no hold is recognised, so the end of the record
-    serves as the first guess of the rest.
-    """
-    signals = read_signals(record)
-    end = quiet_end(signals)
-    times = find_phases(signals if end is None else signals.zeroed(end))
-    if times.rest is None:
-        times = find_phases(signals)
-    if times.rest is None:
-        return signals, times
-    signals = signals.zeroed(times.rest)
-    return signals, find_phases(signals)
+        return _nothing_found(record, instruments, velocity, velocity_filter, options)
+    return _analyse(record, instruments, velocity, velocity_filter, options)
 
 
 def _analyse(
     record: TestRecord,
-    signals: Signals,
-    times: TestTimes,
+    instruments: Instruments,
     velocity: Floats,
     velocity_filter: VelocityFilter,
     options: AnalysisOptions,
 ) -> TestAnalysis:
-    track = track_motion(signals.settings, times, signals.time_s, signals.rotation_rad)
+    signals, times = instruments.signals, instruments.times
+    slow = any(finding.kind == "slow" for finding in instruments.findings)
+    tracks = follow_families(signals, times, fuse=not slow)
+    track = tracks.lead
     side = 1 if track.theta0_rad > 0 else -1
     peaks = filtered_peaks(signals.time_s, velocity, track.impacts_s)
-    estimates = _estimates(signals, times, track, peaks, velocity_filter)
-    onsets = _onsets(record, signals, track)
+    series = decay_series(signals, tracks, peaks, velocity_filter)
+    estimates = estimates_of(series)
+    onsets = _onsets(instruments.record, signals, track)
     fit = _fit(signals, track, estimates) if options.fit else None
-    theta0 = _theta0(signals, track)
+    theta0 = theta0_by_family(signals, track, instruments.gain_sigma)
+    verdict, findings = verdict_of(instruments, tracks, series, estimates, levels_apart(signals, theta0))
     headline = theta0.get("tiltmeters", theta0["wires"])
     bias: Mapping[str, Bias] = {}
     if options.bias_runs > 0:
@@ -119,7 +110,7 @@ def _analyse(
                 seed=zlib.crc32(record.label.encode()) if options.seed is None else options.seed,
             )
         )
-    joint = summarise_joint(record, signals, track) if signals.joint is not None else None
+    joint = summarise_joint(instruments.record, signals, track) if signals.joint is not None else None
     residuals = residuals_after(signals, times.rest)
     analysis = TestAnalysis(
         label=record.label,
@@ -131,7 +122,10 @@ def _analyse(
         side=side,
         release_s=track.release.time_s,
         rest_s=math.nan if times.rest_s is None else times.rest_s,
-        half_cycles=_half_cycles(signals.settings, track, peaks, onsets),
+        half_cycles=half_cycles_of(track, peaks, onsets, instruments.gain_sigma),
+        verdict=verdict,
+        families=families_of(record, instruments, tracks, estimates, theta0, onsets),
+        findings=findings,
         estimates=estimates,
         fit=fit,
         bias=bias,
@@ -144,20 +138,7 @@ def _analyse(
         notes=(),
         series=_series(signals, velocity) if options.keep_series else None,
     )
-    return replace(analysis, notes=quality_notes(record, signals, times, track, analysis, onsets))
-
-
-def track_motion(
-    settings: MotionSettings, times: TestTimes, time_s: Floats, rotation_rad: Floats
-) -> MotionTrack:
-    """Half-cycles of a whole record, one after the other as online."""
-    assert times.release_s is not None
-    first, last = np.searchsorted(time_s, [times.release_s - 1.0, times.impacts_s[0] + 1e-3])
-    track = MotionTrack.begin(
-        settings, time_s[first:last], rotation_rad[first:last], times.release_s, times.hold_rad
-    )
-    track.add_impacts(times.impacts_s, time_s, rotation_rad)
-    return track
+    return replace(analysis, notes=quality_notes(record, signals, times, track, analysis, onsets, findings))
 
 
 def _onsets(record: TestRecord, signals: Signals, track: MotionTrack) -> list[Onset | None]:
@@ -169,32 +150,6 @@ def _onsets(record: TestRecord, signals: Signals, track: MotionTrack) -> list[On
 
     offsets = [record.offset_s(channel_id) for channel_id in ids]
     return find_onsets(read, record.n_samples, record.rate_hz, signals.first_s, offsets, track.impacts_s)
-
-
-def _estimates(
-    signals: Signals, times: TestTimes, track: MotionTrack, peaks: Floats, velocity_filter: VelocityFilter
-) -> dict[str, RestitutionEstimate]:
-    """Every method; the keys are those of `TestAnalysis.estimates`."""
-    p, alpha = signals.settings.p_rad_s, signals.settings.alpha_rad
-    noise = np.full(peaks.size, velocity_filter.noise_rad_s(signals.noise_rad))
-    corrected = corrected_peaks(peaks, velocity_filter, p, alpha)
-    series = {
-        "eav": track.eav_series(),
-        "crt": track.crt_series(),
-        "crt_exact": track.crt_exact_series(),
-        "eav_filtered": eav_series(peaks, noise, method="EAV, filtered peaks (biased low)"),
-        "eav_filtered_corrected": eav_series(
-            corrected, noise, method="EAV, filtered peaks, amplitude loss corrected"
-        ),
-    }
-    if signals.fused is not None and signals.joint is not None:
-        others = {"best": signals.fused.rotation_rad, "lvdts": signals.joint.rotation_rad}
-        for name, rotation in others.items():
-            if np.isfinite(rotation).mean() > 0.9:
-                other = track_motion(signals.settings, times, signals.time_s, rotation)
-                series[f"eav_{name}"] = other.eav_series(f"EAV, rotation from {name}")
-                series[f"crt_{name}"] = other.crt_series(f"CRT, rotation from {name}")
-    return dict(zip(series, estimate_all(list(series.values())), strict=True))
 
 
 def _typical_r(estimates: Mapping[str, RestitutionEstimate]) -> float:
@@ -219,65 +174,6 @@ def _fit(
         p_rad_s=signals.settings.p_rad_s,
         alpha_rad=signals.settings.alpha_rad,
     )
-
-
-def _theta0(signals: Signals, track: MotionTrack) -> dict[str, ValueWithSigma]:
-    """θ0 by family over the last half second of the hold (slow tiltmeters have settled), and the best."""
-    start, stop = np.searchsorted(signals.time_s, [track.release.time_s - 0.5, track.release.time_s - 0.02])
-    scale = abs(track.theta0_rad)
-    found: dict[str, ValueWithSigma] = {}
-    if signals.tilts_rad.shape[0]:
-        value = signals.geometry.tilt(signals.tilts_rad[:, start:stop], track.theta0_rad)
-        noise = signals.geometry.tilt_noise_rad / math.sqrt(
-            max(signals.tilts_rad.shape[0] * (stop - start), 1)
-        )
-        spread = level(np.full(10, value), scale, noise)
-        if math.isfinite(value):
-            found["tiltmeters"] = spread
-    found["wires"] = level(np.array([track.theta0_rad] * 10), scale, track.sigma_theta0_rad)
-    if signals.joint is not None:
-        lvdts = level(signals.joint.rotation_rad[start:stop], scale, signals.lvdt_noise_rad)
-        if math.isfinite(lvdts.value):
-            found["lvdts"] = lvdts
-    found["best"] = best_value(found)
-    return found
-
-
-def _half_cycles(
-    settings: MotionSettings, track: MotionTrack, peaks: Floats, onsets: list[Onset | None]
-) -> tuple[HalfCycle, ...]:
-    impacts = track.impacts_s
-    starts = [track.release.time_s, *impacts]
-    before, after = [math.nan, *track.speeds_before_rad_s], [math.nan, *track.speeds_after_rad_s]
-    sigma_before = [math.nan, *track.sigma_speeds_before_rad_s]
-    sigma_after = [math.nan, *track.sigma_speeds_after_rad_s]
-    filtered = [math.nan, *peaks.tolist()]
-    heard = [None, *onsets]
-    peak, sigma = [*track.peaks_rad, math.nan], [*track.sigma_peaks_rad, math.nan]
-    cycles = []
-    for n, start in enumerate(starts):
-        phi = abs(peak[n]) / settings.alpha_rad
-        theoretical = float(theory.period(phi, settings.p_rad_s)) if 0.0 <= phi < 1.0 else math.nan
-        shock = heard[n]
-        cycles.append(
-            HalfCycle(
-                n=n,
-                start_s=start,
-                duration_s=starts[n + 1] - start if n + 1 < len(starts) else math.nan,
-                peak_rad=peak[n],
-                sigma_peak_rad=sigma[n],
-                phi=phi,
-                speed_before_rad_s=before[n],
-                sigma_speed_before_rad_s=sigma_before[n],
-                speed_after_rad_s=after[n],
-                sigma_speed_after_rad_s=sigma_after[n],
-                speed_filtered_rad_s=filtered[n],
-                jump_ratio=abs(after[n] / before[n]) if before[n] else math.nan,
-                accelerometer_s=math.nan if shock is None else shock.time_s,
-                period_theory_s=theoretical / (4.0 if n == 0 else 2.0),
-            )
-        )
-    return tuple(cycles)
 
 
 def _theory(record: TestRecord, theta0: float, r: float | None, impacts: int) -> Theory:
@@ -318,12 +214,12 @@ def _series(signals: Signals, velocity: Floats) -> Series:
 
 def _nothing_found(
     record: TestRecord,
-    signals: Signals,
-    times: TestTimes,
+    instruments: Instruments,
     velocity: Floats,
     velocity_filter: VelocityFilter,
     options: AnalysisOptions,
 ) -> TestAnalysis:
+    signals, times = instruments.signals, instruments.times
     hold = times.hold_rad
     return TestAnalysis(
         label=record.label,
@@ -336,6 +232,9 @@ def _nothing_found(
         release_s=math.nan if times.release_s is None else times.release_s,
         rest_s=math.nan,
         half_cycles=(),
+        verdict=judge(_NO_ESTIMATE, _NO_ESTIMATE, "wires", instruments.findings, []),
+        families=(),
+        findings=instruments.findings,
         estimates={},
         fit=None,
         bias={},
@@ -345,6 +244,6 @@ def _nothing_found(
         noise_rad=signals.noise_rad,
         zero=signals.zero,
         filter_statement=velocity_filter.statement,
-        notes=quality_notes(record, signals, times, None, None, []),
+        notes=quality_notes(record, signals, times, None, None, [], instruments.findings),
         series=_series(signals, velocity) if options.keep_series else None,
     )

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from daq_app.config.rig import Family
 from daq_app.rocking.analysis.results import QualityNote, TestAnalysis
 from daq_app.rocking.analysis.signals import Signals, TestTimes
+from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.motion.swings import MotionTrack
 from daq_app.rocking.motion.transients import Onset
 from daq_app.rocking.record import TestRecord
 
 _THETA0_DISAGREEMENT = 0.005
-_GAIN_TOLERANCE = 0.01
 _REST_TOLERANCE_RAD = 3e-4
 _SLIDING_TOLERANCE_M = 5e-4
 _CLEAN_RELEASE_SHARE = 0.01
@@ -27,9 +28,11 @@ def quality_notes(
     track: MotionTrack | None,
     analysis: TestAnalysis | None,
     onsets: list[Onset | None],
+    findings: Sequence[FamilyFinding],
 ) -> tuple[QualityNote, ...]:
     """All notes, warnings first."""
-    notes = [*_sensors(record, signals), *_course(times), _alignment(record)]
+    notes = [QualityNote(finding.severity, finding.text) for finding in findings]
+    notes += [*_sensors(record, signals), *_course(times), _alignment(record)]
     if track is not None and analysis is not None:
         notes += [*_agreement(signals, analysis), *_motion(times, track, analysis), *_shocks(record, onsets)]
     return tuple(sorted(notes, key=lambda note: note.severity != "warning"))
@@ -56,8 +59,7 @@ def _sensors(record: TestRecord, signals: Signals) -> list[QualityNote]:
     bad = 1.0 - float(np.isfinite(signals.rotation_rad).mean())
     if bad > 0:
         notes.append(_warn(f"{bad:.2%} of the record has no rotation (gaps); half-cycles there are left out"))
-    ids = record.family("wire")
-    for name, values in zip(ids, signals.wires_m, strict=True):
+    for name, values in zip(signals.geometry.wires.ids, signals.wires_m, strict=True):
         low, high = record.rig.channel(name).range_si
         edge = 0.002 * (high - low)
         if np.any((values <= low + edge) | (values >= high - edge)):
@@ -140,13 +142,6 @@ def _agreement(signals: Signals, analysis: TestAnalysis) -> list[QualityNote]:
     if spread > _THETA0_DISAGREEMENT * alpha:
         told = ", ".join(f"{name} {value * 1e3:.2f}" for name, value in values.items())
         notes.append(_warn(f"the families disagree on θ0 by {spread / alpha:.1%} of α (mrad: {told})"))
-    if signals.fused is not None and abs(signals.fused.gain - 1.0) > _GAIN_TOLERANCE:
-        notes.append(
-            _warn(
-                f"LVDT rotation is {signals.fused.gain:.3f} of wire rotation: "
-                "a calibration is wrong, or the wall is not rigid"
-            )
-        )
     residuals = analysis.residuals
     if residuals is not None:
         left = residuals.rotation_wires_rad.value
@@ -168,17 +163,6 @@ def _motion(times: TestTimes, track: MotionTrack, analysis: TestAnalysis) -> lis
     lost = [n + 1 for n, arc in enumerate(track.arcs) if arc is None]
     if lost:
         notes.append(_info(f"half-cycles before impacts {', '.join(map(str, lost))} could not be fitted"))
-    eav, crt = analysis.estimates["eav"], analysis.estimates["crt"]
-    if eav.r is not None and crt.r is not None and eav.standard_error and crt.standard_error:
-        difference = eav.r - crt.r
-        sigma = math.hypot(eav.standard_error, crt.standard_error, 5e-4)
-        if abs(difference) > 4 * sigma:
-            notes.append(
-                _warn(
-                    f"EAV and CRT differ by {difference:+.4f} ({abs(difference) / sigma:.0f} σ): "
-                    "the motion is not Housner's"
-                )
-            )
     if analysis.fit is not None and not analysis.fit.explains_the_motion:
         notes.append(
             _info(

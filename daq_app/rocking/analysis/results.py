@@ -11,17 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.rocking.estimators import RestitutionEstimate
+from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.families.verdict import FamilyView, RVerdict
 from daq_app.rocking.motion.motion_fit import MotionFit
 
 Floats = NDArray[np.float64]
 
 Zero = Literal["tare", "rest", "certificates"]
 """Taken before the test with the wall upright; from the rest after it; or the certificates' offsets alone."""
-ZERO_WORDS: Mapping[Zero, str] = {
-    "tare": "the tare before the test",
-    "rest": "the rest after the test",
-    "certificates": "the offsets of the certificates (no tare, and no other zero was taken)",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +44,11 @@ class HalfCycle:
     n: int
     start_s: float
     """Time of impact n, or of the release."""
+    sigma_start_s: float
+    """NaN for the release."""
     duration_s: float
     """To the next impact: T/2 (the fall from the release: T/4). NaN for the last."""
+    sigma_duration_s: float
     peak_rad: float
     sigma_peak_rad: float
     phi: float
@@ -177,6 +177,12 @@ class TestAnalysis:
     release_s: float
     rest_s: float
     half_cycles: tuple[HalfCycle, ...]
+    verdict: RVerdict
+    """r from everything that was recorded, and how far it is to be believed."""
+    families: tuple[FamilyView, ...]
+    """What each family says, side by side; empty where no test was found."""
+    findings: tuple[FamilyFinding, ...]
+    """Instruments and families that disagree with the rest: who, by how much, what was done."""
     estimates: Mapping[str, RestitutionEstimate]
     """By method: eav, crt (headline), eav_filtered, eav_filtered_corrected, crt_exact, and eav and
     crt from the fused rotation and from the LVDTs."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ from daq_app.rocking.motion.swings import MotionSettings
 from daq_app.rocking.record import TestRecord
 
 Floats = NDArray[np.float64]
+
+Lead = Literal["wires", "lvdts"]
+"""The family whose rotation is analysed: the wires unless they are slow."""
 
 TILT_SETTLING_S = 1.0
 """Tiltmeters are slow: their first second at rest still shows the rocking."""
@@ -40,7 +44,10 @@ class Signals:
     openings_m: Floats
     """Brought onto the wires' instants."""
     rotation_rad: Floats
+    """Of the family that leads; NaN in gaps."""
+    wire_rotation_rad: Floats
     """From the wires; NaN in gaps."""
+    lead: Lead
     bridged_rad: Floats
     """The same, gaps filled with the last value: for filters."""
     excluded_share: dict[str, float]
@@ -75,6 +82,7 @@ class Signals:
             _zero(self.wires_m, rest),
             _zero(self.tilts_rad, settled),
             _zero(self.openings_m, rest),
+            self.lead,
         )
         return replace(zeroed, zeroed_at_rest=True)
 
@@ -95,7 +103,7 @@ class TestTimes:
     """Samples of the rest after the test, up to 2 s."""
 
 
-def read_signals(record: TestRecord) -> Signals:
+def read_signals(record: TestRecord, lead: Lead = "wires") -> Signals:
     """Read and combine. `ValueError` where the record lacks the wires."""
     ids = record.family("wire")
     if len(ids) < 2:
@@ -117,6 +125,7 @@ def read_signals(record: TestRecord) -> Signals:
         record.load(ids),
         record.load(tilts) if tilts else empty,
         _aligned(record.load(lvdts), lags) if lvdts else empty,
+        lead,
     )
 
 
@@ -126,11 +135,12 @@ def _combine(
     wires_m: Floats,
     tilts_rad: Floats,
     openings_m: Floats,
+    lead: Lead,
 ) -> Signals:
     combined = geometry.rotation(wires_m)
-    rotation = combined.rotation_rad
+    wire_rotation = combined.rotation_rad
     offset = geometry.time_offset_s(record.time_offsets_s)
-    noise = _white_noise(rotation)
+    wire_noise = _white_noise(wire_rotation)
     specimen = record.rig.specimen
     joint, lvdt_noise, fused = None, math.nan, None
     lvdts = record.family("lvdt")
@@ -141,7 +151,10 @@ def _combine(
     if base is not None:
         joint = base.motion(openings_m)
         lvdt_noise = _white_noise(joint.rotation_rad)
-        fused = fuse(rotation, joint.rotation_rad, noise, max(lvdt_noise, 1e-7))
+        fused = fuse(wire_rotation, joint.rotation_rad, wire_noise, max(lvdt_noise, 1e-7))
+    leads = lead == "lvdts" and joint is not None
+    rotation = joint.rotation_rad if leads and joint is not None else wire_rotation
+    noise = lvdt_noise if leads else wire_noise
     bad = ~np.isfinite(rotation)
     index = np.maximum.accumulate(np.where(bad, 0, np.arange(rotation.size)))
     first = float(rotation[~bad][0]) if not bad.all() else 0.0
@@ -156,6 +169,8 @@ def _combine(
         tilts_rad=tilts_rad,
         openings_m=openings_m,
         rotation_rad=rotation,
+        wire_rotation_rad=wire_rotation,
+        lead="lvdts" if leads else "wires",
         bridged_rad=bridged,
         excluded_share={
             name: float(share)

@@ -82,7 +82,7 @@ def fit_stack(x: Floats, y: Floats, present: Bools, kappa: Floats, noise_rad: Fl
     """The candidate with the smallest BIC for each arc; the stiffest unless another is clearly better.
 
     `x`, `y` (arcs, points) with `present` where there is a point: an absent one has x = y = 0. `noise_rad`
-    (arcs,) is the least that a point is uncertain by: noise that is slower than a point leaves small residuals.
+    (arcs,) is the least that a point is uncertain by: noise slower than a point leaves small residuals.
     """
     count = present.sum(axis=1)
     table = design(x, kappa) * present[..., None]

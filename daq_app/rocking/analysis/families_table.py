@@ -1,0 +1,144 @@
+"""What each family says of a test, side by side, and the verdict of r drawn from it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from daq_app.rocking.analysis.instruments import Instruments
+from daq_app.rocking.analysis.results import ValueWithSigma
+from daq_app.rocking.analysis.tracks import FamilyTracks
+from daq_app.rocking.estimators import DecaySeries, RestitutionEstimate
+from daq_app.rocking.families import words
+from daq_app.rocking.families.body import BodyEstimate, body_of_half_cycles
+from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.families.verdict import (
+    FamilyView,
+    RVerdict,
+    compare_series,
+    families_apart,
+    judge,
+    methods_apart,
+)
+from daq_app.rocking.motion.swings import MotionTrack
+from daq_app.rocking.motion.transients import Onset
+from daq_app.rocking.record import TestRecord
+from daq_app.rocking.theory.block import RigidBlock
+
+_LEADS = {"wires": "wires", "lvdts": "LVDTs"}
+
+
+def families_of(
+    record: TestRecord,
+    instruments: Instruments,
+    tracks: FamilyTracks,
+    estimates: Mapping[str, RestitutionEstimate],
+    theta0: Mapping[str, ValueWithSigma],
+    onsets: Sequence[Onset | None],
+) -> tuple[FamilyView, ...]:
+    """One row per family that was recorded, and the survey's."""
+    findings = instruments.findings
+    rows = []
+    for name, family in _LEADS.items():
+        track = tracks.of(name)
+        suffix = "" if name == instruments.signals.lead else f"_{name}"
+        if track is not None and f"eav{suffix}" in estimates:
+            eav, crt = estimates[f"eav{suffix}"], estimates[f"crt{suffix}"]
+            own = theta0.get(name)
+            rows.append(_rotation_view(family, instruments, track, tracks.lead, eav, crt, own))
+    if "tiltmeters" in theta0:
+        value = theta0["tiltmeters"]
+        rows.append(FamilyView("tiltmeters", value.value, value.sigma, used=True))
+    if record.family("accelerometer"):
+        heard = [(o, t) for o, t in zip(onsets, tracks.lead.impacts_s, strict=True) if o is not None]
+        late = float(np.median([onset.time_s - time for onset, time in heard])) if heard else math.nan
+        rows.append(FamilyView("accelerometers", impacts=len(heard), late_s=late))
+    specimen = RigidBlock.from_specimen(record.rig.specimen)
+    rows.append(FamilyView("survey", alpha_rad=specimen.alpha0_rad, p_rad_s=record.rig.specimen.p_rad_s))
+    return tuple(replace(row, remarks=_remarks(row.family, findings)) for row in rows)
+
+
+def _rotation_view(
+    family: str,
+    instruments: Instruments,
+    track: MotionTrack,
+    lead: MotionTrack,
+    eav: RestitutionEstimate,
+    crt: RestitutionEstimate,
+    theta0: ValueWithSigma | None,
+) -> FamilyView:
+    body = body_of(track, instruments.gain_sigma)
+    apart = [own - other for own, other in zip(track.impacts_s, lead.impacts_s, strict=True)]
+    return FamilyView(
+        family=family,
+        theta0_rad=track.theta0_rad if theta0 is None else theta0.value,
+        sigma_theta0_rad=track.sigma_theta0_rad if theta0 is None else theta0.sigma,
+        eav=math.nan if eav.r is None else eav.r,
+        sigma_eav=eav.standard_error or math.nan,
+        crt=math.nan if crt.r is None else crt.r,
+        sigma_crt=crt.standard_error or math.nan,
+        alpha_rad=math.nan if body is None else body.alpha_rad,
+        sigma_alpha_rad=math.nan if body is None else body.sigma_alpha_rad,
+        p_rad_s=math.nan if body is None else body.p_rad_s,
+        sigma_p_rad_s=math.nan if body is None else body.sigma_p_rad_s,
+        impacts=sum(arc is not None for arc in track.arcs),
+        late_s=float(np.median(apart)) if track is not lead else 0.0,
+        used=track is lead,
+    )
+
+
+def body_of(track: MotionTrack, gain_sigma: float) -> BodyEstimate | None:
+    """α and p by the half-cycles of one family; the error of its gain counts for α."""
+    arcs = [arc for arc in track.arcs[1:] if arc is not None]
+    columns = np.array(
+        [
+            (arc.peak_rad, arc.sigma_peak_rad, arc.duration_s, math.hypot(arc.sigma_start_s, arc.sigma_end_s))
+            for arc in arcs
+        ]
+    ).reshape(-1, 4)
+    peaks, sigma_peaks, durations, sigma_durations = columns.T
+    found = body_of_half_cycles(
+        peaks, sigma_peaks, durations, sigma_durations, track.settings.alpha_rad, track.settings.p_rad_s
+    )
+    if found is None:
+        return None
+    return replace(found, sigma_alpha_rad=math.hypot(found.sigma_alpha_rad, gain_sigma * found.alpha_rad))
+
+
+def _remarks(family: str, findings: Sequence[FamilyFinding]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(f.kind for f in findings if family in f.family.split(" or ")))
+
+
+def verdict_of(
+    instruments: Instruments,
+    tracks: FamilyTracks,
+    series: Mapping[str, DecaySeries],
+    estimates: Mapping[str, RestitutionEstimate],
+    theta0_findings: Sequence[FamilyFinding],
+) -> tuple[RVerdict, tuple[FamilyFinding, ...]]:
+    """The verdict of r, and every finding behind it."""
+    findings = [*instruments.findings, *theta0_findings]
+    lead, other = instruments.signals.lead, tracks.other_name
+    blamed = any(
+        f.kind in ("slow", "late", "drift") and _LEADS[other] in f.family and f.treatment != "put in step"
+        for f in findings
+    )
+    disagreements = []
+    if not blamed:
+        for method, name in (("eav", "EAV"), ("crt", "CRT")):
+            if f"{method}_{other}" in series:
+                own, others = series[method], series[f"{method}_{other}"]
+                wires, lvdts = (own, others) if lead == "wires" else (others, own)
+                said = families_apart(name, compare_series(wires, lvdts))
+                if said is not None:
+                    disagreements.append(said)
+                    findings.append(words.disagreement(said))
+    said = methods_apart(estimates["eav"], estimates["crt"])
+    if said is not None:
+        disagreements.append(said)
+        findings.append(words.not_housner(said))
+    verdict = judge(estimates["eav"], estimates["crt_exact"], _LEADS[lead], findings, disagreements)
+    return verdict, tuple(findings)

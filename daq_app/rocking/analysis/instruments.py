@@ -1,0 +1,295 @@
+"""Before the numbers: hum, signs and units, late, slow and deviating instruments are found and put right.
+
+Three looks, each on what the last left: mains hum in every channel; signs and units of whole families, on the
+still parts; and, once the test is found, how families and single wires follow each other through the motion.
+What was found is said, with what was done about it. The recording itself is not changed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.rocking.analysis.signals import Lead, Signals, TestTimes, find_phases, quiet_end, read_signals
+from daq_app.rocking.families import words
+from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.families.hum import Hum, find_hum
+from daq_app.rocking.families.noise import slow_noise
+from daq_app.rocking.families.response import Response, compare
+from daq_app.rocking.families.scales import wrong_scales
+from daq_app.rocking.families.shocks import ShockTiming, shock_timing
+from daq_app.rocking.families.single_wires import CALIBRATION_SHARE, SingleWires, compare_wires
+from daq_app.rocking.families.treated import Corrections, held_in_memory, without_hum
+from daq_app.rocking.geometry.joint import BaseJoint
+from daq_app.rocking.geometry.kinematics import RotationGeometry
+from daq_app.rocking.record import TestRecord
+
+Floats = NDArray[np.float64]
+
+LATE_S = 1.5e-3
+"""Families further apart in time than this are named. Known skews are below 0.2 ms; raising it hides late
+families."""
+SLOW_S = 1.5e-3
+"""Time constant above which a family is named slow; raising it lets EAV be too low and nothing be said."""
+LATE_SHOCKS_S = 4e-3
+"""The same between shocks and rotation: a wall's contact lasts some milliseconds."""
+DRIFT_RAD = 3e-4
+"""Drift of one family against the other over the motion that is named."""
+GAIN_SHARE = 0.01
+"""Gain of one family against the other that is named: three times what calibration leaves."""
+_COVERED = 0.98
+"""LVDTs take the wires' place where they know at least this share of the motion."""
+_COMPARED_IMPACTS = 12
+_GEOMETRY_SHARE = 0.0005
+"""Standard uncertainty of a family's gain from the places of its ends, common to all wires."""
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """Signals with the instruments put right, the test found in them, and what was found on the way."""
+
+    record: TestRecord
+    signals: Signals
+    times: TestTimes
+    findings: tuple[FamilyFinding, ...]
+    response: Response | None
+    """How the wires follow the LVDTs after all corrections."""
+    shocks: ShockTiming | None
+    gain_sigma: float
+    """Standard uncertainty of the gain of the rotation, as a share."""
+
+
+def prepare(record: TestRecord, *, from_rest: bool) -> Instruments:
+    """Read, clean, find the test, put instruments right. `ValueError` where the record lacks the wires."""
+    ids = (*record.family("wire"), *record.family("lvdt"), *record.family("tiltmeter", "x"))
+    held, findings = _without_hum(held_in_memory(record, ids), ids)
+    scaled, corrections = _put_to_scale(held)
+    findings += scaled
+    corrected = corrections.applied(held)
+    signals, times = _zeroed_at_rest(corrected) if from_rest else _as_recorded(corrected)
+    if times.release_s is None or not times.impacts_s:
+        return Instruments(corrected, signals, times, tuple(findings), None, None, CALIBRATION_SHARE)
+    return _in_step(corrected, signals, times, findings, from_rest=from_rest)
+
+
+def _as_recorded(record: TestRecord, lead: Lead = "wires") -> tuple[Signals, TestTimes]:
+    signals = read_signals(record, lead)
+    return signals, find_phases(signals)
+
+
+def _zeroed_at_rest(record: TestRecord, lead: Lead = "wires") -> tuple[Signals, TestTimes]:
+    """With every sensor's zero from the rest after the test; as recorded where no rest shows a test.
+
+    Offsets of a run without a tare may be so large that no hold is recognised, so the end of the record
+    serves as the first guess of the rest.
+    """
+    signals = read_signals(record, lead)
+    end = quiet_end(signals)
+    times = find_phases(signals if end is None else signals.zeroed(end))
+    if times.rest is None:
+        times = find_phases(signals)
+    if times.rest is None:
+        return signals, times
+    signals = signals.zeroed(times.rest)
+    return signals, find_phases(signals)
+
+
+# -- before the test is found ----------------------------------------------------------------------
+
+
+def _without_hum(record: TestRecord, ids: tuple[str, ...]) -> tuple[TestRecord, list[FamilyFinding]]:
+    noises = [record.rig.channel(channel_id).noise_si for channel_id in ids]
+    hum = find_hum(record.load(ids), noises, record.rate_hz)
+    if hum is None:
+        return record, []
+    found = []
+    for family, name in words.FAMILY_NAMES.items():
+        rows = [k for k, channel_id in enumerate(ids) if record.rig.channel(channel_id).family == family]
+        rows = [k for k in rows if hum.amplitude[k]]
+        if rows:
+            found.append(_hum_finding(hum, rows, ids, name, record.rig.channel(ids[rows[0]]).si_unit))
+    return without_hum(record, ids, hum), found
+
+
+def _hum_finding(hum: Hum, rows: Sequence[int], ids: tuple[str, ...], name: str, unit: str) -> FamilyFinding:
+    largest = float(np.abs(hum.amplitude[list(rows)]).max())
+    channels = tuple(ids[k] for k in rows)
+    return words.hum(name, channels, largest, unit, hum.frequency_hz)
+
+
+def _put_to_scale(record: TestRecord) -> tuple[list[FamilyFinding], Corrections]:
+    """Signs and units of whole families, from rotations that need no hold to be found."""
+    found, factors = [], {}
+    wrong = wrong_scales(_crude_rotations(record), record.rate_hz)
+    for name, factor in wrong.items():
+        family = words.families_by_name()[name]
+        axis = "x" if family == "tiltmeter" else None
+        found.append(words.scale(name, factor))
+        factors.update(dict.fromkeys(record.family(family, axis), 1.0 / factor))
+    return found, Corrections(factors=factors)
+
+
+def _crude_rotations(record: TestRecord) -> dict[str, Floats]:
+    """Rotation by family, linear in the readings, so that a wrong sign or unit stays a factor."""
+    rotations: dict[str, Floats] = {}
+    ids = record.family("wire")
+    if len(ids) >= 2:
+        geometry = RotationGeometry.from_rig(record.rig)
+        levers = {
+            wire: float(lever) for wire, lever in zip(geometry.wires.ids, geometry.wires.lever_m, strict=True)
+        }
+        own = record.load(ids) / np.array([[levers[channel_id]] for channel_id in ids])
+        rotations["wires"] = np.median(own - np.nanmedian(own, axis=1, keepdims=True), axis=0)
+    lvdts = record.family("lvdt")
+    try:
+        joint = BaseJoint.from_rig(record.rig, lvdts)
+    except ValueError:
+        joint = None
+    if joint is not None:
+        openings = record.load(lvdts)
+        left = joint.x_m < 0
+        across = float(joint.x_m[~left].mean() - joint.x_m[left].mean())
+        rotations["LVDTs"] = (np.median(openings[left], axis=0) - np.median(openings[~left], axis=0)) / across
+    tilts = record.family("tiltmeter", "x")
+    if tilts:
+        rotations["tiltmeters"] = record.load(tilts).mean(axis=0)
+    return rotations
+
+
+# -- once the test is found ------------------------------------------------------------------------
+
+
+def _in_step(
+    record: TestRecord,
+    signals: Signals,
+    times: TestTimes,
+    findings: list[FamilyFinding],
+    *,
+    from_rest: bool,
+) -> Instruments:
+    """Single wires and the timing of families; read again where something had to be put right."""
+    read = _zeroed_at_rest if from_rest else _as_recorded
+    lead: Lead = "wires"
+    wires = _single_wires(signals, times)
+    changed = Corrections()
+    if wires is not None and (outlier := wires.outlier()) is not None:
+        place, kind = outlier
+        name = signals.geometry.wires.ids[place]
+        findings.append(words.single_wire(name, kind, wires, place))
+        changed = replace(changed, left_out=frozenset({name}))
+    response = _follow(signals, times)
+    shocks = shock_timing(record, signals.first_s, times.impacts_s)
+    if response is not None:
+        timing, lead, earlier = _timing(record, signals, times, response, shocks)
+        findings += timing
+        changed = replace(changed, earlier_s=earlier)
+    if changed.left_out or changed.earlier_s or lead != "wires":
+        record = changed.applied(record)
+        again, times_again = read(record, lead)
+        if times_again.impacts_s:
+            signals, times = again, times_again
+            wires = _single_wires(signals, times)
+            response = _follow(signals, times)
+            shocks = shock_timing(record, signals.first_s, times.impacts_s)
+    if response is not None:
+        findings += _levels(signals, times, response)
+    sigma = CALIBRATION_SHARE
+    if wires is not None:
+        sigma = wires.family_gain_sigma(signals.geometry.weights()[0])
+    return Instruments(
+        record, _with_slow_noise(signals, times), times, tuple(findings), response, shocks,
+        math.hypot(sigma, _GEOMETRY_SHARE),
+    )  # fmt: skip
+
+
+def _motion(signals: Signals, times: TestTimes) -> slice:
+    """Samples from just before the release to the last impact that tells something of timing."""
+    assert times.release_s is not None
+    last = times.impacts_s[min(len(times.impacts_s), _COMPARED_IMPACTS) - 1]
+    start, stop = np.searchsorted(signals.time_s, [times.release_s - 0.3, last + 0.2])
+    return slice(int(start), int(stop))
+
+
+def _single_wires(signals: Signals, times: TestTimes) -> SingleWires | None:
+    if len(signals.excluded_share) > 1:
+        return None  # they are named already, and the median of the rest is no judge
+    wires = signals.geometry.wires
+    own = wires.rotation_of_each(signals.wires_m[:, _motion(signals, times)])
+    return compare_wires(own, signals.record.rate_hz, wires.position_m[:, 1] / wires.lever_m)
+
+
+def _follow(signals: Signals, times: TestTimes) -> Response | None:
+    """How the wires follow the LVDTs through the motion."""
+    if signals.joint is None:
+        return None
+    part = _motion(signals, times)
+    return compare(signals.time_s[part], signals.joint.rotation_rad[part], signals.wire_rotation_rad[part])
+
+
+def _timing(
+    record: TestRecord, signals: Signals, times: TestTimes, response: Response, shocks: ShockTiming | None
+) -> tuple[list[FamilyFinding], Lead, dict[str, float]]:
+    """Slow and late families: findings, the family that leads, and by how much channels are moved earlier."""
+    if response.response_s > SLOW_S:
+        assert signals.joint is not None
+        known = np.isfinite(signals.joint.rotation_rad[_motion(signals, times)]).mean()
+        lead: Lead = "lvdts" if known >= _COVERED else "wires"
+        return [words.slow("wires", response.response_s, left_out=lead == "lvdts")], lead, {}
+    if response.response_s < -SLOW_S:
+        return [words.slow("LVDTs", -response.response_s, left_out=True)], "wires", {}
+    late = response.delay_s
+    lag = None if shocks is None else shocks.lag_s
+    if abs(late) <= LATE_S:
+        if lag is not None and abs(lag) > LATE_SHOCKS_S:
+            return [words.late("accelerometers", lag, "wires and LVDTs")], "wires", {}
+        return [], "wires", {}
+    if lag is None:
+        later = "wires" if late > 0 else "LVDTs"
+        return [words.one_of_two_late(later, abs(late))], "wires", {}
+    # Shocks come `lag` after the wires' crossings and `lag + late` after the LVDTs'.
+    if abs(lag) > abs(lag + late):
+        moved = dict.fromkeys(record.family("wire"), late)
+        return [words.late("wires", late, "LVDTs and accelerometers")], "wires", moved
+    moved = dict.fromkeys(record.family("lvdt"), -late)
+    return [words.late("LVDTs", -late, "wires and accelerometers")], "wires", moved
+
+
+def _levels(signals: Signals, times: TestTimes, response: Response) -> list[FamilyFinding]:
+    """Gain and drift of wires against LVDTs, blamed on the one that the tiltmeters contradict."""
+    assert times.release_s is not None and signals.joint is not None
+    drift = response.drift_rad_s * response.span_s
+    apart = response.gain - 1.0
+    if abs(drift) <= DRIFT_RAD and abs(apart) <= GAIN_SHARE:
+        return []
+    start, stop = np.searchsorted(signals.time_s, [times.release_s - 0.5, times.release_s - 0.02])
+    hold = slice(int(start), int(stop))
+    wires, lvdts = (
+        float(np.nanmedian(values[hold])) if np.isfinite(values[hold]).any() else math.nan
+        for values in (signals.wire_rotation_rad, signals.joint.rotation_rad)
+    )
+    tilt = math.nan
+    if signals.tilts_rad.shape[0]:
+        tilt = signals.geometry.tilt(signals.tilts_rad[:, hold], wires)
+    family = "wires or LVDTs"
+    if math.isfinite(tilt) and math.isfinite(wires) and math.isfinite(lvdts):
+        by_wires, by_lvdts = abs(wires - tilt), abs(lvdts - tilt)
+        if max(by_wires, by_lvdts) > 2.0 * min(by_wires, by_lvdts):
+            family = "wires" if by_wires > by_lvdts else "LVDTs"
+    if abs(drift) > DRIFT_RAD:
+        return [words.drift(family, drift)]
+    return [words.gain(family, apart)]
+
+
+def _with_slow_noise(signals: Signals, times: TestTimes) -> Signals:
+    """The same with half-cycles judged by the noise that long means have at rest."""
+    rate = signals.record.rate_hz
+    still = None if times.rest is None else signals.rotation_rad[times.rest]
+    slow = math.nan if still is None else slow_noise(still, rate)
+    if not math.isfinite(slow):
+        return signals
+    settings = replace(signals.settings, slow_noise_rad=max(slow, signals.noise_rad))
+    return replace(signals, settings=settings)

@@ -1,0 +1,1 @@
+"""What each sensor family says of one motion, who disagrees with whom, and what that usually means."""

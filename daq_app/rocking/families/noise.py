@@ -1,0 +1,32 @@
+"""Noise that is slower than white: what long means of a still record scatter by."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_MEAN_S = 0.025
+"""Length of the means: a quarter of the shortest half-cycles that tell something of r."""
+_FEWEST_MEANS = 12
+
+
+def slow_noise(signal: Floats, rate_hz: float) -> float:
+    """rms of one sample of the white noise whose 25 ms means scatter as those of `signal` (n,) do.
+
+    The signal shows a wall at rest; slow drift falls away by second differences. NaN for less than 0.3 s.
+    """
+    size = max(1, round(_MEAN_S * rate_hz))
+    groups = signal.size // size
+    if groups < _FEWEST_MEANS:
+        return math.nan
+    means = signal[: groups * size].reshape(groups, size).mean(axis=1)
+    second = np.diff(means, 2)
+    second = second[np.isfinite(second)]
+    if second.size < _FEWEST_MEANS - 2:
+        return math.nan
+    # A second difference of white noise has six times its variance.
+    return float(np.sqrt(np.mean(second**2) / 6.0 * size))

@@ -1,0 +1,154 @@
+"""How one rotation follows another: gain, offset, drift, and a delay or a first-order response."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+from scipy.signal import lfilter
+
+Floats = NDArray[np.float64]
+
+_RATE_HZ = 500.0
+_FEWEST = 200
+_STEP_S = 2e-4
+_LARGEST_S = 0.08
+_GRID_S = (0.0, 0.002, 0.005, 0.01, 0.02, 0.04, _LARGEST_S)
+"""Delays and time constants from which the search begins."""
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """follower(t) ≈ gain · [reference, delayed and slowed](t) + offset + drift · t."""
+
+    gain: float
+    offset_rad: float
+    drift_rad_s: float
+    delay_s: float
+    response_s: float
+    """Time constant of a first order; negative where it is the reference that is slow."""
+    residual_rad: float
+    plain_residual_rad: float
+    """Without delay and response."""
+    span_s: float
+    """Length of what was compared."""
+
+
+def compare(time_s: Floats, reference_rad: Floats, follower_rad: Floats) -> Response | None:
+    """Response of `follower_rad` (n,) to `reference_rad` (n,) on one time base; None with too few samples."""
+    rate = (time_s.size - 1) / (time_s[-1] - time_s[0]) if time_s.size > 1 else 0.0
+    size = max(1, round(rate / _RATE_HZ))
+    groups = time_s.size // size
+    if groups < _FEWEST:
+        return None
+    x, y = (
+        values[: groups * size].reshape(groups, size).mean(axis=1) for values in (reference_rad, follower_rad)
+    )
+    step = size / rate
+    pair, turned = _Pair(x, y, step), _Pair(y, x, step)
+    if min(pair.known, turned.known) < _FEWEST or np.nanstd(x) < 1e-4 or np.nanstd(y) < 1e-4:
+        return None
+    plain = pair.solved(0.0, 0.0)
+    delay = _least(lambda value: pair.solved(value, 0.0).rms, -_LARGEST_S)
+    slow = _least(lambda value: pair.solved(0.0, value).rms, 0.0)
+    turned_slow = _least(lambda value: turned.solved(0.0, value).rms, 0.0)
+    # A response smooths the noise of what it is applied to: residuals are judged less the noise they hold.
+    noise_x, noise_y = _noise(x), _noise(y)
+    solved_late, solved_slow, solved_turned = (
+        pair.solved(delay, 0.0), pair.solved(0.0, slow), turned.solved(0.0, turned_slow),
+    )  # fmt: skip
+    candidates = [
+        (solved_late.rms**2 - noise_y**2 - (solved_late.gain * noise_x) ** 2, delay, 0.0),
+        (
+            solved_slow.rms**2 - noise_y**2 - (solved_slow.gain * noise_x) ** 2 * _passed(slow, step),
+            0.0,
+            slow,
+        ),
+        (
+            (solved_turned.rms**2 - noise_x**2) / solved_turned.gain**2
+            - noise_y**2 * _passed(turned_slow, step),
+            0.0,
+            -turned_slow,
+        ),
+    ]
+    turned_rms = solved_turned.rms / abs(solved_turned.gain)
+    span = groups * step
+    _, delay, response = min(candidates)
+    if response < 0.0:
+        # The reference is the slower one: the other way round the fit is better.
+        solved = turned.solved(0.0, -response)
+        gain = 1.0 / solved.gain
+        offset, drift = -solved.offset * gain, -solved.drift * gain
+        return Response(gain, offset, drift, 0.0, response, turned_rms, plain.rms, span)
+    solved = pair.solved(delay, response)
+    return Response(solved.gain, solved.offset, solved.drift, delay, response, solved.rms, plain.rms, span)
+
+
+def _noise(values: Floats) -> float:
+    """rms of white noise by second differences, robust to jumps of the speed."""
+    second = np.diff(values, 2)
+    return float(np.nanmedian(np.abs(second))) * 1.4826 / math.sqrt(6.0)
+
+
+def _passed(response_s: float, step_s: float) -> float:
+    """Share of white noise's variance that a first order lets through."""
+    return math.tanh(0.5 * step_s / response_s) if response_s > 0.0 else 1.0
+
+
+def _least(cost: Callable[[float], float], low: float) -> float:
+    """Where `cost` is least between `low` and the largest delay: the best of a grid, then Brent about it."""
+    grid = np.array([sign * value for value in _GRID_S for sign in (-1.0, 1.0) if sign * value >= low])
+    values = [cost(float(place)) for place in grid]
+    best = float(grid[int(np.argmin(values))])
+    reach = max(abs(best) / 2.0, 2.0 * _GRID_S[1])
+    bounds = (max(best - reach, low), best + reach)
+    found = minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": _STEP_S / 4.0})
+    return float(found.x) if found.fun <= min(values) else best
+
+
+@dataclass(frozen=True, slots=True)
+class _Solved:
+    gain: float
+    offset: float
+    drift: float
+    rms: float
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """Reference and follower at one spacing; NaN where unknown."""
+
+    reference: Floats
+    follower: Floats
+    step_s: float
+
+    @property
+    def known(self) -> int:
+        return int(np.count_nonzero(np.isfinite(self.reference) & np.isfinite(self.follower)))
+
+    def solved(self, delay_s: float, response_s: float) -> _Solved:
+        """Linear part for a delay and a response: residuals where both are known."""
+        n = np.arange(self.reference.size, dtype=np.float64)
+        known = np.isfinite(self.reference)
+        filled = np.interp(n, n[known], self.reference[known])
+        if delay_s:
+            filled = np.interp(n - delay_s / self.step_s, n, filled)
+        if response_s > 0.0:
+            # First order, the input straight between samples (exact for a ramp).
+            a = math.exp(-self.step_s / response_s)
+            b = 1.0 - (1.0 - a) * response_s / self.step_s
+            start = np.array([filled[0] * (1.0 - b)])
+            filled, _ = lfilter([b, 1.0 - a - b], [1.0, -a], filled, zi=start)
+        good = known & np.isfinite(self.follower)
+        time = (n - n.mean()) * self.step_s
+        table = np.column_stack([filled[good], np.ones(int(good.sum())), time[good]])
+        y = self.follower[good]
+        normal = table.T @ table
+        solution = np.linalg.solve(normal, table.T @ y)
+        left = y - table @ solution
+        gain, offset, drift = (float(value) for value in solution)
+        return _Solved(gain, offset, drift, float(np.sqrt(np.mean(left**2))))

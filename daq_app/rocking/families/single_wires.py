@@ -1,0 +1,98 @@
+"""Each wire against the others: its gain, lag and drift, and how well the family's gain is known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtr
+
+Floats = NDArray[np.float64]
+
+_MEAN_S = 0.005
+_FEWEST = 100
+CALIBRATION_SHARE = 0.002
+"""Prior standard uncertainty of one wire's gain, place of its ends included; laboratories: 0.1 to 0.3 %."""
+_PRIOR_WEIGHT = 4.0
+"""Degrees of freedom that the prior counts for."""
+_GAIN_CHANCE = 0.005
+"""A wire is named where chance alone would name one in a family this seldom."""
+_LEAST_GAIN = 0.006
+_LEAST_LAG_S = 0.004
+_LEAST_DRIFT_RAD = 4e-4
+"""Over the record; a fifth of what a wall's sway does to one wire alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class SingleWires:
+    """Deviations of each wire from the median of all; arrays (wires,)."""
+
+    gain: Floats
+    lag_s: Floats
+    drift_rad: Floats
+    """Over the span looked at."""
+
+    def outlier(self) -> tuple[int, str] | None:
+        """The wire that deviates most beyond its kind's limit, and the kind: gain, late or drift."""
+        count = self.gain.size
+        if count < 4:
+            return None
+        candidates: list[tuple[float, int, str]] = []
+        worst = int(np.argmax(np.abs(self.gain - np.median(self.gain))))
+        others = np.delete(self.gain, worst)
+        deviation = float(self.gain[worst] - others.mean())
+        freedom = _PRIOR_WEIGHT + others.size - 1.0
+        spread = math.sqrt(
+            (_PRIOR_WEIGHT * CALIBRATION_SHARE**2 + float(np.sum((others - others.mean()) ** 2))) / freedom
+        )
+        t = abs(deviation) / (spread * math.sqrt(1.0 + 1.0 / others.size))
+        if 2.0 * count * float(stdtr(freedom, -t)) < _GAIN_CHANCE and abs(deviation) > _LEAST_GAIN:
+            candidates.append((abs(deviation) / _LEAST_GAIN, worst, "gain"))
+        kinds = ((self.lag_s, _LEAST_LAG_S, "late"), (self.drift_rad, _LEAST_DRIFT_RAD, "drift"))
+        for values, limit, kind in kinds:
+            apart = values - np.median(values)
+            place = int(np.argmax(np.abs(apart)))
+            rest = float(np.median(np.abs(np.delete(apart, place))))
+            if abs(apart[place]) > max(limit, 5.0 * rest):
+                candidates.append((abs(float(apart[place])) / limit, place, kind))
+        if not candidates:
+            return None
+        _, place, kind = max(candidates)
+        return place, kind
+
+    def family_gain_sigma(self, weights: Floats) -> float:
+        """Standard uncertainty of the gain of the wires' weighted mean, from how the wires differ."""
+        spread = float(np.sum((self.gain - self.gain.mean()) ** 2))
+        freedom = _PRIOR_WEIGHT + self.gain.size - 1.0
+        single = math.sqrt((_PRIOR_WEIGHT * CALIBRATION_SHARE**2 + spread) / freedom)
+        return single * float(np.sqrt(np.sum(weights**2)))
+
+
+def compare_wires(own_rad: Floats, rate_hz: float, y_over_lever: Floats) -> SingleWires | None:
+    """Each wire's own rotation (wires, n) against the median of all, less what of a twist is out of step.
+
+    `y_over_lever` (wires,) is how much of a twist each wire shows. None for less than half a second.
+    """
+    size = max(1, round(_MEAN_S * rate_hz))
+    groups = own_rad.shape[1] // size
+    if groups < _FEWEST or own_rad.shape[0] < 3:
+        return None
+    means = own_rad[:, : groups * size].reshape(own_rad.shape[0], groups, size).mean(axis=2)
+    means = means[:, np.isfinite(means).all(axis=0)]
+    if means.shape[1] < _FEWEST:
+        return None
+    middle = np.median(means, axis=0)
+    apart = means - middle
+    twisted = y_over_lever - y_over_lever.mean()
+    time = np.linspace(-0.5, 0.5, middle.size)
+    speed = np.gradient(middle, size / rate_hz)
+    table = np.column_stack([middle, speed, time, np.ones(middle.size)])
+    if float(twisted @ twisted) > 1e-6:
+        # Only what of the twist is not in step with the rotation: the rest may be a gain.
+        twist = twisted @ apart
+        twist = twist - table @ np.linalg.lstsq(table, twist, rcond=None)[0]
+        table = np.column_stack([table, twist])
+    solution = np.linalg.lstsq(table, apart.T, rcond=None)[0]
+    return SingleWires(solution[0], -solution[1], solution[2])

@@ -1,0 +1,133 @@
+"""The sentences that say what was found about an instrument, and what it usually means."""
+
+from __future__ import annotations
+
+from typing import Final, Literal
+
+from daq_app.config.rig import Family
+from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.families.scales import factor_words
+from daq_app.rocking.families.single_wires import SingleWires
+
+FAMILY_NAMES: Final[dict[Family, str]] = {
+    "wire": "wires",
+    "lvdt": "LVDTs",
+    "accelerometer": "accelerometers",
+    "tiltmeter": "tiltmeters",
+}
+_IN_UNIT: Final[dict[str, tuple[float, str]]] = {
+    "m": (1e3, "mm"),
+    "rad": (1e3, "mrad"),
+    "m/s²": (1.0, "m/s²"),
+}
+
+
+def families_by_name() -> dict[str, Family]:
+    """The rig's word of each family by the word for the reader."""
+    return {name: family for family, name in FAMILY_NAMES.items()}
+
+
+def hum(
+    family: str, channels: tuple[str, ...], amplitude: float, unit: str, frequency_hz: float
+) -> FamilyFinding:
+    scale, shown = _IN_UNIT.get(unit, (1.0, unit))
+    many = f"{len(channels)} channels" if len(channels) > 1 else channels[0]
+    text = (
+        f"{family}: mains hum of up to {amplitude * scale:.3g} {shown} at {frequency_hz:.2f} Hz in {many}; "
+        "it was taken out. Usual causes: a missing shield, an earth loop, a cable beside mains"
+    )
+    return FamilyFinding(family, channels, "hum", amplitude, unit, "removed", "warning", text)
+
+
+def scale(family: str, factor: float) -> FamilyFinding:
+    kind: Literal["reversed", "unit"] = "reversed" if factor == -1.0 else "unit"
+    text = (
+        f"all {family} are {factor_words(factor)}, as the other families show; they were put right for this "
+        "analysis. Correct the rig file or the import map"
+    )
+    return FamilyFinding(family, (), kind, factor, "1", "put right", "warning", text)
+
+
+def single_wire(name: str, kind: str, wires: SingleWires, place: int) -> FamilyFinding:
+    """A wire that deviates from the other wires; it is left out of the rotation."""
+    if kind == "gain":
+        size, unit = float(wires.gain[place]), "1"
+        what = f"wire {name} shows {size:+.2%} more rotation than the others: a wrong gain or a misplaced end"
+    elif kind == "late":
+        size, unit = float(wires.lag_s[place]), "s"
+        what = f"wire {name} is {size * 1e3:+.1f} ms late against the others: slow, or an unknown delay"
+    else:
+        size, unit = float(wires.drift_rad[place]), "rad"
+        what = f"wire {name} drifts by {size * 1e3:+.2f} mrad against the others: a zero or a fixture moves"
+    return FamilyFinding(
+        "wires", (name,), "gain" if kind == "gain" else "late" if kind == "late" else "drift", size, unit,
+        "left out", "warning", what + "; it is left out of the rotation",
+    )  # fmt: skip
+
+
+def slow(family: str, time_constant_s: float, *, left_out: bool) -> FamilyFinding:
+    done = (
+        "r is taken from the other family"
+        if left_out
+        else "EAV is too low and α too large: the other family does not reach far enough to take its place"
+    )
+    text = (
+        f"{family} are slow: they follow like a first-order instrument of {time_constant_s * 1e3:.1f} ms "
+        f"(a filter, a weak wire spring); {done}"
+    )
+    return FamilyFinding(
+        family, (), "slow", time_constant_s, "s", "left out" if left_out else "none", "warning", text
+    )
+
+
+def late(family: str, by_s: float, others: str) -> FamilyFinding:
+    word = "late" if by_s > 0 else "early"
+    text = f"{family} are {abs(by_s) * 1e3:.1f} ms {word} against {others}: a delay unknown to the task plan"
+    if family == "accelerometers":
+        return FamilyFinding(family, (), "late", by_s, "s", "none", "warning", text)
+    return FamilyFinding(
+        family, (), "late", by_s, "s", "put in step", "warning", text + "; they were put in step"
+    )
+
+
+def one_of_two_late(later: str, by_s: float) -> FamilyFinding:
+    text = (
+        f"{later} are {by_s * 1e3:.1f} ms later than the other family, and nothing tells which is right: "
+        "impact times may be off by as much"
+    )
+    return FamilyFinding("wires or LVDTs", (), "late", by_s, "s", "none", "warning", text)
+
+
+def drift(family: str, by_rad: float) -> FamilyFinding:
+    text = (
+        f"{family}: wires and LVDTs drift apart by {by_rad * 1e3:+.2f} mrad over the motion: a zero moves "
+        "(temperature, a slipping fixture)"
+    )
+    return FamilyFinding(family, (), "drift", by_rad, "rad", "none", "warning", text)
+
+
+def gain(family: str, share: float) -> FamilyFinding:
+    text = (
+        f"{family}: wires show {share:+.2%} of rotation against LVDTs: a calibration is wrong, a fixture "
+        "slips, or the wall is not rigid"
+    )
+    return FamilyFinding(family, (), "gain", share, "1", "none", "warning", text)
+
+
+def disagreement(text: str) -> FamilyFinding:
+    """Wires and LVDTs give different r, and nothing simpler explains it."""
+    return FamilyFinding("wires or LVDTs", (), "motion", 0.0, "1", "none", "warning", text)
+
+
+def not_housner(text: str) -> FamilyFinding:
+    """EAV and CRT differ."""
+    return FamilyFinding("wires or LVDTs", (), "motion", 0.0, "1", "none", "warning", text)
+
+
+def level(family: str, by_rad: float, share: float) -> FamilyFinding:
+    """θ0 of one family is off while the others agree."""
+    text = (
+        f"{family} show θ0 by {by_rad * 1e3:+.2f} mrad ({share:+.2%}) off what the other families agree on: "
+        "a gain or a zero is wrong, or a fixture slipped"
+    )
+    return FamilyFinding(family, (), "gain", share, "1", "none", "warning", text)
