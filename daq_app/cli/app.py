@@ -9,7 +9,7 @@ import importlib
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -32,7 +32,7 @@ _COMMANDS: Final[Mapping[str, _Entry]] = {
         ("monitor_commands",),
         "Look at a run: time cursor, zoom, channels, export of pictures and data.",
     ),
-    "config": _Entry(("config_commands",), "Check and show rig files."),
+    "config": _Entry(("config_commands",), "Check, show and copy rig files."),
     "run": _Entry(
         ("record.commands",),
         "Take one release test: zero, arm, hold, release, rest, and the table of r.",
@@ -110,7 +110,21 @@ def build_app() -> typer.Typer:
     return app
 
 
-def _root(context: typer.Context) -> None:
+def _print_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version  # slow to import, and rarely asked for
+
+        typer.echo(f"daq-app {version('rocking-test-recorder')}")
+        raise typer.Exit
+
+
+def _root(
+    context: typer.Context,
+    show_version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end."),
+    ] = False,
+) -> None:
     """Record, watch and analyse free-rocking tests of masonry walls. Without a command: the window."""
     if context.invoked_subcommand is None:
         importlib.import_module("daq_app.cli.monitor_commands").monitor()

@@ -1,4 +1,4 @@
-"""`daq-app config check` and `daq-app config show`."""
+"""`daq-app config check`, `show` and `templates`."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ from rich.console import Console
 from daq_app.cli.config_tables import plan_tables
 from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, print_problems, reported
 from daq_app.config import ConfigError, load_rig, plan_tasks
+from daq_app.config.shipped import copy_shipped
 
 
 def register(app: typer.Typer) -> None:
     """Add the group ``config``."""
-    group = typer.Typer(no_args_is_help=True, help="Check and show rig files.")
+    group = typer.Typer(no_args_is_help=True, help="Check, show and copy rig files.")
     group.command("check", epilog="Example: daq-app config check configs/fr1.toml configs/fr2.toml")(check)
     group.command("show", epilog="Example: daq-app config show configs/fr1-iepe.toml")(show)
+    group.command("templates", epilog="Example: daq-app config templates configs")(templates)
     app.add_typer(group, name="config")
 
 
@@ -92,3 +94,12 @@ def show(file: Annotated[Path, typer.Argument(help="Rig file (TOML).")]) -> None
         for part in plan_tables(rig, plan):
             console.print(part)
             console.print()
+
+
+def templates(
+    folder: Annotated[Path, typer.Argument(help="Where to put them; made if it is not there.")],
+) -> None:
+    """Copy the rig files and campaigns that come with the program, to be edited. Overwrites nothing."""
+    with reported():
+        for path in copy_shipped(folder):
+            typer.echo(path)

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from daq_app.campaign.plan import Campaign, load_campaign
-from daq_app.config import ConfigError, Problem
+from daq_app.config.shipped import here_or_shipped
 
 DEFAULT_PLAN: Final = Path("configs/campaigns/costa.toml")
 
@@ -36,9 +36,8 @@ def progress_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
 
 
 def open_plan(path: Path) -> Campaign:
-    """The campaign of a file. Raises `ConfigError`; where nobody named a file, it says how to."""
-    if path == DEFAULT_PLAN and not path.exists():
-        wrong = "it is the campaign that is taken if none is named, and it is not here"
-        right = "Name the campaign file (--plan FILE.toml), or start in the folder that has `configs`"
-        raise ConfigError([Problem(str(path), "--plan", wrong, right)])
-    return load_campaign(path)
+    """The campaign of a file; the default, where it is not in this folder, is the one that ships.
+
+    Raises `ConfigError`.
+    """
+    return load_campaign(here_or_shipped(path) if path == DEFAULT_PLAN else path)

@@ -16,6 +16,7 @@ from rich.table import Table
 
 from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, reported
 from daq_app.config import load_rig
+from daq_app.config.shipped import here_or_shipped
 
 if TYPE_CHECKING:
     from daq_app.gap.blind.scoring.score import Score
@@ -103,7 +104,7 @@ def make(
     with _refusals():
         kept = labels or _beside(out)
         check_apart(out, kept)
-        files = rig or list(_RIGS)
+        files = rig or [here_or_shipped(path) for path in _RIGS]
         for file in files:
             load_rig(file)
         texts = tuple(file.read_text(encoding="utf-8") for file in files)

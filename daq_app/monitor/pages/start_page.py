@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 from daq_app.acquisition.viewers.client import AcquisitionUnreachable
 from daq_app.acquisition.viewers.launcher import AcquisitionDied
 from daq_app.config import ConfigError, load_rig
+from daq_app.config.shipped import shipped_configs
 from daq_app.monitor.widgets.labels import role_label
 from daq_app.monitor.widgets.settings import WindowSettings
 from daq_app.monitor.widgets.theme import font
@@ -29,8 +30,12 @@ Start = Callable[[Path, Path], None]
 
 
 def known_rigs(settings: WindowSettings, folder: Path) -> list[Path]:
-    """Rig files used before, then those in ``configs`` of the working folder; only those that exist."""
+    """Rig files used before, those in ``configs`` of the working folder, those that come with the program.
+
+    Only those that exist.
+    """
     found = [*settings.recent_rigs, *sorted((folder / "configs").glob("*.toml"))]
+    found += sorted(shipped_configs().glob("*.toml"))
     return list(dict.fromkeys(path.resolve() for path in found if path.is_file()))
 
 
