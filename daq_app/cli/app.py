@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import importlib
 import os
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
 import typer
 from typer.core import TyperCommand, TyperGroup
+
+from daq_app.extras import missing_extra
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,4 +139,11 @@ def main() -> None:
     # processor time from the acquisition. Read by NumPy when it is loaded, by this process and its children.
     for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    build_app()()
+    try:
+        build_app()()
+    except ModuleNotFoundError as error:
+        missing = missing_extra(error)
+        if missing is None:
+            raise
+        print(f"Error: {missing}", file=sys.stderr)
+        sys.exit(2)

@@ -96,6 +96,8 @@ def _window() -> Any:
     """The window's module; what is missing on this machine is said in words."""
     try:
         return importlib.import_module("daq_app.monitor.window.app")
+    except ModuleNotFoundError:
+        raise  # the root command says which extra brings it
     except ImportError as error:
         print_paragraph(
             "Error",

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import errno
-from pathlib import Path
 
 import pytest
 import typer
-from typer.testing import CliRunner
 
-from daq_app.cli.app import build_app
 from daq_app.cli.errors import reported
 from daq_app.config import ConfigError, Problem
 from daq_app.runfile.errors import RunFileError
@@ -53,10 +50,3 @@ def test_each_problem_is_a_paragraph_and_they_are_counted(capsys: pytest.Capture
 def test_a_bug_is_not_hidden() -> None:
     with pytest.raises(ZeroDivisionError), reported():
         raise ZeroDivisionError
-
-
-def test_a_plan_that_nobody_named_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(build_app(), ["campaign", "status", "runs"])
-    assert result.exit_code == 2
-    assert "--plan FILE.toml" in result.stderr

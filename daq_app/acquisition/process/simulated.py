@@ -7,6 +7,7 @@ import subprocess
 import threading
 from collections import deque
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -23,7 +24,15 @@ class SimulatedServer:
     """``sim_hardware.daqmx_server`` in its own process."""
 
     def __init__(self, rig_file: Path, options: Sequence[str] = ()) -> None:
-        """Start the server; it needs some seconds, which the caller may use (see `connection`)."""
+        """Start the server; it needs some seconds, which the caller may use (see `connection`).
+
+        Raises `DriverError` where the packages of the simulated hardware are not installed.
+        """
+        if find_spec("numba") is None:
+            raise DriverError(
+                "The simulated hardware is not installed",
+                advice="python -m pip install 'rocking-test-recorder[sim]', or name another connection",
+            )
         self._process = start_guarded(
             "sim_hardware.daqmx_server", ["--port", "0", "--config", str(rig_file), *options]
         )

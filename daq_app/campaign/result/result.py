@@ -20,6 +20,7 @@ from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.report.summary import MethodResult, TestSummary
 from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.config import ConfigError
+from daq_app.extras import missing_extra
 from daq_app.runfile import RunFileError
 
 SUFFIX: Final = ".result.json"
@@ -112,10 +113,12 @@ def load_result(run: Path) -> Result | None:
 
 
 def make_result(run: Path) -> Result:
-    """Analyse the run (and earlier ones that have no summary), save everything. Raises `NoResult`."""
+    """Analyse the run (and earlier ones that have no summary), save everything.
+
+    Raises `NoResult`, also where the summary is saved and the packages of its page are not installed.
+    """
     # Imported here: reading a saved result needs neither the analysis nor matplotlib.
     from daq_app.campaign.report.collect import Failure, summarise_run
-    from daq_app.campaign.result.report import write_result
     from daq_app.rocking.analysis.analyse import AnalysisOptions
 
     this, earlier = level_of(run)
@@ -133,6 +136,13 @@ def make_result(run: Path) -> Result:
             found = made
         summaries.append(judged(found, test))
     result = Result(summaries[-1], tuple(summaries[:-1]))
+    try:
+        from daq_app.campaign.result.report import write_result
+    except ModuleNotFoundError as error:
+        missing = missing_extra(error)
+        if missing is None:
+            raise
+        raise NoResult(f"The figures are saved, the page is not: {missing}") from error
     write_result(run, result.test, result.earlier)
     return result
 

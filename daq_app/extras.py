@@ -1,0 +1,30 @@
+"""What is installed only where it is asked for: which extra brings a package, said to whoever misses it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+EXTRA_OF: Final[Mapping[str, str]] = {
+    "PySide6": "window",
+    "pyqtgraph": "window",
+    "numba": "sim",
+    "matplotlib": "report",
+    "jinja2": "report",
+    "pyarrow": "formats",
+    "xarray": "formats",
+    "h5netcdf": "formats",
+    "nptdms": "formats",
+    "distributed": "scale",
+    "mujoco": "contact",
+}
+"""Package → extra of this project (`[project.optional-dependencies]` of pyproject.toml)."""
+
+
+def missing_extra(error: ModuleNotFoundError) -> str | None:
+    """What is missing and how to get it; None if the module belongs to no extra."""
+    package = (error.name or "").partition(".")[0]
+    extra = EXTRA_OF.get(package)
+    if extra is None:
+        return None
+    return f"this needs the package {package}: python -m pip install 'rocking-test-recorder[{extra}]'"
