@@ -20,6 +20,7 @@ from daq_app.gap.rocking_model.features.run_features import extract
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.traces import Trace, traces
+from daq_app.gap.words import in_words
 
 _A4_IN: Final = (8.27, 11.69)
 _LISTED: Final = 6
@@ -40,6 +41,7 @@ def write_report(result: Diagnosis, path: Path, runs: Sequence[GapRun] = ()) -> 
         .render(
             d=result,
             verdict=_verdict(result),
+            causes=_causes(result),
             estimates=(*result.effect_parameters, *result.parameters),
             pictures=_pictures(result, shown, maps),
         )
@@ -52,6 +54,11 @@ def write_report(result: Diagnosis, path: Path, runs: Sequence[GapRun] = ()) -> 
 
 def _verdict(result: Diagnosis) -> str:
     return result.decision.verdict.replace("_", " ")
+
+
+def _causes(result: Diagnosis) -> tuple[str, ...]:
+    sizes = {e.name: (e.value, e.low, e.high) for e in result.effect_parameters}
+    return in_words(result.best, sizes)
 
 
 def _meanings(runs: Sequence[GapRun]) -> dict[str, str]:
@@ -151,7 +158,10 @@ def _pdf(result: Diagnosis, shown: Sequence[Trace], maps: Sequence[ProbeMap]) ->
 
 def _write_head(part: Any, result: Diagnosis) -> None:
     part.text(0.04, 0.93, f"Sim-to-real gap: {_verdict(result)}", fontsize=14, weight="bold", va="top")
-    lines = _wrapped(result.decision.sentence) + _wrapped(f"Where: {result.where.sentence}")
+    lines = _wrapped(result.decision.sentence)
+    if causes := _causes(result):
+        lines += _wrapped(f"In words: {'; '.join(causes)}.")
+    lines += _wrapped(f"Where: {result.where.sentence}")
     if result.gap is not None:
         lines += _wrapped(
             f"How far: the held-out gap falls from {result.gap.before:.2f} to {result.gap.after:.2f} times "

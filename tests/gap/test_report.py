@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from daq_app.gap.core.findings import Finding
 from daq_app.gap.report import write_report
 from daq_app.gap.report_figures import ProbeMap, map_table
 from daq_app.gap.traces import traces
@@ -50,6 +51,24 @@ def test_each_impact_gets_the_r_that_meets_the_next_peak():
         assert np.nanmax(left) < 0.02 * peak
 
 
+def test_the_page_has_a_table_of_what_instruments_were_found_to_do(tmp_path):
+    hum = Finding(
+        "hum@wire",
+        "mains hum of 0.03 mm in the wires",
+        "sensor",
+        0.999,
+        3e-5,
+        2e-5,
+        4e-5,
+        "m",
+        "5 of 8 runs",
+        False,
+    )
+    found = replace(diagnosis({"viscous.zeta": 0.006}, ("0",)), findings=(hum,))
+    page = write_report(found, tmp_path / "gap.html")[0].read_text(encoding="utf-8")
+    assert "mains hum of 0.03 mm in the wires" in page and "5 of 8 runs" in page and "ordinary" in page
+
+
 def test_the_page_holds_everything_and_says_it_safely(tmp_path):
     runs = simulate({"viscous": {"zeta": 0.006}}, (0.15,))
     dead = replace(runs[0], name="dead", channels=np.zeros_like(runs[0].channels))
@@ -60,6 +79,7 @@ def test_the_page_holds_everything_and_says_it_safely(tmp_path):
     assert "viscous &lt;explains&gt; the gap &amp; more" in page
     assert "falls from 9.10 to" in page and "viscous.zeta" in page
     assert "Measure next: Repeat at another level" in page
+    assert "In words: viscous damping of 0.60 ± 0.06 % of critical." in page
     assert "<stated>" not in page
     headings = re.findall("<h2>(.*?)</h2>", page)
     assert [h.split(":")[0] for h in headings] == [

@@ -182,8 +182,13 @@ def starter(
 
 
 def _print(result: Diagnosis) -> None:
+    from daq_app.gap.words import in_words
+
     console = Console()
     console.print(f"{result.decision.verdict}: {result.decision.sentence}", markup=False)
+    sizes = {e.name: (e.value, e.low, e.high) for e in result.effect_parameters}
+    if causes := in_words(result.best, sizes):
+        console.print(f"In words: {'; '.join(causes)}.", markup=False)
     console.print(f"Where: {result.where.sentence}", markup=False)
     table = Table("hypothesis", "family", "probability", "log evidence")
     for entry in result.which[:6]:

@@ -23,6 +23,7 @@ from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.config import ConfigError
 from daq_app.gap.files import newest_result
+from daq_app.gap.words import causes_in_words
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.gap_runner import GapRunner
 from daq_app.monitor.plots.gap_views import BarRows, GapMapView, closure_bars, evidence_bars, map_cells
@@ -275,7 +276,9 @@ class GapPage(QWidget):
         set_role(self._title, role)
         self._sentence.setText(str(result["decision_detail"]["sentence"]))
         set_role(self._sentence, "")
-        parts = [str(result["where"]["sentence"])]
+        causes = causes_in_words(result)
+        parts = [f"In words: {'; '.join(causes)}."] if causes else []
+        parts.append(str(result["where"]["sentence"]))
         if gap := result.get("gap"):
             parts.append(
                 f"Gap on held-out runs {number(gap['before'], 2)} → {number(gap['after'], 2)} "
