@@ -5,19 +5,19 @@ from __future__ import annotations
 import pytest
 
 from daq_app.acquisition.checks.check_model import ChannelCheck, Finding, SensorCheck, Verdict
-from daq_app.acquisition.messages.published import EventMessage, State
+from daq_app.acquisition.messages.published import CheckMessage, EventMessage, Judgement, Reply, State
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.widgets.actions import ActionBar
 from daq_app.monitor.widgets.notices import NoticeLine
-from daq_app.monitor.widgets.state_look import LOOKS, look_of
+from daq_app.monitor.widgets.state_look import SHAPES, look_of
 
 
-def test_every_state_has_its_own_word_and_shape_so_that_colour_is_not_needed():
-    words = [look.word for look in LOOKS.values()]
-    assert set(LOOKS) == set(State)
-    assert len(set(words)) == len(words)
-    assert len({(look.shape, look.tone) for look in LOOKS.values()}) == len(LOOKS)
-    assert look_of(None).word == "No link"
+def test_every_state_has_its_own_shape_so_that_colour_is_not_needed():
+    assert set(SHAPES) == set(State)
+    assert len(set(SHAPES.values())) == len(SHAPES)
+    lost = look_of(None, Judgement())
+    assert (lost.word, "open it again" in lost.sentence) == ("No link", True)
+    assert look_of(State.SAVED, Judgement(word="Not armed", alarm="arm first")).shape == "cross"
 
 
 @pytest.mark.parametrize(
@@ -81,20 +81,39 @@ def test_arming_without_a_name_is_refused_with_what_to_do(window):
     assert window.notices.current == ("warning", "Give the test a name before arming.")
 
 
-def test_a_no_go_must_be_overruled_on_purpose(window, monkeypatch):
+def test_a_no_go_must_be_overruled_on_purpose_and_in_time(qtbot, window, monkeypatch):
     bad = Finding("stuck", Verdict.NO_GO, "Stuck.")
-    window.prepare.check = SensorCheck((ChannelCheck("WP-3", "wire", (bad,), 0.0, 0.0, 1.0, 0.0),))
+    check = SensorCheck((ChannelCheck("WP-3", "wire", (bad,), 0.0, 0.0, 1.0, 0.0),))
+    window._after(CheckMessage(check=check))
     window.prepare.card.propose("FR1-L3-1")
     asked = []
     monkeypatch.setattr(
         window.orders, "request", lambda name, arguments=None: asked.append((name, arguments))
     )
     window.orders.arm()
-    assert asked == []
-    assert "no-go" in window.notices.current[1]
+    assert (asked[-1][1]["test"], asked[-1][1]["overrule"]) == ("FR1-L3-1", 0.0)
+    window._on_reply("arm", Reply(ok=False, text="Not armed: the sensor check says no-go."))
+    assert window.notices.current[1].startswith("Not armed")
     window.orders.arm()
-    assert asked[0][1]["test"] == "FR1-L3-1"
-    assert "Sensor check: no-go" in asked[0][1]["notes"]
+    assert asked[-1][1]["overrule"] == 1.0
+    window._on_reply("arm", Reply(ok=False, text="Not armed: the sensor check says no-go."))
+    window.orders._overrule_timer.setInterval(1)
+    window.orders._overrule_timer.start()
+    qtbot.waitUntil(lambda: not window.orders._overrule_timer.isActive())
+    assert any("was not pressed again" in line for line in window.notices.log)
+    window.orders.arm()
+    assert asked[-1][1]["overrule"] == 0.0, "what has run out must be asked for again"
+
+
+def test_a_warning_leaves_when_its_trouble_is_over_and_stays_in_the_log(window):
+    begins = EventMessage(
+        kind="alarm", sample=1, text="no samples", severity="error", data={"alarm": "silence"}
+    )
+    window._after(begins)
+    assert window.notices.current == ("error", "no samples")
+    window._after(begins.model_copy(update={"text": "samples again", "severity": "info"}))
+    assert ("error", "no samples") not in window.notices._queue
+    assert any("no samples" in line for line in window.notices.log)
 
 
 def test_a_note_is_typed_in_a_line_not_in_a_box(qtbot, window, monkeypatch):

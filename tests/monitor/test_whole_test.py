@@ -93,13 +93,15 @@ def test_from_the_check_to_the_next_test(qtbot, acquisition, configs, settings):
     window._on_slow()
     window.actions_bar.buttons["arm"].click()
     reach(State.ARMED)
-    assert window.stack.currentWidget() is window.live
+    assert window.stack.currentWidget() is prepare, "the gauge stays in front while the wall is pulled"
     until(lambda: session.recording_on_disk)
     window._on_slow()
     assert window.header.words["recording"] == "Recording"
     prepare.wall.order("pull")
     reach(State.HOLDING)
-    prepare.run_pull()
+    prepare.pull_button.setEnabled(True)
+    prepare.pull_button.click()
+    until(lambda: prepare.check.pull_rotation_rad is not None)
     assert prepare.check.verdict is Verdict.GO, [
         (c.channel_id, c.text) for c in prepare.check.channels if c.findings
     ]
@@ -123,7 +125,8 @@ def test_from_the_check_to_the_next_test(qtbot, acquisition, configs, settings):
     assert prepare.card.choice.name == "FR1-L1-2"
     assert verify(run).ok
     with open_run(run) as opened:
-        assert "Sensor check: go" in opened.header.notes
+        assert opened.header.test_plan.check.verdict == "go"
+        assert opened.header.test_plan.theta0_over_alpha == 0.15
     window.close()
 
 

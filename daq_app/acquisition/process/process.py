@@ -44,6 +44,7 @@ class Process:
         from daq_app.acquisition.session.session import Session, SessionSettings
 
         self._rig = rig
+        self._no_results = bool(options.no_results)
         self._plan_rate_hz = plan.rate_hz
         self._rig_text = options.rig.read_text(encoding="utf-8")
         self._token = os.environ.get("DAQ_APP_TOKEN") or secrets.token_urlsafe(24)
@@ -147,6 +148,7 @@ class Process:
             "tare_record": self.session.analyst.tare.record,
             "connection": self._connection() if opened else "",
             "simulated": self._simulated,
+            "makes_results": not self._no_results,
             "events": [event.model_dump(mode="json") for event in self.session.recent_events],
             "folder": str(self._folder.resolve()),
             "pid": os.getpid(),

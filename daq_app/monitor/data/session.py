@@ -22,6 +22,7 @@ from daq_app.acquisition.messages.published import (
     EstimateMessage,
     EventMessage,
     HealthMessage,
+    Judgement,
     MotionMessage,
     State,
     StateMessage,
@@ -165,6 +166,8 @@ class Session:
         self.state = message
         if message.state is State.ARMED and (before is None or before.state is not State.ARMED):
             self.estimate = None
+            for means in self._running.values():
+                means.clear()  # the lines of the last test are not this one's
             self._peak_rad = 0.0
             self._rest_sample = None
             self._armed_sample = message.since_sample
@@ -244,6 +247,11 @@ class Session:
     def current_state(self) -> State | None:
         """The state, or None when nothing has been heard for too long to know."""
         return self.state.state if self.state is not None and self.linked else None
+
+    @property
+    def judgement(self) -> Judgement:
+        """What the recorder makes of the moment; empty when nothing has been heard for too long."""
+        return self.state.judgement if self.state is not None and self.linked else Judgement()
 
     @property
     def data_missing(self) -> bool:

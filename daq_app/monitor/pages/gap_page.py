@@ -296,7 +296,9 @@ class GapPage(QWidget):
 
     def _open_page(self) -> None:
         if self._result_file is not None:
-            open_outside(self._result_file.with_suffix(".html"))
+            page = self._result_file.with_suffix(".html")
+            if not open_outside(page):
+                self.told.emit("warning", f"No program on this computer opens pages: {page}")
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -7,31 +7,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from daq_app.acquisition.checks.check_model import SensorCheck
-from daq_app.acquisition.checks.pull_check import PullTooSmall, check_pull
-from daq_app.acquisition.checks.sensor_check import Conditions, check_at_rest
 from daq_app.config.rig import Rig
-from daq_app.config.scaling import Scaling
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.session import RECORDING, Session
 from daq_app.monitor.widgets.actions import BETWEEN_TESTS
 from daq_app.monitor.widgets.check_table import SHAPES, TONES, CheckTable
 from daq_app.monitor.widgets.labels import role_label, set_role
-from daq_app.monitor.widgets.notices import Severity
 from daq_app.monitor.widgets.pull_gauge import PullGauge
 from daq_app.monitor.widgets.shapes import Sign
 from daq_app.monitor.widgets.test_card import TestCard
 from daq_app.monitor.widgets.theme import DARK, Colours, font
 from daq_app.monitor.widgets.wall_card import WallCard
-
-REST_S = 3.0
-"""How much of the still wall the check looks at."""
-PULL_S = 1.0
 
 
 @dataclass(slots=True)
@@ -43,22 +33,21 @@ class Zero:
 
 
 class PreparePage(QWidget):
-    """Emits `tare_wanted` and `told(severity, text)`; everything else happens here."""
+    """Emits what is wanted of the recorder (zero, check, pull test) and `told(severity, text)`."""
 
     tare_wanted = Signal()
+    check_wanted = Signal()
+    pull_wanted = Signal()
     told = Signal(str, str)
     checked = Signal()
 
     def __init__(self, session: Session, background: Background, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
-        self._background = background
         self._colours = DARK
         self.zero = Zero()
         self.planned_rate_hz = 0.0
         self.check: SensorCheck | None = None
-        self._rest_readings: NDArray[np.float64] | None = None
-        """Mean reading of each channel at the check at rest: the pull test starts from it."""
         self.card = TestCard()
         self.gauge = PullGauge(session)
         self.table = CheckTable()
@@ -81,10 +70,9 @@ class PreparePage(QWidget):
         self._build()
         self.keys = {"F2": self.check_button, "F3": self.pull_button, "Ctrl+0": self.tare_button}
         """Keys of the whole window: a pull test is wanted while the live page is in front."""
-        self.check_button.clicked.connect(self.run_check)
-        self.pull_button.clicked.connect(self.run_pull)
+        self.check_button.clicked.connect(self.check_wanted.emit)
+        self.pull_button.clicked.connect(self.pull_wanted.emit)
         self.tare_button.clicked.connect(self.tare_wanted.emit)
-        self.card.changed.connect(self._on_choice)
 
     def _build(self) -> None:
         left = QVBoxLayout()
@@ -150,7 +138,6 @@ class PreparePage(QWidget):
     def set_rig(self, rig: Rig) -> None:
         """A new rig is wired: nothing has been checked on it."""
         self.check = None
-        self._rest_readings = None
         self.table.show_check(rig, None)
         self._show_verdict()
         self._show_zero()
@@ -164,63 +151,22 @@ class PreparePage(QWidget):
         """Bring buttons and gauge up to date; several times a second."""
         state = self._session.current_state
         between = state in BETWEEN_TESTS and self._session.sampling
-        self.check_button.setEnabled(between and not self._background.busy)
+        self.check_button.setEnabled(between)
         self.tare_button.setEnabled(between)
         may_pull = between or (state in RECORDING and self._session.sampling)
-        self.pull_button.setEnabled(self._rest_readings is not None and may_pull)
+        self.pull_button.setEnabled(self.check is not None and may_pull)
         self.gauge.update()
 
     # -- the check -------------------------------------------------------------------------------
 
-    def run_check(self) -> None:
-        """Check the last seconds of every channel; the wall must stand still."""
-        rig = self._session.rig
-        data = self._session.recent(REST_S)
-        if rig is None or data is None:
-            self._tell(
-                "warning", f"The check needs {REST_S:g} s of data without a gap. Wait a little and try again."
-            )
-            return
-        health = self._session.health
-        conditions = Conditions(
-            rate_hz=self._session.rate_hz,
-            planned_rate_hz=self.planned_rate_hz or self._session.rate_hz,
-            free_bytes=health.free_bytes if health is not None else -1,
-            today=dt.date.today(),
-            tare=dict(self.zero.readings),
-            overloaded=self._session.overloaded,
-        )
-        readings = self._mean_readings(data)
-        self.check_button.setEnabled(False)
-
-        def done(check: SensorCheck) -> None:
-            self._rest_readings = readings
+    def show_check(self, check: SensorCheck | None) -> None:
+        """Show the check in force, as the recorder took it."""
+        if check is None:
+            self.check = None
+            self.table.show_check(self._session.rig, None)
+            self._show_verdict()
+        else:
             self._show_check(check)
-
-        self._background.run(
-            lambda: check_at_rest(rig, data, conditions), done, lambda error: self._tell("error", str(error))
-        )
-
-    def run_pull(self) -> None:
-        """Compare every channel with the common rotation since the check at rest."""
-        rig, check, rest = self._session.rig, self.check, self._rest_readings
-        data = self._session.recent(PULL_S)
-        if rig is None or check is None or rest is None or data is None:
-            self._tell("warning", "Check the sensors at rest first; the pull test compares with it.")
-            return
-        now = self._mean_readings(data)
-        scaling = Scaling.of(rig.channels)
-        change = (scaling.to_si(now) - scaling.to_si(rest))[:, 0]
-        try:
-            self._show_check(check_pull(rig, check, change))
-        except PullTooSmall as error:
-            self._tell("warning", str(error))
-
-    def _mean_readings(self, data: NDArray[np.float32]) -> NDArray[np.float64]:
-        """(n_channels, 1): a zero taken between two looks must not count as motion."""
-        assert self._session.rig is not None
-        mean = data.mean(axis=1, dtype=np.float64, keepdims=True)
-        return Scaling.of(self._session.rig.channels, self.zero.readings).to_readings(mean)
 
     def _show_check(self, check: SensorCheck) -> None:
         self.check = check
@@ -288,10 +234,3 @@ class PreparePage(QWidget):
             )
             parts.append(f"· largest {100 * share:.1f} % of the input range ({name})")
         self._zero_text.setText(" ".join(parts))
-
-    def _on_choice(self) -> None:
-        self.gauge.target_ratio = self.wall.target_ratio = self.card.choice.target_ratio
-        self.gauge.update()
-
-    def _tell(self, severity: Severity, text: str) -> None:
-        self.told.emit(severity, text)

@@ -124,8 +124,11 @@ class ResultPage(QWidget):
         self.plots.restyle(colours)
         self._show_verdict()
 
-    def open(self, run: Path) -> None:
-        """Show the result of a run; it is analysed in another process if it has none yet."""
+    def open(self, run: Path, *, soon: bool = False) -> None:
+        """Show the result of a run; it is analysed in another process if it has none yet.
+
+        `soon`: the recorder is making the result; `open_if_shown` is called when it is there.
+        """
         self.run, self.result = run, None
         self._title.setText(run.stem.split("_")[0])
         self._verdict.setText("The run is being analysed …")
@@ -136,7 +139,15 @@ class ResultPage(QWidget):
         for tile in self.tiles.values():
             tile.show_value(DASH)
         self._show_buttons()
-        self._background.run(lambda: analyse(run), lambda result: self._show(run, result), self._on_trouble)
+        if not soon:
+            self._background.run(
+                lambda: analyse(run), lambda result: self._show(run, result), self._on_trouble
+            )
+
+    def open_if_shown(self, run: Path) -> None:
+        """The recorder has made the result of a run, or says that there is none."""
+        if self.run is not None and run.name == self.run.name and self.result is None:
+            self.open(self.run)
 
     def _on_trouble(self, error: Exception) -> None:
         if not isinstance(error, (NoResult, OSError)):
@@ -203,4 +214,6 @@ class ResultPage(QWidget):
 
     def _open_page(self) -> None:
         if self.run is not None:
-            open_outside(self.run.with_suffix(".result.html"))
+            page = self.run.with_suffix(".result.html")
+            if not open_outside(page):
+                self.told.emit("warning", f"No program on this computer opens pages: {page}")

@@ -22,10 +22,11 @@ from daq_app.acquisition.viewers.client import AcquisitionUnreachable
 from daq_app.acquisition.viewers.launcher import AcquisitionDied
 from daq_app.config import ConfigError, load_rig
 from daq_app.config.shipped import shipped_configs
-from daq_app.monitor.widgets.labels import role_label
+from daq_app.monitor.widgets.labels import role_label, set_role
 from daq_app.monitor.widgets.settings import WindowSettings
 from daq_app.monitor.widgets.theme import font
 
+_NO_RIGS = "No rig was opened here before, and this folder has no configs/*.toml: choose a rig file below."
 Start = Callable[[Path, Path], None]
 
 
@@ -61,7 +62,7 @@ class StartWindow(QWidget):
         self.go = QPushButton("Open  Enter")
         self.go.setProperty("role", "primary")
         self.go.setDefault(True)
-        self.message = role_label("", "bad")
+        self.message = role_label("" if self.rigs.count() else _NO_RIGS, "muted")
         self.message.setWordWrap(True)
         self.message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         folder_row = QHBoxLayout()
@@ -84,6 +85,7 @@ class StartWindow(QWidget):
         browse_out.clicked.connect(self._browse_out)
         self.go.clicked.connect(self._open)
         self.rigs.itemActivated.connect(lambda _item: self._open())
+        self.out.returnPressed.connect(self._open)
 
     def _add(self, path: Path) -> None:
         try:
@@ -108,10 +110,10 @@ class StartWindow(QWidget):
     def _open(self) -> None:
         item = self.rigs.currentItem()
         if item is None:
-            self.message.setText("Choose a rig file first.")
+            self._say("Choose a rig file first.", "warning")
             return
         self.go.setEnabled(False)
-        self.message.setText("Starting the acquisition …")
+        self._say("Starting the recorder …", "muted")
         # The sentence must be on screen before the start, which takes some seconds.
         QTimer.singleShot(50, lambda: self._try(Path(str(item.data(Qt.ItemDataRole.UserRole)))))
 
@@ -119,7 +121,11 @@ class StartWindow(QWidget):
         try:
             self._start(rig, Path(self.out.text()).expanduser())
         except (ConfigError, AcquisitionDied, AcquisitionUnreachable, OSError) as error:
-            self.message.setText(str(error))
+            self._say(str(error), "bad")
             self.go.setEnabled(True)
             return
         self.close()
+
+    def _say(self, text: str, role: str) -> None:
+        self.message.setText(text)
+        set_role(self.message, role)

@@ -53,6 +53,6 @@ def keyed_button(page: QWidget, text: str, key: str, act: Callable[[], object]) 
     return button
 
 
-def open_outside(path: Path) -> None:
-    """Show a saved page with what this computer shows such files with."""
-    QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
+def open_outside(path: Path) -> bool:
+    """Show a saved page with what this computer shows such files with; False where there is nothing."""
+    return QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))

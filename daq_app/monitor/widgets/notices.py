@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from typing import Final, Literal
 
@@ -26,13 +27,16 @@ class NoticeLine(QFrame):
         self.setObjectName("bar")
         self._colours: Colours | None = None
         self._queue: deque[tuple[Severity, str]] = deque(maxlen=50)
+        self._troubles: dict[str, str] = {}
+        """Text of a warning → what it is about, where its end is told as well."""
+        self.log: deque[str] = deque(maxlen=200)
+        """Everything that was told, with the time of day, newest last."""
         self._sign = Sign(18)
         self._text = QLabel()
         self._text.setWordWrap(True)
         self._text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._more = role_label("", "muted")
         button = QPushButton("Read  (Ctrl+D)")
-        button.setShortcut("Ctrl+D")
         button.setProperty("role", "flat")
         button.clicked.connect(self.dismiss)
         layout = QHBoxLayout(self)
@@ -53,10 +57,17 @@ class NoticeLine(QFrame):
         self._colours = colours
         self._show()
 
-    def tell(self, severity: Severity, text: str) -> None:
-        """Show a notice; a repetition of one that waits is not added."""
+    def tell(self, severity: Severity, text: str, trouble: str = "") -> None:
+        """Show a notice; a repetition of one that waits is not added.
+
+        `trouble`: what it is about, so that `settle` can take it away when it is over.
+        """
         if not text or any(text == waiting for _, waiting in self._queue):
             return
+        self.log.append(f"{time.strftime('%H:%M:%S')}  {severity}  {text}")
+        self.setToolTip("\n".join(list(self.log)[-20:]))
+        if trouble and severity != "info":
+            self._troubles[text] = trouble
         if severity == "info":
             # What is good to know gives way to the next such line by itself.
             for old in [notice for notice in self._queue if notice[0] == "info"]:
@@ -65,6 +76,13 @@ class NoticeLine(QFrame):
             self._fade.start()
         else:
             self._queue.appendleft((severity, text))
+        self._show()
+
+    def settle(self, trouble: str) -> None:
+        """That trouble is over: its warnings leave; the log keeps them."""
+        for old in [notice for notice in self._queue if self._troubles.get(notice[1]) == trouble]:
+            self._queue.remove(old)
+        self._troubles = {text: about for text, about in self._troubles.items() if about != trouble}
         self._show()
 
     def _let_info_go(self) -> None:

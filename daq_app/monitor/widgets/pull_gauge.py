@@ -3,55 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
-from daq_app.acquisition.messages.published import MotionMessage
+from daq_app.acquisition.messages.published import Call, Judgement, MotionMessage
 from daq_app.monitor.data.session import Session
 from daq_app.monitor.widgets.labels import DASH, number
 from daq_app.monitor.widgets.theme import DARK, Colours, font
 
-ON_TARGET = 0.02
-"""Within this share of the target the pull is right."""
-
-
-@dataclass(frozen=True, slots=True)
-class PullAdvice:
-    """What the gauge says."""
-
-    words: str
-    role: str
-    """Theme colour: text, good, warning, bad or muted."""
-
-
-def pull_advice(tilt_rad: float, target_rad: float, alpha_rad: float) -> PullAdvice:
-    """What to do at this rotation to come to the target on either side."""
-    if not math.isfinite(tilt_rad):
-        return PullAdvice("The rotation is not live", "muted")
-    if not math.isfinite(target_rad) or target_rad <= 0:
-        return PullAdvice("Choose a test to get a target", "muted")
-    missing = target_rad - abs(tilt_rad)
-    if abs(missing) <= ON_TARGET * target_rad:
-        return PullAdvice("On target: hold", "good")
-    if missing > 0:
-        return PullAdvice(f"Pull {1e3 * missing:.1f} mrad more", "text")
-    over = "ease back" if abs(tilt_rad) < 0.6 * alpha_rad else "STOP, ease back: near overturning"
-    return PullAdvice(
-        f"{-1e3 * missing:.1f} mrad too far: {over}", "warning" if "STOP" not in over else "bad"
-    )
-
 
 class PullGauge(QWidget):
-    """The gauge: tiltmeters' rotation over α from 0 to 0.5, target marked."""
+    """The gauge: tiltmeters' rotation over α, the band of the recorder's plan, and its words."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
         self._colours = DARK
-        self.target_ratio = math.nan
         self.setMinimumHeight(150)
 
     def sizeHint(self) -> QSize:
@@ -67,10 +36,14 @@ class PullGauge(QWidget):
         return session.tilt_rad if session.fresh(MotionMessage) else math.nan
 
     @property
-    def advice(self) -> PullAdvice:
-        """What the gauge says now."""
-        alpha = self._session.alpha_rad
-        return pull_advice(self._tilt_rad(), self.target_ratio * alpha, alpha)
+    def words(self) -> str:
+        """What the gauge says now: the recorder's words, or that the rotation is not live."""
+        if not self._session.fresh(MotionMessage):
+            return "The rotation is not live"
+        judgement = self._session.judgement
+        left_s = judgement.hold_s - judgement.held_s
+        counts = judgement.call is Call.HOLD and judgement.held_s > 0 and left_s > 0
+        return f"{judgement.gauge}  {math.ceil(left_s)} s" if counts else judgement.gauge
 
     def paintEvent(self, event: QPaintEvent) -> None:
         colours = self._colours
@@ -93,17 +66,20 @@ class PullGauge(QWidget):
         detail = number(tilt * 1e3, 1, "mrad") if math.isfinite(tilt) else DASH
         painter.drawText(top, right, f"θ/α by tiltmeters\n{detail}")
         bar = QRectF(1, line + 8, width - 2, max(14.0, min(44.0, height * 0.13)))
-        full = max(0.5, 1.25 * self.target_ratio) if math.isfinite(self.target_ratio) else 0.5
-        self._paint_bar(painter, bar, abs(tilt) / alpha, full)
-        advice = self.advice
-        painter.setPen(QColor(str(getattr(colours, advice.role))))
+        judgement = self._session.judgement
+        full = max(0.5, 1.25 * (judgement.high or 0.0))
+        self._paint_bar(painter, bar, abs(tilt) / alpha, full, judgement)
+        role = judgement.tone if self._session.fresh(MotionMessage) else "muted"
+        painter.setPen(QColor(str(getattr(colours, role))))
         painter.setFont(font(words, bold=True))
         below = QRectF(0, bar.bottom() + 24, width, height - bar.bottom() - 24)
         wrap = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap
-        painter.drawText(below, int(wrap), advice.words)
+        painter.drawText(below, int(wrap), self.words)
         painter.end()
 
-    def _paint_bar(self, painter: QPainter, bar: QRectF, ratio: float, full: float) -> None:
+    def _paint_bar(
+        self, painter: QPainter, bar: QRectF, ratio: float, full: float, judgement: Judgement
+    ) -> None:
         colours = self._colours
         painter.setPen(QPen(QColor(colours.line), 1))
         painter.setBrush(QColor(colours.raised))
@@ -114,17 +90,19 @@ class PullGauge(QWidget):
             painter.drawRoundedRect(
                 QRectF(bar.left(), bar.top(), bar.width() * min(1.0, ratio / full), bar.height()), 3, 3
             )
-        if not math.isfinite(self.target_ratio):
+        if judgement.target is None or judgement.low is None or judgement.high is None:
             return
-        x = bar.left() + bar.width() * self.target_ratio / full
-        half = bar.width() * ON_TARGET * self.target_ratio / full
+        scale = bar.width() / full
+        x, low = bar.left() + scale * judgement.target, bar.left() + scale * judgement.low
         painter.setPen(Qt.PenStyle.NoPen)
         band = QColor(colours.good)
         band.setAlpha(90)
         painter.setBrush(band)
-        painter.drawRect(QRectF(x - half, bar.top() - 5, 2 * half, bar.height() + 10))
+        width = scale * (judgement.high - judgement.low)
+        painter.drawRect(QRectF(low, bar.top() - 5, width, bar.height() + 10))
         painter.setPen(QPen(QColor(colours.good), 2))
         painter.drawLine(int(x), int(bar.top() - 6), int(x), int(bar.bottom() + 6))
         painter.setFont(font(9, bold=True))
         align = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop
-        painter.drawText(QRectF(x - 90, bar.bottom() + 6, 180, 16), align, f"target {self.target_ratio:.2f}")
+        told = f"target {judgement.target:.2f}  ({judgement.low:.3f} to {judgement.high:.3f})"
+        painter.drawText(QRectF(x - 120, bar.bottom() + 6, 240, 16), align, told)

@@ -1,14 +1,26 @@
-"""How each state of the acquisition is told: a word, a sentence, a shape and a colour's role."""
+"""How each state of the acquisition is drawn: a shape and a colour. Its words are the recorder's."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from daq_app.acquisition.messages.published import State
+from daq_app.acquisition.messages.published import Judgement, State, Tone
 
 Shape = Literal["ring", "eye", "triangle", "square", "diamond", "disc", "bar", "arrow", "tick", "cross"]
-Tone = Literal["muted", "accent", "warning", "bad", "good"]
+
+SHAPES: Final[dict[State, Shape]] = {
+    State.IDLE: "ring",
+    State.PREVIEWING: "eye",
+    State.ARMED: "triangle",
+    State.HOLDING: "square",
+    State.RELEASED: "diamond",
+    State.ROCKING: "disc",
+    State.AT_REST: "bar",
+    State.SAVING: "arrow",
+    State.SAVED: "tick",
+    State.FAILED: "cross",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,28 +34,18 @@ class StateLook:
     tone: Tone
 
 
-LOOKS: Final[dict[State, StateLook]] = {
-    State.IDLE: StateLook("Idle", "No task runs. Start the live view to see the sensors.", "ring", "muted"),
-    State.PREVIEWING: StateLook(
-        "Live view", "Sensors are read; nothing is recorded. Check, zero, then arm.", "eye", "accent"
-    ),
-    State.ARMED: StateLook("Armed", "Pull the wall to the target rotation.", "triangle", "warning"),
-    State.HOLDING: StateLook(
-        "Holding", "The wall is held still at its rotation. Release when ready.", "square", "warning"
-    ),
-    State.RELEASED: StateLook("Released", "The wall moves. Keep clear.", "diamond", "bad"),
-    State.ROCKING: StateLook("Rocking", "Keep clear; recording stops by itself.", "disc", "bad"),
-    State.AT_REST: StateLook("At rest", "Recording the wall at rest for the end zero.", "bar", "good"),
-    State.SAVING: StateLook(
-        "Saving", "The record is checked and written. Do not switch off.", "arrow", "accent"
-    ),
-    State.SAVED: StateLook("Saved", "Look at the result, then take the next test.", "tick", "good"),
-    State.FAILED: StateLook("Failed", "The test did not end as it should. Read the message.", "cross", "bad"),
-}
-
-UNLINKED: Final = StateLook("No link", "Nothing is heard from the acquisition.", "cross", "bad")
+UNLINKED: Final = StateLook(
+    "No link",
+    "Nothing is heard from the recorder. A test under way goes on without this window: open it again on the "
+    "same rig and folder.",
+    "cross",
+    "bad",
+)
 
 
-def look_of(state: State | None) -> StateLook:
-    """The look of a state; None is a lost link."""
-    return UNLINKED if state is None else LOOKS[state]
+def look_of(state: State | None, judgement: Judgement) -> StateLook:
+    """The look of a state with the recorder's words; None is a lost link."""
+    if state is None:
+        return UNLINKED
+    shape: Shape = "cross" if judgement.alarm else SHAPES[state]
+    return StateLook(judgement.word, judgement.do, shape, judgement.tone)

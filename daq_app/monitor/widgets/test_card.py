@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QButtonGroup,
+    QComboBox,
     QFrame,
     QGridLayout,
     QHBoxLayout,
@@ -19,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from daq_app.monitor.widgets.labels import role_label
+from daq_app.runfile import TestPlan
 
 LEVELS = {"L1": 0.15, "L2": 0.25, "L3": 0.35, "L4": 0.40}
 """θ0/α of Table 3.2."""
@@ -35,6 +37,19 @@ class TestChoice:
     target_ratio: float = math.nan
     """θ0/α to pull to; NaN when no level is chosen."""
     notes: str = ""
+    side: str = ""
+    operator: str = ""
+
+    @property
+    def level(self) -> str:
+        """Level of the target, as in the plan of a campaign; empty where there is none."""
+        return next((name for name, ratio in LEVELS.items() if abs(ratio - self.target_ratio) < 1e-6), "")
+
+    def as_order(self) -> dict[str, float | str]:
+        """The arguments of an order to choose or to arm this test."""
+        target = {"theta0_over_alpha": self.target_ratio} if math.isfinite(self.target_ratio) else {}
+        words = {"test": self.name, "level": self.level, "side": self.side}
+        return {**words, "operator": self.operator, "notes": self.notes, **target}
 
 
 class TestCard(QFrame):
@@ -53,6 +68,12 @@ class TestCard(QFrame):
         self._notes.setPlaceholderText("Notes for the run: weather, cracks, who pulled …")
         self._notes.setMaximumHeight(58)
         self._notes.setTabChangesFocus(True)
+        self._operator = QLineEdit()
+        self._operator.setPlaceholderText("who takes the test")
+        self._operator.setMaxLength(200)
+        self._side = QComboBox()
+        for text, side in (("either side", ""), ("towards +x", "+x"), ("towards −x", "-x")):
+            self._side.addItem(text, side)
         self._group = QButtonGroup(self)
         levels = QHBoxLayout()
         levels.setSpacing(4)
@@ -71,16 +92,47 @@ class TestCard(QFrame):
         layout.addWidget(self._name, 0, 1)
         layout.addWidget(role_label("θ0/α", "heading"), 1, 0)
         layout.addLayout(levels, 1, 1)
-        layout.addWidget(self._notes, 2, 0, 1, 2)
+        people = QHBoxLayout()
+        people.addWidget(self._operator, 1)
+        people.addWidget(self._side)
+        layout.addWidget(role_label("By", "heading"), 2, 0)
+        layout.addLayout(people, 2, 1)
+        layout.addWidget(self._notes, 3, 0, 1, 2)
         self._name.textEdited.connect(self._on_name)
         self._group.buttonClicked.connect(lambda _button: self.changed.emit())
         self._notes.textChanged.connect(self.changed.emit)
+        self._operator.textEdited.connect(lambda _text: self.changed.emit())
+        self._side.activated.connect(lambda _index: self.changed.emit())
 
     @property
     def choice(self) -> TestChoice:
         """What is chosen now."""
         ratio = next((LEVELS[name] for name, button in self._buttons.items() if button.isChecked()), math.nan)
-        return TestChoice(self._name.text().strip(), ratio, self._notes.toPlainText().strip())
+        return TestChoice(
+            self._name.text().strip(),
+            ratio,
+            self._notes.toPlainText().strip(),
+            str(self._side.currentData()),
+            self._operator.text().strip(),
+        )
+
+    def adopt(self, plan: TestPlan, *, locked: bool) -> None:
+        """Show the recorder's plan: it is what counts, whoever chose it. Locked: nothing can be changed."""
+        for part in (self._name, self._operator, self._side, self._notes, *self._buttons.values()):
+            part.blockSignals(True)
+            part.setEnabled(not locked)
+        if self.choice.as_order() != _order_of(plan):
+            self._name.setText(plan.test)
+            self._operator.setText(plan.operator)
+            self._side.setCurrentIndex(max(0, self._side.findData(plan.side)))
+            self._notes.setPlainText(plan.notes)
+            self._group.setExclusive(False)
+            for level, button in self._buttons.items():
+                target = plan.theta0_over_alpha
+                button.setChecked(target is not None and abs(LEVELS[level] - target) < 1e-6)
+            self._group.setExclusive(True)
+        for part in (self._name, self._operator, self._side, self._notes, *self._buttons.values()):
+            part.blockSignals(False)
 
     def propose(self, name: str, target_ratio: float = math.nan) -> None:
         """Fill in the next test. Notes of the last test are not carried over."""
@@ -99,3 +151,8 @@ class TestCard(QFrame):
             if (found is not None and found[1] == level) or abs(LEVELS[level] - ratio) < 1e-6:
                 button.setChecked(True)
                 return
+
+
+def _order_of(plan: TestPlan) -> dict[str, float | str]:
+    target = math.nan if plan.theta0_over_alpha is None else plan.theta0_over_alpha
+    return TestChoice(plan.test, target, plan.notes, plan.side, plan.operator).as_order()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
-from daq_app.acquisition.messages.published import HealthMessage, State
+from daq_app.acquisition.messages.published import HealthMessage, State, StateMessage
 from daq_app.monitor.data.session import RECORDING, Session
 from daq_app.monitor.widgets.labels import role_label, set_role
 from daq_app.monitor.widgets.shapes import Sign
@@ -55,22 +55,21 @@ class Header(QFrame):
         """Bring the strip up to date."""
         session = self._session
         state = session.current_state
-        look = look_of(state)
+        judgement = session.judgement
+        look = look_of(state, judgement)
         colour = str(getattr(colours, look.tone))
         self._sign.show_shape(look.shape, colour)
         self._word.setText(look.word)
         _colour(self._word, colour)
         message = session.state
-        self._test.setText(message.test if message is not None and message.test else "No test chosen")
+        self._test.setText(_test_name(message))
         sentence = look.sentence
-        if state is not None and message is not None and message.text:
-            told = message.text.rstrip(".")
-            sentence = f"{told[:1].upper()}{told[1:]}. {look.sentence}"
         if session.data_missing:
             sentence = "No data for more than half a second: what is shown is not live."
         self._sentence.setText(sentence)
         self._sentence.setToolTip(sentence)
-        set_role(self._sentence, "bad" if session.data_missing or state is None else "muted")
+        wrong = session.data_missing or state is None or bool(judgement.alarm)
+        set_role(self._sentence, "bad" if wrong else "muted")
         self._refresh_light(state, colours)
 
     def _refresh_light(self, state: State | None, colours: Colours) -> None:
@@ -82,6 +81,8 @@ class Header(QFrame):
             self._show_light("triangle", colours.warning, "Disk is slow", behind)
         elif state in RECORDING:
             self._show_light("triangle", colours.warning, "Not confirmed", "no sample confirmed on disk")
+        elif state is State.SAVED and session.judgement.word == "Aborted":
+            self._show_light("ring", colours.muted, "Not recording", "the aborted arming is kept")
         elif state is State.SAVED:
             self._show_light("tick", colours.good, "On disk", "checked and closed")
         else:
@@ -104,6 +105,15 @@ class Header(QFrame):
             "recording": self._light_word.text(),
             "recording_detail": self._light_detail.text(),
         }
+
+
+def _test_name(message: StateMessage | None) -> str:
+    """The test that is recorded, or was last, or is chosen."""
+    if message is None:
+        return "No test chosen"
+    if message.locked or message.state in (State.SAVING, State.SAVED, State.FAILED):
+        return message.test or message.plan.test or "No test chosen"
+    return message.plan.test or "No test chosen"
 
 
 def _colour(label: QLabel, colour: str) -> None:

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import QApplication, QMainWindow, QPushButton, QWidget
 
 from daq_app.acquisition.messages.published import (
     BlockMessage,
+    CheckMessage,
     EventMessage,
     HealthMessage,
     MotionMessage,
@@ -42,7 +43,9 @@ from daq_app.monitor.window.window_frame import WindowFrame
 
 FRAME_MS: Final = 25
 SLOW_MS: Final = 160
-_QUIET_EVENTS: Final = frozenset({"impact", "marker", "tare", "saved", *State})
+_MAY_BE_REFUSED: Final = frozenset({"tare", "check", "pull", "plan"})
+"""Orders whose refusal is no error: the wall was not still, or the test is locked."""
+_QUIET_EVENTS: Final = frozenset({"impact", "marker", "tare", "saved", "check", "result", *State})
 """Events that the pages show anyway, unless they are more than information."""
 
 
@@ -68,6 +71,7 @@ class MainWindow(QMainWindow):
         self._state_before: State | None = None
         self._was_live: tuple[bool, ...] = ()
         self._told_past = False
+        self._recorder_makes_results = False
         self._runs_folder: Path | None = None
         self._released = False
         """Whether the wall was let go since the last arming: an aborted arming has no result."""
@@ -138,7 +142,8 @@ class MainWindow(QMainWindow):
         self.note_entry.noted.connect(self.orders.note)
         self.prepare.tare_wanted.connect(lambda: self.orders.request("tare"))
         self.prepare.told.connect(self.notices.tell)
-        self.prepare.card.changed.connect(self._on_choice)
+        self.prepare.check_wanted.connect(lambda: self.orders.request("check"))
+        self.prepare.pull_wanted.connect(lambda: self.orders.request("pull"))
         self.campaign.told.connect(self.notices.tell)
         self.campaign.run_chosen.connect(lambda name: self.open_run(Path(name)))
         self.replay.told.connect(self.notices.tell)
@@ -156,6 +161,8 @@ class MainWindow(QMainWindow):
         """Check, pull test and zero from any page; their answer is on the page that comes to the front."""
         self.prepare.refresh()
         self.show_page(self.prepare)
+        if not button.isEnabled():
+            self.notices.tell("info", f"{button.text()}: not now. {self.session.judgement.do}")
         button.click()
 
     def show_page(self, page: QWidget) -> None:
@@ -202,7 +209,8 @@ class MainWindow(QMainWindow):
             self.session.set_rig(rig, rate_hz or rig.acquisition.rate_hz)
             self.prepare.set_rig(rig)
             self.setWindowTitle(f"{rig.name} – Rocking-test recorder")
-        self.prepare.wall.set_address(str(about.get("connection", "")) if about.get("simulated") else "")
+        ours = about.get("simulated") and self.link is not None and self.link.may_command
+        self.prepare.wall.set_address(str(about.get("connection", "")) if ours else "")
         folder = str(about.get("folder", ""))
         self._runs_folder = Path(folder) if folder else None
         if self._runs_folder is not None and self._runs_folder != self.gap.folder:
@@ -211,6 +219,11 @@ class MainWindow(QMainWindow):
         if "tare" in about:
             self.prepare.set_zero(Zero(dict(about["tare"]), dict(about.get("tare_record", {}))))
             self.session.set_zeroed(bool(about["tare"]))
+        if "check" in about:
+            self.prepare.show_check(CheckMessage.model_validate({"check": about["check"]}).check)
+        if about.get("state"):
+            self._after(StateMessage.model_validate(about["state"]))
+        self._recorder_makes_results = bool(about.get("makes_results"))
         self._adopt_past(about.get("events", []))
 
     def _adopt_past(self, events: Sequence[Any]) -> None:
@@ -253,12 +266,21 @@ class MainWindow(QMainWindow):
     def _after(self, message: object) -> None:
         match message:
             case StateMessage():
+                self.orders.adopt_plan(message)
+                self._show_target(message)
                 self._on_state(message)
+            case CheckMessage():
+                self.prepare.show_check(message.check)
             case EventMessage():
                 if message.kind == "tare" and self.link is not None:
                     self.link.request("hello")
+                if message.kind == "result" and self.result.run is not None:
+                    self.result.open_if_shown(Path(str(message.data.get("run", ""))))
+                trouble = _trouble(message)
+                if trouble and message.severity == "info":
+                    self.notices.settle(trouble)
                 if message.kind not in _QUIET_EVENTS or message.severity != "info":
-                    self.notices.tell(message.severity, message.text)
+                    self.notices.tell(message.severity, message.text, trouble)
 
     def _on_state(self, message: StateMessage) -> None:
         before, self._state_before = self._state_before, message.state
@@ -269,7 +291,7 @@ class MainWindow(QMainWindow):
             self._released = False
         if message.state in (State.RELEASED, State.ROCKING):
             self._released = True
-        if message.state is State.ARMED:
+        if message.state is State.RELEASED:
             self.show_page(self.live)
         if message.state is State.PREVIEWING and before in (State.IDLE, None) and self.link is not None:
             self.link.request("hello")
@@ -286,7 +308,7 @@ class MainWindow(QMainWindow):
         self.replay.open(run)
         if self._released:
             self.show_page(self.result)
-            self.result.open(run)
+            self.result.open(run, soon=self._recorder_makes_results)
             self.gap.after_run(run)
 
     def _on_slow(self) -> None:
@@ -302,8 +324,16 @@ class MainWindow(QMainWindow):
         elif page is self.prepare:
             self.prepare.refresh()
 
-    def _on_choice(self) -> None:
-        self.live.motion.set_target(self.prepare.card.choice.target_ratio * self.session.alpha_rad)
+    def _show_target(self, message: StateMessage) -> None:
+        """The target of the recorder's plan, wherever one is drawn."""
+        target = message.judgement.target
+        ratio = math.nan if target is None else target
+        self.prepare.wall.target_ratio = ratio
+        target_rad = ratio * self.session.alpha_rad
+        if target_rad != self.live.motion.target_rad and not (
+            math.isnan(target_rad) and math.isnan(self.live.motion.target_rad)
+        ):
+            self.live.motion.set_target(target_rad)
 
     # -- orders ----------------------------------------------------------------------------------
 
@@ -327,8 +357,9 @@ class MainWindow(QMainWindow):
         self.orders.set_campaign(campaign, folder or self._runs_folder)
 
     def _on_reply(self, name: str, reply: Reply) -> None:
+        self.orders.on_reply(name, reply)
         if not reply.ok:
-            self.notices.tell("error" if name != "tare" else "warning", reply.text)
+            self.notices.tell("error" if name not in _MAY_BE_REFUSED else "warning", reply.text)
             return
         if name == "hello":
             self._adopt(reply.data)
@@ -355,6 +386,13 @@ class MainWindow(QMainWindow):
         self._analyses.finish(0)
         self._diagnoses.finish(2000)
         super().closeEvent(event)
+
+
+def _trouble(event: EventMessage) -> str:
+    """What a warning is about, where its end is told as well; empty for others."""
+    if event.kind == "alarm":
+        return f"alarm {event.data.get('alarm', '')}"
+    return event.kind if event.kind in ("disk", "memory", "recorder") else ""
 
 
 def _numbers(value: object) -> dict[str, float]:

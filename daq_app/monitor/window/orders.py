@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QWidget
 
 from daq_app.acquisition.checks.check_model import Verdict
 from daq_app.acquisition.course.tare import UNZEROED
+from daq_app.acquisition.messages.published import Reply, StateMessage
 from daq_app.campaign.plan import Campaign
 from daq_app.campaign.verdicts import give_verdict
 from daq_app.config import ConfigError
@@ -25,6 +24,8 @@ from daq_app.monitor.widgets.notices import NoticeLine
 from daq_app.runfile import RunFileError, open_run
 
 ARM_AGAIN_WITHIN_S: Final = 10.0
+PLAN_AFTER_MS: Final = 250
+"""Pause in the typing after which the recorder hears of the plan."""
 
 
 class Orders(QObject):
@@ -45,7 +46,11 @@ class Orders(QObject):
         self._prepare, self._campaign, self._result = pages
         self._notices = notices
         self._show_page = show_page
-        self._arm_asked_s = -math.inf
+        self._plan_timer = _single_shot(self, PLAN_AFTER_MS, self._send_plan)
+        self._plan_sent = False
+        """An order to change the plan is on its way: what the recorder says until then is older."""
+        self._overrule_timer = _single_shot(self, round(1e3 * ARM_AGAIN_WITHIN_S), self._on_overrule_over)
+        self._prepare.card.changed.connect(self._on_choice)
         self._campaign.take.connect(self._take)
         self._campaign.scanned.connect(self._propose_after_scan)
         self._result.judge.connect(self.judge)
@@ -72,6 +77,21 @@ class Orders(QObject):
         """Write a note into the record."""
         self.request("note", {"text": text})
 
+    # -- the plan --------------------------------------------------------------------------------
+
+    def _on_choice(self) -> None:
+        """The operator edits the plan; the recorder hears of it once the typing pauses."""
+        self._plan_timer.start()
+
+    def _send_plan(self) -> None:
+        self._plan_sent = True
+        self.request("plan", self._prepare.card.choice.as_order())
+
+    def adopt_plan(self, message: StateMessage) -> None:
+        """Show the recorder's plan, unless the operator is changing it at this moment."""
+        if message.locked or not (self._plan_timer.isActive() or self._plan_sent):
+            self._prepare.card.adopt(message.plan, locked=message.locked)
+
     # -- arming ----------------------------------------------------------------------------------
 
     def arm(self) -> None:
@@ -81,23 +101,26 @@ class Orders(QObject):
             self._show_page(self._prepare)
             self._notices.tell("warning", "Give the test a name before arming.")
             return
-        check = self._prepare.check
-        if check is not None and check.verdict is Verdict.NO_GO and not self._arm_insisted():
-            self._notices.tell(
-                "warning", f"The sensor check says no-go. {check.summary} Press F5 again to arm all the same."
-            )
-            return
+        self._plan_timer.stop()
+        overrule = self._overrule_timer.isActive()
+        self._overrule_timer.stop()
         if self._session.zeroed is False:
             self._notices.tell("warning", UNZEROED)
-        looked = (
-            f"Sensor check: {check.verdict.value}. {check.summary}" if check else "Sensor check: not done."
-        )
-        self.request("arm", {"test": choice.name, "notes": f"{choice.notes}\n{looked}".strip()})
+        self.request("arm", {**choice.as_order(), "overrule": float(overrule)})
 
-    def _arm_insisted(self) -> bool:
-        """Whether arming was asked for a second time within some seconds."""
-        before, self._arm_asked_s = self._arm_asked_s, time.monotonic()
-        return self._arm_asked_s - before <= ARM_AGAIN_WITHIN_S
+    def on_reply(self, name: str, reply: Reply) -> None:
+        """What became of an order."""
+        if name == "plan":
+            self._plan_sent = False
+        no_go = self._prepare.check is not None and self._prepare.check.verdict is Verdict.NO_GO
+        if name == "arm" and not reply.ok and no_go:
+            self._show_page(self._prepare)
+            self._overrule_timer.start()
+
+    def _on_overrule_over(self) -> None:
+        self._notices.tell(
+            "warning", f"Not armed: F5 was not pressed again within {ARM_AGAIN_WITHIN_S:.0f} s."
+        )
 
     # -- the campaign ----------------------------------------------------------------------------
 
@@ -145,3 +168,11 @@ class Orders(QObject):
             return
         self._result.open(run)
         self._campaign.scan()
+
+
+def _single_shot(parent: QObject, after_ms: int, call: Callable[[], None]) -> QTimer:
+    timer = QTimer(parent)
+    timer.setSingleShot(True)
+    timer.setInterval(after_ms)
+    timer.timeout.connect(call)
+    return timer

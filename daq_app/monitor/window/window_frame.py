@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QBoxLayout,
     QFrame,
@@ -38,6 +39,8 @@ class WindowFrame(QWidget):
         self.actions_bar = ActionBar()
         self.health = HealthBar(session)
         self.pages = pages
+        # A shortcut of the window: with no message to read, the key must not reach a field and edit it.
+        QShortcut(QKeySequence("Ctrl+D"), self).activated.connect(self.notices.dismiss)
         self.stack = QStackedWidget()
         for page in pages.values():
             self.stack.addWidget(page)
