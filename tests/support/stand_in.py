@@ -18,6 +18,7 @@ from daq_app.acquisition.messages.published import (
     EstimateMessage,
     EstimatePoint,
     HealthMessage,
+    Judgement,
     MotionMessage,
     State,
     StateMessage,
@@ -166,6 +167,7 @@ class StandIn:
                     (
                         StateMessage(
                             state=state,
+                            judgement=Judgement(word=state.value.capitalize()),
                             test="FR1-L3-2",
                             sample=first + self.block,
                             since_sample=round(self.upright_s * self.rate_hz),

@@ -366,6 +366,11 @@ class Analyst(threading.Thread):
         return self._preparation.tare if self._preparation is not None else self._tare
 
     @property
+    def sample(self) -> int:
+        """Samples that have been looked at."""
+        return self._sample
+
+    @property
     def upright(self) -> bool:
         """Whether the wall stands upright, as far as is known."""
         rotation = self._live.rotation_rad if self._live is not None else math.nan

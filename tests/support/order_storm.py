@@ -1,0 +1,371 @@
+"""Random orders and faults against a model of what must hold: ``python -m tests.support.order_storm 200``.
+
+Each sequence is a wall that is pulled, held, released or lowered at random, a session that samples it, orders
+in any order at any time, disks that fill up or fail for a while, and moments at which the folder is copied as
+a kill would leave it. What must hold: no release unrecorded, no sample wrong or missing, no target that
+differs from the armed plan, no two contradicting words, nothing that had been called safe lost in a kill.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.acquisition.closing.derive import derive
+from daq_app.acquisition.closing.finaliser import Finaliser
+from daq_app.acquisition.closing.ring_recovery import recover_rings
+from daq_app.acquisition.messages.items import RequestRefused
+from daq_app.acquisition.messages.published import Command, HealthMessage, State, StateMessage
+from daq_app.acquisition.pipeline.reader import Patience
+from daq_app.acquisition.session.session import Session, SessionSettings
+from daq_app.config import Rig, Scaling, load_rig, plan_tasks
+from daq_app.rocking import RotationGeometry, free_rocking
+from daq_app.runfile import Run, open_run, recover
+from daq_app.runfile.folder import find_runs
+from drivers import Block, DriverError, Opened
+
+RATE_HZ = 4000
+_ORDERS = ("tare", "check", "pull", "plan", "arm", "arm", "abort", "stop", "marker", "nonsense", "preview")
+_AROUND_RELEASE = (RATE_HZ, 2 * RATE_HZ)
+"""Samples before and after a release that must be in a run."""
+
+
+@dataclass
+class Wall:
+    """Readings (n_channels, n) of a random day, and the samples of its releases."""
+
+    readings: NDArray[np.float64]
+    releases: list[int]
+
+
+def random_wall(rig: Rig, rng: np.random.Generator, tests: int) -> Wall:
+    """Upright, pulled, held, then released or lowered; so often."""
+    alpha, p = rig.specimen.alpha0_rad, rig.specimen.p_rad_s
+    pieces, releases, n = [], [], 0
+    for _ in range(tests):
+        theta0 = rng.choice([-1.0, 1.0]) * alpha * rng.uniform(0.12, 0.42)
+        pieces.append(np.zeros(round(RATE_HZ * rng.uniform(2.5, 5.0))))
+        pieces.append(np.linspace(0.0, theta0, round(RATE_HZ * rng.uniform(0.8, 2.0))))
+        pieces.append(np.full(round(RATE_HZ * rng.uniform(0.2, 6.0)), theta0))
+        n = sum(piece.size for piece in pieces)
+        if rng.random() < 0.3:
+            pieces.append(np.linspace(theta0, 0.0, round(RATE_HZ * rng.uniform(1.5, 3.0))))
+        else:
+            motion = free_rocking(abs(theta0), 0.7, p, alpha, smallest_peak_rad=1e-5)
+            last_s = float(motion.impacts_s[-1])
+            after = np.arange(round(RATE_HZ * last_s)) / RATE_HZ
+            pieces.append(np.sign(theta0) * motion.at(np.minimum(after, last_s - 1e-9))[0])
+            pieces.append(np.zeros(round(RATE_HZ * 2.5)))
+            releases.append(n)
+    pieces.append(np.zeros(2 * RATE_HZ))
+    rotation = np.concatenate(pieces)
+    si = rng.normal(size=(len(rig.channels), rotation.size))
+    si *= np.array([channel.noise_si for channel in rig.channels])[:, None]
+    wires = RotationGeometry.from_rig(rig).wires
+    for name, shortening in zip(wires.ids, wires.shortening(rotation), strict=True):
+        si[rig.channel_ids.index(name)] += shortening
+    for row, channel in enumerate(rig.channels):
+        if channel.family == "tiltmeter" and channel.axis == "x":
+            si[row] += rotation
+    return Wall(Scaling.of(rig.channels).to_readings(si), releases)
+
+
+class WallDriver:
+    """Plays a wall up to the sample that is allowed."""
+
+    def __init__(self, wall: Wall) -> None:
+        self._wall = wall
+        self.allowed = 0
+        self._next = 0
+        self._read_samples = 400
+
+    def open(self, plan: Any) -> Opened:
+        self._read_samples = plan.read_samples
+        return Opened(float(RATE_HZ), dict.fromkeys(plan.channel_ids, (-10.0, 10.0)), 80_000, (), "a storm")
+
+    def start(self) -> None:
+        self._next = 0
+
+    def read(self, timeout_s: float, n_samples: int | None = None) -> Block:
+        stop = self._next + (n_samples or self._read_samples)
+        if stop > self.allowed:
+            time.sleep(0.002)
+            raise DriverError("No samples", advice="Wait", retryable=True)
+        block = Block(self._next, np.ascontiguousarray(self._wall.readings[:, self._next : stop]), 0, 0)
+        self._next = stop
+        return block
+
+    def recover(self) -> str:
+        return ""
+
+    def stop(self) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
+
+
+class Listener:
+    """Stands where the publisher stands, and keeps what was said."""
+
+    def __init__(self) -> None:
+        self.states: list[StateMessage] = []
+        self.health: HealthMessage | None = None
+
+    def send(self, topic: str, message: Any, readings: bytes | None = None) -> None:
+        del topic, readings
+        if isinstance(message, StateMessage):
+            self.states.append(message)
+        elif isinstance(message, HealthMessage):
+            self.health = message
+
+
+class BadDisk:
+    """Makes writes fail while `trouble` is set; files of other programs are not touched."""
+
+    def __init__(self) -> None:
+        self.trouble = 0
+
+    @contextmanager
+    def in_place(self) -> Iterator[None]:
+        real = os.write
+
+        def write(fd: int, data: Any) -> int:
+            if self.trouble:
+                raise OSError(self.trouble, os.strerror(self.trouble))
+            return real(fd, data)
+
+        os.write = write  # type: ignore[assignment]
+        try:
+            yield
+        finally:
+            os.write = real
+
+
+@dataclass
+class Storm:
+    """One sequence: everything that happens is drawn from `rng`."""
+
+    rig: Rig
+    rig_text: str
+    folder: Path
+    finaliser: Finaliser
+    rng: np.random.Generator
+    log: list[str] = field(default_factory=list)
+    broken: list[str] = field(default_factory=list)
+
+    def run(self) -> list[str]:
+        """What did not hold, in words; empty when everything did."""
+        wall = random_wall(self.rig, self.rng, int(self.rng.integers(1, 3)))
+        driver, listener, disk = WallDriver(wall), Listener(), BadDisk()
+        settings = SessionSettings(
+            self.rig,
+            self.rig_text,
+            plan_tasks(self.rig),
+            self.folder,
+            lambda: driver,  # type: ignore[arg-type, return-value]
+            spare_folder=self.folder.with_name(f"{self.folder.name}-spare"),
+            patience=Patience(read_timeout_s=0.02, silence_limit_s=600.0),
+        )
+        kills: list[tuple[Path, int, int]] = []
+        with disk.in_place():
+            session = Session(settings, listener, self.finaliser)  # type: ignore[arg-type]
+            session.start()
+            end = wall.readings.shape[1] // 400 * 400
+            while driver.allowed < end:
+                self._order(session)
+                self._break(disk)
+                driver.allowed = min(end, driver.allowed + int(self.rng.integers(1, 10)) * 400)
+                self._catch_up(session, driver.allowed)
+                session.tick()
+                if self.rng.random() < 0.03 and not disk.trouble:
+                    kills.append(self._kill(session, listener, driver.allowed, len(kills)))
+            disk.trouble = 0
+            self._end(session)
+        self._check_runs(wall, find_runs(self.folder))
+        self._check_words(listener.states)
+        for copy, safe, sample in kills:
+            self._check_kill(wall, copy, safe, sample)
+        return self.broken
+
+    # -- what happens ----------------------------------------------------------------------------
+
+    def _order(self, session: Session) -> None:
+        if self.rng.random() > 0.35:
+            return
+        names = [
+            "tare",
+            "check",
+            "pull",
+            "plan",
+            "arm",
+            "arm",
+            "abort",
+            "stop",
+            "marker",
+            "nonsense",
+            "preview",
+        ]
+        name = str(self.rng.choice(names))
+        arguments: dict[str, float | str] = {}
+        if name in ("plan", "arm"):
+            level = int(self.rng.integers(1, 5))
+            arguments = {"test": f"FR1-L{level}-{int(self.rng.integers(1, 9))}", "overrule": 1.0}
+            arguments["theta0_over_alpha"] = {1: 0.15, 2: 0.25, 3: 0.35, 4: 0.40}[level]
+        self.log.append(f"{session.recorder.status.sample}: {name} {arguments.get('test', '')}")
+        with suppress(RequestRefused):
+            session.handle(Command(name=name, arguments=arguments))
+
+    def _break(self, disk: BadDisk) -> None:
+        if self.rng.random() < 0.04:
+            disk.trouble = int(self.rng.choice([0, errno.ENOSPC, errno.EIO]))
+            self.log.append(f"disk: {disk.trouble}")
+        elif disk.trouble and self.rng.random() < 0.3:
+            disk.trouble = 0
+            self.log.append("disk: well")
+
+    @staticmethod
+    def _catch_up(session: Session, sample: int) -> None:
+        deadline = time.monotonic() + 60.0
+        while session.analyst.sample < sample - 400 and time.monotonic() < deadline:
+            time.sleep(0.002)
+
+    def _kill(self, session: Session, listener: Listener, sample: int, number: int) -> tuple[Path, int, int]:
+        """The folder as kill −9 would leave it now, what had been called safe, and the newest sample."""
+        status = session.recorder.status
+        safe = status.acknowledged_sample if status.recording else 0
+        copy = self.folder.with_name(f"{self.folder.name}-kill{number}")
+        shutil.copytree(self.folder, copy, ignore=shutil.ignore_patterns("*.h5*"))
+        self.log.append(f"{sample}: killed (copy {number}), safe up to {safe}")
+        return copy, safe, sample
+
+    def _end(self, session: Session) -> None:
+        deadline = time.monotonic() + 60.0
+        while session.recording and session.analyst.state is not State.ARMED and time.monotonic() < deadline:
+            session.tick()
+            time.sleep(0.01)
+            if session.analyst.state in (State.HOLDING, State.RELEASED, State.ROCKING, State.AT_REST):
+                break
+        if session.recording:
+            session.ask("stop", {})
+        session.close()
+
+    # -- what must hold --------------------------------------------------------------------------
+
+    def _check_runs(self, wall: Wall, paths: list[Path]) -> None:
+        spans = []
+        for path in [*paths, *find_runs_or_none(self.folder.with_name(f"{self.folder.name}-spare"))]:
+            with open_run(path) as run:
+                spans.append((run.first_sample, run.first_sample + run.n_samples))
+                self._check_samples(wall, run, path)
+        for release in wall.releases:
+            low, high = release - _AROUND_RELEASE[0], release + _AROUND_RELEASE[1]
+            high = min(high, wall.readings.shape[1] // 400 * 400)
+            if not any(first <= max(0, low) and end >= high for first, end in spans):
+                # Stopped by the operator in mid-motion: what came until then is what there is to keep.
+                if any(first <= max(0, low) and release < end for first, end in spans) and self._stopped():
+                    continue
+                self.broken.append(f"the release at {release} is in no run; runs: {spans}")
+
+    def _stopped(self) -> bool:
+        return any(re.search(r": (stop|abort) ", line) for line in self.log)
+
+    def _check_samples(self, wall: Wall, run: Run, path: Path) -> None:
+        if run.gaps:
+            self.broken.append(f"{path.name}: samples are missing: {run.gaps[:2]}")
+        first, end = run.first_sample, run.first_sample + run.n_samples
+        if not np.array_equal(run.readings(), wall.readings[:, first:end]):
+            self.broken.append(f"{path.name}: readings differ from what was measured")
+
+    def _check_words(self, states: list[StateMessage]) -> None:
+        armed_plan = None
+        for message in states:
+            judgement = message.judgement
+            said = f"{judgement.word} {judgement.do} {judgement.gauge} {judgement.alarm}".lower()
+            if message.judgement.target != message.plan.theta0_over_alpha:
+                self.broken.append(f"target {judgement.target} is not the plan's: {message}")
+            if message.armed:
+                armed_plan = armed_plan or message.plan
+                if message.plan != armed_plan:
+                    self.broken.append(f"the plan changed while armed: {armed_plan} → {message.plan}")
+            else:
+                armed_plan = None
+                if re.search(r"on target|held still on target", said):
+                    self.broken.append(f"told to hold while nobody had armed: {said}")
+            if message.state in (State.RELEASED, State.ROCKING) and re.search(r"\b(pull|ease|hold)\b", said):
+                self.broken.append(f"told to pull a wall that moves: {said}")
+            if "stop:" in said and re.search(r"\b(pull|on target)\b", said):
+                self.broken.append(f"contradicting words: {said}")
+
+    def _check_kill(self, wall: Wall, copy: Path, safe: int, sample: int) -> None:
+        recover_rings(copy)
+        recover(copy, derive=lambda contents: derive(contents)[0])
+        ends = [0]
+        spans = []
+        for path in find_runs(copy):
+            with open_run(path) as run:
+                self._check_samples(wall, run, path)
+                ends.append(run.first_sample + run.n_samples)
+                spans.append((run.first_sample, run.first_sample + run.n_samples))
+        if safe > max(ends):
+            self.broken.append(f"{copy.name}: safe up to {safe}, recovered up to {max(ends)}")
+        # A release that lies a second back had been noticed: the kill must not cost it.
+        for release in wall.releases:
+            known = release + RATE_HZ < sample <= release + 2 * RATE_HZ
+            if known and not any(first <= release - 400 and end > release for first, end in spans):
+                self.broken.append(
+                    f"{copy.name}: killed at {sample}, the release at {release} is lost: {spans}"
+                )
+
+
+def find_runs_or_none(folder: Path) -> list[Path]:
+    """Runs of a folder that need not be there."""
+    return find_runs(folder) if folder.is_dir() else []
+
+
+def storm_once(rig_file: Path, folder: Path, finaliser: Finaliser, seed: int) -> tuple[list[str], list[str]]:
+    """(what did not hold, what happened) of the sequence of a seed."""
+    rig = load_rig(rig_file)
+    quick = rig.acquisition.model_copy(update={"post_rest_s": 0.5, "max_duration_s": 20.0})
+    folder.mkdir(parents=True)
+    rng = np.random.default_rng(seed)
+    text = rig_file.read_text(encoding="utf-8")
+    storm = Storm(rig.model_copy(update={"acquisition": quick}), text, folder, finaliser, rng)
+    return storm.run(), storm.log
+
+
+def main(argv: list[str]) -> int:
+    """Run so many sequences; 1 if something did not hold."""
+    count, start = int(argv[0]) if argv else 200, int(argv[1]) if len(argv) > 1 else 0
+    finaliser = Finaliser()
+    finaliser.start()
+    bad = 0
+    began = time.monotonic()
+    for seed in range(start, start + count):
+        with tempfile.TemporaryDirectory() as place:
+            broken, log = storm_once(Path("configs/fr1.toml"), Path(place) / "runs", finaliser, seed)
+        if "-v" in argv:
+            print(f"{seed}: {len(log)} orders and faults, {time.monotonic() - began:.0f} s", flush=True)
+        if broken:
+            bad += 1
+            print(f"sequence {seed}:", *broken[:4], *log, sep="\n  ", flush=True)
+    finaliser.close()
+    print(f"{count} sequences in {time.monotonic() - began:.0f} s, {bad} of them broke a rule")
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
