@@ -30,6 +30,7 @@ class TaskLedger:
     def opening(self, target: str, names: list[str]) -> None:
         """Call before the tasks are created. A folder that cannot be written to is no reason to fail."""
         with contextlib.suppress(OSError):
+            self._path.unlink(missing_ok=True)  # it may be a link to another file
             self._path.write_text(json.dumps({"target": target, "tasks": names}), encoding="utf-8")
 
     def closed(self) -> None:

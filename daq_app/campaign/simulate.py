@@ -25,7 +25,7 @@ from daq_app.acquisition.session.offline import Readings, record_offline
 from daq_app.campaign.plan import Campaign
 from daq_app.config import ConfigError, Problem, Rig, TaskPlan, load_rig, plan_tasks
 from daq_app.runfile import RunFileError
-from daq_app.runfile.durable import replace_durably
+from daq_app.runfile.durable import replace_durably, write_whole
 from daq_app.runfile.folder import RUN_SUFFIX
 from daq_app.workers import run_all
 from sim_hardware.direct import synthesise_test
@@ -185,9 +185,7 @@ def _keep_truth(path: Path, document: dict[str, object]) -> None:
     try:
         same = json.loads(path.read_text(encoding="utf-8")) == json.loads(text)
     except FileNotFoundError:
-        part = path.with_name(path.name + ".part")
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
+        write_whole(path, text)
         return
     except ValueError:
         same = False

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import datetime as dt
-import os
 from pathlib import Path
 from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from daq_app.config import ConfigError, Problem
-from daq_app.runfile.durable import replace_durably
+from daq_app.runfile.durable import write_whole
 
 FILE_NAME: Final = "verdicts.json"
 
@@ -77,9 +76,4 @@ def _write(folder: Path, run_id: str, given: OperatorVerdict) -> None:
     runs = read_verdicts(folder)
     runs[run_id] = given
     path = folder / FILE_NAME
-    temporary = path.with_suffix(f".{os.getpid()}.tmp")
-    try:
-        temporary.write_text(_Ledger(runs=runs).model_dump_json(indent=1), encoding="utf-8")
-        replace_durably(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_whole(path, _Ledger(runs=runs).model_dump_json(indent=1))

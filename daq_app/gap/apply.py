@@ -4,55 +4,120 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Final, TypeVar
 
 import tomli_w
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from daq_app.config import ConfigError, load_rig
+from daq_app.config import load_rig, parse_rig
+from daq_app.config.toml_file import parse_toml, read_text
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.result import FORMAT_VERSION
+from daq_app.runfile.durable import write_whole
+from daq_app.runfile.folder import require_replaceable
 from sim_hardware.dynamics.effects import MOTION_EFFECTS
 from sim_hardware.dynamics.spec import find_effect
 from sim_hardware.sensors.effects import SENSOR_EFFECTS
 
+_MAX_BYTES: Final = 2**26
 FORMS_ONLY = {("compliance", "fall"), ("ambient", "shift")}
 """Parameters that the simulator has not: of a form that it knows only one of, or read from a run itself."""
+
+
+class _Value(BaseModel):
+    """A named number of a result."""
+
+    model_config = ConfigDict(frozen=True)
+
+    name: Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]+$")]
+    value: Annotated[float, Field(allow_inf_nan=False)]
+
+
+class _Wiring(BaseModel):
+    """Channels whose plugs are reversed or in each other's places."""
+
+    model_config = ConfigDict(frozen=True)
+
+    reversed: tuple[str, ...] = ()
+    exchanged: dict[str, str] = Field(default_factory=dict)
+
+
+class _Result(BaseModel):
+    """The part of a diagnosis that can be switched on in a simulated wall."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    decision: str
+    effect_parameters: tuple[_Value, ...]
+    parameters: tuple[_Value, ...]
+    scatter: tuple[_Value, ...] = ()
+    notes: dict[str, Any] = Field(default_factory=dict)
+
+
+class _Wall(BaseModel):
+    """Fitted parameters of the wall, SI."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    alpha: Annotated[float, Field(gt=0.0, lt=math.pi / 2)]
+    p: Annotated[float, Field(gt=0.0)]
+    half_base: Annotated[float, Field(gt=0.0)]
+    r: Annotated[float, Field(gt=0.0)]
 
 
 def read_result(path: Path) -> dict[str, Any]:
     """The JSON of a diagnosis. Raises `CannotDiagnose` if the file is none."""
     try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise CannotDiagnose(f"{path} is far too large for a result of a diagnosis.")
         data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as problem:
+    except (OSError, ValueError, RecursionError) as problem:
         raise CannotDiagnose(f"{path} is no result of a diagnosis ({problem}).") from None
     if not isinstance(data, dict) or data.get("format") != FORMAT_VERSION or "effect_parameters" not in data:
         raise CannotDiagnose(f"{path} is no result of a diagnosis in format {FORMAT_VERSION}.")
     return data
 
 
-def effects_found(result: dict[str, Any]) -> dict[str, dict[str, float]]:
-    """Effects with their parameters as the simulator takes them."""
+def effects_found(result: Mapping[str, Any]) -> dict[str, dict[str, float]]:
+    """Effects with their parameters as the simulator takes them. Raises `CannotDiagnose`."""
+    checked = _checked(_Result, result)
     effects: dict[str, dict[str, float]] = {}
-    for estimate in result["effect_parameters"]:
-        name, _, parameter = str(estimate["name"]).rpartition(".")
+    for estimate in checked.effect_parameters:
+        name, _, parameter = estimate.name.rpartition(".")
         if (name, parameter) in FORMS_ONLY:
             continue
         if name == "polarity" or name.startswith("swap"):
-            effects |= _wired(name, result)
+            effects |= _wired(name, checked)
             continue
-        effects.setdefault(name, {})[parameter] = _possible(name, parameter, float(estimate["value"]))
+        effects.setdefault(name, {})[parameter] = _possible(name, parameter, estimate.value)
     return effects
 
 
-def _wired(effect: str, result: dict[str, Any]) -> dict[str, dict[str, float]]:
+_Model = TypeVar("_Model", bound=BaseModel)
+
+
+def _checked(model: type[_Model], data: object) -> _Model:
+    try:
+        return model.model_validate(data)
+    except (ValidationError, RecursionError) as problem:
+        where, what = "", str(problem)
+        if isinstance(problem, ValidationError):
+            first = problem.errors(include_url=False, include_input=False)[0]
+            where, what = ".".join(map(str, first["loc"])) + ": ", first["msg"]
+        raise CannotDiagnose(
+            f"The result cannot be used ({where}{what}).", "Diagnose the runs again with this version."
+        ) from None
+
+
+def _wired(effect: str, result: _Result) -> dict[str, dict[str, float]]:
     """Reversed channels, or any exchange of plugs as exchanges of two, one after the other."""
-    wiring = result.get("notes", {}).get("wiring", {})
-    turned, exchanged = wiring.get("reversed", ()), wiring.get("exchanged", {})
+    wiring = _checked(_Wiring, result.notes.get("wiring") or {})
+    turned, exchanged = wiring.reversed, wiring.exchanged
     if effect == "polarity" and turned:
         return {f"polarity@{'+'.join(turned)}": {"on": 1.0}}
-    if effect == "polarity" or not exchanged:
+    if effect == "polarity" or not exchanged or set(exchanged) != set(exchanged.values()):
         raise CannotDiagnose(
             f"The result does not say which channels {effect} means.",
             "Diagnose the runs again with this version.",
@@ -80,38 +145,49 @@ def _possible(effect: str, parameter: str, value: float) -> float:
     return min(max(value, spec.minimum), spec.maximum)
 
 
-def apply_result(result: dict[str, Any], rig: Path, out: Path) -> dict[str, dict[str, float]]:
+def apply_result(
+    result: Mapping[str, Any], rig: Path, out: Path, *, overwrite: bool = False
+) -> dict[str, dict[str, float]]:
     """Write `out`: `rig` with fitted α, p, r, b, scatter of r, and the effects found. Returns the effects.
 
     Comments of the rig file are not kept. Raises `ConfigError` where a file is no rig, and
-    `CannotDiagnose` where the result names nothing that can be switched on.
+    `CannotDiagnose` where the result names nothing that can be switched on, `RunFileError` where `out` is
+    there already or cannot be written; nothing is written then.
     """
-    load_rig(rig)
+    known = set(load_rig(rig).channel_ids)
     effects = effects_found(result)
-    if not effects and result["decision"] not in ("parameters", "nothing_missing"):
+    checked = _checked(_Result, result)
+    wiring = _checked(_Wiring, checked.notes.get("wiring") or {})
+    unknown = {*wiring.reversed, *wiring.exchanged, *wiring.exchanged.values()} - known
+    if unknown:
         raise CannotDiagnose(
-            f"The diagnosis ended with {result['decision']}: there is no effect to switch on.",
+            f"The rig file has no channel {sorted(unknown)[0]!r}.", "Give the rig of these runs."
+        )
+    if not effects and checked.decision not in ("parameters", "nothing_missing"):
+        raise CannotDiagnose(
+            f"The diagnosis ended with {checked.decision!r}: there is no effect to switch on.",
             "Read its report.",
         )
-    data = tomllib.loads(rig.read_text(encoding="utf-8-sig"))
-    values = {p["name"]: float(p["value"]) for p in result["parameters"]}
+    require_replaceable(out, (rig,), overwrite=overwrite)
+    wall = _checked(_Wall, {value.name: value.value for value in checked.parameters})
+    scatter = [value.value for value in checked.scatter if value.name == "scatter of r"]
+    text = _rig_text(rig, wall, scatter, effects)
+    parse_rig(text, str(out))
+    write_whole(out, text)
+    return effects
+
+
+def _rig_text(rig: Path, wall: _Wall, scatter: Sequence[float], effects: dict[str, dict[str, float]]) -> str:
+    data = parse_toml(read_text(rig), str(rig))
     specimen = data["specimen"]
-    r0 = values["half_base"] / math.sin(values["alpha"])
-    specimen["alpha0_rad"], specimen["r0_m"], specimen["p_rad_s"] = values["alpha"], r0, values["p"]
-    specimen["rotational_inertia_kg_m2"] = specimen["weight_n"] * r0 / values["p"] ** 2
+    r0 = wall.half_base / math.sin(wall.alpha)
+    specimen["alpha0_rad"], specimen["r0_m"], specimen["p_rad_s"] = wall.alpha, r0, wall.p
+    specimen["rotational_inertia_kg_m2"] = specimen["weight_n"] * r0 / wall.p**2
     simulation = data.setdefault("simulation", {})
-    simulation["restitution"] = min(values["r"], 1.0)
-    scatter = [s["value"] for s in result["scatter"] if s["name"] == "scatter of r"]
+    simulation["restitution"] = min(wall.r, 1.0)
     if scatter:
-        simulation["restitution_scatter"] = float(scatter[0])
+        simulation["restitution_scatter"] = scatter[0]
     simulation["effects"] = {**simulation.get("effects", {}), **effects}
     if "assumed" in simulation:
         simulation["assumed"] = [k for k in simulation["assumed"] if k != "restitution_scatter"]
-    text = tomli_w.dumps(data)
-    out.write_text(text, encoding="utf-8")
-    try:
-        load_rig(out)
-    except ConfigError:
-        out.unlink()
-        raise
-    return effects
+    return tomli_w.dumps(data)

@@ -21,6 +21,7 @@ from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.traces import Trace, traces
 from daq_app.gap.words import in_words
+from daq_app.runfile.durable import write_whole
 
 _A4_IN: Final = (8.27, 11.69)
 _LISTED: Final = 6
@@ -47,8 +48,8 @@ def write_report(result: Diagnosis, path: Path, runs: Sequence[GapRun] = ()) -> 
         )
     )
     return [
-        _replace(path, html.encode("utf-8")),
-        _replace(path.with_suffix(".pdf"), _pdf(result, shown, maps)),
+        write_whole(path, html.encode("utf-8")),
+        write_whole(path.with_suffix(".pdf"), _pdf(result, shown, maps)),
     ]
 
 
@@ -203,11 +204,3 @@ def _write_parameters(part: Any, result: Diagnosis) -> None:
         fontsize=7,
         parse_math=False,
     )
-
-
-def _replace(path: Path, content: bytes) -> Path:
-    """Whole or not at all."""
-    part = path.with_name(path.name + ".tmp")
-    part.write_bytes(content)
-    part.replace(path)
-    return path

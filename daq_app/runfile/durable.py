@@ -11,6 +11,34 @@ if sys.platform == "darwin":
     import fcntl
 
 
+def create_anew(path: Path) -> int:
+    """A new file, open for reading and writing. What stood there is removed, never written through.
+
+    A name that is known beforehand (``RUN.h5.tmp``) may be a link that leads to another file.
+    Raises `OSError`.
+    """
+    path.unlink(missing_ok=True)
+    flags = os.O_RDWR | os.O_CREAT | os.O_EXCL
+    flags |= getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+    return os.open(path, flags, 0o644)
+
+
+def write_whole(path: Path, content: bytes | str) -> Path:
+    """Write a file beside its name, flush it, and give it its name: no reader ever sees a part of it.
+
+    Raises `OSError`; what stood under the name is untouched then.
+    """
+    data = content.encode() if isinstance(content, str) else content
+    beside = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        with os.fdopen(create_anew(beside), "wb") as file:
+            file.write(data)
+        replace_durably(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
+    return path
+
+
 def fsync_data(fd: int) -> None:
     """Flush a file's content and length to the device."""
     if sys.platform == "linux":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import sys
 import threading
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from daq_app.runfile import (
     JournalWriter,
     RunFileError,
     RunHeader,
+    finalise,
     read_journal,
 )
 from daq_app.runfile.journal import writer as journal
@@ -166,3 +168,39 @@ def test_two_recorders_never_share_a_folder(tmp_path: Path) -> None:
     with FolderLock(tmp_path), pytest.raises(BusyError, match=f"process {os.getpid()}"):
         FolderLock(tmp_path)
     FolderLock(tmp_path).release()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows lets nobody delete an open file")
+def test_a_deleted_lock_file_does_not_let_a_second_recorder_in(tmp_path: Path) -> None:
+    with FolderLock(tmp_path):
+        (tmp_path / ".recorder.lock").unlink()
+        with pytest.raises(BusyError, match="in use by another recorder"):
+            FolderLock(tmp_path)
+    FolderLock(tmp_path).release()
+
+
+@pytest.mark.parametrize("link", ["symlink_to", "hardlink_to"])
+def test_a_lock_never_writes_through_a_link(tmp_path: Path, link: str) -> None:
+    runs, victim = tmp_path / "runs", tmp_path / "victim"
+    runs.mkdir()
+    victim.write_text("precious", encoding="utf-8")
+    try:
+        getattr(runs / ".recorder.lock", link)(victim)
+    except OSError:
+        pytest.skip("this system lets no test make links")
+    with pytest.raises(RunFileError, match="is a link to another file"):
+        FolderLock(runs)
+    assert victim.read_text(encoding="utf-8") == "precious"
+
+
+def test_a_link_at_the_temporary_name_of_a_run_is_not_written_through(tmp_path: Path, header) -> None:
+    victim = tmp_path / "victim"
+    victim.write_text("precious", encoding="utf-8")
+    with JournalWriter(tmp_path / "a.journal", header) as writer:
+        writer.append_block(0, np.ones((4, 3)))
+    try:
+        (tmp_path / "a.h5.tmp").symlink_to(victim)
+    except OSError:
+        pytest.skip("this system lets no test make links")
+    finalise(tmp_path / "a.journal", tmp_path / "a.h5")
+    assert victim.read_text(encoding="utf-8") == "precious"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from scipy.special import stdtrit
 from daq_app.campaign.report.statistics import GroupMean, random_effects_mean
 from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.status import CampaignStatus
+from daq_app.runfile.durable import write_whole
 
 METHODS: Final = ("CRT", "EAV", "fit")
 
@@ -268,12 +270,11 @@ def _point_table(tests: Sequence[TestSummary]) -> tuple[tuple[str, ...], list[tu
 
 
 def _write(path: Path, header: Sequence[str], rows: Sequence[Sequence[object]]) -> Path:
-    part = path.with_name(path.name + ".tmp")
-    with part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(header)
-        writer.writerows([["" if _missing(cell) else cell for cell in row] for row in rows])
-    return part.replace(path)
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(header)
+    writer.writerows([["" if _missing(cell) else cell for cell in row] for row in rows])
+    return write_whole(path, text.getvalue())
 
 
 def _missing(cell: object) -> bool:

@@ -17,6 +17,7 @@ from daq_app.campaign.report.collect import Failure
 from daq_app.campaign.report.number_words import interval, number, signed
 from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.status import CampaignStatus
+from daq_app.runfile.durable import write_whole
 from daq_app.workers import process_pool
 
 
@@ -113,7 +114,10 @@ def write_report(
         path = folder / f"{picture.name}.svg"
         path.write_text('<?xml version="1.0" encoding="utf-8"?>\n' + picture.svg, encoding="utf-8")
         written.append(path)
-    written += [_replace(folder / "report.html", html.encode()), _replace(folder / "report.pdf", document)]
+    written += [
+        write_whole(folder / "report.html", html.encode()),
+        write_whole(folder / "report.pdf", document),
+    ]
     return written
 
 
@@ -125,11 +129,3 @@ def _environment() -> Environment:
     environment.filters["signed"] = signed
     environment.filters["interval"] = interval
     return environment
-
-
-def _replace(path: Path, content: bytes) -> Path:
-    """Whole or not at all: a reader never sees half a report."""
-    part = path.with_name(path.name + ".tmp")
-    part.write_bytes(content)
-    part.replace(path)
-    return path

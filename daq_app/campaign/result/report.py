@@ -17,6 +17,7 @@ from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.result.figures import measured_periods, result_figure
 from daq_app.config.wording import plus_minus
 from daq_app.rocking import period
+from daq_app.runfile.durable import write_whole
 
 METHODS: Final = ("EAV", "CRT")
 
@@ -87,8 +88,8 @@ def write_result(run: Path, test: TestSummary, earlier: Sequence[TestSummary] = 
         )
     )
     return [
-        _replace(run.with_suffix(".result.html"), html.encode()),
-        _replace(run.with_suffix(".result.pdf"), _pdf(test, figure, rows)),
+        write_whole(run.with_suffix(".result.html"), html.encode()),
+        write_whole(run.with_suffix(".result.pdf"), _pdf(test, figure, rows)),
     ]
 
 
@@ -156,11 +157,3 @@ def _table(
     table.auto_set_font_size(False)
     table.set_fontsize(10)
     table.scale(1.0, 1.5)
-
-
-def _replace(path: Path, content: bytes) -> Path:
-    """Whole or not at all."""
-    part = path.with_name(path.name + ".tmp")
-    part.write_bytes(content)
-    part.replace(path)
-    return path

@@ -22,6 +22,7 @@ from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.config import ConfigError
 from daq_app.extras import missing_extra
 from daq_app.runfile import RunFileError
+from daq_app.runfile.durable import write_whole
 
 SUFFIX: Final = ".result.json"
 _FORMAT: Final = 1
@@ -46,11 +47,8 @@ def save_summary(run: Path, summary: TestSummary) -> Path:
     for name in _ARRAYS:
         content[name] = np.round(np.asarray(content[name], dtype=np.float64), 9).tolist()
     path = run.with_suffix(SUFFIX)
-    part = path.with_name(path.name + ".tmp")
     document = {"format": _FORMAT, "run_bytes": run.stat().st_size, "summary": content}
-    part.write_text(json.dumps(document), encoding="utf-8")
-    part.replace(path)
-    return path
+    return write_whole(path, json.dumps(document))
 
 
 def load_summary(run: Path) -> TestSummary | None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from daq_app.cli.analyse.joint import joint_figure, profile_csv
+from daq_app.runfile.durable import write_whole
 
 if TYPE_CHECKING:
     from daq_app.rocking.analysis.results import TestAnalysis
@@ -41,9 +42,7 @@ def write_outputs(analysis: TestAnalysis, folder: Path, stem: str) -> list[Path]
 
 
 def _write(path: Path, text: str) -> Path:
-    temporary = path.with_name(path.name + ".tmp")
-    temporary.write_text(text, encoding="utf-8", newline="")
-    return temporary.replace(path)
+    return write_whole(path, text)
 
 
 def _cycles_csv(analysis: TestAnalysis) -> str:
@@ -123,6 +122,6 @@ def _picture(analysis: TestAnalysis, path: Path) -> Path:
 
 
 def _save(figure: Any, path: Path) -> Path:
-    temporary = path.with_name(path.name + ".tmp")
-    figure.savefig(temporary, format="svg")
-    return temporary.replace(path)
+    picture = io.StringIO()
+    figure.savefig(picture, format="svg")
+    return write_whole(path, picture.getvalue())

@@ -17,6 +17,7 @@ from rich.table import Table
 from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, reported
 from daq_app.config import load_rig
 from daq_app.config.shipped import here_or_shipped
+from daq_app.runfile.durable import write_whole
 
 if TYPE_CHECKING:
     from daq_app.gap.blind.scoring.score import Score
@@ -179,7 +180,7 @@ def score(
         found = score_folder(folder, labels or _beside(folder), kept)
         _print_score(found)
         if json_out:
-            json_out.write_text(json.dumps(found.to_dict(), ensure_ascii=False, indent=1), encoding="utf-8")
+            write_whole(json_out, json.dumps(found.to_dict(), ensure_ascii=False, indent=1))
         if html:
             from daq_app.gap.blind.scoring.report import write_report
 

@@ -16,6 +16,7 @@ from rich.table import Table
 
 from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED, print_paragraph, reported
 from daq_app.config import load_rig
+from daq_app.runfile.folder import require_replaceable
 
 if TYPE_CHECKING:
     from daq_app.gap.core import Diagnosis, Options
@@ -74,6 +75,7 @@ def diagnose(
         str, typer.Option(help="What is held out to measure the gap: level or repetition.")
     ] = "level",
     cores: Annotated[int, typer.Option(min=0, help="Processes; 0 takes all cores.")] = 0,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that are there.")] = False,
 ) -> None:
     """Say where simulator and runs differ, which missing effect explains it, and how far the gap shrinks.
 
@@ -88,6 +90,10 @@ def diagnose(
         raise _bad_input("--rig describes a rocking wall; with --model the model file says what is known.")
     asked = _Asked(pairs, hold_out, cores or os.cpu_count() or 1)
     with _refusals():
+        read = [*runs, *filter(None, (rig, model))]
+        for written in (json_out, report, report and report.with_suffix(".pdf")):
+            if written is not None:
+                require_replaceable(written, read, overwrite=overwrite)
         result, loaded = (
             _diagnose_own(model, runs, asked) if model is not None else _diagnose_walls(runs, rig, asked)
         )
@@ -273,6 +279,7 @@ def apply(
     result: Annotated[Path, typer.Argument(help="Result of `gap diagnose --json`.", metavar="RESULT")],
     rig: Annotated[Path, typer.Option(help="Rig file to start from.")],
     out: Annotated[Path, typer.Option(help="Rig file to write.")],
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")] = False,
 ) -> None:
     """Write a rig file whose simulated wall has the parameters and the effect that a diagnosis found.
 
@@ -281,7 +288,7 @@ def apply(
     from daq_app.gap.apply import apply_result, read_result
 
     with _refusals():
-        found = apply_result(read_result(result), rig, out)
+        found = apply_result(read_result(result), rig, out, overwrite=overwrite)
     console = Console()
     for name, values in found.items():
         written = ", ".join(f"{key} = {value:.5g}" for key, value in values.items())

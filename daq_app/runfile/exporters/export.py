@@ -59,6 +59,7 @@ def export_run(
         selection = Selection.of(run, units, from_s, to_s, report)
         write = importlib.import_module(f"daq_app.runfile.exporters.to_{format_}").write
         try:
+            temporary.unlink(missing_ok=True)  # it may be a link to another file
             write(temporary, selection)
             replace_durably(temporary, final)
         except OSError as error:

@@ -17,13 +17,14 @@ from typing import Any
 
 import h5py
 
+from daq_app.runfile.durable import create_anew
+
 
 class GuardedFile(io.RawIOBase):
     """A new file, replacing one that is there. `failure` is the first error of a write, or None."""
 
     def __init__(self, path: Path) -> None:
-        flags = os.O_RDWR | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
-        self._fd = os.open(path, flags, 0o644)
+        self._fd = create_anew(path)
         self._position = 0
         self._size = 0
         self._kept: list[tuple[int, bytes]] = []

@@ -2,13 +2,16 @@
 
 A lock covers one byte far beyond the end of the file, so that on Windows, where locks bar reading,
 the file's content stays readable to everyone.  A killed process leaves no lock behind.
+
+A folder is locked by itself, not only by a file in it: a file can be deleted under its owner, and another
+would then lock a new one.  Windows cannot lock a folder, and does not let an open file be deleted.
 """
 
 from __future__ import annotations
 
-import contextlib
 import os
 import socket
+import stat
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -71,41 +74,85 @@ def journal_locked(path: Path) -> Iterator[None]:
         os.close(fd)
 
 
+def _own_file(path: Path) -> int:
+    """The lock file opened, made if need be. Raises `RunFileError` if its name leads to another file."""
+    flags = os.O_RDWR | os.O_CREAT
+    for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"):
+        flags |= getattr(os, name, 0)
+    elsewhere = RunFileError(
+        f"{path} is a link to another file, which must not be written to",
+        advice="Find out who put it there, remove it, and start again.",
+    )
+    if path.is_symlink():
+        raise elsewhere
+    fd = os.open(path, flags, 0o644)
+    try:
+        opened = os.fstat(fd)
+        if not stat.S_ISREG(opened.st_mode) or opened.st_nlink > 1 or path.is_symlink():
+            raise elsewhere
+    except BaseException:
+        os.close(fd)
+        raise
+    return fd
+
+
+def _locked(fd: int, *, may_be_impossible: bool) -> bool:
+    """Whether the lock was got; also where the file system cannot lock this kind of file."""
+    try:
+        return _try_lock(fd)
+    except OSError:
+        if not may_be_impossible:
+            raise
+        return True
+
+
 class FolderLock:
     """Exclusive right to record into a folder: two recorders never share one.
 
-    The lock file stays behind (empty of meaning once its owner is gone); the lock itself does not.
+    The lock file stays behind (it names the last owner); the lock itself does not.
     """
 
     def __init__(self, folder: Path) -> None:
         """Take the lock. Raises `BusyError` naming the owner, `RunFileError` if the folder is unusable."""
         self.path = folder / ".recorder.lock"
+        self._fds: list[int] = []
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
-            self._fd = os.open(self.path, flags, 0o644)
+            self._take(folder)
         except OSError as error:
+            self.release()
             raise RunFileError(
                 f"{folder}: cannot be written to ({error.strerror})",
                 advice="Choose a folder on a writable disk.",
             ) from error
-        if not _try_lock(self._fd):
-            owner = os.read(self._fd, _OWNER_BYTES).decode("utf-8", "replace")
-            os.close(self._fd)
-            raise BusyError(
-                f"{folder} is in use by another recorder ({owner or 'owner unknown'})",
-                advice="Stop that one first, or record into another folder.",
-            )
-        os.ftruncate(self._fd, 0)
-        os.write(self._fd, f"process {os.getpid()} on {socket.gethostname()}"[:_OWNER_BYTES].encode())
+        except RunFileError:
+            self.release()
+            raise
+
+    def _take(self, folder: Path) -> None:
+        file = _own_file(self.path)
+        self._fds.append(file)
+        fds = [file]
+        if sys.platform != "win32":
+            fds.append(os.open(folder, os.O_RDONLY | os.O_CLOEXEC))
+            self._fds.append(fds[1])
+        for fd in fds:
+            if not _locked(fd, may_be_impossible=fd != file):
+                self._fds.remove(file)
+                owner = os.read(file, _OWNER_BYTES).decode("utf-8", "replace")
+                os.close(file)
+                raise BusyError(
+                    f"{folder} is in use by another recorder ({owner or 'owner unknown'})",
+                    advice="Stop that one first, or record into another folder.",
+                )
+        os.ftruncate(file, 0)
+        os.write(file, f"process {os.getpid()} on {socket.gethostname()}"[:_OWNER_BYTES].encode())
 
     def release(self) -> None:
         """Give the folder back; safe twice."""
-        if self._fd >= 0:
-            with contextlib.suppress(OSError):
-                os.ftruncate(self._fd, 0)
-            os.close(self._fd)
-            self._fd = -1
+        for fd in self._fds:
+            os.close(fd)
+        self._fds = []
 
     def __enter__(self) -> Self:
         return self
