@@ -12,6 +12,10 @@ from daq_app.config.errors import ConfigError, Problem
 MAX_BYTES: Final = 4 * 1024 * 1024
 """A configuration is some tens of kilobytes; more is a wrong file (a recording, an image)."""
 
+_MAX_PARTS: Final = 32
+"""Parts of a dotted key. Reading one takes a time that grows with the square of their number."""
+_PART: Final = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_CHAIN: Final = re.compile(rf"""(?<![\w.\-"']){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_MAX_PARTS},}}+""")
 _LINE_IN_MESSAGE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
@@ -56,6 +60,11 @@ def read_text(path: Path | str) -> str:
 
 def parse_toml(text: str, file: str) -> dict[str, Any]:
     """Tables of a TOML text. Raises `ConfigError` with the line of the first fault."""
+    chain = _LONG_CHAIN.search(text)
+    if chain is not None:
+        line = text.count("\n", 0, chain.start()) + 1
+        wrong = f"has more than {_MAX_PARTS} names joined by dots on line {line}"
+        raise _single(file, wrong, "No key of a rig or campaign is so deep; remove it")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -87,3 +87,24 @@ def test_unreadable_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_name_that_the_system_refuses() -> None:
     assert "cannot be read" in only_problem(Path("rig\0.toml")).wrong
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        ".".join("a" * 200_000) + " = 1",
+        "x = { " + ".".join(['"a"'] * 100_000) + " = 1 }",
+        "[" + " . ".join("a" * 50_000) + "]",
+    ],
+)
+def test_a_key_of_absurdly_many_parts_is_refused_at_once(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "deep.toml"
+    path.write_text(text, encoding="utf-8")
+    assert "more than 32 names joined by dots on line 1" in only_problem(path).wrong
+
+
+def test_dots_in_texts_are_no_key(tmp_path: Path, configs: Path) -> None:
+    text = (configs / "fr1.toml").read_text(encoding="utf-8")
+    path = tmp_path / "fr1.toml"
+    path.write_text(text + "# " + "0.1 0.2 … end. " * 1000 + "\n# " + "." * 1000 + "\n", encoding="utf-8")
+    assert load_rig(path).name == "fr1"

@@ -61,6 +61,20 @@ def test_npz_pickles_are_never_opened(tmp_path: Path, bring, monkeypatch: pytest
     assert not (tmp_path / "bomb-went-off").exists()
 
 
+def test_npz_that_unpacks_to_gigabytes_is_refused_by_what_it_claims(
+    tmp_path: Path, bring, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "bomb.npz"
+    np.savez_compressed(path, **{"WP-1": np.zeros(40_000_000), "rate_hz": 4000.0})
+
+    def unpack(*_: object, **__: object) -> object:
+        raise AssertionError("nothing of it is unpacked")
+
+    monkeypatch.setattr(zipfile.ZipFile, "open", unpack)
+    with pytest.raises(RunFileError, match=r"claims to unpack from 0\.3 MB to 0\.3 GB"):
+        bring(path, {"WP-1": "WP-1"})
+
+
 def test_npz_that_claims_more_than_it_holds(tmp_path: Path, bring) -> None:
     head = io.BytesIO()
     np.lib.format.write_array_header_1_0(head, {"descr": "<f8", "fortran_order": False, "shape": (41, 2**40)})

@@ -6,17 +6,26 @@ interpreter's lock against the reader. The worker is started early and kept, so 
 
 from __future__ import annotations
 
+import contextlib
 import json
 import queue
 import subprocess
 import threading
+import time
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
 
 from daq_app.guarded import end_guarded, start_guarded
 
-_WORKER = "daq_app.acquisition.closing.finalise_worker"
+_WORKER: Final = "daq_app.acquisition.closing.finalise_worker"
+_LEAST_LIMIT_S: Final = 120.0
+_SLOWEST_BYTES_PER_S: Final = 1e6
+_LOOK_EVERY_S: Final = 0.1
+_CLOSING_S: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,13 +39,17 @@ class Finished:
 
 
 class Finaliser(threading.Thread):
-    """Sends jobs to the worker, one after the other; starts a new worker if one dies."""
+    """Sends jobs to workers, one after the other; starts a new worker if one dies or does not end.
+
+    Runs of this session and journals of earlier ones have a worker each: whatever an old file does to
+    its worker, a new run is saved.
+    """
 
     def __init__(self) -> None:
         super().__init__(name="finaliser", daemon=True)
         self._jobs: queue.SimpleQueue[tuple[dict[str, str], Future[Finished]] | None] = queue.SimpleQueue()
-        self._worker: subprocess.Popen[str] | None = None
-        self._closing = False
+        self._worker = _Worker()
+        self._recovery = _Recovery()
 
     def submit(self, job: dict[str, str], then: Callable[[Finished], None] | None = None) -> Future[Finished]:
         """Do ``{"job": "finalise", "journal": …, "out": …}`` or ``{"job": "recover", "journal": …}``.
@@ -46,56 +59,149 @@ class Finaliser(threading.Thread):
         done: Future[Finished] = Future()
         if then is not None:
             done.add_done_callback(lambda future: then(future.result()))
-        self._jobs.put((job, done))
+        if job["job"] == "recover":
+            self._recovery.submit(job, done)
+        else:
+            self._jobs.put((job, done))
         return done
 
     def run(self) -> None:
         """Until `close`."""
-        self._worker = _start()
-        while True:
-            entry = self._jobs.get()
-            if entry is None:
-                break
+        self._worker.start()
+        while (entry := self._jobs.get()) is not None:
             job, done = entry
-            if self._closing and job["job"] in ("recover", "ring"):
-                done.set_result(Finished(True, ""))  # the next start does it
-            else:
-                done.set_result(self._do(job))
-        if self._worker is not None:
-            end_guarded(self._worker)
+            done.set_result(self._worker.do(job))
+        self._worker.end()
 
     def close(self) -> None:
-        """Finish what must be saved (recovery can wait for the next start), then end the worker."""
-        self._closing = True
+        """Finish what must be saved (recovery can wait for the next start), then end the workers."""
+        self._recovery.close()
         self._jobs.put(None)
         if self.is_alive():
             self.join()
 
-    def _do(self, job: dict[str, str]) -> Finished:
+
+class _Recovery:
+    """Journals of earlier sessions, on a thread and with a worker that last while there are any."""
+
+    def __init__(self) -> None:
+        self._jobs: deque[tuple[dict[str, str], Future[Finished]]] = deque()
+        self._lock = threading.Lock()
+        self._thread: threading.Thread | None = None
+        self._worker = _Worker()
+        self._closing = False
+
+    def submit(self, job: dict[str, str], done: Future[Finished]) -> None:
+        with self._lock:
+            self._jobs.append((job, done))
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._run, name="recovery", daemon=True)
+                self._thread.start()
+
+    def _run(self) -> None:
+        while True:
+            with self._lock:
+                if not self._jobs:
+                    self._thread = None
+                    break
+                job, done = self._jobs.popleft()
+            # What is not recovered before the session ends waits for the next start.
+            done.set_result(Finished(True, "") if self._closing else self._worker.do(job))
+        self._worker.end()
+
+    def close(self) -> None:
+        """Let the job that is being done end, but not for long: its journal is untouched all the same."""
+        with self._lock:
+            self._closing = True
+            thread = self._thread
+        if thread is not None:
+            thread.join(_CLOSING_S)
+            self._worker.stop()
+            thread.join()
+
+
+class _Worker:
+    """A process that makes run files, and its successor if it dies or does not end."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[str] | None = None
+        self._stopped = threading.Event()
+
+    def start(self) -> None:
+        """Start the process now, so that it is warm when it is needed."""
+        if self._process is None or self._process.poll() is not None:
+            self.end()
+            self._process = start_guarded(_WORKER, [], reads_input=True)
+
+    def do(self, job: dict[str, str]) -> Finished:
+        """The answer to a job; in words, and with the journal untouched, if there is none."""
         for _ in range(2):  # a worker that died (memory short, killed) gets one successor
-            if self._worker is None or self._worker.poll() is not None:
-                self._worker = _start()
-            answer = _exchange(self._worker, job)
+            self.start()
+            assert self._process is not None
+            try:
+                answer = _exchange(self._process, job, _time_limit_s(job), self._stopped)
+            except TimeoutError:  # another would hang as well
+                self._kill()
+                break
             if answer is not None:
                 return answer
+            self._kill()
+            if self._stopped.is_set():
+                return Finished(True, "")
         return Finished(
             False,
-            f"The process that makes run files ended twice. {job['journal']} is untouched: run "
-            "`daq-app recover` on its folder",
+            f"The process that makes run files ended twice, or did not end. {job['journal']} is untouched: "
+            "run `daq-app recover` on its folder",
         )
 
+    def stop(self) -> None:
+        """Give up the job that is being done, from another thread."""
+        self._stopped.set()
 
-def _start() -> subprocess.Popen[str]:
-    return start_guarded(_WORKER, [], reads_input=True)
+    def _kill(self) -> None:
+        if self._process is not None:
+            end_guarded(self._process, grace_s=0.0)
+            self._process = None
+
+    def end(self) -> None:
+        """End the process; safe twice."""
+        if self._process is not None:
+            end_guarded(self._process)
+            self._process = None
 
 
-def _exchange(worker: subprocess.Popen[str], job: dict[str, str]) -> Finished | None:
-    """One job and its answer; None if the worker died over it."""
+def _time_limit_s(job: dict[str, str]) -> float:
+    """Far more than a job can take: packing handles some 20 MB of journal a second."""
+    try:
+        n_bytes = Path(job["journal"]).stat().st_size
+    except OSError:
+        n_bytes = 0
+    return _LEAST_LIMIT_S + n_bytes / _SLOWEST_BYTES_PER_S
+
+
+def _exchange(
+    worker: subprocess.Popen[str], job: dict[str, str], limit_s: float, stopped: threading.Event
+) -> Finished | None:
+    """One job and its answer; None if the worker died over it or is to be stopped.
+
+    Raises `TimeoutError` if it takes longer than `limit_s`.
+    """
     assert worker.stdin is not None and worker.stdout is not None
+    answers: queue.SimpleQueue[str] = queue.SimpleQueue()
     try:
         worker.stdin.write(json.dumps(job) + "\n")
         worker.stdin.flush()
-        line = worker.stdout.readline()
-        return Finished(**json.loads(line)) if line else None
+        output = worker.stdout
+        threading.Thread(target=lambda: answers.put(output.readline()), daemon=True).start()
+        until_s = time.monotonic() + limit_s
+        while not stopped.is_set():
+            if time.monotonic() > until_s:
+                raise TimeoutError
+            with contextlib.suppress(queue.Empty):
+                line = answers.get(timeout=_LOOK_EVERY_S)
+                return Finished(**json.loads(line)) if line else None
+    except TimeoutError:
+        raise
     except (OSError, ValueError, TypeError):
-        return None
+        pass
+    return None

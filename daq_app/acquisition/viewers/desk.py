@@ -25,6 +25,8 @@ from daq_app.acquisition.messages.publisher import INBOX, SEND_QUEUE, Publisher
 from daq_app.acquisition.viewers.curve import KeyFileError, ServerKeys, is_loopback, secure_server
 
 _MAX_REQUEST_BYTES: Final = 64 * 1024
+_KEYS_EVERY_S: Final = 0.5
+_REOPENING_S: Final = 5.0
 
 Answer = Reply | Future[Reply]
 Handler = Callable[[Command], Answer]
@@ -83,7 +85,11 @@ class Desk:
         socket.rcvhwm = 100
         if self._keys is not None:
             self._keys.apply(socket)
-        socket.bind(endpoint)
+        try:
+            socket.bind(endpoint)
+        except zmq.ZMQError:
+            socket.close(linger=0)
+            raise
         return socket
 
     def stop(self) -> None:
@@ -96,6 +102,7 @@ class Desk:
         poller.register(self._commands, zmq.POLLIN)
         poller.register(self._inbox, zmq.POLLIN)
         ticker = _Ticker(tick, tick_s)
+        keys = _Ticker(lambda: self._shut_out_removed(poller), _KEYS_EVERY_S)
         while not self._stopping:
             # Replies of other threads are looked for more often while some are owed.
             wait_s = min(ticker.due_in_s(), 0.01 if self._waiting else tick_s)
@@ -106,8 +113,33 @@ class Desk:
                 self._take_request()
             self._send_replies()
             ticker.run_if_due()
+            keys.run_if_due()
         self._forward()
         self._send_replies()
+
+    def _shut_out_removed(self, poller: zmq.Poller) -> None:
+        """A viewer whose key was taken away is cut off: everybody has to show a key anew.
+
+        Keys are asked for when a viewer connects only, so the sockets are closed and opened again; viewers
+        that are still admitted come back by themselves within a moment.
+        """
+        if self._keys is None or not self._keys.admitted.somebody_was_removed():
+            return
+        poller.unregister(self._commands)
+        self._commands = self._reopened(self._commands, zmq.ROUTER, self.addresses.commands)
+        self._pub = self._reopened(self._pub, zmq.PUB, self.addresses.publisher)
+        poller.register(self._commands, zmq.POLLIN)
+
+    def _reopened(self, socket: zmq.Socket[bytes], kind: int, endpoint: str) -> zmq.Socket[bytes]:
+        socket.close(linger=0)
+        until_s = time.monotonic() + _REOPENING_S
+        while True:
+            try:
+                return self._bound(kind, endpoint)
+            except zmq.ZMQError:  # the library closes a socket on a thread of its own
+                if time.monotonic() > until_s:
+                    raise
+                time.sleep(0.01)
 
     def _forward(self) -> None:
         while True:

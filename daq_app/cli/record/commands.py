@@ -187,8 +187,13 @@ def viewer_keys(
 
 @contextmanager
 def _writing(folder: Path) -> Iterator[None]:
+    from daq_app.acquisition.viewers.curve import KeyFileError
+
     try:
         yield
+    except KeyFileError as error:
+        print_paragraph("Error", str(error))
+        raise typer.Exit(EXIT_BAD_INPUT) from None
     except OSError as error:
         print_paragraph("Error", f"{folder} cannot be written to ({error.strerror})")
         raise typer.Exit(EXIT_BAD_INPUT) from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -49,6 +50,11 @@ class Findings:
     """(first sample, rows) where the file itself says that rows are not consecutive; empty: one piece."""
 
 
+_CHECK_EVERY_BYTES: Final = 2**26
+_KEPT_FREE_BYTES: Final = 2**29
+"""Left free on the disk of the runs, where a test may be recorded at this moment."""
+
+
 class Spool:
     """Samples of the chosen channels in unnamed files beside the output, which vanish with the process.
 
@@ -61,6 +67,8 @@ class Spool:
             raise RunFileError(f"{len(names)} channels are more than any rig has")
         self._stack = contextlib.ExitStack()
         self._lengths = dict.fromkeys(names, 0)
+        self._folder = folder
+        self._unchecked = 0
         with self._stack:
             self._files = {
                 name: self._stack.enter_context(
@@ -79,10 +87,23 @@ class Spool:
 
     def append(self, name: str, values: NDArray[np.float64]) -> None:
         """Add samples to a channel."""
+        self._require_room(8 * values.size)
         file = self._files[name]
         file.seek(8 * self._lengths[name])
         file.write(np.ascontiguousarray(values, dtype="<f8").data)
         self._lengths[name] += values.size
+
+    def _require_room(self, n_bytes: int) -> None:
+        """A file that unpacks to more than was foreseen must not fill the disk of a recorder."""
+        self._unchecked += n_bytes
+        if self._unchecked < _CHECK_EVERY_BYTES:
+            return
+        self._unchecked = 0
+        if shutil.disk_usage(self._folder).free < _KEPT_FREE_BYTES:
+            raise RunFileError(
+                f"the recording unpacks to more than {self._folder} has room for",
+                advice="Free space on this disk, or give another folder with --out.",
+            )
 
     def read(self, name: str, start: int, stop: int) -> NDArray[np.float64]:
         """Samples [start, stop) of a channel; NaN beyond its end."""

@@ -20,6 +20,9 @@ from daq_app.runfile.importers.import_map import SourceMap
 from daq_app.runfile.importers.recording import Findings, ForeignChannel, Spool
 
 _SMALL_BYTES: Final = 2**24
+_UNSUSPICIOUS_BYTES: Final = 2**28
+_MAX_RATIO: Final = 50
+"""Readings are noise: a recording shrinks to a fifth at best, channels that never change included."""
 _PIECE_ROWS: Final = 2**17
 _RATES: Final = ("fs", "rate_hz", "sampling_rate", "sampling_rate_hz")
 _TIMES: Final = ("time", "t", "time_s")
@@ -70,6 +73,7 @@ class NpzReader:
 
     def _read_shapes(self) -> dict[str, tuple[tuple[int, ...], np.dtype[Any], bool]]:
         """name → (shape, type, Fortran order) from the heads of the arrays."""
+        self._refuse_bombs()
         shapes = {}
         for info in self._archive.infolist()[:10_000]:
             if not info.filename.endswith(".npy"):
@@ -86,6 +90,17 @@ class NpzReader:
         if not shapes:
             raise RunFileError(f"{self._path} holds no arrays of numbers")
         return shapes
+
+    def _refuse_bombs(self) -> None:
+        """What the archive claims to unpack to is known before a byte of it is."""
+        claimed = sum(info.file_size for info in self._archive.infolist())
+        packed = self._path.stat().st_size
+        if claimed > max(_UNSUSPICIOUS_BYTES, _MAX_RATIO * packed):
+            raise RunFileError(
+                f"{self._path} claims to unpack from {packed / 1e6:.1f} MB to {claimed / 1e9:.1f} GB, as no "
+                "recording does",
+                advice="If it is one, unpack it and save it again with np.savez.",
+            )
 
     def _told(self, name: str) -> _Told:
         return _Told(f"{self._path}: {name}")
