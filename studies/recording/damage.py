@@ -2,11 +2,13 @@
 
 A sound file is damaged (a bit, a byte, a page, a cut, blocks that are repeated, exchanged or left out), half
 of the time anywhere and half of the time in its metadata, and `verify` is asked in a process of its own.
-Found would be: "good" with another content than the sound file's, a crash, more than 10 s, or more than 300 MB.
+Found would be: "good" with another content than the sound file's, a crash, more than 10 s, or more than
+300 MB.
 
 Who judges is not `verify`: a sealed run is another content if a byte differs; a run of format version 1 is
 read by plain h5py; a journal by ``docs/reference/journal_reader.py``.  A journal that was cut within one
-frame looks like one whose recorder died: it may be called good if that is said, and what is left is the beginning.
+frame looks like one whose recorder died: it may be called good if that is said, and what is left is the
+beginning.
 """
 
 from __future__ import annotations
