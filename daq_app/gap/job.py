@@ -17,6 +17,7 @@ import psutil
 
 from daq_app.gap.core import CannotDiagnose, Options
 from daq_app.runfile import RunFileError, open_run
+from daq_app.runfile.durable import write_whole
 
 
 def step_back() -> None:
@@ -42,9 +43,7 @@ def diagnose_files(runs: Sequence[Path], out: Path, options: Options) -> None:
     result = diagnose_runs(loaded, options)
     page = out.with_suffix(".html")
     write_report(result, page, loaded)
-    part = out.with_name(out.name + ".tmp")
-    result.save(part)
-    part.replace(out)
+    write_whole(out, result.to_json())
 
 
 def _say(**words: Any) -> None:

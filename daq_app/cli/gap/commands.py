@@ -16,6 +16,7 @@ from rich.table import Table
 
 from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED, print_paragraph, reported
 from daq_app.config import load_rig
+from daq_app.runfile.durable import write_whole
 from daq_app.runfile.folder import require_replaceable
 
 if TYPE_CHECKING:
@@ -98,7 +99,7 @@ def diagnose(
             _diagnose_own(model, runs, asked) if model is not None else _diagnose_walls(runs, rig, asked)
         )
         if json_out is not None:
-            result.save(json_out)
+            write_whole(json_out, result.to_json())
         if report is not None:
             from daq_app.gap.report import write_report
 

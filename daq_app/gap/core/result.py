@@ -14,7 +14,6 @@ from daq_app.gap.core.goodness import Goodness
 from daq_app.gap.core.held_out import GapSize
 from daq_app.gap.core.other_forms import FreeForm
 from daq_app.gap.core.where import GapMap
-from daq_app.runfile.durable import write_whole
 
 FORMAT_VERSION: Final = 2
 
@@ -140,8 +139,7 @@ class Diagnosis:
         return json.dumps(self.to_dict(), indent=indent, ensure_ascii=False, allow_nan=False)
 
     def save(self, path: Path) -> None:
-        """Write the JSON beside `path` and rename it: what stood there is replaced whole or not at all."""
-        write_whole(path, self.to_json())
+        path.write_text(self.to_json(), encoding="utf-8")
 
 
 def _plain(value: Any) -> Any:
