@@ -20,6 +20,7 @@ from daq_app.config.shipped import here_or_shipped
 from daq_app.runfile.durable import write_whole
 
 if TYPE_CHECKING:
+    from daq_app.gap.blind.scoring.laboratories import LaboratoryScore
     from daq_app.gap.blind.scoring.score import Score
 
 _RIGS = (Path("configs/fr1.toml"), Path("configs/fr2.toml"))
@@ -205,12 +206,8 @@ def table(
     with _refusals():
         scores = [score_folder(folder, _beside(folder), results) for folder in folders]
     judged = [one for score in scores for one in score.judged]
-    rows = by_laboratory(judged)
-    shown = Table("score", *(f"{row.laboratory} ({row.cases})" for row in rows))
-    for name in dict.fromkeys(name for row in rows for name in row.columns):
-        shown.add_row(name, *(row.columns.get(name, "–") for row in rows))
     console = Console()
-    console.print(shown)
+    console.print(_laboratory_table(by_laboratory(judged)))
     if misses:
         for one in judged:
             if not one.answered_rightly:
@@ -220,6 +217,23 @@ def table(
     waiting = sum(len(score.waiting) for score in scores)
     if waiting:
         console.print(f"{waiting} cases have no result yet")
+
+
+_SIDE_BY_SIDE = 6
+"""Laboratories that stand beside each other; more are a line each, with fewer scores."""
+_IN_A_LINE = ("decisions right", "singles", "nothing", "wrong at p > 0.95", "closure ≥ 0.9")
+
+
+def _laboratory_table(rows: list[LaboratoryScore]) -> Table:
+    if len(rows) > _SIDE_BY_SIDE:
+        shown = Table("laboratory", *_IN_A_LINE)
+        for row in rows:
+            shown.add_row(f"{row.laboratory} ({row.cases})", *(row.columns.get(n, "–") for n in _IN_A_LINE))
+        return shown
+    shown = Table("score", *(f"{row.laboratory} ({row.cases})" for row in rows))
+    for name in dict.fromkeys(name for row in rows for name in row.columns):
+        shown.add_row(name, *(row.columns.get(name, "–") for row in rows))
+    return shown
 
 
 def _print_score(found: Score) -> None:

@@ -80,8 +80,9 @@ def test_each_imperfection_of_each_laboratory_is_known_and_drawn_within_its_rang
 
 def test_switching_one_imperfection_on_alone_keeps_its_size(configs: Path, tmp_path: Path) -> None:
     every = draw_case(order(configs, tmp_path, "rough"), 4)[0].surroundings.sizes
-    alone = draw_case(order(configs, tmp_path, "rough", "mains_pick_up"), 4)[0].surroundings.sizes
-    assert alone == {"mains_pick_up": every["mains_pick_up"]}
+    alone = draw_case(order(configs, tmp_path, "rough", "mains_pick_up"), 4)[0].surroundings
+    assert alone.sizes == {"mains_pick_up": every["mains_pick_up"]}
+    assert alone.laboratory == "rough: mains_pick_up alone"
 
 
 def test_laboratories_and_imperfections_that_do_not_exist_are_refused(configs: Path, tmp_path: Path) -> None:

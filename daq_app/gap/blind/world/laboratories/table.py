@@ -51,6 +51,7 @@ class Laboratory:
             )
         return replace(
             self,
+            name=f"{self.name}: {imperfection} alone",
             ranges={imperfection: self.ranges[imperfection]},
             shocks=self.shocks if imperfection == "impact_shock" else ("half_sine",),
             rates_hz=(),
