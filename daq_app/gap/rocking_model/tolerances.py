@@ -7,3 +7,9 @@ CALIBRATION = 3e-3
 
 Raising it hides gain errors of single channels and of families below three times its value.
 """
+
+TILT_CONSTANT = 0.25
+"""Relative prior sd of a tiltmeter's time constant: data sheets leave it open by a half (two sd; assumed).
+
+Raising it costs next to nothing: the runs tell the constant to some per cent.
+"""

@@ -155,3 +155,11 @@ def test_commands_say_what_is_wrong_and_exit_with_two(tmp_path: Path) -> None:
     ]
     assert runner.invoke(app, arguments).exit_code == 0
     assert load_rig(tmp_path / "o.toml").simulation.effects == {"viscous": {"zeta": 0.01}}
+
+
+def test_lvdts_that_all_read_nothing_are_refused_in_words() -> None:
+    run = simulate({}, (0.25,))[0]
+    channels = run.channels.copy()
+    channels[run.indices("lvdt")] = 0.0
+    with pytest.raises(CannotDiagnose, match="LVDT"):
+        prepare([replace(run, channels=channels)])

@@ -64,6 +64,8 @@ class Block:
     """Of a ring-down: what the signal of each coefficient shows."""
     fading: tuple[float, ...] = ()
     """Of a ring-down: change of each coefficient of unit size per ln of the damping ratio."""
+    time_constants_s: tuple[float, ...] = ()
+    """Time constants, s, of the slow sensors behind the block, as this run shows them."""
     undone_s: float = 0.0
     """Delay of accelerometers (of a ring-down) or LVDTs (of the joint) that was undone before."""
     unequal: FloatArray | None = None

@@ -10,7 +10,7 @@ import numpy as np
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.memo import any_of
-from daq_app.gap.rocking_model.features.response import bessel, first_order, resonator
+from daq_app.gap.rocking_model.features.response import bessel, first_order, resonator, slow_response
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape
 from daq_app.gap.rocking_model.motion.rotation import anchors_off
@@ -116,10 +116,9 @@ def base_rotation(run: RockingRun, block: Block, values: Mapping[str, float]) ->
     of the second, which is the simulator's form (1 where it is not fitted).
     """
     theta, fall = run.grid.theta, values.get("compliance.fall", 1.0)
-    slow = 0.3 if block.family == "tiltmeter" else 0.0
 
     def seen(shape: FloatArray) -> FloatArray:
-        return first_order(shape, slow)
+        return slow_response(shape, np.array(block.time_constants_s))
 
     moment = unit_coefficients(run, block, "moment", lambda: seen(moment_shape(theta, run.survey.alpha_rad)))
     reaction = unit_coefficients(run, block, "reaction", lambda: seen(side_of(theta)))

@@ -25,6 +25,13 @@ def first_order(values: FloatArray, time_constant_s: float, rate_hz: float = GRI
     return found
 
 
+def slow_response(values: FloatArray, time_constants_s: FloatArray) -> FloatArray:
+    """Mean response, (m,), of slow sensors with these time constants, (k,), s; `values` for none."""
+    if time_constants_s.size == 0:
+        return values
+    return np.asarray(np.mean([first_order(values, float(slow)) for slow in time_constants_s], axis=0))
+
+
 def bessel(values: FloatArray, delay_s: float) -> FloatArray:
     """Second-order Bessel low-pass of group delay `delay_s` on the coarse grid."""
     if delay_s <= 1e-5:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.gap.core import FeatureSet, Label
+from daq_app.gap.core import CannotDiagnose, FeatureSet, Label
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import scalar_block
 from daq_app.gap.rocking_model.features.families import sensor_families
@@ -105,6 +105,11 @@ def _from_hold(run: GapRun) -> tuple[GapRun, Rotation]:
     step = max(round(run.rate_hz / GRID_HZ), 1)
     theta = np.abs(coarse(joint.theta, run.rate_hz))
     largest = float(theta.max())
+    if largest == 0.0:
+        raise CannotDiagnose(
+            f"Run {run.name}: the LVDTs read nothing but their zero.",
+            "Check their wiring and supply; the rotation of the joint is read from them.",
+        )
     below = np.flatnonzero(theta < 0.5 * largest)
     # The release ends the first stay near the largest rotation; a later peak never comes that high.
     after = below[below > np.flatnonzero(theta > 0.98 * largest)[0]]

@@ -9,7 +9,6 @@ import pytest
 
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.coefficients import block_coefficients
-from daq_app.gap.rocking_model.features.response import first_order
 from daq_app.gap.rocking_model.features.rings import ring_columns
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.findings import findings_of
@@ -343,22 +342,6 @@ def test_worn_edges_are_where_the_simulator_has_them(healthy: list[RockingRun]) 
     plain = _predicted(run, values, joint, place)
     worn = _predicted(run, values | {"crushing.loss": 0.02}, joint, place)
     assert plain - worn == pytest.approx(shifted, rel=1e-6)
-
-
-def test_a_tiltmeter_with_another_time_constant_is_another_filter_and_no_mere_delay(
-    healthy: list[RockingRun],
-) -> None:
-    run = healthy[0]
-    values = {p.name: p.mean for p in RockingModel(run.survey).nuisance} | {"zero": 0.0, "omega0": 0.0}
-    block = next(b for b in run.blocks if b.family == "tiltmeter")
-    theta = run.grid.theta
-    for changed, time_constant_s in (({"tilt_response": 0.01}, 0.31), ({"clock.error": -0.03}, 0.3 / 0.97)):
-        slower = block.coefficients(first_order(theta, time_constant_s) - first_order(theta, 0.3))
-        for place in range(len(block.names)):
-            plain = _predicted(run, values, block, place)
-            change = _predicted(run, values | changed, block, place) - plain
-            assert change == pytest.approx(float(slower[place]), rel=0.1)
-    assert abs(slower[block.names.index("gain")]) > 1e-3, "a delay alone would leave the gain as it is"
 
 
 def test_a_wall_that_sways_on_its_joint_at_rest_is_no_vibration_of_the_floor() -> None:

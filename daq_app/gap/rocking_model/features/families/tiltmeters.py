@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq_app.gap.core import Parameter
 from daq_app.gap.core.features import FloatArray
@@ -16,57 +18,105 @@ from daq_app.gap.rocking_model.features.differences import (
     unit_coefficients,
 )
 from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size
-from daq_app.gap.rocking_model.features.response import first_order
+from daq_app.gap.rocking_model.features.response import slow_response
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, coarse
+from daq_app.gap.rocking_model.motion.motion_grid import coarse
 from daq_app.gap.rocking_model.motion.rotation import (
     zeroed,
 )
 from daq_app.gap.rocking_model.records import Survey
-from daq_app.gap.rocking_model.tolerances import CALIBRATION
+from daq_app.gap.rocking_model.tolerances import CALIBRATION, TILT_CONSTANT
+
+_SHORTEST_S = 0.05
+"""Least time constant, s, to which errors are relative: a tiltmeter below it is as prompt as the grid."""
+_ROUNDS = 12
 
 
 def _tilt_block(scene: Scene) -> Block | None:
+    """Gain, drift and time constant of the tiltmeters along x against the reference rotation.
+
+    The time constant is estimated for each instrument in each run, so that its error, which a data sheet
+    leaves open by a half, spoils neither the gain nor the drift.
+    """
     run, grid = scene.run, scene.grid
     chosen = [i for i in run.indices("tiltmeter", "x") if np.all(np.isfinite(run.channels[i]))]
     if not chosen:
         return None
-    slow = run.sensors[chosen[0]].time_constant_s
-    measured = np.mean([coarse(zeroed(run, i), run.rate_hz) for i in chosen], axis=0)
-    expected = first_order(grid.theta, slow)
+    pick = scene.rocking | (grid.time_s <= 0)
+    measured = [coarse(zeroed(run, i), run.rate_hz) for i in chosen]
+    nominal = np.array([max(run.sensors[i].time_constant_s, _SHORTEST_S) for i in chosen])
+    slow = np.array([_time_constant(scene, m, s, pick) for m, s in zip(measured, nominal, strict=True)])
+    found = regress(
+        "tiltmeter",
+        np.mean(measured, axis=0) - slow_response(grid.theta, slow),
+        _columns(scene, slow, nominal),
+        pick,
+        absorbed=("zero", "start"),
+    )
+    if found is None:
+        return None
+    values = found.values.copy()
+    values[found.names.index("time constant")] += float(np.mean(slow / nominal - 1.0))
+    return replace(found, values=values, time_constants_s=tuple(slow.tolist()))
+
+
+def _columns(scene: Scene, slow: FloatArray, nominal: FloatArray) -> dict[str, tuple[FloatArray, str]]:
+    """Shapes in which tiltmeters of the time constants `slow`, s, differ from their prediction."""
+    time_s, theta = scene.grid.time_s, scene.grid.theta
+    expected = slow_response(theta, slow)
     # A tiltmeter is at rest only some time constants after the wall: its own last value is no zero.
-    columns = {
+    return {
         "zero": (np.ones_like(expected), "rad"),
         "gain": (expected, "1"),
-        "lag": (-np.gradient(expected, 1 / GRID_HZ), "s"),
-        "drift": (grid.time_s, "rad/s"),
-        "start": (np.exp(-(grid.time_s - grid.time_s[0]) / max(slow, 0.05)), "rad"),
+        "time constant": (_per_time_constant(theta, slow, nominal), "1"),
+        "drift": (time_s, "rad/s"),
+        "start": (np.exp(-(time_s - time_s[0]) / float(slow.mean())), "rad"),
     }
-    wide = scene.rocking | (grid.time_s <= 0)
-    return regress("tiltmeter", measured - expected, columns, wide, absorbed=("zero", "start"))
+
+
+def _per_time_constant(theta: FloatArray, slow: FloatArray, nominal: FloatArray) -> FloatArray:
+    """d response / d (relative error of the time constants), rad, shape (m,)."""
+    step = 0.03
+    ahead, behind = slow_response(theta, slow + step * nominal), slow_response(theta, slow - step * nominal)
+    return (ahead - behind) / (2.0 * step)
+
+
+def _time_constant(scene: Scene, measured: FloatArray, nominal_s: float, pick: NDArray[np.bool_]) -> float:
+    """Time constant of one tiltmeter, s, by least squares with the other shapes free (Gauss–Newton)."""
+    slow, nominal = np.array([nominal_s]), np.array([nominal_s])
+    for _ in range(_ROUNDS):
+        columns = _columns(scene, slow, nominal)
+        design = np.column_stack([column[pick] for column, _ in columns.values()])
+        difference = (measured - slow_response(scene.grid.theta, slow))[pick]
+        step = np.linalg.lstsq(design, difference, rcond=None)[0][list(columns).index("time constant")]
+        slow = np.clip(slow + step * nominal_s, 0.5 * slow, 1.5 * slow)
+        if abs(step) < 1e-4:
+            break
+    return float(slow[0])
 
 
 def _predict(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     theta = run.grid.theta
-    found = values["cal_tiltmeter"] * unit_coefficients(run, block, "theta", lambda: first_order(theta, 0.3))
+    slow = np.array(block.time_constants_s)
+
+    def seen(shape: FloatArray) -> FloatArray:
+        return slow_response(shape, slow)
+
+    found = values["cal_tiltmeter"] * unit_coefficients(run, block, "theta", lambda: seen(theta))
     # Each face of the joint has its own calibration: the slow response makes their difference a drift.
     first, second = ("face_a", "face_b") if run.reference == "lvdt" else ("cal_wire", "cal_wire")
-    positive = unit_coefficients(run, block, "positive", lambda: first_order(np.maximum(theta, 0.0), 0.3))
-    negative = unit_coefficients(run, block, "negative", lambda: first_order(np.minimum(theta, 0.0), 0.3))
+    positive = unit_coefficients(run, block, "positive", lambda: seen(np.maximum(theta, 0.0)))
+    negative = unit_coefficients(run, block, "negative", lambda: seen(np.minimum(theta, 0.0)))
     found = found - values[first] * positive - values[second] * negative
     if "compliance.phi" in values:
         found = found + base_rotation(run, block, values)
     series = difference_of(run, "tiltmeter", run.reference, values)
     if series is not None:
-        found = found + block.coefficients(first_order(series, 0.3))
+        found = found + block.coefficients(seen(series))
     # A clock that is off shows the time constant as another one.
-    response = values["tilt_response"] + 0.3 / (1.0 + values.get("clock.error", 0.0)) - 0.3
-
-    def slower() -> FloatArray:
-        difference: FloatArray = (first_order(theta, 0.31) - first_order(theta, 0.29)) / 0.02
-        return difference
-
-    return found + response * unit_coefficients(run, block, "response", slower)
+    response = values["tilt_response"] + 1.0 / (1.0 + values.get("clock.error", 0.0)) - 1.0
+    found[block.names.index("time constant")] += response
+    return found
 
 
 def _observe(scene: Scene) -> Iterator[Block | None]:
@@ -84,7 +134,12 @@ def _priors(survey: Survey) -> tuple[Parameter, ...]:
             linear=True,
         ),
         Parameter(
-            "tilt_response", 0.0, 0.01, "s", meaning="error of the tiltmeters' time constant", linear=True
+            "tilt_response",
+            0.0,
+            TILT_CONSTANT,
+            "1",
+            meaning="relative error of the tiltmeters' time constant",
+            linear=True,
         ),
     )
 
@@ -94,7 +149,7 @@ FAMILY = SensorFamily(
     {"tiltmeter": _predict},
     {
         ("tiltmeter", "gain"): Size(3e-4),
-        ("tiltmeter", "lag"): Size(1e-4, 3e-4, "s"),
+        ("tiltmeter", "time constant"): Size(1e-3),
         ("tiltmeter", "drift"): Size(2e-6, 6e-6, "rad/s"),
     },
     _priors,
