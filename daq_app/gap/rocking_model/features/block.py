@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.noise import coefficient_covariance
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import WireInverse
 
@@ -109,9 +110,7 @@ def regress(
     projection = scaled / scale[:, None]
     values = projection @ difference[pick]
     residual = difference[pick] - design @ values
-    fraction = max(independent_fraction(residual), 0.01)
-    variance = float(residual @ residual) / max(residual.size - len(columns), 1) / fraction
-    covariance = variance * projection @ projection.T
+    covariance = coefficient_covariance(residual, projection, pick, len(columns))
     kept = [k for k, name in enumerate(columns) if name not in absorbed]
     names = tuple(name for name in columns if name not in absorbed)
     units = tuple(unit for name, (_, unit) in columns.items() if name not in absorbed)

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.config.rig import Family
-from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.noise import coefficient_covariance
 from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ
 from daq_app.gap.rocking_model.motion.rotation import WireInverse
-from daq_app.gap.rocking_model.tolerances import CALIBRATION
+from daq_app.gap.rocking_model.tolerances import CALIBRATION, CROSSTALK
 
 _SHAPES = ("gain", "lag", "curvature", "drift")
 SHAPES: dict[Family, tuple[str, ...]] = {
@@ -64,6 +65,8 @@ class Others:
     """Half-cycles, in each of which the same steps come back."""
     sided: bool = False
     """Whether its side is among the shapes."""
+    crosstalk: FloatArray | None = None
+    """What a full crosstalk from the channel that is scanned before this one would add to it, (m,), SI."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,16 +100,18 @@ def deviation(beside: Others) -> Deviation:
     inverse = np.linalg.pinv(columns / scale, rcond=1e-9) / scale[:, None]
     difference = (beside.measured - e)[beside.pick]
     left = difference - columns @ (inverse @ difference)
-    variance = left_over = float(left @ left) / max(left.size - columns.shape[1], 1)
-    fraction = max(independent_fraction(left), 0.01)
+    left_over = float(left @ left) / max(left.size - columns.shape[1], 1)
     rest = (beside.measured - e)[-round(0.4 * GRID_HZ) :]
     noise = float(np.std(rest - np.linspace(rest[:8].mean(), rest[-8:].mean(), rest.size))) + 1e-12
     # At rest a reading in steps shows none of them, and in motion the same ones in every half-cycle.
     noise = float(np.hypot(noise, beside.rough))
-    if beside.rough > 0.0:
-        variance *= max(beside.repeats, 1)
     kept = slice(0, columns.shape[1] - 1)
-    covariance = variance / fraction * (inverse @ inverse.T)[kept, kept]
+    covariance = coefficient_covariance(left, inverse[kept], beside.pick, columns.shape[1])
+    if beside.rough > 0.0:
+        covariance = covariance * max(beside.repeats, 1)
+    if beside.crosstalk is not None:
+        shared = CROSSTALK * (inverse[kept] @ beside.crosstalk[beside.pick])
+        covariance = covariance + np.outer(shared, shared)
     return Deviation(
         (inverse @ difference)[kept],
         covariance,

@@ -31,6 +31,8 @@ class ChannelFamily:
     step: float = 0.0
     repeats: int = 1
     sided: bool = False
+    crosstalk: FloatArray | None = None
+    """What a full crosstalk from the channel that is scanned before would add to each signal."""
 
 
 def channel_family(
@@ -47,7 +49,28 @@ def channel_family(
             found = _wires(whole, moving)
         case "accelerometer":
             found = _accelerometers(whole, moving & ~grid.near_impact)
-    return found and replace(found, step=step, repeats=grid.impact_s.size, sided="side" in SHAPES[family])
+    if found is None:
+        return None
+    shared = _crosstalk(whole, found.ids)
+    return replace(
+        found, step=step, repeats=grid.impact_s.size, sided="side" in SHAPES[family], crosstalk=shared
+    )
+
+
+def _crosstalk(run: GapRun, ids: tuple[str, ...]) -> FloatArray | None:
+    """Signals, (k, m), of the channels before these in the order of the scan, in shares of their ranges and
+    scaled to those of the channels themselves; zero where a range is not known."""
+    places = {sensor.id: i for i, sensor in enumerate(run.sensors)}
+    rows = []
+    for name in ids:
+        own, before = run.sensors[places[name]], run.sensors[max(places[name] - 1, 0)]
+        spans = [s.range_si[1] - s.range_si[0] for s in (own, before)]
+        values = run.channels[places[before.id]]
+        known = own is not before and np.all(np.isfinite(spans)) and np.all(np.isfinite(values))
+        share = spans[0] / spans[1] if known else 0.0
+        rows.append(share * coarse(zeroed(run, places[before.id]), run.rate_hz) if known else None)
+    length = next((row.size for row in rows if row is not None), 0)
+    return np.array([np.zeros(length) if row is None else row for row in rows]) if length else None
 
 
 def _lvdts(run: GapRun, pick: NDArray[np.bool_]) -> ChannelFamily | None:
@@ -90,7 +113,8 @@ def beside(data: ChannelFamily, name: str, without: tuple[str, ...]) -> Others:
     own = float(np.sqrt(np.mean(expected**2))) + 1e-300
     spread = float(np.sqrt(1.0 + np.sum((weights * sizes / own) ** 2)))
     rough = data.step / np.sqrt(12.0) * float(np.sqrt(1.0 + np.sum(weights**2)))
-    return Others(data.signals[place], expected, data.pick, spread, rough, data.repeats, data.sided)
+    shared = None if data.crosstalk is None else data.crosstalk[place]
+    return Others(data.signals[place], expected, data.pick, spread, rough, data.repeats, data.sided, shared)
 
 
 def smoothed(run: GapRun, chosen: Sequence[int], late_s: float = 0.0) -> FloatArray:

@@ -25,6 +25,10 @@ _LAST = 9
 """Peaks from which the fall from one to the next is taken, where it no longer depends on the amplitude."""
 _SMOOTH_HZ = 30.0
 _WINDOW_S = 0.015
+_FALLEN = 0.9
+"""Share of the largest rotation below which the wall is falling."""
+_HELD_S = (0.6, 0.25)
+"""Before that, s: from when to when the wall is held; it falls to nine tenths within 0.1–0.2 s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +85,7 @@ def find_swings(theta: FloatArray, noise_rad: float, rate_hz: float, name: str) 
         raise CannotDiagnose(
             f"Run {name}: the wall never rocks.", "Check that it was released in this record."
         )
-    release = _release(smooth, held, noise_rad, int(crossings[0]))
+    release = _release(smooth, noise_rad, int(crossings[0]), rate_hz)
     held, held_sd, sway, sway_rate = _hold(theta, release, noise_rad, rate_hz)
     peaks = _peaks(theta, smooth, crossings, noise_rad, rate_hz)
     if len(peaks) < 3:
@@ -149,16 +153,25 @@ def _hold(
     return float(last.mean()), float(own / 2.0), sway, speed
 
 
-def _release(smooth: FloatArray, held: float, noise: float, first_crossing: int) -> float:
-    """Sample of the release: the fall extrapolated back to the held rotation, |θ₀| − ½ a t²."""
-    moved = abs(held) - np.sign(held) * smooth[:first_crossing]
-    low, high = max(10 * noise * 0.2, 0.01 * abs(held)), 0.1 * abs(held)
-    window = np.flatnonzero((moved > low) & (moved < high))
-    window = window[window > first_crossing // 2] if window.size > 20 else window
+def _release(smooth: FloatArray, noise: float, first_crossing: int, rate_hz: float) -> float:
+    """Sample of the release: the fall extrapolated back to the held rotation, |θ₀| − ½ a t².
+
+    The held rotation is that of the last moments before the fall: a hand that sways and a zero that walks
+    move it by more than the first part of the fall does.
+    """
+    size = np.abs(smooth[:first_crossing])
+    fallen = int(np.flatnonzero(size > _FALLEN * size.max())[-1])
+    first, last = (max(fallen - round(back * rate_hz), 0) for back in _HELD_S)
+    held = float(np.median(size[first : max(last, first + 1)]))
+    moved = held - size
+    low, high = max(2.0 * noise, 0.01 * held), 0.1 * held
+    still = np.flatnonzero(moved[: fallen + 1] < low)
+    start = int(still[-1]) + 1 if still.size else first
+    window = np.flatnonzero(moved[start:] < high) + start
     if window.size < 5:
-        return float(np.flatnonzero(moved < low)[-1])
-    slope, intercept = np.polyfit(window, np.sqrt(moved[window]), 1)
-    return float(-intercept / slope)
+        return float(start)
+    slope, intercept = np.polyfit(window, np.sqrt(np.maximum(moved[window], 0.0)), 1)
+    return float(max(-intercept / slope, 0.0)) if slope > 0.0 else float(start)
 
 
 def _peaks(

@@ -1,0 +1,63 @@
+"""Covariance of regression coefficients under noise with a spectrum: white, short-lived and slow parts.
+
+What a regression leaves is modelled as noise of a short memory plus a random walk of the zero. The walk is what a
+zero that drifts, a cable that warms or 1/f noise makes over seconds; it goes almost wholly into the coefficients
+of slow shapes, where the autocorrelation of the residual no longer shows it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.core.features import FloatArray, independent_fraction
+
+_CELL = 8
+"""Samples of the grid, 40 ms, that are averaged before increments are taken: averages out white noise."""
+_LAGS = (2, 4, 8, 16)
+"""Lags in cells, 0.08–0.64 s: longer ones are absorbed by the shapes of the regression."""
+
+
+def walk_variance(residual: FloatArray, places: NDArray[np.intp]) -> float:
+    """Variance per sample of the random walk in a residual, (n,), at the places `places` of the grid.
+
+    The mean square increment over a lag is 2 σ² + q · lag: what an impact leaves is short and only raises σ², a
+    cable that jumps by s in n samples is a walk of q = s²/n. 0 where increments do not grow with the lag.
+    """
+    breaks = np.flatnonzero(np.diff(places) != 1) + 1
+    squares: list[list[FloatArray]] = [[] for _ in _LAGS]
+    for part in np.split(residual, breaks):
+        count = part.size // _CELL
+        means = part[: count * _CELL].reshape(count, _CELL).mean(axis=1)
+        for row, lag in zip(squares, _LAGS, strict=True):
+            if count > lag:
+                row.append((means[lag:] - means[:-lag]) ** 2)
+    known = [(lag * _CELL, np.concatenate(row)) for lag, row in zip(_LAGS, squares, strict=True) if row]
+    known = [(lag, row) for lag, row in known if row.size >= 8]
+    if len(known) < 2:
+        return 0.0
+    lags = np.array([lag for lag, _ in known], dtype=float)
+    levels = np.array([float(row.mean()) for _, row in known])
+    # Increments of longer lags overlap more and are known less well: relative errors ∝ √lag.
+    slope, _ = np.polyfit(lags, levels, 1, w=1.0 / np.sqrt(lags))
+    return max(float(slope), 0.0)
+
+
+def coefficient_covariance(
+    residual: FloatArray, projection: FloatArray, pick: NDArray[np.bool_], shapes: int
+) -> FloatArray:
+    """Covariance, (k, k), of coefficients = `projection` @ series at the samples `pick` of the grid.
+
+    `residual`: (n,) what the regression leaves at those samples; `shapes`: how many shapes it has.
+    """
+    places = np.flatnonzero(pick)
+    fraction = max(independent_fraction(residual), 0.01)
+    variance = float(residual @ residual) / max(residual.size - shapes, 1) / fraction
+    walk = walk_variance(residual, places)
+    covariance: FloatArray = variance * projection @ projection.T
+    if walk > 0.0:
+        steps = np.diff(places, prepend=places[0]).astype(float)
+        # A walk is a sum of steps: each moves all samples after it.
+        moved = np.cumsum(projection[:, ::-1], axis=1)[:, ::-1]
+        covariance = covariance + walk * (moved * steps) @ moved.T
+    return covariance
