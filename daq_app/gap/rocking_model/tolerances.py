@@ -17,6 +17,13 @@ Raising it costs next to nothing: the runs tell the constant to some per cent.
 CROSSTALK = 5e-3
 """Relative sd of what a channel shows of the one that is scanned before it, both in shares of their ranges.
 
-Multiplexed modules leave 0.1–1 % behind long cables (assumed). Raising it hides single channels that are off in
-the shape of another family's signal.
+Multiplexed modules leave 0.1–1 % behind long cables (assumed). Raising it hides single channels that are off
+in the shape of another family's signal.
+"""
+
+SKEW_S = 1.5e-4
+"""Sd of the time, s, by which channels of a family are sampled apart beyond what the task plan says.
+
+Assumed: a module that is started by its own clock edge, or filters more than its neighbour. Raising it hides
+restoring that differs between the sides of a wall below it.
 """

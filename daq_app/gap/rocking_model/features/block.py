@@ -69,8 +69,8 @@ class Block:
     """Time constants, s, of the slow sensors behind the block, as this run shows them."""
     undone_s: float = 0.0
     """Delay of accelerometers (of a ring-down) or LVDTs (of the joint) that was undone before."""
-    unequal: FloatArray | None = None
-    """Of a ring-down, (k,): what calibrations that differ by one sd add to each coefficient in all runs."""
+    systematic: Mapping[str, FloatArray] = field(default_factory=dict)
+    """What parameters that all runs share add to the coefficients at a value of one, (k,) each."""
     tags: Mapping[str, str] = field(default_factory=dict)
     """Sensor family behind a channel or a mark."""
     said: Mapping[str, tuple[str, str]] = field(default_factory=dict)

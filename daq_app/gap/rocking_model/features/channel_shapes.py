@@ -100,6 +100,7 @@ def deviation(beside: Others) -> Deviation:
     inverse = np.linalg.pinv(columns / scale, rcond=1e-9) / scale[:, None]
     difference = (beside.measured - e)[beside.pick]
     left = difference - columns @ (inverse @ difference)
+    left = left - _leaked(left, columns, beside)
     left_over = float(left @ left) / max(left.size - columns.shape[1], 1)
     rest = (beside.measured - e)[-round(0.4 * GRID_HZ) :]
     noise = float(np.std(rest - np.linspace(rest[:8].mean(), rest[-8:].mean(), rest.size))) + 1e-12
@@ -120,6 +121,17 @@ def deviation(beside: Others) -> Deviation:
         0.5 * float(np.log(left_over / noise**2)),
         noise,
     )
+
+
+def _leaked(left: FloatArray, columns: FloatArray, beside: Others) -> FloatArray:
+    """What crosstalk of up to three sd explains of what the shapes leave, both (n,)."""
+    if beside.crosstalk is None:
+        return np.zeros_like(left)
+    basis = np.linalg.qr(columns / (np.abs(columns).max(axis=0) + 1e-300))[0]
+    own = beside.crosstalk[beside.pick]
+    own = own - basis @ (basis.T @ own)
+    share = float(own @ left) / max(float(own @ own), 1e-300)
+    return np.asarray(np.clip(share, -3.0 * CROSSTALK, 3.0 * CROSSTALK) * own)
 
 
 def usual_remains(of_channels: Sequence[float]) -> float:

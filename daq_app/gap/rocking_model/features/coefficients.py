@@ -12,12 +12,13 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.channel_response import channel
 from daq_app.gap.rocking_model.features.families import sensor_families
-from daq_app.gap.rocking_model.features.family import Predict, Size
+from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE, Predict, Size
 from daq_app.gap.rocking_model.features.floor_response import floor
 from daq_app.gap.rocking_model.features.memo import Memo
 from daq_app.gap.rocking_model.features.ring_response import bending, turning
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.records import Survey
+from daq_app.gap.rocking_model.tolerances import CROSSTALK
 
 BIAS = "bias_"
 """Prefix of the parameters that say what sound sensors may be off by in all runs."""
@@ -70,8 +71,8 @@ def _coefficients(run: RockingRun, block: Block, unit: FloatArray, values: Mappi
     coefficients = _rules()[block.rule](run, block, values)
     for i, name in _bias_names(block.family, block.names):
         coefficients[i] += values.get(name, 0.0)
-    if block.unequal is not None:
-        coefficients = coefficients + values.get(_unequal_name(block.family), 0.0) * block.unequal
+    for name, loading in block.systematic.items():
+        coefficients = coefficients + values.get(name, 0.0) * loading
     if f"free_{block.family}.c0" in values:
         free = [values.get(f"free_{block.family}.c{i}", 0.0) for i in range(unit.size)]
         coefficients = coefficients + 3.0 * unit * np.array(free)
@@ -100,11 +101,6 @@ def _bias_name(family: str, coefficient: str) -> str:
     return f"{BIAS}{family}_{coefficient}".replace(" ", "_")
 
 
-def _unequal_name(family: str) -> str:
-    """The parameter of what unequal calibrations make of a ring-down, in sd."""
-    return f"{BIAS}{family}_unequal"
-
-
 def sensor_priors(survey: Survey) -> tuple[Parameter, ...]:
     """Parameters of all sensor families: calibrations, and what sound sensors may be off by in all runs.
 
@@ -126,11 +122,14 @@ def sensor_priors(survey: Survey) -> tuple[Parameter, ...]:
     )
     unequal = (
         Parameter(
-            _unequal_name(name), 0.0, 1.0, "1", meaning=f"{name} from unequal accelerometers", linear=True
+            f"{name}_unequal", 0.0, 1.0, "1", meaning=f"{name} from unequal accelerometers", linear=True
         )
         for name in _RINGS
     )
-    return (*own, *biases, *unequal)
+    shared = Parameter(
+        CROSSTALK_SHARE, 0.0, CROSSTALK, "1", meaning="crosstalk from the channel scanned before", linear=True
+    )
+    return (*own, *biases, *unequal, shared)
 
 
 @cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
 
 Predict = Callable[[RockingRun, Block, Mapping[str, float]], FloatArray]
 """Predicted coefficients, (k,), of a block of a run at the values of a hypothesis."""
+CROSSTALK_SHARE = "crosstalk"
+"""Parameter of the share of the channel scanned before, which the families' blocks carry as `systematic`."""
 _SWAY_SHARE = 0.005
 """Mean acceleration of the sway over that of gravity, up to which the held wall shows gravity alone."""
 
@@ -75,6 +77,11 @@ class Scene:
         mean_error = 3.0 * self.swings.hold_rate_sd / max(float(held.sum()) / GRID_HZ, 0.05)
         still: NDArray[np.bool_] = held & (mean_error < _SWAY_SHARE * GRAVITY_M_S2 * abs(middle))
         return still
+
+
+def with_crosstalk(block: Block | None, added: FloatArray) -> Block | None:
+    """The block with what a full crosstalk of its channels, (m,) in the series' unit, does to it."""
+    return block and replace(block, systematic={CROSSTALK_SHARE: block.coefficients(added)})
 
 
 @dataclass(frozen=True, slots=True)

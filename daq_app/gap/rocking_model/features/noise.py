@@ -1,8 +1,8 @@
 """Covariance of regression coefficients under noise with a spectrum: white, short-lived and slow parts.
 
-What a regression leaves is modelled as noise of a short memory plus a random walk of the zero. The walk is what a
-zero that drifts, a cable that warms or 1/f noise makes over seconds; it goes almost wholly into the coefficients
-of slow shapes, where the autocorrelation of the residual no longer shows it.
+What a regression leaves is modelled as noise of a short memory plus a random walk of the zero. The walk is
+what a zero that drifts, a cable that warms or 1/f noise makes over seconds; it goes almost wholly into the
+coefficients of slow shapes, where the autocorrelation of the residual no longer shows it.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ _LAGS = (2, 4, 8, 16)
 def walk_variance(residual: FloatArray, places: NDArray[np.intp]) -> float:
     """Variance per sample of the random walk in a residual, (n,), at the places `places` of the grid.
 
-    The mean square increment over a lag is 2 σ² + q · lag: what an impact leaves is short and only raises σ², a
-    cable that jumps by s in n samples is a walk of q = s²/n. 0 where increments do not grow with the lag.
+    The mean square increment over a lag is 2 σ² + q · lag: what an impact leaves is short and only raises σ²,
+    a cable that jumps by s in n samples is a walk of q = s²/n. 0 where increments do not grow with the lag.
     """
     breaks = np.flatnonzero(np.diff(places) != 1) + 1
     squares: list[list[FloatArray]] = [[] for _ in _LAGS]

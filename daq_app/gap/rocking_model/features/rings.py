@@ -242,7 +242,7 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
         ring=(ring.frequency_hz, ring.zeta, GRID_HZ),
         shares=tuple(shares),
         fading=tuple(fading),
-        unequal=np.array([*unequal, 0.0, 0.0]),
+        systematic={f"{name}_unequal": np.array([*unequal, 0.0, 0.0])},
         undone_s=next((s.undone_s for s in signals if s.family == "accelerometer"), 0.0),
     )
 

@@ -12,6 +12,7 @@ from scipy.signal import oaconvolve
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.channel_shapes import SHAPES, Others
+from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
 from daq_app.gap.rocking_model.motion.rotation import sooner, wall_rotation, zeroed
 from daq_app.gap.rocking_model.records import GapRun
@@ -51,26 +52,14 @@ def channel_family(
             found = _accelerometers(whole, moving & ~grid.near_impact)
     if found is None:
         return None
-    shared = _crosstalk(whole, found.ids)
+    places = [i for name in found.ids for i, sensor in enumerate(run.sensors) if sensor.id == name]
     return replace(
-        found, step=step, repeats=grid.impact_s.size, sided="side" in SHAPES[family], crosstalk=shared
+        found,
+        step=step,
+        repeats=grid.impact_s.size,
+        sided="side" in SHAPES[family],
+        crosstalk=crosstalk(run, places),
     )
-
-
-def _crosstalk(run: GapRun, ids: tuple[str, ...]) -> FloatArray | None:
-    """Signals, (k, m), of the channels before these in the order of the scan, in shares of their ranges and
-    scaled to those of the channels themselves; zero where a range is not known."""
-    places = {sensor.id: i for i, sensor in enumerate(run.sensors)}
-    rows = []
-    for name in ids:
-        own, before = run.sensors[places[name]], run.sensors[max(places[name] - 1, 0)]
-        spans = [s.range_si[1] - s.range_si[0] for s in (own, before)]
-        values = run.channels[places[before.id]]
-        known = own is not before and np.all(np.isfinite(spans)) and np.all(np.isfinite(values))
-        share = spans[0] / spans[1] if known else 0.0
-        rows.append(share * coarse(zeroed(run, places[before.id]), run.rate_hz) if known else None)
-    length = next((row.size for row in rows if row is not None), 0)
-    return np.array([np.zeros(length) if row is None else row for row in rows]) if length else None
 
 
 def _lvdts(run: GapRun, pick: NDArray[np.bool_]) -> ChannelFamily | None:

@@ -10,6 +10,7 @@ import numpy as np
 from daq_app.gap.core import Parameter, Prediction, Run, Scatter
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.coefficients import block_coefficients, sensor_priors
+from daq_app.gap.rocking_model.features.families.lvdts import FACE_SKEW
 from daq_app.gap.rocking_model.features.floor_response import with_measured_inputs
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.prediction.free_forms import free_times, with_uneven_loss
@@ -177,6 +178,9 @@ class RockingModel:
         k = places[across, 0]
         times[across] += table[k, shooting.FALL_S] + pause[k] + table[k + 1, shooting.RISE_S]
         times = times / clock + free_times(run, values)
+        if run.reference == "lvdt":
+            # Before an impact one face opens, after it the other.
+            times[across] += np.sign(true[places[across, 0]]) * values[FACE_SKEW]
         k = run.peaks
         before = k - 1
         r = restitution_of(run, values, speeds_out[before], np.sign(true[before]), before)

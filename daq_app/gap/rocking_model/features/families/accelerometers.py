@@ -14,9 +14,10 @@ from daq_app.gap.rocking_model.features.differences import (
     base_rotation,
     own_gain,
 )
-from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size
+from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size, with_crosstalk
 from daq_app.gap.rocking_model.features.response import delay
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
 from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid, coarse
 from daq_app.gap.rocking_model.motion.rotation import (
@@ -54,13 +55,15 @@ def _acceleration_block(scene: Scene) -> Block | None:
     }
     # The held wall sways: only the mean of that part, less the sway's, says what gravity alone shows.
     held = pick & (grid.time_s < 0.0)
+    leaked = crosstalk(run, chosen).mean(axis=0)
     if held.any():
+        leaked[held] = leaked[held].mean()
         swaying = height * float(_sway(grid)[held].mean())
         measured[held], gravity[held] = measured[held].mean() - swaying, gravity[held].mean()
         expected = gravity + inertia - grid.omega**2 * arm
         columns["gain of gravity"], columns["gain of inertia"] = (gravity, "1"), (inertia, "1")
     # No lag here: between impacts the specific force hardly changes. The impacts themselves tell it.
-    return regress("accelerometer", measured - expected, columns, pick, ("zero",))
+    return with_crosstalk(regress("accelerometer", measured - expected, columns, pick, ("zero",)), leaked)
 
 
 def _sway(grid: Grid) -> FloatArray:

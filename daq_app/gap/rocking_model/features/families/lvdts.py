@@ -25,7 +25,10 @@ from daq_app.gap.rocking_model.motion.rotation import (
     Rotation,
 )
 from daq_app.gap.rocking_model.records import GapRun, Survey
-from daq_app.gap.rocking_model.tolerances import CALIBRATION
+from daq_app.gap.rocking_model.tolerances import CALIBRATION, SKEW_S
+
+FACE_SKEW = "face_skew"
+"""Parameter by which the two faces are sampled apart: the face that opens is the one that tells the time."""
 
 
 def _lift_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:
@@ -128,6 +131,14 @@ def _priors(survey: Survey) -> tuple[Parameter, ...]:
             )
             for name, where in faces
         ),
+        Parameter(
+            FACE_SKEW,
+            0.0,
+            SKEW_S,
+            "s",
+            meaning="how much later the LVDTs at x > 0 are sampled than those at x < 0",
+            linear=True,
+        ),
         Parameter("twist_follow", 0.0, 2e-3, "1/m", meaning="twist from LVDT calibrations", linear=True),
         Parameter(
             "mount_height",
@@ -152,6 +163,6 @@ FAMILY = SensorFamily(
         ("twist", "follows rotation"): Size(1.5e-4),
     },
     _priors,
-    frozenset(("face_a", "face_b")),
+    frozenset(("face_a", "face_b", FACE_SKEW)),
     {"joint": "interface"},
 )

@@ -17,9 +17,10 @@ from daq_app.gap.rocking_model.features.differences import (
     difference_of,
     unit_coefficients,
 )
-from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size
+from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size, with_crosstalk
 from daq_app.gap.rocking_model.features.response import slow_response
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import coarse
 from daq_app.gap.rocking_model.motion.rotation import (
     zeroed,
@@ -53,6 +54,7 @@ def _tilt_block(scene: Scene) -> Block | None:
         pick,
         absorbed=("zero", "start"),
     )
+    found = with_crosstalk(found, crosstalk(run, chosen).mean(axis=0))
     if found is None:
         return None
     values = found.values.copy()

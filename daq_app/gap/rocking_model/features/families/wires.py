@@ -16,10 +16,11 @@ from daq_app.gap.rocking_model.features.differences import (
     difference_of,
     unit_coefficients,
 )
-from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size
+from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size, with_crosstalk
 from daq_app.gap.rocking_model.features.pivots import travel
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import moment_shape, slip_shape
+from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
 from daq_app.gap.rocking_model.motion.rotation import (
     anchors_off,
@@ -27,7 +28,7 @@ from daq_app.gap.rocking_model.motion.rotation import (
     wire_reading,
     zeroed,
 )
-from daq_app.gap.rocking_model.records import Survey
+from daq_app.gap.rocking_model.records import GapRun, Survey
 from daq_app.gap.rocking_model.tolerances import CALIBRATION
 
 _OTHER_WIRES = 2e-3
@@ -36,7 +37,7 @@ _OTHER_WIRES = 2e-3
 
 def _wire_block(scene: Scene) -> Block | None:
     run, joint, grid, reference = scene.run, scene.joint, scene.grid, scene.reference
-    rows, heights, _ = wall_rotation(run)
+    rows, heights, names = wall_rotation(run)
     if len(rows) == 0:
         return None
     theta = np.average(rows, axis=0, weights=heights**2)
@@ -49,7 +50,12 @@ def _wire_block(scene: Scene) -> Block | None:
     if found is not None and some:
         # Other wires than in the other runs: their mean has another calibration.
         found.covariance[found.names.index("gain"), found.names.index("gain")] += _OTHER_WIRES**2
-    return found
+    return with_crosstalk(found, heights @ _leaked(run, names) / (heights @ heights))
+
+
+def _leaked(run: GapRun, names: tuple[str, ...]) -> FloatArray:
+    """What a full crosstalk would add to these wires, (k, m), m."""
+    return crosstalk(run, [i for i in run.indices("wire") if run.sensors[i].id in names])
 
 
 def rotation_columns(grid: Grid, alpha: float) -> dict[str, tuple[FloatArray, str]]:
@@ -78,14 +84,16 @@ def _translation_block(scene: Scene) -> Block | None:
         ideal = wire_reading(grid.theta, sensor.position_m, sensor.anchor_m, run.survey.half_base_m)
         shift.append(coarse(zeroed(run, i), run.rate_hz) - ideal)
     design = np.column_stack([np.ones_like(heights), heights])
-    moved = (np.linalg.pinv(design) @ np.array(shift))[0]
+    at_base = np.linalg.pinv(design)[0]
+    moved = at_base @ np.array(shift)
     columns = {
         "zero": (np.ones_like(grid.theta), "m"),
         "slip per speed": (slip_shape(grid), "m s/rad"),
         "follows rotation": (grid.theta, "m/rad"),
         "drift": (grid.time_s, "m/s"),
     }
-    return regress("base", moved, columns, scene.rocking, ("zero", "drift"))
+    found = regress("base", moved, columns, scene.rocking, ("zero", "drift"))
+    return with_crosstalk(found, at_base @ _leaked(run, names))
 
 
 def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
