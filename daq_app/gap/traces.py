@@ -22,7 +22,7 @@ from scipy.signal import bessel, bilinear, lfilter
 from daq_app.gap.core import CannotDiagnose, Diagnosis
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.rotation import (
-    WireInverse,
+    Wire,
     anchors_off,
     joint_rotation,
     wall_rotation,
@@ -291,7 +291,7 @@ def _seen(
     slow_s: float,
     rest_s: float,
     height_m: float,
-    wires: Sequence[WireInverse],
+    wires: Sequence[Wire],
 ) -> FloatArray:
     """A motion as the family that is shown would show it; `height_m` is where the wires look."""
     fine = np.arange(time[0], time[-1] + 0.5e-3, 0.5e-3)

@@ -14,6 +14,7 @@ from daq_app.rocking.analysis.fusion import Fused, fuse
 from daq_app.rocking.analysis.results import Zero
 from daq_app.rocking.geometry.joint import BaseJoint, JointMotion
 from daq_app.rocking.geometry.kinematics import RotationGeometry
+from daq_app.rocking.geometry.noise import white_noise
 from daq_app.rocking.motion.phases import PhaseDetector, PhaseEvent, PhaseSettings
 from daq_app.rocking.motion.swings import MotionSettings
 from daq_app.rocking.record import TestRecord
@@ -140,7 +141,7 @@ def _combine(
     combined = geometry.rotation(wires_m)
     wire_rotation = combined.rotation_rad
     offset = geometry.time_offset_s(record.time_offsets_s)
-    wire_noise = _white_noise(wire_rotation)
+    wire_noise = white_noise(wire_rotation)
     specimen = record.rig.specimen
     joint, lvdt_noise, fused = None, math.nan, None
     lvdts = record.family("lvdt")
@@ -150,7 +151,7 @@ def _combine(
         base = None  # too few LVDTs for a profile: said in the quality notes
     if base is not None:
         joint = base.motion(openings_m)
-        lvdt_noise = _white_noise(joint.rotation_rad)
+        lvdt_noise = white_noise(joint.rotation_rad)
         fused = fuse(wire_rotation, joint.rotation_rad, wire_noise, max(lvdt_noise, 1e-7))
     leads = lead == "lvdts" and joint is not None
     rotation = joint.rotation_rad if leads and joint is not None else wire_rotation
@@ -232,16 +233,6 @@ def _zero(values: Floats, rest: slice) -> Floats:
     if not values.size:
         return values
     return np.asarray(values - np.nan_to_num(np.nanmedian(values[:, rest], axis=1))[:, None])
-
-
-def _white_noise(signal: Floats) -> float:
-    """rms of white noise from second differences (motion falls away), robust to impacts."""
-    second = np.diff(signal, 2)
-    second = second[np.isfinite(second)]
-    if second.size < 100:
-        return math.nan
-    # Median absolute deviation to standard deviation; a second difference has variance 6.
-    return float(np.median(np.abs(second - np.median(second)))) * 1.4826 / math.sqrt(6.0)
 
 
 def _aligned(rows: Floats, lags: Sequence[float]) -> Floats:

@@ -1,9 +1,6 @@
 """Rotation of the wall from the wire potentiometers and the tiltmeters, by their true geometry.
 
-The wall turns as a rigid body about its edge at x = +b/2 (θ > 0) or −b/2 (θ < 0). In the (x, z)
-plane the wall point P and the anchor A keep their distances ρ_P, ρ_A from that edge, so the wire's
-length is L² = Δy² + ρ_A² + ρ_P² − 2 ρ_A ρ_P cos(γ − θ) with γ the angle from P to A upright: the
-inversion is closed and exact (it is √((d+Δx)²+Δz²) − d written about the edge).
+The map of one wire and its inverse stand in `wires`.
 """
 
 from __future__ import annotations
@@ -16,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from daq_app.config.rig import Channel, Rig
+from daq_app.rocking.geometry.wires import lever, wire_rotation, wire_shortening
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -70,21 +68,12 @@ class WireGeometry:
 
     def shortening(self, rotation_rad: ArrayLike) -> Floats:
         """(wires, n) wire shortening in m at rotations (n,): the forward map."""
-        theta = np.atleast_1d(np.asarray(rotation_rad, dtype=np.float64))
-        pivot = np.where(theta < 0.0, -self.half_width_m, self.half_width_m)
-        arm_x = self.position_m[:, :1] - pivot
-        arm_z = self.position_m[:, 2:]
-        x = pivot + arm_x * np.cos(theta) + arm_z * np.sin(theta)
-        z = arm_z * np.cos(theta) - arm_x * np.sin(theta)
-        dy = (self.anchor_m - self.position_m)[:, 1:2]
-        length = np.sqrt((self.anchor_m[:, :1] - x) ** 2 + dy**2 + (self.anchor_m[:, 2:] - z) ** 2)
-        return np.asarray(self.length0_m[:, None] - length)
+        return wire_shortening(rotation_rad, self.position_m, self.anchor_m, self.half_width_m)
 
     @cached_property
     def lever_m(self) -> Floats:
         """(wires,) ds/dθ in m/rad at upright, the mean of both sides."""
-        step = 1e-6
-        return np.asarray((self.shortening(step) - self.shortening(-step))[:, 0] / (2 * step))
+        return lever(self.position_m, self.anchor_m, self.half_width_m)
 
     def shortening_per_shift(self) -> Floats:
         """(wires,) ds/du for a small shift u of the whole wall towards +x: the wire's direction."""
@@ -92,22 +81,10 @@ class WireGeometry:
 
     def rotation_of_each(self, shortening_m: Floats) -> Floats:
         """(wires, n) rotation that each wire alone shows; NaN where no rotation explains the reading."""
-        # Only two pivots exist: everything that does not depend on the sample is known per wire and side.
-        pivots = np.array([self.half_width_m, -self.half_width_m])
-        ax, px = self.anchor_m[:, :1] - pivots, self.position_m[:, :1] - pivots
-        az, pz = self.anchor_m[:, 2:], self.position_m[:, 2:]
-        dy = (self.anchor_m - self.position_m)[:, 1:2]
-        squares = ax * ax + az * az + px * px + pz * pz + dy * dy
-        products = 2.0 * np.sqrt((ax * ax + az * az) * (px * px + pz * pz))
-        gammas = np.arctan2(ax, az) - np.arctan2(px, pz)
         rotation = np.empty_like(shortening_m)
         for wire, row in enumerate(shortening_m):
-            side = (row * np.sign(self.lever_m[wire]) < 0.0).astype(np.intp)
-            length = self.length0_m[wire] - row
-            with np.errstate(invalid="ignore"):
-                opening = np.arccos((squares[wire, side] - length * length) / products[wire, side])
-            gamma = gammas[wire, side]
-            rotation[wire] = gamma - np.copysign(opening, gamma)
+            position, anchor = self.position_m[wire], self.anchor_m[wire]
+            rotation[wire] = wire_rotation(row, position, anchor, self.half_width_m)
         return rotation
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.noise import coefficient_covariance
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
-from daq_app.gap.rocking_model.motion.rotation import WireInverse
+from daq_app.gap.rocking_model.motion.rotation import Wire
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class Block:
     """Of a single channel: the shapes of the regression at the samples of `pick`."""
     noise: float = 1.0
     """Of a single channel: rms at rest."""
-    wire: WireInverse | None = None
+    wire: Wire | None = None
     """Of a single wire: how its rotation was made from its length, which is what its faults act on."""
     ring: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Of a ring-down: frequency in Hz, damping ratio, rate of the grid in Hz."""

@@ -12,7 +12,7 @@ from daq_app.gap.rocking_model.features.response import responded
 from daq_app.gap.rocking_model.features.rings import ring_columns
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ
-from daq_app.gap.rocking_model.motion.rotation import TAIL_S, WireInverse
+from daq_app.gap.rocking_model.motion.rotation import TAIL_S, Wire
 from daq_app.gap.rocking_model.records import Sensor
 
 
@@ -79,7 +79,7 @@ def _ringing(run: RockingRun, block: Block, values: Mapping[str, float]) -> Floa
     return np.asarray(np.sum(parts, axis=0)) if parts else None
 
 
-def _ringing_of_one(run: RockingRun, wire: WireInverse, ring: Block, key: str) -> FloatArray:
+def _ringing_of_one(run: RockingRun, wire: Wire, ring: Block, key: str) -> FloatArray:
     """The same for a strength of one, at the frequency and damping that the runs show."""
     frequency, zeta, rate = ring.ring
     wave = np.sinc(frequency / rate) * ring_columns(run.grid, frequency, zeta)[:, 0]

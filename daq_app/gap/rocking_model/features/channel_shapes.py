@@ -16,7 +16,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.noise import coefficient_covariance
 from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ
-from daq_app.gap.rocking_model.motion.rotation import WireInverse
+from daq_app.gap.rocking_model.motion.rotation import Wire
 from daq_app.gap.rocking_model.tolerances import CALIBRATION, CROSSTALK
 
 _SHAPES = ("gain", "lag", "curvature", "drift")
@@ -143,9 +143,7 @@ def usual_remains(of_channels: Sequence[float]) -> float:
     return max(float(np.median(of_channels)), 0.0)
 
 
-def block_of(
-    name: str, family: Family, beside: Others, usual: float, wire: WireInverse | None = None
-) -> Block:
+def block_of(name: str, family: Family, beside: Others, usual: float, wire: Wire | None = None) -> Block:
     """Block of the coefficients of a channel; `usual` is what remains (`Deviation`) of a sound one."""
     found = deviation(beside)
     k = len(SHAPES[family])

@@ -15,7 +15,7 @@ from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.floor_vibration import Vibration
 from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
-from daq_app.gap.rocking_model.motion.rotation import WireInverse
+from daq_app.gap.rocking_model.motion.rotation import Wire
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import Survey, Wiring
 
@@ -55,7 +55,7 @@ class RockingRun:
     """(n, k): measurement covariance of the blocks as loadings."""
     notes: tuple[str, ...] = ()
     vibration: Vibration | None = None
-    wires: tuple[WireInverse, ...] = ()
+    wires: tuple[Wire, ...] = ()
     """All wires whose geometry is known."""
     wiring: Wiring = field(default_factory=Wiring)
     """What was put right in all runs before anything was read from them."""

@@ -30,7 +30,7 @@ from daq_app.gap.rocking_model.inspection.channel_families import (
     channel_family,
 )
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
-from daq_app.gap.rocking_model.motion.rotation import WireInverse
+from daq_app.gap.rocking_model.motion.rotation import Wire
 from daq_app.gap.rocking_model.records import GapRun
 
 SUSPECT: dict[Family, float] = {"lvdt": 4.0, "wire": 2.0, "accelerometer": 3.0}
@@ -243,6 +243,6 @@ def channel_block(run: GapRun, grid: Grid, family: Family, name: str, step: floa
     return block_of(name, family, own, usual, _wire(run, name) if family == "wire" else None)
 
 
-def _wire(run: GapRun, name: str) -> WireInverse:
+def _wire(run: GapRun, name: str) -> Wire:
     sensor = next(sensor for sensor in run.sensors if sensor.id == name)
-    return WireInverse.of(sensor, run.survey.half_base_m)
+    return Wire(sensor, run.survey.half_base_m)

@@ -17,8 +17,11 @@ from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.records import GapRun
+from daq_app.rocking.geometry.noise import white_noise
 
 MAINS_HZ = 50.0
+REST_S = 0.45
+"""Rest at the end of a record from which noise is read, s."""
 LOUD = 4.0
 """Size beyond that of noise and hum together from which a sample belongs to an impact …"""
 AROUND_S = 0.03
@@ -61,7 +64,7 @@ def inspect_channel(run: GapRun, index: int) -> Condition:
     if not np.all(np.isfinite(values)):
         return Condition(0.0, 1.0, None, 0.0, 1.0, 0.0, 1e-3, 0.0)
     rate, accelerometer = run.rate_hz, run.sensors[index].family == "accelerometer"
-    noise = _white_noise(values, rate)
+    noise = white_noise(values[-int(REST_S * rate) :]) + 1e-15
     hum, hum_sd, wave = _hum(values, rate)
     usual = max(noise, run.sensors[index].noise_si)
     if accelerometer:
@@ -71,13 +74,6 @@ def inspect_channel(run: GapRun, index: int) -> Condition:
     frozen, frozen_sd = _frozen(values, rate, step, run.sensors[index].range_si)
     spikes = _spikes(clean, noise, rate) if step == 0.0 and frozen == 0.0 else 0.0
     return Condition(hum, hum_sd, wave, step, step_sd, frozen, frozen_sd, spikes, usual)
-
-
-def _white_noise(values: FloatArray, rate_hz: float) -> float:
-    """Rms of the sample-to-sample noise at rest, robust against spikes."""
-    rest = values[-int(0.45 * rate_hz) :]
-    second = rest[2:] - 2.0 * rest[1:-1] + rest[:-2]
-    return float(1.4826 * np.median(np.abs(second - np.median(second))) / np.sqrt(6.0)) + 1e-15
 
 
 def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray | None]:

@@ -13,7 +13,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.motion.late_joint import lateness
 from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, coarse
-from daq_app.gap.rocking_model.motion.rotation import reaches_its_range, wire_reading, zeroed
+from daq_app.gap.rocking_model.motion.rotation import Wire, reaches_its_range, zeroed
 from daq_app.gap.rocking_model.records import GapRun
 
 _OTHER: dict[Family, Family] = {"lvdt": "wire", "wire": "lvdt"}
@@ -105,10 +105,7 @@ def _rotation(run: GapRun, family: Family) -> FloatArray | None:
             continue
         values = coarse(zeroed(run, i), run.rate_hz)
         if family == "wire" and sensor.anchor_m is not None:
-            grid = np.linspace(-0.15, 0.15, 301)
-            table = wire_reading(grid, sensor.position_m, sensor.anchor_m, run.survey.half_base_m)
-            order = 1.0 if table[-1] > table[0] else -1.0
-            values = np.interp(order * values, order * table, grid)
+            values = Wire(sensor, run.survey.half_base_m).rotation(values)
         rows.append((sensor.position_m[0], values))
     if family == "wire":
         return np.median([v for _, v in rows], axis=0) if len(rows) >= 2 else None
@@ -157,7 +154,7 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None, rough: float) ->
     furthest = float(reading.max())
     half = run.survey.half_base_m
     if sensor.family == "wire" and sensor.anchor_m is not None:
-        expected = np.abs(wire_reading(rotation, sensor.position_m, sensor.anchor_m, half))
+        expected = np.abs(Wire(sensor, half).shortening(rotation))
     else:
         expected = half * np.abs(rotation) - sensor.position_m[0] * rotation
     if reaches_its_range(run.aligned(i), sensor.range_si):

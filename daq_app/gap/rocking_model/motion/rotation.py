@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.records import GapRun, Sensor
+from daq_app.gap.rocking_model.records import GapRun, Sensor, Vector3
+from daq_app.rocking.geometry.noise import timing_noise
+from daq_app.rocking.geometry.wires import wire_rotation, wire_shortening
 
 TAIL_S = 0.3
 """The wall stands at rest at the end of a record; this much of it is the zero of every channel."""
 HOLD_S = 0.5
 NOISE_S = 0.45
-_ROTATIONS = np.linspace(-0.15, 0.15, 1201)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,19 +57,8 @@ def sooner(values: FloatArray, samples: int) -> FloatArray:
 
 
 def sample_noise(values: FloatArray, rate_hz: float) -> float:
-    """Rms noise of one sample, as averages over the timing windows see it, from the rest at the end.
-
-    Coloured noise averages down less than white noise of the same rms; the larger of the two counts.
-    """
-    rest = values[-int(NOISE_S * rate_hz) :]
-    second = rest[2:] - 2 * rest[1:-1] + rest[:-2]
-    white = float(np.sqrt(np.mean(second**2) / 6.0))
-    block = max(int(0.015 * rate_hz), 1)
-    means = rest[: rest.size // block * block].reshape(-1, block).mean(axis=1)
-    trend = np.polyfit(np.arange(means.size), means, 1)
-    left = means - np.polyval(trend, np.arange(means.size))
-    coloured = float(np.sqrt(np.sum(left**2) / max(means.size - 2, 1) * block))
-    return max(white, coloured) + 1e-12
+    """Rms noise of one sample, as averages over the timing windows see it, from the rest at the end."""
+    return timing_noise(values[-int(NOISE_S * rate_hz) :], rate_hz)
 
 
 def joint_rotation(run: GapRun) -> Rotation:
@@ -139,63 +129,40 @@ def _outlier(used: list[int], misfit: FloatArray, values: FloatArray) -> int | N
     return used[k] if rms[k] > limit and len(used) > 6 else None
 
 
-def wire_reading(
-    theta: FloatArray,
-    point: tuple[float, float, float],
-    anchor: tuple[float, float, float],
-    half_base: float,
-    pivot_shift: float = 0.0,
-) -> FloatArray:
-    """Shortening of a wire from a wall point to its anchor for a sharp-edged wall rotated by `theta`, m."""
-    side = np.where(theta >= 0, 1.0, -1.0)
-    pivot = side * (half_base - pivot_shift)
-    sin, cos = np.sin(theta), np.cos(theta)
-    x = pivot + (point[0] - pivot) * cos + point[2] * sin
-    z = -(point[0] - pivot) * sin + point[2] * cos
-    now = np.sqrt((anchor[0] - x) ** 2 + (anchor[1] - point[1]) ** 2 + (anchor[2] - z) ** 2)
-    before = float(np.linalg.norm(np.subtract(anchor, point)))
-    shortening: FloatArray = before - now
-    return shortening
-
-
 @dataclass(frozen=True, slots=True)
-class WireInverse:
-    """Rotation from the shortening of one wire, by its real geometry about the nominal edges."""
+class Wire:
+    """One wire with its real geometry about the nominal edges."""
 
     sensor: Sensor
     half_base: float
-    shortenings: FloatArray
-    """Of the rotations `_ROTATIONS`, times `direction`: increasing."""
-    direction: float
 
-    @classmethod
-    def of(cls, sensor: Sensor, half_base: float) -> WireInverse:
-        """For a wire of the rig file, which says where its anchor is."""
-        assert sensor.anchor_m is not None
-        table = wire_reading(_ROTATIONS, sensor.position_m, sensor.anchor_m, half_base)
-        direction = 1.0 if table[-1] > table[0] else -1.0
-        return cls(sensor, half_base, direction * table, direction)
+    @property
+    def anchor_m(self) -> Vector3:
+        """Where the wire is anchored; only wires of the rig file that say so are made a `Wire`."""
+        assert self.sensor.anchor_m is not None
+        return self.sensor.anchor_m
 
     def rotation(self, shortening: FloatArray) -> FloatArray:
-        """θ, rad, at which the wire is shorter by `shortening`, m."""
-        return np.asarray(np.interp(self.direction * shortening, self.shortenings, _ROTATIONS))
+        """θ, rad, at which the wire is shorter by `shortening`, m; NaN where there is none."""
+        return wire_rotation(shortening, self.sensor.position_m, self.anchor_m, self.half_base)
 
-    def shortening(self, theta: FloatArray, anchor_higher: float = 0.0) -> FloatArray:
-        """Shortening, m, at `theta`, rad, with the anchor higher by `anchor_higher`, m."""
-        assert self.sensor.anchor_m is not None
-        x, y, z = self.sensor.anchor_m
-        return wire_reading(theta, self.sensor.position_m, (x, y, z + anchor_higher), self.half_base)
+    def shortening(
+        self, theta: FloatArray, anchor_higher: float = 0.0, pivot_further: float = 0.0
+    ) -> FloatArray:
+        """Shortening, m, at `theta`, rad, with the anchor higher and the pivots further out by so much, m."""
+        x, y, z = self.anchor_m
+        return wire_shortening(
+            theta, self.sensor.position_m, (x, y, z + anchor_higher), self.half_base + pivot_further
+        )
 
 
-def wires_of(run: GapRun) -> tuple[WireInverse, ...]:
+def wires_of(run: GapRun) -> tuple[Wire, ...]:
     """All wires whose geometry is known."""
     chosen = (run.sensors[i] for i in run.indices("wire"))
-    return tuple(WireInverse.of(s, run.survey.half_base_m) for s in chosen if s.anchor_m is not None)
+    return tuple(Wire(s, run.survey.half_base_m) for s in chosen if s.anchor_m is not None)
 
 
-def anchors_off(
-    wires: Sequence[WireInverse], theta: FloatArray, higher: float
-) -> tuple[FloatArray, FloatArray]:
+def anchors_off(wires: Sequence[Wire], theta: FloatArray, higher: float) -> tuple[FloatArray, FloatArray]:
     """(rad, m): what higher anchors add to the wires' mean rotation (weights z²) and to the base."""
     return _seen_as(wires, theta, [wire.shortening(theta, higher) for wire in wires])
 
@@ -203,22 +170,18 @@ def anchors_off(
 _FURTHER_M = 1e-3
 
 
-def pivots_off(wires: Sequence[WireInverse], theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+def pivots_off(wires: Sequence[Wire], theta: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(rad/m, m/m): what pivots further from the middle add to the wires' mean rotation and to the base.
 
     To first order: the wall moves along x by 1 − cos θ and rises by sin|θ| for each metre.
     """
-    seen = [
-        wire_reading(theta, wire.sensor.position_m, wire.sensor.anchor_m, wire.half_base + _FURTHER_M)
-        for wire in wires
-        if wire.sensor.anchor_m is not None
-    ]
+    seen = [wire.shortening(theta, pivot_further=_FURTHER_M) for wire in wires]
     turned, moved = _seen_as(wires, theta, seen)
     return turned / _FURTHER_M, moved / _FURTHER_M
 
 
 def _seen_as(
-    wires: Sequence[WireInverse], theta: FloatArray, shortenings: Sequence[FloatArray]
+    wires: Sequence[Wire], theta: FloatArray, shortenings: Sequence[FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
     """(rad, m): what wires shorter by `shortenings` show beyond `theta`: mean rotation (weights z²), base."""
     z = np.array([wire.sensor.position_m[2] for wire in wires])
@@ -240,7 +203,10 @@ def wall_rotation(run: GapRun) -> tuple[FloatArray, FloatArray, tuple[str, ...]]
         raw = run.aligned(i)
         if sensor.anchor_m is None or not np.all(np.isfinite(raw)) or _clipped(raw, sensor.range_si).any():
             continue
-        rows.append(WireInverse.of(sensor, run.survey.half_base_m).rotation(zeroed(run, i)))
+        theta = Wire(sensor, run.survey.half_base_m).rotation(zeroed(run, i))
+        if not np.all(np.isfinite(theta)):
+            continue  # no rotation explains what it reads
+        rows.append(theta)
         heights.append(sensor.position_m[2])
         names.append(sensor.id)
     return np.array(rows), np.array(heights), tuple(names)

@@ -12,7 +12,8 @@ from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import examine, extract
 from daq_app.gap.rocking_model.features.shapes import UPRIGHT_RAD, moment_shape, side_of, slip_shape
 from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid, coarse
-from daq_app.gap.rocking_model.motion.rotation import pivots_off, wire_reading, wires_of
+from daq_app.gap.rocking_model.motion.rotation import pivots_off, wires_of
+from daq_app.rocking.geometry.wires import wire_shortening
 from tests.support.simulated_wall import simulate
 
 RATE_HZ = 4000.0
@@ -123,8 +124,7 @@ def test_wires_see_a_shifted_pivot_as_they_are_strung() -> None:
     z = np.array([wire.sensor.position_m[2] for wire in wires])
     rows, base = [], []
     for wire in wires:
-        assert wire.sensor.anchor_m is not None
-        shorter = wire_reading(theta, wire.sensor.position_m, wire.sensor.anchor_m, half, shift)
+        shorter = wire_shortening(theta, wire.sensor.position_m, wire.anchor_m, half - shift)
         rows.append(wire.rotation(shorter))
         base.append(shorter - wire.shortening(theta))
     mean = np.average(np.array(rows), axis=0, weights=z**2) - theta

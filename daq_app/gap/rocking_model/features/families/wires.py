@@ -23,9 +23,9 @@ from daq_app.gap.rocking_model.features.shapes import moment_shape, slip_shape
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
 from daq_app.gap.rocking_model.motion.rotation import (
+    Wire,
     anchors_off,
     wall_rotation,
-    wire_reading,
     zeroed,
 )
 from daq_app.gap.rocking_model.records import GapRun, Survey
@@ -80,8 +80,7 @@ def _translation_block(scene: Scene) -> Block | None:
     shift = []
     for i in chosen:
         sensor = run.sensors[i]
-        assert sensor.anchor_m is not None
-        ideal = wire_reading(grid.theta, sensor.position_m, sensor.anchor_m, run.survey.half_base_m)
+        ideal = Wire(sensor, run.survey.half_base_m).shortening(grid.theta)
         shift.append(coarse(zeroed(run, i), run.rate_hz) - ideal)
     design = np.column_stack([np.ones_like(heights), heights])
     at_base = np.linalg.pinv(design)[0]

@@ -1,0 +1,37 @@
+"""Noise of one sample, read from a record itself."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_MEAN_S = 0.015
+"""Length of the means over which a crossing is timed."""
+
+
+def white_noise(values: Floats) -> float:
+    """rms of the white noise of a record (n,), by second differences, robust to impacts; NaN for too few."""
+    second = np.diff(values, 2)
+    second = second[np.isfinite(second)]
+    if second.size < 100:
+        return math.nan
+    # Median absolute deviation to standard deviation; a second difference has six times the variance.
+    return float(np.median(np.abs(second - np.median(second)))) * 1.4826 / math.sqrt(6.0)
+
+
+def timing_noise(rest: Floats, rate_hz: float) -> float:
+    """rms of one sample of a record at rest (n,), as means over 15 ms see it, of the unit of `rest`.
+
+    Coloured noise averages down less than white noise of the same rms; the larger of the two counts.
+    """
+    white = float(np.sqrt(np.mean(np.diff(rest, 2) ** 2) / 6.0))
+    size = max(int(_MEAN_S * rate_hz), 1)
+    means = rest[: rest.size // size * size].reshape(-1, size).mean(axis=1)
+    place = np.arange(means.size)
+    left = means - np.polyval(np.polyfit(place, means, 1), place)
+    coloured = float(np.sqrt(np.sum(left**2) / max(means.size - 2, 1) * size))
+    return max(white, coloured) + 1e-12
