@@ -135,16 +135,16 @@ def test_accelerometers_of_unequal_calibration_do_not_make_a_wall_that_bends_tur
     )
     k = first.names.index("sine in accelerometers")
     feigned = second.values[k] - first.values[k]
-    assert second.unequal is not None
-    assert second.unequal.shape == second.values.shape
+    unequal = second.systematic["turning_unequal"]
+    assert unequal.shape == second.values.shape
     # 0.02 of one of eight is 0.02/(0.003 √8) sd of all together at most; a high one has most of it.
-    assert 0.5 < abs(feigned / second.unequal[k]) < 0.02 / 3e-3
+    assert 0.5 < abs(feigned / unequal[k]) < 0.02 / 3e-3
     (run,) = prepare(uneven)[0]
     model = RockingModel(run.survey)
     values = {p.name: p.mean for p in (*model.nuisance, *model.local_nuisance(run))}
     name = next(p.name for p in model.nuisance if "turning" in p.name and "unequal" in p.name)
     change = np.subtract(*(block_coefficients(run, {**values, name: v})[0] for v in (1.0, 0.0)))
-    assert np.abs(change).max() == pytest.approx(np.abs(second.unequal).max())
+    assert np.abs(change).max() == pytest.approx(np.abs(second.systematic["turning_unequal"]).max())
 
 
 def test_the_transfer_of_a_response_is_what_it_does_to_a_wave() -> None:

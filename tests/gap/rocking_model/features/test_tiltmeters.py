@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from daq_app.gap.rocking_model.features.coefficients import sizes
 from daq_app.gap.rocking_model.features.response import first_order
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import extract
@@ -58,3 +60,20 @@ def test_a_clock_that_is_off_shows_another_time_constant_with_the_gain_as_it_is(
     theta = run.grid.theta
     slower = block.coefficients(first_order(theta, slow / 0.97) - first_order(theta, slow))
     assert change == pytest.approx(slower, rel=0.05, abs=3e-4)
+
+
+def test_a_delay_of_a_sample_is_explained_by_how_channels_are_sampled(recorded: GapRun) -> None:
+    """A converter's filter delays by half a sample or more: that is no gain, no drift and no free form."""
+    late = replace(recorded, channels=recorded.channels.copy())
+    chosen = recorded.indices("tiltmeter")
+    late.channels[chosen] = np.roll(recorded.channels[chosen], 1, axis=1)
+    late.channels[chosen, 0] = recorded.channels[chosen, 0]
+    before, after = extract(recorded), extract(late)
+    delay = 1.0 / recorded.rate_hz
+    block = next(b for b in after.blocks if b.family == "tiltmeter")
+    explained = delay * block.systematic["tilt_delay"]
+    for name, value in zip(block.names, explained, strict=True):
+        shown = _coefficient(after, name) - _coefficient(before, name)
+        assert value == pytest.approx(shown, abs=0.3 * sizes()["tiltmeter", name].scatter)
+    allowed = next(p for p in RockingModel(after.survey).nuisance if p.name == "tilt_delay")
+    assert delay < 2.0 * allowed.sd < 1e-3, "a sound tiltmeter's, and none that is late by milliseconds"

@@ -21,16 +21,18 @@ from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size,
 from daq_app.gap.rocking_model.features.response import slow_response
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
-from daq_app.gap.rocking_model.motion.motion_grid import coarse
+from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, coarse
 from daq_app.gap.rocking_model.motion.rotation import (
     zeroed,
 )
 from daq_app.gap.rocking_model.records import Survey
-from daq_app.gap.rocking_model.tolerances import CALIBRATION, TILT_CONSTANT
+from daq_app.gap.rocking_model.tolerances import CALIBRATION, SKEW_S, TILT_CONSTANT
 
 _SHORTEST_S = 0.05
 """Least time constant, s, to which errors are relative: a tiltmeter below it is as prompt as the grid."""
 _ROUNDS = 12
+_DELAY = "tilt_delay"
+"""Parameter of how much later the tiltmeters are sampled than the reference."""
 
 
 def _tilt_block(scene: Scene) -> Block | None:
@@ -57,9 +59,11 @@ def _tilt_block(scene: Scene) -> Block | None:
     found = with_crosstalk(found, crosstalk(run, chosen).mean(axis=0))
     if found is None:
         return None
+    later = -np.gradient(slow_response(grid.theta, slow), 1.0 / GRID_HZ)
+    systematic = {**found.systematic, _DELAY: found.coefficients(later)}
     values = found.values.copy()
     values[found.names.index("time constant")] += float(np.mean(slow / nominal - 1.0))
-    return replace(found, values=values, time_constants_s=tuple(slow.tolist()))
+    return replace(found, values=values, systematic=systematic, time_constants_s=tuple(slow.tolist()))
 
 
 def _columns(scene: Scene, slow: FloatArray, nominal: FloatArray) -> dict[str, tuple[FloatArray, str]]:
@@ -133,6 +137,14 @@ def _priors(survey: Survey) -> tuple[Parameter, ...]:
             CALIBRATION / math.sqrt(2),
             "1",
             meaning="calibration of the tiltmeters",
+            linear=True,
+        ),
+        Parameter(
+            _DELAY,
+            0.0,
+            2.0 * SKEW_S,
+            "s",
+            meaning="how much later the tiltmeters are sampled than the reference",
             linear=True,
         ),
         Parameter(
