@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from daq_app.gap.core import Diagnosis
-from daq_app.gap.core.where import GapMap
+from daq_app.gap.core.judging.where import GapMap
 from daq_app.gap.traces import Trace
 
 BEFORE, AFTER, MEASURED = "#8fa6bf", "#c8442e", "#1c232b"

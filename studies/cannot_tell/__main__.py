@@ -70,7 +70,7 @@ def _answer(ask: Callable[[], Diagnosis]) -> dict[str, Any]:
         "set95": [r["effects"] for r in result["set95"]],
         "next": result["next_measurement"],
         "top": [[r["effects"], r["probability"]] for r in result["which"][:6]],
-        "worst": result["goodness"]["worst"],
+        "unknown": result["p_unknown"],
     }
 
 

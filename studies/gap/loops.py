@@ -18,9 +18,10 @@ import numpy as np
 
 from daq_app.gap.apply import apply_result
 from daq_app.gap.core import CannotDiagnose, Parameter, Prediction, Run, fit
-from daq_app.gap.core.held_out import strain_of
-from daq_app.gap.core.likelihood import Covariance
-from daq_app.gap.core.problem import Problem
+from daq_app.gap.core.fitting.experiment import Experiment
+from daq_app.gap.core.fitting.held_out import strain_of
+from daq_app.gap.core.fitting.likelihood import Covariance
+from daq_app.gap.core.fitting.problem import Problem
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.inspection.inspect_runs import calibrations
 from daq_app.gap.rocking_model.prediction.model import RockingModel
@@ -88,7 +89,7 @@ def gap_of(
     """
     model = FileModel(rig, RockingModel(runs[0].survey, calibrations(runs)))
     found = fit(model, runs)
-    problem = Problem(model, runs, ())
+    problem = Problem(Experiment.of(model, runs), ())
     # A calibration that must be far off is a gap too, though the prediction follows it.
     square, count = strain_of(model, found), 0
     for i, (run, left) in enumerate(zip(runs, found.residuals, strict=True)):

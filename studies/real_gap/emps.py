@@ -60,7 +60,7 @@ def run(folder: Path) -> EmpsResult:
     ]
     from_mass = diagnose(model, both, effects, Options(hold_out="level"))
     with_viscous = EmpsModel(viscous_in_baseline=True)
-    singles = Options(hold_out="level", pairs=False)
+    singles = Options(hold_out="level", causes=1)
     from_viscous = diagnose(
         with_viscous, both, library(with_viscous=False).without("friction_probe"), singles
     )

@@ -113,9 +113,7 @@ class EmpsModel:
 
     def __init__(self, *, viscous_in_baseline: bool = False) -> None:
         self.viscous_in_baseline = viscous_in_baseline
-        self.scatters = (
-            Scatter("unexplained force", 1.0, 1.5, 8.0, "N", "what the model leaves per sample"),
-        )
+        self.scatters = (Scatter("unexplained force", 1.0, 1.5, "N", "what the model leaves per sample"),)
 
     @property
     def nuisance(self) -> tuple[Parameter, ...]:

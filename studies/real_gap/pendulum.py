@@ -13,7 +13,8 @@ from rich.console import Console
 
 from daq_app.gap.core import Diagnosis, Fit, Options, diagnose, fit
 from daq_app.gap.core.features import FloatArray, PlainRun
-from daq_app.gap.core.held_out import score
+from daq_app.gap.core.fitting.experiment import Experiment
+from daq_app.gap.core.fitting.held_out import score
 from studies.real_gap import pendulum_model as pm
 from studies.real_gap.independence import with_independence
 from studies.real_gap.report import arguments, print_rows, show
@@ -52,17 +53,17 @@ def run(folder: Path) -> PendulumResult:
     records = with_independence(
         pm.PendulumModel(), pm.load_runs(paths), (library["hand"], library["quadratic"], library["coulomb"])
     )
-    release = diagnose(pm.PendulumModel(), records, library, Options(pairs=False, hold_out="repetition"))
+    release = diagnose(pm.PendulumModel(), records, library, Options(causes=1, hold_out="repetition"))
     best = fit(pm.PendulumModel(), records, tuple(library[e] for e in release.which[0].effects))
     traces = pm.load_traces(paths)
     beyond_viscous = pm.TRACE_EFFECTS.without("viscous")
-    options = Options(pairs=False, hold_out="repetition")
+    options = Options(causes=1, hold_out="repetition")
     loss = diagnose(pm.TraceModel(viscous_in_baseline=True), traces, beyond_viscous, options)
     degrees, fitted_degrees, scores, residuals = {}, {}, {}, {}
     for name, effects in STAGES:
         chosen = tuple(pm.TRACE_EFFECTS[e] for e in effects)
         whole = fit(pm.TraceModel(), traces, chosen)
-        held_out = score(pm.TraceModel(), traces, chosen, whole, "repetition")
+        held_out = score(Experiment.of(pm.TraceModel(), traces), chosen, whole, "repetition", whole.columns)
         residuals[name] = [r.residual for r in held_out]
         degrees[name] = _rms_degrees(residuals[name])
         fitted_degrees[name] = _rms_degrees(list(whole.residuals))

@@ -96,7 +96,7 @@ class PendulumModel:
     """θ̈ = −ω₀² sin(θ − θ₀) − c θ̇, with unknown ω₀², c and zero of the encoder."""
 
     name = "free-swinging pendulum"
-    scatters = (Scatter("unexplained acceleration", 0.5, 1.5, 6.0, "rad/s²"),)
+    scatters = (Scatter("unexplained acceleration", 0.5, 1.5, "rad/s²"),)
     nuisance = (
         Parameter("omega2", 100.0, 30.0, "rad²/s²", 1.0, 1000.0, meaning="gravity over reduced length"),
         Parameter("c", 0.3, 0.5, "1/s", 0.0, 10.0, meaning="viscous damping"),
@@ -230,7 +230,7 @@ class TraceModel:
     """The angle itself, integrated from the second turning point on (the hand has let go by then)."""
 
     name = "free swing, trace"
-    scatters = (Scatter("unexplained angle", 0.02, 1.5, 0.5, "rad"),)
+    scatters = (Scatter("unexplained angle", 0.02, 1.5, "rad"),)
 
     def __init__(self, *, viscous_in_baseline: bool = False) -> None:
         self.viscous_in_baseline = viscous_in_baseline

@@ -14,7 +14,8 @@ from rich.console import Console
 
 from daq_app.gap.core import Diagnosis, Fit, Options, diagnose, fit
 from daq_app.gap.core.features import FloatArray, PlainRun
-from daq_app.gap.core.held_out import score
+from daq_app.gap.core.fitting.experiment import Experiment
+from daq_app.gap.core.fitting.held_out import score
 from studies.real_gap.independence import with_independence
 from studies.real_gap.report import arguments, print_rows, show
 from studies.real_gap.tanks_model import TanksModel, library, load_runs
@@ -47,7 +48,7 @@ def run(folder: Path) -> TanksResult:
     for name, names in STAGES:
         chosen = tuple(effects[e] for e in names)
         fits[name] = fit(model, runs, chosen)
-        held_out = score(model, runs, chosen, fits[name], "level")
+        held_out = score(Experiment.of(model, runs), chosen, fits[name], "level", fits[name].columns)
         rises[name] = (_rms(fits[name].residuals), _rms([r.residual for r in held_out]))
     return TanksResult(rises, diagnose(model, runs, effects, Options(hold_out="level")), runs, fits)
 

@@ -78,7 +78,7 @@ class TanksModel:
     """Outlets that obey Torricelli's law and a pump in proportion to its voltage."""
 
     name = "cascaded tanks"
-    scatters = (Scatter("unexplained rise", 0.1, 1.5, 2.0, "V", "what the model leaves per block"),)
+    scatters = (Scatter("unexplained rise", 0.1, 1.5, "V", "what the model leaves per block"),)
     nuisance = (
         between("k1", 0.01, 0.3, "√V/s", "outlet of the upper tank"),
         between("k3", 0.01, 0.3, "√V/s", "outlet of the lower tank"),

@@ -76,7 +76,7 @@ def main() -> None:
         )
         gap = f"{result.gap.before:.2f} → {result.gap.after:.2f}" if result.gap else ""
         print(
-            f"{case}: {result.decision.verdict}; {first}; {values}; {gap}; {result.goodness.worst}",
+            f"{case}: {result.decision.verdict}; {first}; {values}; {gap}; {result.rest.words}",
             flush=True,
         )
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from daq_app.gap.core import Diagnosis
-from daq_app.gap.core.evidence import Ranked
-from daq_app.gap.core.goodness import Goodness
-from daq_app.gap.core.held_out import GapSize
+from daq_app.gap.core.fitting.held_out import GapSize
+from daq_app.gap.core.judging.evidence import Ranked
+from daq_app.gap.core.judging.remainder import GroupRest, Remainder
+from daq_app.gap.core.judging.where import Cell, GapMap
 from daq_app.gap.core.result import Decision, Detection, Estimate
-from daq_app.gap.core.where import Cell, GapMap
 
 NOMINAL = {"alpha": (0.215, "rad"), "p": (2.2021, "rad/s"), "r": (0.9, "1"), "half_base": (0.3254, "m")}
 
@@ -36,7 +36,7 @@ def diagnosis(effects: dict[str, float], runs: tuple[str, ...], **parameters: fl
     gap = GapSize(
         9.1, 1.05, 1.0, 0.98, (8.0, 10.0), (1.0, 1.1), 400.0, {"L1": (6.0, 1.1), "L4": (11.0, 1.0)}, {}
     )
-    goodness = Goodness(True, 0.4, "lvdt, fall time 1", 0.1, (), ())
+    rest = Remainder(9.1, 9.1, 1.02, 0.0, 0.0, (GroupRest("lvdt", "fall time 1", 40, 0.1, 1.1, 0.0),), 0.02)
     values = {name: (parameters.get(name, value), unit) for name, (value, unit) in NOMINAL.items()}
     return Diagnosis(
         model="free rocking",
@@ -56,8 +56,7 @@ def diagnosis(effects: dict[str, float], runs: tuple[str, ...], **parameters: fl
         scatter=(Estimate("scatter of r", 0.004, float("nan"), float("nan"), "1", 0.004, 0.7),),
         gap=gap,
         remaining=GapMap((cell("lvdt", "swing", "fall time 1", 1.0),), "Nothing stands out."),
-        goodness=goodness,
-        goodness_null=goodness,
+        rest=rest,
         probes=(Ranked(("free_restitution",), "restitution", 0.0, 300.0),),
         probe_shapes={
             "free_restitution": {

@@ -32,7 +32,7 @@ class DecayModel:
     """Each peak is predicted from the measured one before it, so that scatter does not accumulate."""
 
     name = "decay"
-    scatters = (Scatter("scatter of r", 0.004, 0.7, 0.02, "1"),)
+    scatters = (Scatter("scatter of r", 0.004, 0.7, "1"),)
     nuisance = (
         Parameter("r", 0.9, 0.02, "1", 0.5, 1.0),
         Parameter("D", 1.0, 0.05, "s", 0.5, 2.0),

@@ -30,7 +30,7 @@ _LabelsOption = Annotated[
 ]
 _WithoutOption = Annotated[
     str,
-    typer.Option(help="Part of the method to leave out: scatter, channels, probes or multistart."),
+    typer.Option(help="Part of the method to leave out: scatter, channels or probes."),
 ]
 _EngineOption = Annotated[
     Literal["events", "contact"] | None,

@@ -69,9 +69,9 @@ def diagnose(
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a one-page report: HTML, and a PDF.")] = None,
     json_out: Annotated[Path | None, typer.Option("--json", help="Write the whole result as JSON.")] = None,
-    pairs: Annotated[
-        bool, typer.Option("--pairs", help="Always fit pairs of effects, not only when needed.")
-    ] = False,
+    causes: Annotated[
+        int, typer.Option(min=1, max=3, help="The largest number of causes that are sought together.")
+    ] = 3,
     hold_out: Annotated[
         str, typer.Option(help="What is held out to measure the gap: level or repetition.")
     ] = "level",
@@ -89,7 +89,7 @@ def diagnose(
         raise _bad_input(f"--hold-out is level or repetition, not {hold_out}.")
     if model is not None and rig is not None:
         raise _bad_input("--rig describes a rocking wall; with --model the model file says what is known.")
-    asked = _Asked(pairs, hold_out, cores or os.cpu_count() or 1)
+    asked = _Asked(causes, hold_out, cores or os.cpu_count() or 1)
     with _refusals():
         read = [*runs, *filter(None, (rig, model))]
         for written in (json_out, report, report and report.with_suffix(".pdf")):
@@ -113,7 +113,7 @@ def diagnose(
 class _Asked:
     """What the options of `diagnose` ask for."""
 
-    pairs: bool
+    causes: int
     hold_out: str
     workers: int
 
@@ -143,7 +143,7 @@ def _diagnose_own(model: Path, recordings: list[Path], asked: _Asked) -> tuple[D
 def _options(asked: _Asked) -> Iterator[Options]:
     """Options that show their progress; an interrupt ends the command in words."""
     from daq_app.gap.core import Options
-    from daq_app.gap.core.parallel import Interrupted
+    from daq_app.gap.core.fitting.parallel import Interrupted
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"))
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
@@ -153,9 +153,7 @@ def _options(asked: _Asked) -> Iterator[Options]:
             progress.update(bar, description=text, completed=done, total=total)
 
         try:
-            yield Options(
-                always_pairs=asked.pairs, hold_out=asked.hold_out, workers=asked.workers, progress=show
-            )
+            yield Options(causes=asked.causes, hold_out=asked.hold_out, workers=asked.workers, progress=show)
         except (KeyboardInterrupt, Interrupted):
             print_paragraph("Interrupted", "the diagnosis was stopped; nothing was written")
             raise typer.Exit(EXIT_INTERRUPTED) from None
@@ -216,6 +214,13 @@ def _print(result: Diagnosis) -> None:
             f"Gap on held-out runs, in units of noise and scatter: {result.gap.before:.2f} → "
             f"{result.gap.after:.2f} (floor {result.gap.floor:.1f}); closure {result.gap.closure:.2f}."
         )
+    for cause in result.causes:
+        closes = f", closes {100 * cause.closes:.0f} % alone" if cause.closes == cause.closes else ""
+        console.print(f"Cause ({cause.probability:.2f}{closes}): {cause.words}", markup=False)
+    for finding in result.findings:
+        weight = "material" if finding.material else "ordinary"
+        console.print(f"Instrument ({weight}): {finding.words}", markup=False)
+    console.print(f"What remains: {result.rest.words}.", markup=False)
     console.print(f"Next: {result.next_measurement}", markup=False)
     for limit in result.limits:
         console.print(f"Limit: {limit}", markup=False)

@@ -9,8 +9,9 @@ small models of `studies/real_gap`.
 from daq_app.gap.core.diagnose import diagnose
 from daq_app.gap.core.effects import Alike, Confusion, Effect, Library
 from daq_app.gap.core.features import FeatureSet, Label, Run
-from daq_app.gap.core.fit import Fit, fit
-from daq_app.gap.core.hypotheses import Options
+from daq_app.gap.core.findings import Finding
+from daq_app.gap.core.fitting.fit import Fit, fit
+from daq_app.gap.core.judging.hypotheses import Options
 from daq_app.gap.core.model import Model, Prediction, Scatter
 from daq_app.gap.core.parameters import Parameter
 from daq_app.gap.core.result import CannotDiagnose, Diagnosis
@@ -22,6 +23,7 @@ __all__ = [
     "Diagnosis",
     "Effect",
     "FeatureSet",
+    "Finding",
     "Fit",
     "Label",
     "Library",

@@ -1,29 +1,36 @@
-"""One diagnosis: fits of all hypotheses, ranking, held-out scores, verdict."""
+"""One diagnosis: fits of all hypotheses, ranking, held-out scores, what remains, decision."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from daq_app.gap.core.decision import Material, decide
 from daq_app.gap.core.effects import Library
-from daq_app.gap.core.evidence import NULL, Ranked, answers, credible_set, family_of
 from daq_app.gap.core.features import Run
 from daq_app.gap.core.findings import Finding
-from daq_app.gap.core.fit import Fit, effects_of
-from daq_app.gap.core.held_out import GapSize, HeldOutRun, gap_size
-from daq_app.gap.core.hypotheses import Hypotheses, Hypothesis, Options
-from daq_app.gap.core.joined import with_findings
-from daq_app.gap.core.likelihood import Covariance
+from daq_app.gap.core.fitting.experiment import Experiment
+from daq_app.gap.core.fitting.fit import Fit, effects_of
+from daq_app.gap.core.fitting.held_out import GapSize, HeldOutRun, gap_size
+from daq_app.gap.core.fitting.parallel import Workers
+from daq_app.gap.core.fitting.problem import Problem
+from daq_app.gap.core.fitting.tasks import FitTask, ScoreTask
+from daq_app.gap.core.judging.decision import Evidence, decide
+from daq_app.gap.core.judging.evidence import NULL, Hypothesis, Ranked, answers, credible_set, inclusion
+from daq_app.gap.core.judging.hypotheses import Hypotheses, Options
+from daq_app.gap.core.judging.joined import with_findings
+from daq_app.gap.core.judging.other_forms import with_other_forms
+from daq_app.gap.core.judging.remainder import remainder
+from daq_app.gap.core.judging.where import gap_map
 from daq_app.gap.core.model import Model
-from daq_app.gap.core.other_forms import with_other_forms
-from daq_app.gap.core.parallel import ScoreTask, Workers
-from daq_app.gap.core.problem import Problem
-from daq_app.gap.core.result import CannotDiagnose, Detection, Diagnosis, Estimate
-from daq_app.gap.core.where import gap_map
+from daq_app.gap.core.result import CannotDiagnose, Cause, Detection, Diagnosis, Estimate
+
+PER_RUN = " (mean of the runs; each has its own)"
+_LISTED = 0.05
+"""Probability from which a cause is listed."""
 
 
 def diagnose(
@@ -34,7 +41,7 @@ def diagnose(
     limits: Sequence[str] = (),
     findings: Sequence[Finding] = (),
 ) -> Diagnosis:
-    """Where model and runs differ, which effect of the library explains it, how far the gap shrinks.
+    """Where model and runs differ, which effects of the library explain it, how far the gap shrinks.
 
     Raises `CannotDiagnose` where there is nothing to fit, and `parallel.Interrupted` when
     `options.cancelled` says so. `limits` are passed on to the result; `findings` are what was
@@ -42,135 +49,147 @@ def diagnose(
     """
     options = options or Options()
     began = time.perf_counter()
-    _refuse(model, runs)
+    _refuse_without_features(runs)
+    experiment = Experiment.of(model, runs)
+    _refuse_undetermined(experiment)
     stated = list(limits)
     if len(runs) == 1:
         stated.append("One run only: nothing is held out, and repeatability comes from its prior.")
-    with Workers(model, runs, options.workers, options.progress, options.cancelled) as workers:
-        study = _Study(model, tuple(runs), library, options, workers)
+    with Workers(experiment, options.workers, options.progress, options.cancelled) as workers:
+        study = _Study(experiment, library, options, workers)
         study.fit_all()
-        return with_findings(study.conclude(stated, began), findings)
+        result = study.conclude(stated)
+    return replace(with_findings(result, findings), seconds=time.perf_counter() - began)
 
 
-def _refuse(model: Model, runs: Sequence[Run]) -> None:
+def _refuse_without_features(runs: Sequence[Run]) -> None:
     if not runs:
         raise CannotDiagnose("There is no run to diagnose.", "Give at least one recorded run.")
     for run in runs:
         if len(run.features) == 0:
             raise CannotDiagnose(f"Run {run.name} has no features.", "Check its recording.")
-    features = sum(len(run.features) for run in runs)
-    unknowns = len(Problem(model, runs, ()))
+
+
+def _refuse_undetermined(experiment: Experiment) -> None:
+    features = sum(len(run.features) for run in experiment.runs)
+    unknowns = len(Problem(experiment, ()))
     if features <= unknowns:
         raise CannotDiagnose(
             f"{features} features cannot determine {unknowns} unknowns.", "Give more runs or longer ones."
         )
 
 
-PER_RUN = " (mean of the runs; each has its own)"
-
-
-def _mean_of_runs(found: Fit, key: str) -> tuple[float, float, float]:
-    """A parameter that every run has for itself: mean over the runs with the interval of that mean."""
-    values = np.array([local[key] for local in found.local_values if key in local])
-    own = (values[:, 2] - values[:, 1]) / 3.92
-    between = float(values[:, 0].std(ddof=1)) if len(values) > 1 else 0.0
-    half = 1.96 * math.sqrt((float(np.mean(own**2)) + between**2) / len(values))
-    middle = float(values[:, 0].mean())
-    return middle, middle - half, middle + half
-
-
 class _Study(Hypotheses):
     """The fits of one diagnosis, and what follows from them."""
 
-    def conclude(self, limits: list[str], began: float) -> Diagnosis:
-        """Ranking, held-out scores, verdict."""
+    def conclude(self, limits: list[str]) -> Diagnosis:
+        """Ranking, held-out scores, what remains, decision."""
         ranked = self.ranked()
         best = answers(ranked, self.library)[0].effects
-        probe_order = sorted(self.probes, key=lambda k: -self.probes[k].log_evidence)
-        for hypothesis in [NULL, best, *probe_order[:1]]:
-            self.goodness(hypothesis)
-        found = self.fits[best]
+        found, null = self._finished(best), self.fits[NULL]
         forms = self.free_forms(best)
-        ranked = with_other_forms(ranked, best, forms, self.library, self.thresholds.priors.other_form)
+        ranked = with_other_forms(ranked, best, forms, self.library, self.policy.prior_other_form)
         classes = answers(ranked, self.library)
-        material = Material(
-            self.library,
-            classes,
-            self.fits,
-            self.probes,
-            self._goodness,
-            forms,
-            null_gap=self._gap(found, self.fits[NULL].known()),
-            best_gap=self.leftover(best),
-            nominal_gap=self._gap(
-                found, {key: u for key, u in self.fits[NULL].known().items() if key[1] is not None}
-            ),
-        )
-        decision, following = decide(material, self.thresholds)
-        gap = self._held_out(best)
-        if decision.verdict in ("effect", "pair") and not self.goodness(best).passed:
-            limits.append(f"A small structure remains: {self.goodness(best).worst}.")
-        suspected = self.suspected(best)
-        if suspected is not None:
-            limits.append(f"Perhaps {' + '.join(suspected)}: the second effect is too weak to be sure of.")
-        if not self.fits[best].converged or self.fits[best].starts_agreeing * 3 < self.fits[best].starts:
-            limits.append(
-                f"Only {self.fits[best].starts_agreeing} of {self.fits[best].starts} starts reached "
-                f"the optimum of {self.fits[best].name}."
-            )
+        rest = remainder(self.experiment, self.library, null, found, forms, self.policy)
+        detection = self._detection()
+        decision, following = decide(Evidence(self.library, classes, found, rest, detection), self.policy)
+        gap, alone = self._held_out(best)
+        if not found.converged:
+            limits.append(f"The fit of {' + '.join(best) or 'nothing missing'} has not settled.")
+        known = 1.0 - rest.unknown
+        scales = self._scales(found)
         return Diagnosis(
-            model=self.model.name,
-            runs=tuple(run.name for run in self.runs),
-            where=gap_map(self.fits[NULL].residuals, found.scales, self.runs),
-            which=tuple(ranked),
-            set95=tuple(r for answer in credible_set(classes) for r in answer.alternatives),
-            decision=decision,
-            parameters=self._estimates(self.fits[best], nuisance=True),
-            effect_parameters=self._estimates(self.fits[best], nuisance=False),
-            scatter=self._scatter(self.fits[best]),
-            gap=gap,
-            remaining=gap_map(found.residuals, found.scales, self.runs),
-            goodness=self.goodness(best),
-            goodness_null=self.goodness(NULL),
-            free_forms=tuple(forms),
-            rest_p=material.rest_p,
-            probes=tuple(
-                Ranked(k, family_of(k, self.library), 0.0, self.probes[k].log_evidence) for k in probe_order
+            model=self.experiment.model.name,
+            runs=tuple(run.name for run in self.experiment.runs),
+            where=gap_map(null.residuals, scales, self.experiment.runs),
+            which=tuple(replace(r, probability=known * r.probability) for r in ranked),
+            set95=tuple(
+                r for answer in credible_set(classes, self.policy.set_content) for r in answer.alternatives
             ),
-            probe_shapes={
-                k[0]: {q: v for q, v in self.probes[k].values.items() if q.startswith(k[0] + ".")}
-                for k in probe_order
-            },
-            detection=self._detection(),
+            decision=decision,
+            parameters=self._estimates(found, nuisance=True),
+            effect_parameters=self._estimates(found, nuisance=False),
+            scatter=self._scatter(found),
+            gap=gap,
+            remaining=gap_map(found.residuals, scales, self.experiment.runs),
+            rest=rest,
+            causes=self._causes(ranked, found, alone),
+            free_forms=tuple(forms),
+            probes=self._probes(),
+            probe_shapes=self._shapes(),
+            detection=detection,
             next_measurement=following,
             limits=tuple(limits),
-            seconds=time.perf_counter() - began,
         )
 
-    def _held_out(self, best: Hypothesis) -> GapSize | None:
-        wanted = [NULL] if best == NULL else [NULL, best]
+    def _finished(self, hypothesis: Hypothesis) -> Fit:
+        """The fit of a hypothesis with exact Jacobians."""
+        found = self.fits[hypothesis]
+        if not found.columns:
+            task = FitTask(effects_of(hypothesis, self.library), found.known(), found.sizes)
+            (found,) = self.workers.run([task], "the best once more")
+            self.fits[hypothesis] = found
+        return found
+
+    def _scales(self, found: Fit) -> list[np.ndarray[tuple[int], np.dtype[np.float64]]]:
+        """What each feature scatters by when nothing is missing and the model is exact."""
+        problem, sizes = Problem(self.experiment, effects_of(found.effects, self.library)), found.sizes
+        exact, u = sizes.without_discrepancy(), problem.start(found.known())
+        return [
+            exact.covariance(self.experiment, i, problem.predict(i, u)).marginal_sd
+            for i in range(len(self.experiment.runs))
+        ]
+
+    def _held_out(self, best: Hypothesis) -> tuple[GapSize | None, dict[str, float]]:
+        """The gap on held-out runs, and the share of it that each cause alone closes."""
+        single: list[Hypothesis] = [(name,) for name in best] if len(best) > 1 else []
+        missing = [h for h in single if h not in self.fits]
+        for result in self.workers.run(
+            [
+                FitTask(effects_of(h, self.library), self.fits[best].known(), self.fits[best].sizes, False)
+                for h in missing
+            ],
+            "held-out runs",
+        ):
+            self.fits[result.effects] = result
+        wanted: list[Hypothesis] = list(dict.fromkeys([NULL, best, *single]))
         tasks = [ScoreTask(effects_of(h, self.library), self.fits[h], self.options.hold_out) for h in wanted]
-        scores: list[list[HeldOutRun]] = self.workers.run(tasks, "held-out runs")
-        return gap_size(self.runs, scores[0], scores[-1], self.fits[best].sigmas)
+        scores: dict[Hypothesis, list[HeldOutRun]] = dict(
+            zip(wanted, self.workers.run(tasks, "held-out runs"), strict=True)
+        )
+        yardstick = self.fits[best].sizes
 
-    def _gap(self, best: Fit, known: Mapping[tuple[str, int | None], float]) -> float:
-        """Gap without any effect at the coordinates given, else at the priors' centres.
+        def against_null(hypothesis: Hypothesis) -> GapSize | None:
+            return gap_size(self.experiment, scores[NULL], scores[hypothesis], yardstick)
 
-        In the noise and scatter units of the best hypothesis.
-        """
-        problem = Problem(self.model, self.runs, ())
-        u = problem.start(known)
-        total, count = 0.0, 0
-        for i, run in enumerate(self.runs):
-            prediction = problem.predict(i, u)
-            residual = run.features.values - prediction.features
-            c = Covariance(run.features.sd, prediction, best.sigmas)
-            total += float(residual @ c.solve(residual))
-            count += residual.size
-        return math.sqrt(total / count)
+        gap = against_null(best)
+        alone = {h[0]: against_null(h) for h in (single or ([best] if best else []))}
+        return gap, {name: size.closure if size else math.nan for name, size in alone.items()}
+
+    def _causes(self, ranked: Sequence[Ranked], found: Fit, alone: dict[str, float]) -> tuple[Cause, ...]:
+        estimates = self._estimates(found, nuisance=False)
+        causes = []
+        for name, probability in inclusion(ranked).items():
+            if probability < _LISTED or self.library[name].kind != "effect":
+                continue
+            own = tuple(e for e in estimates if e.name.rpartition(".")[0] == name)
+            closes = alone.get(name, math.nan)
+            effect = self.library[name]
+            causes.append(
+                Cause(
+                    name,
+                    _in_words(effect.signature or name, own),
+                    effect.family,
+                    probability,
+                    own,
+                    closes,
+                    name in alone and not closes < self.policy.cause_closes,
+                )
+            )
+        return tuple(sorted(causes, key=lambda c: (-c.material, -np.nan_to_num(c.closes), -c.probability)))
 
     def _estimates(self, found: Fit, *, nuisance: bool) -> tuple[Estimate, ...]:
-        problem = Problem(self.model, self.runs[:1], effects_of(found.effects, self.library))
+        problem = Problem(self.experiment.only([0]), effects_of(found.effects, self.library))
         wanted = [q for q in problem.unknowns if bool(q.effect) != nuisance and (q.run is None or q.effect)]
         return tuple(
             Estimate(
@@ -187,19 +206,55 @@ class _Study(Hypotheses):
     def _scatter(self, found: Fit) -> tuple[Estimate, ...]:
         return tuple(
             Estimate(s.name, found.sigmas[s.name], math.nan, math.nan, s.unit, s.median, s.log_sd, s.meaning)
-            for s in self.model.scatters
+            for s in self.experiment.model.scatters
         )
 
     def _detection(self) -> tuple[Detection, ...]:
-        limits: list[Detection] = []
-        for effect in self.library.named:
-            found: Mapping[tuple[str, int | None], int] = {
-                key: k for k, key in enumerate(self.fits[(effect.name,)].keys)
+        """Strength at which each effect would be as many posterior sd from none as detection needs."""
+        return tuple(
+            Detection(effect.name, p.name, self.policy.detected_sd * sd * p.sd, p.unit)
+            for effect in self.library.named
+            for p, sd in zip(effect.shared, self.alone[effect.name].sd, strict=True)
+            if p.scale != "log"
+        )
+
+    def _probes(self) -> tuple[Ranked, ...]:
+        """The free forms by what each gains on top of nothing."""
+        null = self.fits[NULL].log_evidence
+        found = [
+            Ranked((p.name,), p.family, 0.0, null + self.alone[p.name].robust.evidence)
+            for p in self.library.probes
+        ]
+        return tuple(sorted(found, key=lambda r: -r.log_evidence))
+
+    def _shapes(self) -> dict[str, dict[str, tuple[float, float, float]]]:
+        """Probe → coefficient → (value, low, high), on top of nothing."""
+        return {
+            probe.name: {
+                probe.key(p): (
+                    p.value(self.alone[probe.name].robust.known[(probe.key(p), None)]),
+                    *p.interval(self.alone[probe.name].robust.known[(probe.key(p), None)], sd),
+                )
+                for p, sd in zip(probe.shared, self.alone[probe.name].sd, strict=True)
             }
-            for parameter in effect.shared:
-                if parameter.scale == "log":
-                    continue
-                k = found[(effect.key(parameter), None)]
-                sd = math.sqrt(self.fits[(effect.name,)].covariance[k, k]) * parameter.sd
-                limits.append(Detection(effect.name, parameter.name, 4 * sd, parameter.unit))
-        return tuple(limits)
+            for probe in self.library.probes
+        }
+
+
+def _in_words(what: str, estimates: Sequence[Estimate]) -> str:
+    """``viscous damping: damping ratio 0.011 ± 0.0004``."""
+    sizes = [
+        f"{e.meaning} {e.value:.3g} ± {0.5 * (e.high - e.low):.1g} {e.unit if e.unit != '1' else ''}".rstrip()
+        for e in estimates
+    ]
+    return f"{what.rstrip('.')}: {', '.join(sizes)}" if sizes else what.rstrip(".")
+
+
+def _mean_of_runs(found: Fit, key: str) -> tuple[float, float, float]:
+    """A parameter that every run has for itself: mean over the runs with the interval of that mean."""
+    values = np.array([local[key] for local in found.local_values if key in local])
+    own = (values[:, 2] - values[:, 1]) / 3.92
+    between = float(values[:, 0].std(ddof=1)) if len(values) > 1 else 0.0
+    half = 1.96 * math.sqrt((float(np.mean(own**2)) + between**2) / len(values))
+    middle = float(values[:, 0].mean())
+    return middle, middle - half, middle + half

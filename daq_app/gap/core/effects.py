@@ -44,8 +44,6 @@ class Effect:
     parameter of the effect that it departs from. Without it the departure says nothing of that."""
     null_value: Mapping[str, float] = field(default_factory=dict)
     """Parameter values at which the effect vanishes; 0 for each that is not listed."""
-    unsteady: tuple[str, ...] = ()
-    """Scatters of the model that this effect brings along: with it they may be larger than repeatability."""
 
     @property
     def shared(self) -> tuple[Parameter, ...]:

@@ -14,14 +14,12 @@ from daq_app.gap.core.parameters import Parameter
 class Scatter:
     """A random effect whose size is itself estimated, e.g. the scatter of r from impact to impact.
 
-    `median` and `log_sd` are the log-normal prior of its standard deviation. `high` is the largest
-    standard deviation that the goodness-of-fit gate lets pass as repeatability.
+    `median` and `log_sd` are the log-normal prior of its standard deviation.
     """
 
     name: str
     median: float
     log_sd: float
-    high: float
     unit: str = ""
     meaning: str = ""
 

@@ -1,7 +1,7 @@
 """Every threshold that decides in a diagnosis: quantity, unit, source, consequence.
 
-Nothing outside this module decides by a number of its own. Search widths and tolerances, which cost time and
-not answers, stand where they are used.
+Nothing in the core decides by a number from elsewhere. Search widths and tolerances, which cost time and not
+answers, stand where they are used.
 """
 
 from __future__ import annotations
@@ -13,9 +13,66 @@ from dataclasses import dataclass
 class Policy:
     """The thresholds of one diagnosis."""
 
+    # Findings about instruments
     finding_in_noise: float = 1.0
     """Size of a pick-up or of a reading step over the rms noise of one reading, from which it is material.
     Below it averaging over a half-cycle leaves nothing (assumed); raising it hides loud pick-up."""
+
+    finding_shaking: float = 0.05
+    """Acceleration of a burst of the floor, m/s², from which it is material: a hundredth of g turns a wall by
+    less than its impacts scatter (assumed); raising it hides weak traffic."""
+
+    # The model's own discrepancy
+    usual_discrepancy: float = 1.0
+    """Scale of the half-Cauchy prior of a group's discrepancy, in nominal sd (Gelman, Bayesian Analysis 1,
+    2006). Raising it lets every group misfit for less, so that weak effects are lost sooner."""
+    starting_discrepancy: float = 0.2
+    """Discrepancy, in nominal sd, from which its estimate starts; it decides between two optima only."""
+
+    # Hypotheses
+    prior_null: float = 0.2
+    """Prior probability that nothing is missing (design targets: 10 to 20 % of cases)."""
+    prior_count: tuple[float, ...] = (0.85, 0.13, 0.02)
+    """Prior probability of one, two and three causes where there are any. A fourth is not looked for."""
+    prior_other_form: float = 0.5
+    """Odds of any other form of a law against the library's."""
+    further_nats: float = 8.0
+    """Log evidence that a further cause must gain. In own worlds false ones gain 2 at most, true ones 54."""
+    further_share: float = 0.05
+    """Share of what is explained that a further cause must explain; below, it takes up what the first one's
+    form leaves. In own worlds true ones explain 6.7 % or more."""
+    name_probability: float = 0.90
+    """Probability from which an answer is named alone; raising it says "cannot tell" more often."""
+    set_content: float = 0.95
+    """Probability that the set of answers holds."""
+    detected_sd: float = 4.0
+    """Posterior sd below which a cause is below detection (design: effects from 4 sd on must be found)."""
+    null_probability: float = 0.5
+    """Probability of "nothing missing" from which it is the answer although weak causes are not excluded;
+    below, the likeliest of them is said to be below detection."""
+    null_excluded: float = 1e-3
+    """Probability of "nothing missing" below which a weak cause is there all the same."""
+
+    # What remains
+    unknown_share: float = 0.3
+    """Share of the gap, in nats, at which what remains is as likely something unknown as not. In the
+    project's own worlds known causes leave 0.01 at most, unknown ones 0.6 or more."""
+    unknown_nats: float = 20.0
+    """Nats of discrepancy beyond the usual at which what remains matters as likely as not. In own worlds
+    known causes leave 1 at most, unknown ones 29 or more; ordinary laboratories leave some."""
+    unknown_steepness: float = 4.0
+    """Slope of the logistic in the logarithm of either; raising it makes the gate a step."""
+    form_nats: float = 6.0
+    """Gain of a free form on top of the best hypothesis, in log posterior, that is as likely another form
+    as not ..."""
+    form_share: float = 0.1
+    """... or this share of what is explained, whichever is more; no effect's model is better."""
+    refused: float = 0.5
+    """Probability of something unknown from which the answer is "none of these"."""
+    parameters_gap: float = 1.3
+    """Gap at nominal parameters, over noise and scatter, from which the answer is "parameters"."""
+    cause_closes: float = 0.02
+    """Share of the held-out gap below which a cause is listed and is not spoken of as material (assumed)."""
 
 
 POLICY = Policy()

@@ -8,12 +8,12 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from daq_app.gap.core.evidence import Ranked
 from daq_app.gap.core.findings import Finding
-from daq_app.gap.core.goodness import Goodness
-from daq_app.gap.core.held_out import GapSize
-from daq_app.gap.core.other_forms import FreeForm
-from daq_app.gap.core.where import GapMap
+from daq_app.gap.core.fitting.held_out import GapSize
+from daq_app.gap.core.judging.evidence import Ranked
+from daq_app.gap.core.judging.other_forms import FreeForm
+from daq_app.gap.core.judging.remainder import Remainder
+from daq_app.gap.core.judging.where import GapMap
 
 FORMAT_VERSION: Final = 2
 
@@ -29,6 +29,10 @@ Verdict = Literal[
 ]
 
 
+NAMING: Final[tuple[Verdict, ...]] = ("effect", "pair", "several")
+"""Verdicts that name one, two, or more things that are missing."""
+
+
 class CannotDiagnose(Exception):
     """The runs do not allow any diagnosis; the message says why and what to do."""
 
@@ -36,6 +40,11 @@ class CannotDiagnose(Exception):
         super().__init__(f"{reason} {what_to_do}".strip())
         self.reason = reason
         self.what_to_do = what_to_do
+
+
+def verdict_of(count: int) -> Verdict:
+    """The verdict that names so many things; 1 or more."""
+    return NAMING[min(count, len(NAMING)) - 1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +69,22 @@ class Detection:
     parameter: str
     limit: float
     unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """One cause in the wall, the release or a sensor, judged given everything else."""
+
+    name: str
+    words: str
+    family: str
+    probability: float
+    """That it is part of the answer, over all hypotheses."""
+    estimates: tuple[Estimate, ...]
+    closes: float
+    """Share of the held-out gap that it alone closes; NaN with one run only."""
+    material: bool
+    """Whether it closes enough to be spoken of as a cause."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +116,7 @@ class Diagnosis:
     scatter: tuple[Estimate, ...]
     gap: GapSize | None
     remaining: GapMap
-    goodness: Goodness
-    goodness_null: Goodness
+    rest: Remainder
     probes: tuple[Ranked, ...]
     probe_shapes: dict[str, dict[str, tuple[float, float, float]]]
     """Probe → knot → (value, low, high): the non-parametric shape of what is missing."""
@@ -102,8 +126,8 @@ class Diagnosis:
     """What was measured directly about instruments; material ones are part of the answer."""
     free_forms: tuple[FreeForm, ...] = ()
     """What freer forms of its families gain on top of the best hypothesis."""
-    rest_p: float = 1.0
-    """Chance of the largest departure from the best hypothesis, if that were right."""
+    causes: tuple[Cause, ...] = ()
+    """Causes that any hypothesis with a chance names, in the order of what they close."""
     limits: tuple[str, ...] = ()
     """Stated limits: one run only, channels left out, gaps in the record …"""
     seconds: float = 0.0
@@ -129,6 +153,7 @@ class Diagnosis:
         data["format"] = FORMAT_VERSION
         data["decision_detail"] = data["decision"]
         data["decision"] = self.decision.verdict
+        data["p_unknown"] = self.rest.unknown
         for key in ("which", "set95", "probes"):
             for entry in data[key]:
                 entry["effects"] = list(entry["effects"])

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core import Effect, Library, Model, Parameter, Prediction, Run
-from daq_app.gap.core.problem import Problem
+from daq_app.gap.core.fitting.experiment import Experiment
+from daq_app.gap.core.fitting.problem import Problem
 
 FloatArray = NDArray[np.float64]
 
@@ -94,7 +95,7 @@ def _recordings(runs: Sequence[Run]) -> list[str]:
 
 def _prediction(model: Model, run: Run) -> list[str]:
     """Whether the model predicts this run at the centre of its priors."""
-    problem = Problem(model, [run], ())
+    problem = Problem(Experiment.without_groups(model, [run]), ())
     try:
         predicted = problem.predict(0, problem.start({}))
     except KeyError as error:
@@ -151,7 +152,7 @@ def _scatters_without_use(model: Model, runs: Sequence[Run]) -> list[str]:
 
 
 def _loading_size(model: Model, run: Run, name: str) -> float:
-    problem = Problem(model, [run], ())
+    problem = Problem(Experiment.without_groups(model, [run]), ())
     loading = problem.predict(0, problem.start({})).loadings.get(name)
     return 0.0 if loading is None else float(np.max(np.abs(loading), initial=0.0))
 
@@ -177,13 +178,15 @@ class _Asked:
 
     def __init__(self, model: Model, runs: Sequence[Run]) -> None:
         self.model, self.runs = model, runs
-        self.centre = [self._predict(Problem(model, [run], ()), {}) for run in runs]
+        self.centre = [
+            self._predict(Problem(Experiment.without_groups(model, [run]), ()), {}) for run in runs
+        ]
 
     def silent_unknowns(self) -> list[str]:
         """Parameters of the model itself that change no feature."""
         found = []
         for index, run in enumerate(self.runs):
-            problem = Problem(self.model, [run], ())
+            problem = Problem(Experiment.without_groups(self.model, [run]), ())
             for unknown in problem.unknowns:
                 if unknown.run is None and index > 0:
                     continue  # shared by all runs: asked once, of all of them
@@ -239,7 +242,7 @@ class _Asked:
         """The wildest features of their kind, beside what each run's parameters can follow."""
         kinds: dict[tuple[str, str], list[tuple[float, str]]] = {}
         for run in self.runs:
-            misfit = np.abs(_robust_residual(Problem(self.model, [run], ())))
+            misfit = np.abs(_robust_residual(Problem(Experiment.without_groups(self.model, [run]), ())))
             for k, label in enumerate(run.features.labels):
                 where = f"feature {k + 1} of run {run.name} ({label.observable} of {label.channel})"
                 kinds.setdefault((label.channel, label.observable), []).append((float(misfit[k]), where))
@@ -257,7 +260,7 @@ class _Asked:
 
     def _change(self, run: Run, effects: Sequence[Effect], key: str, parameter: Parameter) -> float:
         """Largest change of a feature of a run, in noise sd, that a parameter makes from its centre."""
-        problem = Problem(self.model, [run], effects)
+        problem = Problem(Experiment.without_groups(self.model, [run]), effects)
         low, high = parameter.unit_bounds
         # An effect's time constant does nothing while its strength is zero.
         beside = {e.key(p): p.start_coordinates()[-1] for e in effects for p in e.parameters}

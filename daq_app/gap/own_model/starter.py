@@ -50,7 +50,7 @@ model = model_of(
     simulate,
     unknowns=[Parameter("e", 0.8, 0.1, "1", 0.1, 1.0, meaning="restitution")],
     per_run=[Parameter("first", 0.5, 0.5, "s", 0.01, 5.0, meaning="first flight")],
-    scatters=[Scatter("scatter of e", 0.005, 1.0, 0.05, "1", "relative, from bounce to bounce")],
+    scatters=[Scatter("scatter of e", 0.005, 1.0, "1", "relative, from bounce to bounce")],
 )
 library = Library(
     [

@@ -53,10 +53,16 @@ def _finding(key: str, marks: Sequence[Mark], runs: int) -> Finding:
         high=size + 1.96 * sd,
         unit=unit,
         where=where,
-        material=kind not in _IN_NOISE or in_noise > POLICY.finding_in_noise,
+        material=_is_material(kind, size, in_noise),
         parameter=EFFECT_SIZES.get(kind, ""),
         in_noise=in_noise,
     )
+
+
+def _is_material(kind: str, size: float, in_noise: float) -> bool:
+    if kind in _IN_NOISE:
+        return in_noise > POLICY.finding_in_noise
+    return kind != "shaking" or size > POLICY.finding_shaking
 
 
 def _median_with_sd(marks: Sequence[Mark]) -> tuple[float, float]:

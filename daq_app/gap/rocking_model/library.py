@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from daq_app.gap.core import Alike, Confusion, Effect, Library, Parameter
 from daq_app.gap.core.parameters import between, positive, signed
-from daq_app.gap.rocking_model.prediction.model import SCATTER_RELEASE
 from daq_app.gap.rocking_model.probes import departures, probes
 from sim_hardware.dynamics.effects import MOTION_EFFECTS
 from sim_hardware.dynamics.spec import EffectSpec
@@ -131,10 +130,6 @@ _FORMS = {
 """Parameters of the form of an effect, beyond those of the simulator, which has one form only."""
 
 
-_UNSTEADY = {"slow_release": (SCATTER_RELEASE,)}
-"""A hand that lets go over tens of milliseconds does not let go alike to a tenth of one."""
-
-
 def _motion_effect(spec: EffectSpec, known: set[str]) -> Effect:
     names = _FREE.get(spec.name, tuple(p.name for p in spec.parameters if p.name != "v_mean"))
     return Effect(
@@ -145,7 +140,6 @@ def _motion_effect(spec: EffectSpec, known: set[str]) -> Effect:
         spec.reference,
         spec.summary,
         tuple(Confusion(other, spec.separated_by) for other in spec.confusable if other in known),
-        unsteady=_UNSTEADY.get(spec.name, ()),
     )
 
 

@@ -90,7 +90,7 @@ def _without_gaps(run: GapRun) -> GapRun:
     return run
 
 
-PARTS = ("scatter", "channels", "probes", "multistart")
+PARTS = ("scatter", "channels", "probes")
 """Parts of the method that a diagnosis can be made without, to see what each is worth."""
 
 
@@ -126,8 +126,6 @@ def diagnose_runs(
         model = UnscatteredModel(model.survey, model.channels)
     if "probes" in without:
         library = library.without(*(e.name for e in library.values() if e.kind != "effect"))
-    if "multistart" in without:
-        options = replace(options or Options(), multistart=False)
     if only:
         library = library.without(*(name for name in library if name not in only))
         limits.append(f"Only {', '.join(sorted(only))} were considered.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from daq_app.gap.core import Alike, Confusion, Effect, Library, Options, diagnose
-from daq_app.gap.core.evidence import Ranked, answers, credible_set
+from daq_app.gap.core.judging.evidence import Ranked, answers, credible_set
 from daq_app.gap.core.parameters import signed
 from daq_app.gap.rocking_model.library import rocking_library
 from tests.support.toy_wave import LIBRARY, DecayModel, make_runs
@@ -33,7 +33,7 @@ class Twins(DecayModel):
 
 
 def test_twins_that_no_sensor_tells_apart_are_an_answer_with_both_names() -> None:
-    result = diagnose(Twins(), make_runs(0, slope_k=0.05), Library(EFFECTS, (SAME,)), Options(pairs=False))
+    result = diagnose(Twins(), make_runs(0, slope_k=0.05), Library(EFFECTS, (SAME,)), Options(causes=1))
     assert result.decision.verdict == "effect"
     assert {result.decision.effects, *result.decision.alternatives} == {("slope",), ("twin",)}
     assert result.decision.confidence > 0.9 > result.which[0].probability
@@ -46,7 +46,7 @@ def test_twins_that_no_sensor_tells_apart_are_an_answer_with_both_names() -> Non
 
 def test_a_pair_of_which_one_is_a_twin_is_named_as_a_pair() -> None:
     runs = make_runs(4, slope_k=0.05, shift_s=0.05)
-    result = diagnose(Twins(), runs, Library(EFFECTS, (SAME,)), Options(always_pairs=True))
+    result = diagnose(Twins(), runs, Library(EFFECTS, (SAME,)), Options())
     assert result.decision.verdict == "pair"
     assert {result.decision.effects, *result.decision.alternatives} == {
         ("shift", "slope"),

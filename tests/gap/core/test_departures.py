@@ -5,21 +5,22 @@ from __future__ import annotations
 import pytest
 
 from daq_app.gap.core import Effect, Library, Options, diagnose, fit
-from daq_app.gap.core.fit import Score, on_top, searches_from
-from daq_app.gap.core.other_forms import FreeForm, together
+from daq_app.gap.core.fitting.experiment import Experiment
+from daq_app.gap.core.fitting.screen import Base, Score
+from daq_app.gap.core.judging.other_forms import FreeForm
 from daq_app.gap.core.parameters import signed
 from tests.support.toy_wave import AGAIN, BEND, LIBRARY, BendingModel, DecayModel, make_runs
 
 
-def test_a_departure_sees_what_is_too_little_for_a_free_form_of_five_coefficients() -> None:
-    """Of runs whose r is bent: the straight form is named without it, and not where it is true."""
+def test_a_departure_from_the_form_of_the_named_effect_is_another_form_of_its_family() -> None:
+    """Where r is bent the straight form is named only if nobody asks for others."""
     model, library = BendingModel(), Library([*LIBRARY.values(), BEND])
-    runs = make_runs(3, scatter=0.002, slope_k=0.03, bend_c=0.03)
+    runs = make_runs(3, scatter=0.002, slope_k=0.03, bend_c=0.08)
     near = diagnose(model, runs, library, Options())
     assert (near.decision.verdict, near.decision.family) == ("none_of_these", "loss")
     assert "slope comes near" in near.decision.sentence
     assert not {"bend"} & {name for hypothesis in near.which for name in hypothesis.effects}
-    assert diagnose(model, runs, LIBRARY, Options()).decision.effects == ("slope",)
+    assert diagnose(model, runs, LIBRARY.without("free"), Options()).decision.effects == ("slope",)
     for seed in range(4):
         true = diagnose(model, make_runs(seed, scatter=0.002, slope_k=0.03), library, Options())
         assert true.decision.effects == ("slope",), seed
@@ -31,9 +32,8 @@ def test_the_named_effect_once_more_gains_nothing_however_unlikely_its_strength_
     model, runs = BendingModel(), make_runs(1, slope_k=0.15)
     found = fit(model, runs, (LIBRARY["slope"],))
     assert found.u[found.keys.index(("slope.k", None))] > 2.5
-    effects = (LIBRARY["slope"], AGAIN)
-    search, *_ = searches_from(model, runs, effects, found.known(), found.sigmas, found.columns, {})
-    again = on_top(search, "again")
+    base = Base(Experiment.of(model, runs), (LIBRARY["slope"],), found, found.columns)
+    again = base.score(AGAIN)
     assert again.gain < 0.01
     assert again.determined < 0.01
 
@@ -41,26 +41,22 @@ def test_the_named_effect_once_more_gains_nothing_however_unlikely_its_strength_
 def test_a_coefficient_that_may_only_be_negative_gains_nothing_where_it_would_be_positive() -> None:
     runs = make_runs(1, slope_k=0.05)
     found = fit(DecayModel(), runs)
+    base = Base(Experiment.of(DecayModel(), runs), (), found, found.columns)
     gains = []
     for low, high in ((-1.0, 0.0), (0.0, 1.0)):
         one = signed("k", 0.1)
         object.__setattr__(one, "low", low)
         object.__setattr__(one, "high", high)
         form = Effect("slope", "loss", (one,), "one-sided", "test")
-        search, *_ = searches_from(
-            DecayModel(), runs, (form,), found.known(), found.sigmas, found.columns, {}
-        )
-        gains.append(on_top(search, "slope").gain)
+        gains.append(base.score(form).gain)
     assert gains[0] == 0.0
     assert gains[1] > 5.0
 
 
-def test_asking_the_same_twice_costs_nothing() -> None:
+def test_what_chance_gives_is_no_gain() -> None:
     form = FreeForm.of(BEND, Score(4.0, 1.0))
     assert form.p_value == pytest.approx(0.004678, rel=1e-3), "χ² of 8 with one degree of freedom"
-    assert together([form, form]) == pytest.approx(form.p_value)
-    none = FreeForm.of(BEND, Score(0.0, 1.0))
-    assert together([form, none]) == pytest.approx(2 * form.p_value, rel=0.01)
+    assert form.excess == pytest.approx(3.5)
 
 
 def test_a_library_knows_what_its_departures_depart_from() -> None:

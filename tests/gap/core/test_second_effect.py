@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -9,11 +10,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from daq_app.gap.core import Effect, Library, Options, Parameter, Prediction, diagnose, fit
-from daq_app.gap.core.decision import Thresholds
-from daq_app.gap.core.evidence import strength
-from daq_app.gap.core.hypotheses import Hypotheses
-from daq_app.gap.core.parallel import Workers
+from daq_app.gap.core import Effect, Library, Options, Parameter, Prediction, Run, diagnose, fit
+from daq_app.gap.core.judging.evidence import strength
 from daq_app.gap.core.parameters import between, positive, signed
 from tests.support.toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
 
@@ -43,10 +41,12 @@ def test_evidence_counts_only_strengths_that_are_an_effect(make, true: float) ->
     run = replace(run, features=replace(run.features, values=values, sd=np.full(x.size, sd)))
     strength = replace(make("b", 1.0), smallest=0.2)
     effect = Effect("tilt", "line", (strength,), "b x", "test")
-    null, found = fit(Line(), [run]), fit(Line(), [run], (effect,))  # type: ignore[arg-type]
+    found = fit(Line(), [run], (effect,))  # type: ignore[arg-type]
+    error = sd * np.sqrt(1.0 + np.repeat(found.sizes.discrepancy, PEAKS))
+    cost = float(np.log1p(found.sizes.discrepancy).sum())
 
     def weighed(b: float) -> float:
-        likelihood = np.exp(norm.logpdf(values, b * x, sd).sum() - null.log_likelihood)
+        likelihood = np.exp(norm.logpdf(values, b * x, error).sum() - found.log_likelihood)
         return float(likelihood * norm.pdf(b, 0.0, strength.sd))
 
     pieces = [(0.2, 6.0)] if strength.low == 0.0 else [(-6.0, -0.2), (0.2, 6.0)]
@@ -54,7 +54,7 @@ def test_evidence_counts_only_strengths_that_are_an_effect(make, true: float) ->
     exact = np.log(sum(quad(weighed, low, high, limit=200, points=[true])[0] for low, high in pieces) / mass)
     weight = run.features.independent_fraction
     assert weight == 1.0
-    assert found.log_evidence - null.log_evidence == pytest.approx(exact, abs=0.02)
+    assert found.log_evidence - found.log_likelihood + cost == pytest.approx(exact, abs=0.02)
 
 
 def test_a_strength_without_a_zero_has_no_smallest() -> None:
@@ -73,43 +73,11 @@ def test_a_bias_far_below_its_range_is_no_effect() -> None:
     assert "shift" not in result.which[0].effects
 
 
-def test_a_second_effect_is_found_though_the_first_passes_the_gate() -> None:
-    runs = make_runs(4, slope_k=0.02, shift_s=0.05)
-    with Workers(DecayModel(), runs) as workers:
-        study = Hypotheses(DecayModel(), tuple(runs), LIBRARY, Options(), workers)
-        study.fit_all()
-        assert study.goodness(("shift",)).passed, "this case shall leave nothing that the gate sees"
-    result = diagnose(DecayModel(), runs, LIBRARY, Options())
-    assert result.decision.verdict == "pair"
-    assert set(result.which[0].effects) == {"slope", "shift"}
-
-
 def test_no_second_effect_where_there_is_none() -> None:
     for seed in range(4):
         result = diagnose(DecayModel(), make_runs(seed, shift_s=0.05), LIBRARY, Options())
         assert result.decision.verdict == "effect"
         assert result.which[0].effects == ("shift",)
-
-
-def test_a_pair_whose_second_effect_is_not_there_is_no_hypothesis() -> None:
-    runs = make_runs(0, shift_s=0.05)
-    with Workers(DecayModel(), runs) as workers:
-        study = Hypotheses(DecayModel(), tuple(runs), LIBRARY, Options(always_pairs=True), workers)
-        study.fit_all()
-        names = {h for h in study.fits if len(h) == 2}
-        assert names
-        weak = {h for h in names if min(study.fits[h].strength(e) for e in h) < 4.9}
-        assert weak
-        assert weak.isdisjoint(r.effects for r in study.ranked())
-
-
-def test_a_second_effect_of_four_sd_is_a_stated_limit_and_no_pair() -> None:
-    runs = make_runs(4, slope_k=0.02, shift_s=0.05)
-    strict = Options(thresholds=Thresholds(second_strength=50.0))
-    result = diagnose(DecayModel(), runs, LIBRARY, strict)
-    assert result.decision.verdict == "effect"
-    assert result.decision.effects == ("shift",)
-    assert any("Perhaps shift + slope" in limit for limit in result.limits)
 
 
 @pytest.mark.parametrize("scale", ["linear", "log"])
@@ -132,14 +100,32 @@ def test_an_effect_that_knows_no_zero_is_as_strong_as_its_value_is_known() -> No
     assert strength(found, shift) > 5.0
 
 
-def test_on_its_way_a_strength_may_still_be_too_weak_to_count() -> None:
-    """What is withheld is the evidence of a strength below its smallest, so that screening can go without."""
-    shift = LIBRARY["shift"]
-    least = replace(shift, parameters=(replace(shift.parameters[0], smallest=0.02),))
-    runs = make_runs(2, shift_s=0.005)
-    known = fit(DecayModel(), runs)
-    free = fit(DecayModel(), runs, (shift,), known.known(), known.sigmas)
-    held = fit(DecayModel(), runs, (least,), known.known(), known.sigmas)
-    assert free.withheld == 0.0
-    assert held.withheld > 20.0
-    assert held.log_evidence + held.withheld == pytest.approx(free.log_evidence, abs=1e-3)
+def test_a_second_effect_is_found_beside_a_first_that_explains_far_more() -> None:
+    result = diagnose(DecayModel(), make_runs(4, slope_k=0.02, shift_s=0.05), LIBRARY, Options())
+    assert result.decision.verdict == "pair"
+    assert result.which[0].effects == ("shift", "slope")
+    first, second = result.causes[:2]
+    assert (first.name, second.name) == ("shift", "slope"), "in the order of what each closes"
+    assert first.closes > second.closes
+    assert min(first.probability, second.probability) > 0.95
+
+
+class LateModel(DecayModel):
+    """The toy with a third effect: durations that grow in the course of a run."""
+
+    def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
+        found = super().predict(run, values)
+        found.features[PEAKS:] += values.get("late.c", 0.0) * np.linspace(0, 1, PEAKS) ** 4
+        return found
+
+
+def test_three_causes_are_found_together() -> None:
+    runs = make_runs(4, slope_k=0.05, shift_s=0.05)
+    for run in runs:
+        run.features.values[PEAKS:] += 0.02 * np.linspace(0, 1, PEAKS) ** 4
+    late = Effect("late", "wear", (signed("c", 0.1, "s"),), "D + c n⁴", "test")
+    library = Library([*LIBRARY.values(), late])
+    result = diagnose(LateModel(), runs, library, Options())
+    assert result.decision.verdict == "several"
+    assert result.decision.effects == ("late", "shift", "slope")
+    assert diagnose(LateModel(), runs, library, Options(causes=2)).decision.verdict != "several"

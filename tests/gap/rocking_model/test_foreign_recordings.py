@@ -38,7 +38,7 @@ def test_parameters_of_a_wall_that_lacks_nothing_are_found() -> None:
 
 
 def _diagnose(case: str) -> Diagnosis:
-    return diagnose_runs(load_case(case), Options(pairs=False))
+    return diagnose_runs(load_case(case), Options(causes=1))
 
 
 @pytest.mark.heavy
@@ -64,7 +64,7 @@ def test_foreign_null_case_is_blamed_on_nothing() -> None:
 def test_foreign_lag_is_named_with_its_size() -> None:
     result = _diagnose("case_004")
     assert result.which[0].effects == ("lag@lvdt",)
-    assert result.decision.verdict == "effect", result.goodness.worst
+    assert result.decision.verdict == "effect", result.rest.words
     estimate = result.effect_parameters[0]
     assert estimate.low < 5.197e-3 < estimate.high
 

@@ -73,12 +73,5 @@ def without_probes(case: Path) -> Result:
     return product(case, ("probes",))
 
 
-def without_multistart(case: Path) -> Result:
-    """The product with every effect started from nothing only."""
-    return product(case, ("multistart",))
-
-
-ABLATIONS: Final = {
-    part: f"{__name__}:without_{part}" for part in ("scatter", "channels", "probes", "multistart")
-}
+ABLATIONS: Final = {part: f"{__name__}:without_{part}" for part in ("scatter", "channels", "probes")}
 """Diagnosers that lack one part of the method."""

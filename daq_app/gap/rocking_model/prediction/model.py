@@ -49,14 +49,10 @@ class RockingModel:
 
     name = "free rocking"
     scatters = (
-        Scatter(SCATTER_R, 0.004, 0.7, 0.012, "1", "relative scatter of r from impact to impact"),
-        Scatter(SCATTER_TIME, 3e-5, 1.0, 8e-5, "s", "what half-cycle times scatter by beyond sensor noise"),
-        Scatter(
-            SCATTER_RELEASE, 3e-5, 1.0, 1.5e-4, "s", "what the times of the first fall scatter by besides"
-        ),
-        Scatter(
-            SCATTER_SENSOR, 0.7, 0.35, 2.0, "1", "repeatability of sensor coefficients, in their own units"
-        ),
+        Scatter(SCATTER_R, 0.004, 0.7, "1", "relative scatter of r from impact to impact"),
+        Scatter(SCATTER_TIME, 3e-5, 1.0, "s", "what half-cycle times scatter by beyond sensor noise"),
+        Scatter(SCATTER_RELEASE, 3e-5, 1.0, "s", "what the times of the first fall scatter by besides"),
+        Scatter(SCATTER_SENSOR, 0.7, 0.7, "1", "repeatability of sensor coefficients, in their own units"),
     )
 
     def __init__(self, survey: Survey, channels: Mapping[str, Mapping[str, float]] | None = None) -> None:
@@ -211,4 +207,4 @@ class RockingModel:
 class UnscatteredModel(RockingModel):
     """The same with a likelihood that knows no scatter of r, to see what it is worth."""
 
-    scatters = (Scatter(SCATTER_R, 1e-6, 1e-3, 1.0, "1", "held at nothing"), *RockingModel.scatters[1:])
+    scatters = (Scatter(SCATTER_R, 1e-6, 1e-3, "1", "held at nothing"), *RockingModel.scatters[1:])

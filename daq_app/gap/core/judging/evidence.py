@@ -2,44 +2,42 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from daq_app.gap.core.effects import Effect, Library
-from daq_app.gap.core.fit import Fit
+from daq_app.gap.core.fitting.fit import Fit
+from daq_app.gap.core.policy import POLICY, Policy
 
-NULL: tuple[str, ...] = ()
+Hypothesis = tuple[str, ...]
+"""Names of the effects that are missing, sorted."""
+NULL: Hypothesis = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Priors:
-    """Prior probabilities: of nothing missing, and of a pair against a single effect.
+def log_prior(effects: Hypothesis, library: Library, policy: Policy = POLICY) -> float:
+    """ln prior probability of a hypothesis.
 
-    The rest is shared equally among the families, and within a family among its effects: a family
-    of many forms is not more probable because it was written down in more forms.
+    What "nothing missing" leaves is shared by how many causes there are, then equally among the families, and
+    within a family among its effects: a family of many forms is not more probable for being written down in
+    more forms.
     """
+    if not effects:
+        return math.log(policy.prior_null)
+    count = len(effects)
+    orders = math.log(math.factorial(count))
+    return (
+        math.log((1 - policy.prior_null) * policy.prior_count[count - 1])
+        + math.fsum(_share(name, library) for name in effects)
+        + orders
+    )
 
-    null: float = 0.2
-    pair: float = 0.15
-    other_form: float = 0.5
-    """Odds of any other form of a law against the library's, where the law is one of an effect's family."""
 
-    def log_prior(self, effects: tuple[str, ...], library: Library) -> float:
-        if not effects:
-            return math.log(self.null)
-        per_effect = sum(self._share(name, library) for name in effects)
-        if len(effects) == 1:
-            return math.log((1 - self.null) * (1 - self.pair)) + per_effect
-        return math.log((1 - self.null) * self.pair) + per_effect + math.log(2.0)
-
-    @staticmethod
-    def _share(name: str, library: Library) -> float:
-        family = library[name].family
-        siblings = sum(1 for e in library.named if e.family == family)
-        families = len({e.family for e in library.named})
-        return -math.log(families * siblings)
+def _share(name: str, library: Library) -> float:
+    family = library[name].family
+    siblings = sum(1 for e in library.named if e.family == family)
+    families = len({e.family for e in library.named})
+    return -math.log(families * siblings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,29 +50,30 @@ class Ranked:
     log_evidence: float
 
 
-def rank(
-    fits: Mapping[tuple[str, ...], Fit], library: Library, priors: Priors, temperature: float = 1.0
-) -> list[Ranked]:
-    """Hypotheses by probability ∝ prior · evidence^(1/temperature), most probable first.
-
-    `temperature` above 1 flattens; it is what calibration sets so that probabilities mean what they say.
-    """
-    logs = {
-        effects: priors.log_prior(effects, library) + found.log_evidence / temperature
-        for effects, found in fits.items()
-    }
+def rank(evidence: Mapping[Hypothesis, float], library: Library, policy: Policy = POLICY) -> list[Ranked]:
+    """Hypotheses by probability ∝ prior · evidence, most probable first; `evidence` is its logarithm."""
+    logs = {effects: log_prior(effects, library, policy) + value for effects, value in evidence.items()}
     top = max(logs.values())
     weights = {effects: math.exp(value - top) for effects, value in logs.items()}
-    total = sum(weights.values())
+    total = math.fsum(weights.values())
     ranked = [
-        Ranked(effects, family_of(effects, library), weight / total, fits[effects].log_evidence)
+        Ranked(effects, family_of(effects, library), weight / total, evidence[effects])
         for effects, weight in weights.items()
     ]
     return sorted(ranked, key=lambda r: (-r.probability, len(r.effects), r.effects))
 
 
+def inclusion(ranked: Sequence[Ranked]) -> dict[str, float]:
+    """Posterior inclusion probabilities (Barbieri and Berger, Ann. Stat. 32, 2004)."""
+    found: dict[str, float] = {}
+    for entry in ranked:
+        for name in entry.effects:
+            found[name] = found.get(name, 0.0) + entry.probability
+    return found
+
+
 def family_of(effects: tuple[str, ...], library: Library) -> str:
-    """Family of a hypothesis; families of a pair joined by `` + ``."""
+    """Family of a hypothesis; families of several joined by `` + ``."""
     return " + ".join(dict.fromkeys(library[name].family for name in effects)) or "none"
 
 
@@ -107,7 +106,7 @@ def answers(ranked: Sequence[Ranked], library: Library) -> list[Answer]:
     return sorted((Answer(tuple(g)) for g in groups.values()), key=lambda a: -a.probability)
 
 
-def credible_set(found: Sequence[Answer], content: float = 0.95) -> list[Answer]:
+def credible_set(found: Sequence[Answer], content: float = POLICY.set_content) -> list[Answer]:
     """Smallest set of answers that holds `content` of the probability."""
     kept, total = [], 0.0
     for answer in found:
@@ -135,21 +134,3 @@ def strength(found: Fit, effect: Effect) -> float:
         if low > 0.0
     ]
     return 1.0 / max(widths) if widths and max(widths) > 0.0 else math.inf
-
-
-def pair_candidates(
-    singles: Mapping[tuple[str, ...], Fit], library: Library, width: int = 6
-) -> list[tuple[str, str]]:
-    """Pairs worth fitting: the best single with every other, and all pairs of the best `width`.
-
-    An effect masked by another does not stand out alone, which is why the best one is paired with
-    everything and not only with the runners-up.
-    """
-    order = sorted((e for e in singles if len(e) == 1), key=lambda e: -singles[e].log_evidence)
-    best = [e[0] for e in order[:width]]
-    pairs = set()
-    if best:
-        pairs |= {tuple(sorted((best[0], e[0]))) for e in order[1:]}
-    pairs |= {tuple(sorted(pair)) for pair in itertools.combinations(best, 2)}
-    names = {e.name for e in library.named}
-    return sorted((a, b) for a, b in pairs if a in names and b in names)

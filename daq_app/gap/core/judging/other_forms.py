@@ -16,8 +16,8 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from daq_app.gap.core.effects import Effect, Library
-from daq_app.gap.core.evidence import Ranked, family_of
-from daq_app.gap.core.fit import Score
+from daq_app.gap.core.fitting.screen import Score
+from daq_app.gap.core.judging.evidence import Ranked, family_of
 
 OWN_FORM: Final = 0.05
 """Departure from its own form, as a share of what another form's is, that our model of an effect may have."""
@@ -36,6 +36,8 @@ class FreeForm:
     """In log posterior."""
     p_value: float
     """Of a gain as large by chance, where the named form is the right one."""
+    excess: float
+    """Gain beyond what chance gives: half a nat for each coefficient that the runs determine."""
     log_bayes: float = math.nan
     """Log of how much likelier what is seen is under another form of the family than under the named one.
     Of a departure only; NaN without."""
@@ -56,6 +58,7 @@ class FreeForm:
             form.equation,
             score.gain,
             chance,
+            score.gain - 0.5 * score.determined,
             _log_bayes(score, form.typical * abs(strength)),
         )
 
@@ -71,15 +74,6 @@ def _log_bayes(score: Score, typical: float) -> float:
     other = math.hypot(score.error, 0.5 * typical)
     sides = [norm.logpdf(score.coefficient, side * typical, other) for side in (-1.0, 1.0)]
     return float(np.logaddexp(*sides) - math.log(2.0) - norm.logpdf(score.coefficient, 0.0, own))
-
-
-def together(forms: Sequence[FreeForm]) -> float:
-    """Chance of all forms together: the harmonic mean of theirs (Wilson, PNAS 116, 2019); 1 of none.
-
-    A departure and a free form of the same family ask nearly the same, so that Bonferroni's correction would
-    count one question several times; the harmonic mean holds where they ask nearly the same.
-    """
-    return len(forms) / sum(1.0 / max(form.p_value, 1e-300) for form in forms) if forms else 1.0
 
 
 def with_other_forms(

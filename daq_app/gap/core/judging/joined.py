@@ -5,17 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from daq_app.gap.core.evidence import Ranked
 from daq_app.gap.core.findings import Finding, material, unexplained
-from daq_app.gap.core.result import Decision, Diagnosis, Estimate, Verdict
+from daq_app.gap.core.judging.evidence import Ranked
+from daq_app.gap.core.result import NAMING, Decision, Diagnosis, Estimate, Verdict, verdict_of
 
-_NAMING: tuple[Verdict, ...] = ("effect", "pair", "several")
 _NO_CAUSE: tuple[Verdict, ...] = ("nothing_missing", "parameters", "below_detection")
-
-
-def verdict_of(count: int) -> Verdict:
-    """The verdict that names so many things; 1 or more."""
-    return _NAMING[min(count, len(_NAMING)) - 1]
 
 
 def with_findings(result: Diagnosis, findings: Sequence[Finding]) -> Diagnosis:
@@ -61,7 +55,7 @@ def _decision(decision: Decision, findings: Sequence[Finding]) -> Decision:
         sure = min(finding.probability for finding in joining)
         return Decision(verdict_of(len(names)), names, "sensor", sentence, sure)
     effects = tuple(sorted((*decision.effects, *names)))
-    verdict = verdict_of(len(effects)) if decision.verdict in _NAMING else decision.verdict
+    verdict = verdict_of(len(effects)) if decision.verdict in NAMING else decision.verdict
     family = _joined(Ranked(decision.effects, decision.family, 0.0, 0.0), names).family
     others = tuple(tuple(sorted((*other, *names))) for other in decision.alternatives)
     return Decision(verdict, effects, family, sentence, decision.confidence, others)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.features import FloatArray, Run
-from daq_app.gap.core.fit import Fit, fit
-from daq_app.gap.core.likelihood import Covariance
+from daq_app.gap.core.fitting.experiment import Experiment
+from daq_app.gap.core.fitting.fit import Fit, finish
+from daq_app.gap.core.fitting.likelihood import Sizes, log_density
+from daq_app.gap.core.fitting.problem import Columns, Problem
+from daq_app.gap.core.fitting.search import Search
 from daq_app.gap.core.model import Model, Prediction
-from daq_app.gap.core.problem import Columns, Problem
 
+_TRAINING_STEPS = 4
 _LOCAL_STEPS = 8
 
 
@@ -31,7 +34,6 @@ class HeldOutRun:
     log_score: float
     residual: FloatArray
     prediction: Prediction
-    sigmas: dict[str, float]
     strain: float = 0.0
     """Squared distance of the model's shared parameters from their priors, in prior sd, over the number of
     runs: a survey and a calibration are measurements too, and a wire scale that is 4 % off is a gap even
@@ -52,31 +54,34 @@ def folds(runs: Sequence[Run], by: str) -> list[list[int]]:
 
 
 def score(
-    model: Model, runs: Sequence[Run], effects: Sequence[Effect], whole: Fit, by: str = "level"
+    experiment: Experiment,
+    effects: Sequence[Effect],
+    whole: Fit,
+    by: str = "level",
+    columns: Columns | None = None,
 ) -> list[HeldOutRun]:
     """Predict every run from a fit to the runs outside its fold.
 
-    `whole` is the fit to all runs, from which the refits start. With a single run there is nothing
-    to learn from, and the list is empty.
+    `whole` is the fit to all runs, from which the refits start and whose sizes they keep; `columns` of its
+    Jacobian save work. With a single run there is nothing to learn from, and the list is empty.
     """
+    runs = experiment.runs
     if len(runs) < 2:
         return []
     results: list[HeldOutRun] = []
     for fold in folds(runs, by):
-        training = [run for i, run in enumerate(runs) if i not in fold]
-        start, columns = _renumber(whole, fold, len(runs))
-        trained = fit(
-            model,
-            training,
-            effects,
-            start,
-            whole.sigmas,
-            multistart=False,
-            frozen=columns,
-            polish=not columns,
-        )
-        strain = strain_of(model, trained) / len(runs)
-        results += [_predict(model, runs[i], effects, trained, _of_run(whole, i), strain) for i in fold]
+        kept = [i for i in range(len(runs)) if i not in fold]
+        start, theirs = _renumber(whole, columns or {}, kept)
+        problem = Problem(experiment.only(kept), effects)
+        search = Search(problem, problem.start(start), whole.sizes, theirs)
+        search.walk(_TRAINING_STEPS)
+        trained = finish(search, True, exact=False)
+        strain = strain_of(experiment.model, trained) / len(runs)
+        for i in fold:
+            own: Columns = {
+                (key, 0): column for (key, index), column in (columns or {}).items() if index == i
+            }
+            results.append(_predict(experiment.only([i]), effects, trained, own, strain))
     return results
 
 
@@ -91,26 +96,22 @@ def strain_of(model: Model, trained: Fit) -> float:
     return max(square - len(own), 0.0)
 
 
-def _of_run(whole: Fit, run: int) -> Columns:
-    """The Jacobian of one run at the whole fit, as that of a problem with this run alone."""
-    return {(key, 0): column for (key, index), column in whole.columns.items() if index == run}
-
-
 def _renumber(
-    whole: Fit, fold: Sequence[int], count: int
+    whole: Fit, columns: Columns, kept: Sequence[int]
 ) -> tuple[dict[tuple[str, int | None], float], Columns]:
-    """The whole fit's coordinates and Jacobian with run indices as they are once the fold is left out."""
+    """The whole fit's coordinates and columns with the indices that the kept runs have among themselves."""
     place: dict[int | None, int | None] = {None: None}
-    place |= {old: new for new, old in enumerate(i for i in range(count) if i not in fold)}
+    place |= {old: new for new, old in enumerate(kept)}
     known = {(key, place[run]): value for (key, run), value in whole.known().items() if run in place}
-    columns = {(key, place[run]): column for (key, run), column in whole.columns.items() if run in place}
-    return known, columns
+    theirs = {(key, place[run]): column for (key, run), column in columns.items() if run in place}
+    return known, theirs
 
 
 def _predict(
-    model: Model, run: Run, effects: Sequence[Effect], trained: Fit, columns: Columns, strain: float
+    experiment: Experiment, effects: Sequence[Effect], trained: Fit, columns: Columns, strain: float
 ) -> HeldOutRun:
-    problem = Problem(model, [run], effects)
+    """One run predicted with everything shared as it was trained, its own parameters fitted."""
+    problem, (run,) = Problem(experiment, effects), experiment.runs
     shared = [k for k, q in enumerate(problem.unknowns) if q.run is None]
     local = [k for k, q in enumerate(problem.unknowns) if q.run is not None]
     order = {key: k for k, (key, index) in enumerate(trained.keys) if index is None}
@@ -118,13 +119,13 @@ def _predict(
     u = problem.start({(key, None): trained.u[k] for key, k in order.items()})
     line = problem.linearise(0, u, known=columns)
     for _ in range(_LOCAL_STEPS if local else 0):
-        jacobian = line.jacobian[:, local]
-        covariance = Covariance(run.features.sd, line.prediction, trained.sigmas)
-        hessian = covariance.gram(jacobian) + np.eye(len(local))
-        step = np.linalg.solve(hessian, jacobian.T @ covariance.solve(line.residual) - u[local])
+        covariance = trained.sizes.covariance(experiment, 0, line.prediction)
+        white = covariance.whiten(np.column_stack([line.jacobian[:, local], line.residual]))
+        hessian = white[:, :-1].T @ white[:, :-1] + np.eye(len(local))
+        step = np.linalg.solve(hessian, white[:, :-1].T @ white[:, -1] - u[local])
         u[local] = np.clip(u[local] + step, problem.low[local], problem.high[local])
         line = problem.linearise(0, u, known=columns)
-        if float(np.abs(step).max()) < 1e-3:
+        if float(np.abs(step).max()) < 1e-2:
             break
     # Predictive covariance: scatter and noise, what training left open, and the run's own prior.
     spread = np.linalg.cholesky(trained.covariance[np.ix_(pick, pick)] + 1e-14 * np.eye(len(pick)))
@@ -132,20 +133,15 @@ def _predict(
     fixed = line.prediction.fixed_loadings
     loadings = open_columns if fixed is None else np.hstack([fixed, open_columns])
     widened = Prediction(line.prediction.features, line.prediction.loadings, loadings)
-    covariance = Covariance(run.features.sd, widened, trained.sigmas)
     from_prior = line.residual + line.jacobian[:, local] @ u[local]
-    n = from_prior.size
-    quadratic = float(from_prior @ covariance.solve(from_prior))
-    log_score = -0.5 * (quadratic + covariance.log_det + n * math.log(2 * math.pi))
+    density = log_density(from_prior, trained.sizes.covariance(experiment, 0, widened))
     weight = run.features.independent_fraction
-    return HeldOutRun(
-        run.name, run.level, weight * log_score, line.residual, line.prediction, trained.sigmas, strain
-    )
+    return HeldOutRun(run.name, run.level, weight * density, line.residual, line.prediction, strain)
 
 
 @dataclass(frozen=True, slots=True)
 class GapSize:
-    """How far the gap shrank on held-out runs, in units of noise and scatter (floor about 1)."""
+    """How far the gap shrank on held-out runs, in units of noise, scatter and discrepancy (floor about 1)."""
 
     before: float
     after: float
@@ -161,39 +157,28 @@ class GapSize:
 
 
 def gap_size(
-    runs: Sequence[Run],
-    before: Sequence[HeldOutRun],
-    after: Sequence[HeldOutRun],
-    yardstick: Mapping[str, float],
+    experiment: Experiment, before: Sequence[HeldOutRun], after: Sequence[HeldOutRun], yardstick: Sizes
 ) -> GapSize | None:
-    """Compare two sets of held-out predictions on one yardstick: C at the scatter sizes given.
+    """Compare two sets of held-out predictions on one yardstick: C at the sizes given.
 
     Closure is the share of the reachable held-out log score that was gained; the reachable score
     is that of a residual as large as C says, −½(n + ln|C| + n ln 2π) per run.
     """
     if not before or not after:
         return None
-    features = {run.name: run.features for run in runs}
+    place = {run.name: i for i, run in enumerate(experiment.runs)}
     rms: dict[str, list[tuple[float, float]]] = {}
     gained = reachable = 0.0
     sums: dict[str, list[float]] = {}
     units: dict[str, str] = {}
     for old, new in zip(before, after, strict=True):
-        measured = features[old.name]
-        covariance = Covariance(measured.sd, new.prediction, yardstick)
-        pair = tuple(
-            math.sqrt((float(r.residual @ covariance.solve(r.residual)) + r.strain) / len(measured))
-            for r in (old, new)
-        )
-        rms.setdefault(old.level, []).append((pair[0], pair[1]))
-        weight = measured.independent_fraction
-        n = len(measured)
-        best = -0.5 * weight * (n + covariance.log_det + n * math.log(2 * math.pi))
-        scores = [
-            -0.5 * weight * (n * size**2 + covariance.log_det + n * math.log(2 * math.pi)) for size in pair
-        ]
-        gained += scores[1] - scores[0]
-        reachable += best - scores[0]
+        measured = experiment.runs[place[old.name]].features
+        covariance = yardstick.covariance(experiment, place[old.name], new.prediction)
+        n, weight = len(measured), measured.independent_fraction
+        squares = [float(np.sum(covariance.whiten(run.residual) ** 2)) + run.strain for run in (old, new)]
+        rms.setdefault(old.level, []).append((math.sqrt(squares[0] / n), math.sqrt(squares[1] / n)))
+        gained += weight * (squares[0] - squares[1])
+        reachable += weight * (squares[0] - n)
         for label, a, b in zip(measured.labels, old.residual, new.residual, strict=True):
             entry = sums.setdefault(label.observable, [0.0, 0.0, 0.0])
             entry[0] += a * a

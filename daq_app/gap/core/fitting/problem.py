@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from daq_app.gap.core.effects import Effect
-from daq_app.gap.core.features import FloatArray, Run
-from daq_app.gap.core.model import Model, Prediction
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.core.fitting.experiment import Experiment
+from daq_app.gap.core.model import Prediction
 from daq_app.gap.core.parameters import Parameter
 
 STEP = 1e-4
@@ -45,9 +46,10 @@ class Problem:
     the local parameters of a run, with everything shared held at the posterior.
     """
 
-    def __init__(self, model: Model, runs: Sequence[Run], effects: Sequence[Effect]) -> None:
-        self.model = model
-        self.runs = tuple(runs)
+    def __init__(self, experiment: Experiment, effects: Sequence[Effect]) -> None:
+        self.experiment = experiment
+        model = self.model = experiment.model
+        self.runs = experiment.runs
         self.effects = tuple(effects)
         unknowns = [Unknown(p.name, p) for p in model.nuisance]
         for effect in effects:

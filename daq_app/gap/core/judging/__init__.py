@@ -1,0 +1,1 @@
+"""From fits to an answer: hypotheses and their probabilities, what remains, the decision in words."""

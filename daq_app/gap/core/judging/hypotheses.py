@@ -1,0 +1,202 @@
+"""Forward search: which causes, up to three together, explain the runs, and with what evidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from daq_app.gap.core.effects import Effect, Library
+from daq_app.gap.core.fitting.experiment import Experiment
+from daq_app.gap.core.fitting.fit import Fit, effects_of
+from daq_app.gap.core.fitting.likelihood import Sizes
+from daq_app.gap.core.fitting.parallel import Workers
+from daq_app.gap.core.fitting.screen import Screened, Step
+from daq_app.gap.core.fitting.tasks import FitTask, FormsTask, ScreenTask
+from daq_app.gap.core.judging.evidence import NULL, Hypothesis, Ranked, rank
+from daq_app.gap.core.judging.other_forms import FreeForm
+from daq_app.gap.core.policy import POLICY, Policy
+
+REFITTED = 6
+"""Effects that are refitted by either ranking, with and without the discrepancy of the fit they stand on."""
+LEADS = 2
+"""Best single causes to which a second one is sought."""
+POLISHED = 3
+POLISH_REACH = 12.0
+"""The best three hypotheses within 12 in log evidence are fitted to the end with exact Jacobians."""
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How a diagnosis is run."""
+
+    causes: int = 3
+    """The largest number of causes that are sought together."""
+    hold_out: str = "level"
+    workers: int = 1
+    policy: Policy = POLICY
+    progress: Callable[[int, int, str], None] | None = None
+    cancelled: Callable[[], bool] | None = None
+
+
+class Hypotheses:
+    """The fits of one diagnosis, made by `fit_all`."""
+
+    def __init__(self, experiment: Experiment, library: Library, options: Options, workers: Workers) -> None:
+        self.experiment, self.library, self.options, self.workers = experiment, library, options, workers
+        self.policy = options.policy
+        self.fits: dict[Hypothesis, Fit] = {}
+        self.evidence: dict[Hypothesis, float] = {}
+        """Log evidence of every hypothesis; where it was not refitted, by one linear step."""
+        self.alone: dict[str, Screened] = {}
+        """What each effect and probe promises on top of nothing."""
+
+    def fit_all(self) -> None:
+        """Nothing, single causes, then further ones on top of the best."""
+        start = FitTask((), {}, Sizes.nominal(self.experiment))
+        (null,) = self.workers.run([start], "without any effect")
+        self.workers.frozen = null.columns
+        self._keep(null)
+        self._extend(NULL, "single effects", with_probes=True)
+        for count in range(2, min(self.options.causes, len(self.policy.prior_count)) + 1):
+            leads = self._best(count - 1)[: LEADS if count == 2 else 1]
+            for lead in leads:
+                self._extend(lead, f"{count} effects together")
+        self._make_consistent()
+        self._polish()
+
+    def _keep(self, found: Fit) -> None:
+        """The better of two fits of one hypothesis, which may have ended at different discrepancies."""
+        known = self.fits.get(found.effects)
+        if known is None or found.log_evidence > known.log_evidence:
+            self.fits[found.effects] = found
+            self.evidence[found.effects] = found.log_evidence
+
+    def _best(self, count: int) -> list[Hypothesis]:
+        """Refitted hypotheses of so many causes, best first."""
+        found = [h for h in self.fits if len(h) == count]
+        return sorted(found, key=lambda h: -self.fits[h].log_evidence)
+
+    def _extend(self, base: Hypothesis, text: str, *, with_probes: bool = False) -> None:
+        """Screen every further effect on top of a hypothesis, and refit the most promising."""
+        found = self.fits[base]
+        taken = set(self.library.class_of(base))
+        further = [e for e in self.library.named if not taken & set(self.library.class_of([e.name]))]
+        probes = list(self.library.probes) if with_probes else []
+        screened = self._screened(base, [*further, *probes], text)
+        if with_probes:
+            self.alone = screened
+        promising = [e.name for e in further if base == NULL or self._promises(screened[e.name])]
+        for name in promising:
+            hypothesis = tuple(sorted((*base, name)))
+            approximate = found.log_evidence + screened[name].robust.evidence
+            self.evidence.setdefault(hypothesis, approximate)
+        tasks = [
+            self._refit(hypothesis, step, found)
+            for hypothesis, step in self._chosen(base, [screened[name] for name in promising])
+        ]
+        for result in self.workers.run(tasks, text):
+            self._keep(result)
+
+    def _screened(self, base: Hypothesis, effects: Sequence[Effect], text: str) -> dict[str, Screened]:
+        share = max(1, -(-len(effects) // (3 * self.options.workers)))
+        named = effects_of(base, self.library)
+        tasks = [
+            ScreenTask(named, self.fits[base], part, tuple(self._hint(base, e) for e in part))
+            for part in (tuple(effects[k : k + share]) for k in range(0, len(effects), share))
+        ]
+        return {found.effect: found for part in self.workers.run(tasks, text) for found in part}
+
+    def _hint(self, base: Hypothesis, effect: Effect) -> dict[tuple[str, int | None], float] | None:
+        """Beside other effects an effect is started from where it ended alone."""
+        if base == NULL:
+            return None
+        alone = self.fits.get((effect.name,))
+        return alone.known() if alone else self.alone[effect.name].strict.known
+
+    def _promises(self, screened: Screened) -> bool:
+        return max(screened.robust.gain, screened.strict.gain) > self.policy.further_nats
+
+    @staticmethod
+    def _chosen(base: Hypothesis, screened: Sequence[Screened]) -> list[tuple[Hypothesis, Step]]:
+        """The effects to refit, each from where its step ended."""
+        chosen = []
+        for kind in ("robust", "strict"):
+            order = sorted(screened, key=lambda s: -getattr(s, kind).evidence)
+            chosen += [(tuple(sorted((*base, s.effect))), getattr(s, kind)) for s in order[:REFITTED]]
+        return chosen
+
+    def _refit(self, hypothesis: Hypothesis, step: Step, found: Fit) -> FitTask:
+        effects = effects_of(hypothesis, self.library)
+        columns = {key: column for key, column in found.columns.items() if "." in key[0]}
+        return FitTask(effects, step.known, step.sizes, polish=False, columns=columns)
+
+    def _make_consistent(self) -> None:
+        """Refit the parts of the best hypothesis at its discrepancy: a part may have stopped short of it."""
+        best = max(self.fits, key=lambda h: self.fits[h].log_evidence)
+        whole = self.fits[best]
+        parts = [tuple(name for name in best if name != left) for left in best]
+        tasks = [
+            FitTask(effects_of(part, self.library), whole.known(), whole.sizes, polish=False)
+            for part in dict.fromkeys([*parts, NULL])
+            if part != best
+        ]
+        for result in self.workers.run(tasks, "parts of the best"):
+            self._keep(result)
+
+    def _polish(self) -> None:
+        """Finish the fits that have a chance; the others keep their quick ones."""
+        ranked = [r for r in self.ranked() if r.effects in self.fits]
+        top = ranked[0].log_evidence
+        near = [r.effects for r in ranked[:POLISHED] if r.log_evidence > top - POLISH_REACH]
+        tasks = [
+            FitTask(effects_of(h, self.library), self.fits[h].known(), self.fits[h].sizes)
+            for h in near
+            if not self.fits[h].columns
+        ]
+        for result in self.workers.run(tasks, "the best once more"):
+            # What was worked out exactly takes the place of what was not, better or not.
+            self.fits[result.effects] = result
+            self.evidence[result.effects] = result.log_evidence
+
+    def ranked(self) -> list[Ranked]:
+        """All hypotheses but those of which one cause explains too little beside the others."""
+        kept = {h: e for h, e in self.evidence.items() if len(h) < 2 or self._worth_it(h)}
+        return rank(kept, self.library, self.policy)
+
+    def _worth_it(self, hypothesis: Hypothesis) -> bool:
+        """Whether the last of several causes gains nats and a share of what is explained."""
+        parts = [tuple(name for name in hypothesis if name != left) for left in hypothesis]
+        without = max(self.evidence.get(part, -math.inf) for part in parts)
+        gained = self.evidence[hypothesis] - without
+        explained = self.evidence[hypothesis] - self.evidence[NULL]
+        return gained >= max(self.policy.further_nats, self.policy.further_share * explained)
+
+    def free_forms(self, best: Hypothesis) -> list[FreeForm]:
+        """What each probe of the families of the best hypothesis, and each departure from the forms of its
+        effects, gains on top of it, by a score test.
+
+        Another form of a family that is in the library (drag with the square of the speed) leaves little,
+        since the named form takes up most of it; what is left has the shape of that family. A probe can have
+        any shape, which dilutes a small difference; a departure has one, which most others share to some
+        degree.
+        """
+        families = {self.library[name].family for name in best}
+        probes = [probe for probe in self.library.probes if probe.family in families]
+        forms = (*probes, *self.library.departures(best))
+        if not forms:
+            return []
+        (scores,) = self.workers.run(
+            [FormsTask(effects_of(best, self.library), self.fits[best], forms)], "free forms"
+        )
+        return [
+            FreeForm.of(form, score, self._departed_from(form, best))
+            for form, score in zip(forms, scores, strict=True)
+        ]
+
+    def _departed_from(self, form: Effect, best: Hypothesis) -> float:
+        """The first parameter, in its unit, of the effect of the best hypothesis that a form departs from."""
+        values, largest = self.fits[best].values, 0.0
+        for effect in (self.library[name] for name in best if name in form.of):
+            largest = max(largest, abs(values.get(effect.key(effect.parameters[0]), (0.0,))[0]))
+        return largest

@@ -1,0 +1,145 @@
+"""What the best hypothesis leaves: how large, where, and how likely something unknown is behind it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from daq_app.gap.core.effects import Library
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.core.fitting.experiment import Experiment
+from daq_app.gap.core.fitting.fit import Fit, effects_of
+from daq_app.gap.core.fitting.likelihood import Sizes
+from daq_app.gap.core.fitting.problem import Problem
+from daq_app.gap.core.judging.other_forms import FreeForm
+from daq_app.gap.core.policy import Policy
+
+
+@dataclass(frozen=True, slots=True)
+class GroupRest:
+    """What remains in one group of features."""
+
+    channel: str
+    observable: str
+    n: int
+    discrepancy: float
+    """What the model itself gets wrong there, in nominal sd."""
+    in_noise: float
+    """Rms of what remains over noise and scatter."""
+    nats: float
+    """What it costs that the model misfits this group by more than the usual discrepancy."""
+
+
+@dataclass(frozen=True, slots=True)
+class Remainder:
+    """Gaps are in units of noise and scatter, without the model's discrepancy; 1 is nothing."""
+
+    nominal: float
+    """Gap with all parameters at the centres of their priors."""
+    before: float
+    """Gap of the fit without any effect."""
+    after: float
+    """Gap of the best hypothesis."""
+    nats: float
+    """What the misfit beyond the usual discrepancy costs in log likelihood: n ln(ν/ν₀) over the groups."""
+    share: float
+    """Share of it in the gap: what remains over what remains and what is explained, both in nats. Nats grow
+    with the logarithm of a misfit, so that no single group that is wild outweighs all others."""
+    groups: tuple[GroupRest, ...]
+    """Those that cost most come first."""
+    unknown: float
+    """Probability that something is there that is not in the library."""
+    form: str = ""
+    """Family of which another form gains most on top of the best hypothesis, where that matters."""
+
+    @property
+    def words(self) -> str:
+        """The remainder with its place."""
+        if not self.groups or self.nats < 1.0:
+            return "nothing remains beyond noise, scatter and what the model is usually wrong by"
+        worst = self.groups[0]
+        return (
+            f"{100 * min(self.share, 1.0):.0f} % of the gap remains, most of it in the {worst.observable} "
+            f"of {worst.channel} ({worst.in_noise:.1f} times noise and scatter)"
+        )
+
+
+def remainder(
+    experiment: Experiment,
+    library: Library,
+    null: Fit,
+    best: Fit,
+    forms: Sequence[FreeForm],
+    policy: Policy,
+) -> Remainder:
+    """What `best` leaves of what `null` leaves, on the yardstick of the scatter of `best`."""
+    sizes = best.sizes.without_discrepancy()
+    local = {key: u for key, u in null.known().items() if key[1] is not None}
+    nominal = _size(_white(experiment, Problem(experiment, ()), local, sizes))
+    before = _size(_white(experiment, Problem(experiment, ()), null.known(), sizes))
+    problem = Problem(experiment, effects_of(best.effects, library))
+    white = _white(experiment, problem, best.known(), sizes)
+    after = _size(white)
+    groups = _groups(experiment, best, white, policy)
+    nats = math.fsum(group.nats for group in groups)
+    explained = max(best.log_evidence - null.log_evidence, 0.0)
+    share = nats / max(nats + explained, 1e-9)
+    rest, form = _unknown(share, nats, policy), ""
+    gain = max((f.excess for f in forms), default=0.0)
+    if gain > 0.0 and best.effects:
+        bar = max(policy.form_nats, policy.form_share * explained)
+        other = _logistic(math.log(gain / bar), policy)
+        rest = 1.0 - (1.0 - rest) * (1.0 - other)
+        form = max(forms, key=lambda f: f.excess).family if other > policy.refused else ""
+    return Remainder(nominal, before, after, nats, share, groups, rest, form)
+
+
+def _unknown(share: float, nats: float, policy: Policy) -> float:
+    """Probability of something unknown behind a remainder of that share and size."""
+    counts = _logistic(math.log(max(share, 1e-6) / policy.unknown_share), policy)
+    matters = _logistic(math.log(max(nats, 1e-6) / policy.unknown_nats), policy)
+    return counts * matters
+
+
+def _logistic(distance: float, policy: Policy) -> float:
+    return 1.0 / (1.0 + math.exp(-policy.unknown_steepness * min(max(distance, -50.0), 50.0)))
+
+
+def _white(
+    experiment: Experiment,
+    problem: Problem,
+    known: dict[tuple[str, int | None], float],
+    sizes: Sizes,
+) -> list[FloatArray]:
+    u = problem.start(known)
+    found = []
+    for i, run in enumerate(experiment.runs):
+        prediction = problem.predict(i, u)
+        covariance = sizes.covariance(experiment, i, prediction)
+        found.append(covariance.whiten(run.features.values - prediction.features))
+    return found
+
+
+def _size(white: Sequence[FloatArray]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(white) ** 2)))
+
+
+def _groups(
+    experiment: Experiment, best: Fit, white: Sequence[FloatArray], policy: Policy
+) -> tuple[GroupRest, ...]:
+    groups = experiment.groups
+    square, count = np.zeros(len(groups)), np.zeros(len(groups))
+    for index, z in zip(groups.index, white, strict=True):
+        square += np.bincount(index, z**2, len(groups))
+        count += np.bincount(index, minlength=len(groups))
+    found = []
+    for (channel, observable), n, nu, s in zip(
+        groups.names, count, np.sqrt(best.sizes.discrepancy), square, strict=True
+    ):
+        nats = float(n) * math.log(max(float(nu) / policy.usual_discrepancy, 1.0))
+        size = math.sqrt(float(s) / max(float(n), 1.0))
+        found.append(GroupRest(channel, observable, int(n), float(nu), size, nats))
+    return tuple(sorted(found, key=lambda g: (-g.nats, -g.in_noise)))
