@@ -73,6 +73,9 @@ _ONE_CHANNEL: dict[str, tuple[str, ...]] = {
 _INERTIA_STARTS = {"frequency": (8.0, 14.0, 24.0), "zeta": (0.1, 0.3)}
 SMALLEST = {("residual_cable", "slack"): 4e-3}
 """Lower end of a range that the simulator lets begin at zero."""
+_FREQUENCIES_HZ = {"flexible_wall": (2.0, 42.0), "yaw": (1.5, 14.0), "twist": (1.5, 14.0)}
+"""Frequencies at which ring-downs are looked for (`rings`): slender walls on soft beds ring below 5 Hz, squat
+ones above 30 Hz, which the simulator's usual ranges leave out."""
 _WIDER = {("yaw", "kick"): 0.4, ("twist", "kick"): 0.4, ("flexible_wall", "gain"): 0.02}
 """Reach of strengths that have no usual size: how hard an impact kicks depends on its very form."""
 _DRIFT_REACH = {"lvdt": 1e-3, "wire": 2e-3, "tiltmeter": 1e-3, "accelerometer": 1e-2}
@@ -106,7 +109,8 @@ def _parameter(spec: EffectSpec, parameter: SpecParameter) -> Parameter:
     per_run = (spec.name, parameter.name) in _PER_RUN
     if (spec.name, parameter.name) in _LOGARITHMIC:
         low = max(parameter.low, SMALLEST.get((spec.name, parameter.name), 1e-6))
-        found = between(parameter.name, low, parameter.high, parameter.unit, parameter.text)
+        ends = _FREQUENCIES_HZ.get(spec.name, ()) if parameter.name == "frequency" else ()
+        found = between(parameter.name, *(ends or (low, parameter.high)), parameter.unit, parameter.text)
         return replace(found, per_run=per_run)
     reach = _WIDER.get((spec.name, parameter.name), parameter.high)
     of_sign = signed if parameter.low < 0 else positive

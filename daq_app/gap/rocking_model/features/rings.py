@@ -18,7 +18,7 @@ from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.ring_signals import Signal
 from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid
 
-BEND_HZ = np.geomspace(7.0, 42.0, 36)
+BEND_HZ = np.geomspace(2.0, 42.0, 61)
 TURN_HZ = np.geomspace(1.5, 14.0, 40)
 DAMPING = (0.01, 0.04)
 FINE_DAMPING = (0.007, 0.012, 0.02, 0.032, 0.05, 0.08)
