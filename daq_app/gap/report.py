@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import textwrap
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,7 +21,7 @@ from daq_app.gap.rocking_model.features.run_features import extract
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.traces import Trace, traces
-from daq_app.gap.words import in_words
+from daq_app.gap.words import causes_in_words
 from daq_app.runfile.durable import write_whole
 
 _A4_IN: Final = (8.27, 11.69)
@@ -58,8 +59,7 @@ def _verdict(result: Diagnosis) -> str:
 
 
 def _causes(result: Diagnosis) -> tuple[str, ...]:
-    sizes = {e.name: (e.value, e.low, e.high) for e in result.effect_parameters}
-    return in_words(result.best, sizes)
+    return causes_in_words(asdict(cause) for cause in result.causes)
 
 
 def _meanings(runs: Sequence[GapRun]) -> dict[str, str]:

@@ -75,15 +75,16 @@ Interval = tuple[float, float, float]
 """(value, low, high) in SI."""
 
 
-def cause_in_words(effect: str, estimates: Mapping[str, Interval]) -> str:
+def cause_in_words(effect: str, estimates: Mapping[str, Interval], otherwise: str = "") -> str:
     """One effect of the library in words; `estimates` are by parameter (``a`` or ``pivot_shift.a``).
 
-    A size that is not known is said to be so; an effect without words keeps its name.
+    A size that is not known is said to be so. An effect without words of its own is said as `otherwise`, or
+    keeps its name.
     """
     base, _, target = effect.partition("@")
     phrase = _PHRASES.get(base)
     if phrase is None:
-        return effect.replace("_", " ")
+        return otherwise or effect.replace("_", " ")
     phrase = phrase.replace("{target}", _SENSORS.get(target, target) or "a channel")
     for parameter, unit in re.findall(r"\{(\w+)\|([^}]*)\}", phrase):
         found = estimates.get(f"{effect}.{parameter}", estimates.get(parameter))
@@ -92,22 +93,18 @@ def cause_in_words(effect: str, estimates: Mapping[str, Interval]) -> str:
     return phrase
 
 
-def causes_in_words(result: Mapping[str, Any]) -> tuple[str, ...]:
-    """What the first hypothesis of a result (as in its JSON) names, without what was measured directly."""
-    measured = {finding["name"] for finding in result.get("findings") or []}
-    which = result.get("which") or [{"effects": []}]
-    return in_words(
-        (name for name in which[0]["effects"] if name not in measured),
-        {
-            estimate["name"]: (estimate["value"], estimate["low"], estimate["high"])
-            for estimate in result.get("effect_parameters") or []
-        },
-    )
-
-
-def in_words(effects: Iterable[str], estimates: Mapping[str, Interval]) -> tuple[str, ...]:
-    """Several effects in words, one sentence part each."""
-    return tuple(cause_in_words(effect, estimates) for effect in effects)
+def causes_in_words(causes: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
+    """The material causes of a result (`causes` of its JSON), each with what it closes alone."""
+    said = []
+    for cause in causes:
+        if not cause["material"]:
+            continue
+        sizes = {e["name"]: (e["value"], e["low"], e["high"]) for e in cause["estimates"]}
+        words = cause_in_words(cause["name"], sizes, cause["words"])
+        closes = cause["closes"]
+        known = closes is not None and math.isfinite(closes)
+        said.append(f"{words} (closes {100.0 * closes:.0f} % of the gap alone)" if known else words)
+    return tuple(said)
 
 
 def with_interval(value: float, low: float, high: float, unit: str) -> str:

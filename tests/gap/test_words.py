@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from daq_app.gap.rocking_model.library import rocking_library
@@ -31,10 +33,22 @@ def test_a_fault_of_sensors_says_which() -> None:
     )
 
 
-def test_what_was_measured_directly_is_no_cause_and_an_effect_without_words_keeps_its_name() -> None:
-    result = {
-        "which": [{"effects": ["base_tilt", "hum@wire", "new_effect"]}],
-        "findings": [{"name": "hum@wire"}],
-        "effect_parameters": [{"name": "base_tilt.beta", "value": 1e-3, "low": 9e-4, "high": 1.1e-3}],
+def cause(name: str, closes: float | None, material: bool = True) -> dict[str, Any]:
+    estimates = [{"name": f"{name}.beta", "value": 1e-3, "low": 9e-4, "high": 1.1e-3}]
+    return {
+        "name": name,
+        "words": "said by its model",
+        "estimates": estimates,
+        "closes": closes,
+        "material": material,
     }
-    assert causes_in_words(result) == ("the base is tilted by 1.00 ± 0.10 mrad", "new effect")
+
+
+def test_material_causes_are_said_with_what_each_closes_alone() -> None:
+    said = causes_in_words(
+        [cause("base_tilt", 0.94), cause("new_effect", None), cause("viscous", 0.01, False)]
+    )
+    assert said == (
+        "the base is tilted by 1.00 ± 0.10 mrad (closes 94 % of the gap alone)",
+        "said by its model",
+    )

@@ -83,7 +83,9 @@ def test_the_page_lists_the_runs_diagnoses_them_and_shows_the_answer(qtbot, page
     assert heard == [(3, 7, "single effects")]
     assert page._title.text() == "An effect explains the gap"
     assert "viscous" in page._sentence.text()
-    assert page._more.text().startswith("In words: viscous damping of 0.60 ± 0.06 % of critical.")
+    assert page._more.text().startswith(
+        "In words: viscous damping of 0.60 ± 0.06 % of critical (closes 97 % of"
+    )
     assert "9.10 → 1.05" in page._more.text() and "Limit: One level only" in page._more.text()
     assert [bar.name for bar in page.evidence.bars] == ["viscous", "coulomb", "nothing missing"]
     assert not page.grab().toImage().isNull()

@@ -7,7 +7,7 @@ from daq_app.gap.core.fitting.held_out import GapSize
 from daq_app.gap.core.judging.evidence import Ranked
 from daq_app.gap.core.judging.remainder import GroupRest, Remainder
 from daq_app.gap.core.judging.where import Cell, GapMap
-from daq_app.gap.core.result import Decision, Detection, Estimate
+from daq_app.gap.core.result import Cause, Decision, Detection, Estimate
 
 NOMINAL = {"alpha": (0.215, "rad"), "p": (2.2021, "rad/s"), "r": (0.9, "1"), "half_base": (0.3254, "m")}
 
@@ -38,6 +38,10 @@ def diagnosis(effects: dict[str, float], runs: tuple[str, ...], **parameters: fl
     )
     rest = Remainder(9.1, 9.1, 1.02, 0.0, 0.0, (GroupRest("lvdt", "fall time 1", 40, 0.1, 1.1, 0.0),), 0.02)
     values = {name: (parameters.get(name, value), unit) for name, (value, unit) in NOMINAL.items()}
+    strengths = tuple(
+        Estimate(key, value, 0.9 * value, 1.1 * value, "1", 0.0, 0.01, "strength")
+        for key, value in effects.items()
+    )
     return Diagnosis(
         model="free rocking",
         runs=runs,
@@ -49,9 +53,18 @@ def diagnosis(effects: dict[str, float], runs: tuple[str, ...], **parameters: fl
             Estimate(name, value, 0.99 * value, 1.01 * value, unit, value, 0.02 * value, "as surveyed")
             for name, (value, unit) in values.items()
         ),
-        effect_parameters=tuple(
-            Estimate(key, value, 0.9 * value, 1.1 * value, "1", 0.0, 0.01, "strength")
-            for key, value in effects.items()
+        effect_parameters=strengths,
+        causes=tuple(
+            Cause(
+                name,
+                "a cause",
+                "dissipation",
+                0.98,
+                tuple(e for e in strengths if e.name.startswith(f"{name}.")),
+                0.97,
+                True,
+            )
+            for name in names
         ),
         scatter=(Estimate("scatter of r", 0.004, float("nan"), float("nan"), "1", 0.004, 0.7),),
         gap=gap,

@@ -187,13 +187,10 @@ def starter(
 
 
 def _print(result: Diagnosis) -> None:
-    from daq_app.gap.words import in_words
+    from daq_app.gap.words import cause_in_words
 
     console = Console()
     console.print(f"{result.decision.verdict}: {result.decision.sentence}", markup=False)
-    sizes = {e.name: (e.value, e.low, e.high) for e in result.effect_parameters}
-    if causes := in_words(result.best, sizes):
-        console.print(f"In words: {'; '.join(causes)}.", markup=False)
     console.print(f"Where: {result.where.sentence}", markup=False)
     table = Table("hypothesis", "family", "probability", "log evidence")
     for entry in result.which[:6]:
@@ -216,7 +213,9 @@ def _print(result: Diagnosis) -> None:
         )
     for cause in result.causes:
         closes = f", closes {100 * cause.closes:.0f} % alone" if cause.closes == cause.closes else ""
-        console.print(f"Cause ({cause.probability:.2f}{closes}): {cause.words}", markup=False)
+        sizes = {e.name: (e.value, e.low, e.high) for e in cause.estimates}
+        words = cause_in_words(cause.name, sizes, cause.words)
+        console.print(f"Cause ({cause.probability:.2f}{closes}): {words}", markup=False)
     for finding in result.findings:
         weight = "material" if finding.material else "ordinary"
         console.print(f"Instrument ({weight}): {finding.words}", markup=False)

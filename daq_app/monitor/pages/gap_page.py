@@ -276,7 +276,7 @@ class GapPage(QWidget):
         set_role(self._title, role)
         self._sentence.setText(str(result["decision_detail"]["sentence"]))
         set_role(self._sentence, "")
-        causes = causes_in_words(result)
+        causes = causes_in_words(result.get("causes") or [])
         parts = [f"In words: {'; '.join(causes)}."] if causes else []
         parts.append(str(result["where"]["sentence"]))
         if gap := result.get("gap"):
