@@ -27,7 +27,7 @@ from daq_app.runfile import (
     recover,
     verify,
 )
-from daq_app.runfile.exporters import ExportFormat, export_run
+from daq_app.runfile.exporters import Decimal, ExportFormat, export_run
 from daq_app.runfile.importers import import_file, load_import_map
 
 
@@ -200,11 +200,25 @@ def export_command(
     ] = None,
     to_s: Annotated[float | None, typer.Option("--to", help="Time in seconds before which to stop.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")] = False,
+    derived: Annotated[
+        bool,
+        typer.Option(
+            "--derived/--channels-only",
+            help="With rotation, velocity, phases, half-cycles and r (and a tidy table beside), or without.",
+        ),
+    ] = True,
+    decimal: Annotated[
+        Decimal,
+        typer.Option("--decimal", help="Decimal mark of CSV; comma goes with semicolons between columns."),
+    ] = "point",
 ) -> None:
     """Write a run, or a part of it, as CSV, MATLAB, TDMS, Parquet, netCDF or NumPy file.
 
-    The file appears under its name only when it is complete; gaps are NaN.
+    The file appears under its name only when it is complete; gaps are NaN. What `analyse` computes goes with
+    it, and stands as a tidy table in NAME.results.csv.
     """
+    from daq_app.cli.analyse.derived import derived_of
+
     with (
         reported(),
         _file_or_folder(out) as place,
@@ -220,6 +234,8 @@ def export_command(
             to_s=to_s,
             overwrite=overwrite,
             report=lambda fraction: progress.update(task, completed=fraction),
+            derive=derived_of if derived else lambda run: None,
+            decimal=decimal,
         )
     typer.echo(f"{path}: written, {path.stat().st_size / 1e6:.1f} MB")
 

@@ -41,6 +41,7 @@ def write_run(folder: Path, configs: Path, *, tared: bool) -> Path:
         rate_hz=test.rate_hz,
         plan=plan_to_dict(plan),
         tare=zeros if tared else {},
+        start_utc_ns=1_790_000_000_000_000_000,
     )
     with JournalWriter(folder / "demo.journal", header) as journal:
         journal.append_block(0, np.ascontiguousarray(test.readings))

@@ -59,10 +59,14 @@ def read_parquet(path: Path) -> Read:
     return table["time_s"].to_numpy(), channels, units
 
 
+_NOT_CF = {"m s-2": "m/s2"}
+
+
 def read_netcdf(path: Path) -> Read:
-    with xr.open_dataset(path, engine="h5netcdf") as content:
-        channels = {str(name): content[name].values for name in content.data_vars}
-        units = {str(name): content[name].attrs["units"] for name in content.data_vars}
+    with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as content:
+        names = {name: str(content[name].attrs["channel"]) for name in content.data_vars}
+        channels = {names[name]: content[name].values for name in content.data_vars}
+        units = {names[name]: _NOT_CF.get(u := content[name].attrs["units"], u) for name in content.data_vars}
         return content["time"].values, channels, units
 
 

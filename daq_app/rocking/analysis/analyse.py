@@ -91,6 +91,9 @@ def _analyse(
     estimates = estimates_of(series)
     onsets = _onsets(instruments.record, signals, track)
     fit = _fit(signals, track, estimates) if options.fit else None
+    if fit is not None:
+        alpha_sigma = math.hypot(fit.sigma_alpha_rad, instruments.gain_sigma * fit.alpha_rad)
+        fit = replace(fit, sigma_alpha_rad=alpha_sigma)
     theta0 = theta0_by_family(signals, track, instruments.gain_sigma)
     verdict, findings = verdict_of(instruments, tracks, series, estimates, levels_apart(signals, theta0))
     headline = theta0.get("tiltmeters", theta0["wires"])
@@ -170,7 +173,7 @@ def _fit(
         speeds_rad_s=track.speeds_before_rad_s,
         r=_typical_r(estimates),
         scatter=max(estimates["eav"].scatter, estimates["crt"].scatter),
-        noise_rad=signals.noise_rad,
+        noise_rad=max(signals.noise_rad, signals.settings.slow_noise_rad),
         p_rad_s=signals.settings.p_rad_s,
         alpha_rad=signals.settings.alpha_rad,
     )

@@ -13,8 +13,8 @@ from daq_app.rocking.analysis.results import ValueWithSigma
 
 Floats = NDArray[np.float64]
 
-CALIBRATION_SHARE = 0.002
-"""Standard uncertainty of a family's calibration, as a share of the value."""
+CALIBRATION_SHARE = 0.0014
+"""Standard uncertainty of a family's calibration, as a share of the value: 0.2 % each of two."""
 ZERO_SHARE_RAD = 3e-5
 """Standard uncertainty of a family's zero."""
 
@@ -76,12 +76,14 @@ def best_value(families: Mapping[str, ValueWithSigma]) -> ValueWithSigma:
     return ValueWithSigma(mean, sigma)
 
 
-def level(signal: Floats, scale: float, noise: float) -> ValueWithSigma:
-    """Mean of a steady stretch, its sigma from noise, calibration (of `scale`) and zero."""
+def level(
+    signal: Floats, scale: float, noise: float, calibration: float = CALIBRATION_SHARE
+) -> ValueWithSigma:
+    """Mean of a steady stretch, its sigma from noise, calibration (a share of `scale`) and zero."""
     good = signal[np.isfinite(signal)]
     if good.size < 10:
         return ValueWithSigma(math.nan, math.nan)
     statistical = max(float(good.std()), noise) / math.sqrt(good.size)
     return ValueWithSigma(
-        float(good.mean()), math.sqrt(statistical**2 + (CALIBRATION_SHARE * scale) ** 2 + ZERO_SHARE_RAD**2)
+        float(good.mean()), math.sqrt(statistical**2 + (calibration * scale) ** 2 + ZERO_SHARE_RAD**2)
     )

@@ -32,9 +32,7 @@ def theta0_by_family(signals: Signals, track: MotionTrack, gain_sigma: float) ->
         )
         if math.isfinite(value):
             found["tiltmeters"] = level(np.full(10, value), scale, noise)
-    own = level(np.full(10, track.theta0_rad), scale, track.sigma_theta0_rad)
-    own = ValueWithSigma(own.value, max(own.sigma, gain_sigma * scale))
-    found[signals.lead] = own
+    found[signals.lead] = level(np.full(10, track.theta0_rad), scale, track.sigma_theta0_rad, gain_sigma)
     wires = level(signals.wire_rotation_rad[start:stop], scale, track.sigma_theta0_rad)
     if signals.lead != "wires" and math.isfinite(wires.value):
         found["wires"] = wires

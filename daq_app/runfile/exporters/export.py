@@ -9,9 +9,11 @@ from typing import Final, Literal
 
 from daq_app.runfile.durable import replace_durably
 from daq_app.runfile.errors import RunFileError
+from daq_app.runfile.exporters.results import Decimal, tidy_csv
 from daq_app.runfile.exporters.selection import Selection, Units
 from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX
-from daq_app.runfile.hdf5.read import open_run
+from daq_app.runfile.hdf5.read import Run, open_run
+from daq_app.runfile.model import DerivedData
 
 ExportFormat = Literal["csv", "mat", "tdms", "parquet", "netcdf", "npz"]
 FORMATS: Final[dict[str, str]] = {
@@ -23,6 +25,8 @@ FORMATS: Final[dict[str, str]] = {
     "npz": ".npz",
 }
 """Format → suffix of its files."""
+RESULTS_SUFFIX: Final = ".results.csv"
+"""In place of the format's suffix: the tidy table of results."""
 
 
 def export_run(
@@ -35,12 +39,16 @@ def export_run(
     to_s: float | None = None,
     overwrite: bool = False,
     report: Callable[[float], None] = lambda fraction: None,
+    derive: Callable[[Run], DerivedData | None] = lambda run: None,
+    decimal: Decimal = "point",
 ) -> Path:
     """Write a run, or the times ``from_s ≤ t < to_s`` of it, in another format; returns the file's path.
 
     `out` is the file, or a folder in which it is named after the run.  An hour of recording needs no
-    more memory than a minute (MAT: one channel at a time).  Samples in gaps are NaN.  Raises
-    `RunFileError`; then, or when interrupted, nothing new is left on disk.
+    more memory than a minute (MAT: one channel at a time).  Samples in gaps are NaN.  What `derive`
+    computes of the run goes with it: its signals beside the channels, its results within the file and as a
+    tidy table ``….results.csv`` beside it.  Raises `RunFileError`; then, or when interrupted, nothing new is
+    left on disk.
     """
     suffix = FORMATS.get(format_)
     if suffix is None:
@@ -56,12 +64,16 @@ def export_run(
         raise RunFileError(f"the folder {final.parent} does not exist", advice="Make it first.")
     temporary = final.with_name(final.name + ".part")
     with open_run(path) as run:
-        selection = Selection.of(run, units, from_s, to_s, report)
+        selection = Selection.of(run, units, from_s, to_s, report, derive(run), decimal)
         write = importlib.import_module(f"daq_app.runfile.exporters.to_{format_}").write
         try:
             temporary.unlink(missing_ok=True)  # it may be a link to another file
             write(temporary, selection)
             replace_durably(temporary, final)
+            if selection.results:
+                test = run.header.test or run.header.run_id
+                temporary.write_text(tidy_csv(test, selection.results, decimal), encoding="utf-8", newline="")
+                replace_durably(temporary, final.with_suffix(RESULTS_SUFFIX))
         except OSError as error:
             raise RunFileError(
                 f"{final} cannot be written ({error.strerror or error})",

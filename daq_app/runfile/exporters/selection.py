@@ -10,11 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.runfile.errors import RunFileError
+from daq_app.runfile.exporters.results import Decimal, ResultRow, result_rows
 from daq_app.runfile.hdf5.read import Run
+from daq_app.runfile.model import DerivedData
 
 Units = Literal["raw", "si"]
 PIECE_SAMPLES: Final = 65536
 """Samples per channel in memory at a time: 21 MB at 41 channels."""
+
+
+@dataclass(frozen=True, slots=True)
+class DerivedColumn:
+    """A signal computed from the readings, one value per sample of the selection; NaN where it is unknown."""
+
+    name: str
+    unit: str
+    long_name: str
+    values: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +39,11 @@ class Selection:
     stop: int
     report: Callable[[float], None]
     """Told the fraction done from time to time."""
+    derived: tuple[DerivedColumn, ...] = ()
+    """Rotation, velocity, phase and what else was computed; none where nothing was."""
+    results: tuple[ResultRow, ...] = ()
+    decimal: Decimal = "point"
+    """Of text formats: comma goes with semicolons between columns."""
 
     @classmethod
     def of(
@@ -36,6 +53,8 @@ class Selection:
         from_s: float | None,
         to_s: float | None,
         report: Callable[[float], None],
+        derived: DerivedData | None = None,
+        decimal: Decimal = "point",
     ) -> Selection:
         """Columns of the times ``from_s ≤ t < to_s`` of the run's own time axis.
 
@@ -54,7 +73,17 @@ class Selection:
                 f"{run.path}: there are no samples in the time asked for",
                 advice=f"The run goes from {low:g} s to {high:g} s.",
             )
-        return cls(run, units, start, stop, report)
+        if derived is None:
+            return cls(run, units, start, stop, report, decimal=decimal)
+        columns = tuple(
+            DerivedColumn(
+                name, signal.unit, signal.long_name, _on_samples(derived, signal.values, run, start, stop)
+            )
+            for name, signal in derived.signals.items()
+            if name not in run.channel_ids
+        )
+        rows = tuple(result_rows(derived.results.get("analysis") or {}))
+        return cls(run, units, start, stop, report, columns, rows, decimal)
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -146,6 +175,15 @@ class Selection:
         """Wall clock at the first sample of the selection; 0 where the run does not know it."""
         started = self.run.header.start_utc_ns
         return started + round(self.start / self.run.rate_hz * 1e9) if started else 0
+
+
+def _on_samples(
+    derived: DerivedData, values: NDArray[np.float64], run: Run, start: int, stop: int
+) -> NDArray[np.float64]:
+    """Derived values on columns start … stop of the run: straight lines between them, NaN beyond."""
+    wanted = run.first_sample + np.arange(start, stop)
+    own = derived.first_sample + derived.step * np.arange(values.size)
+    return np.interp(wanted, own, values, left=np.nan, right=np.nan)
 
 
 def _column(run: Run, time_s: float) -> int:

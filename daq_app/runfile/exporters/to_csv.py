@@ -19,17 +19,28 @@ Formatter = Callable[[NDArray[np.float64]], Iterator[bytes]]
 
 
 def write(path: Path, selection: Selection) -> None:
-    """Columns ``time_s`` and one per channel; ``nan`` in gaps. Every number is its shortest exact text."""
-    lines_of = _formatter()
+    """Columns ``time_s``, one per channel and derived signal; ``nan`` in gaps. Numbers are exact.
+
+    With decimal commas the columns are parted by semicolons.
+    """
+    lines_of = _formatter() if selection.decimal == "point" else _with_commas
+    between = "," if selection.decimal == "point" else ";"
     with path.open("wb") as file:
         for key, value in selection.metadata().items():
             file.write(f"# {key}: {json.dumps(value, ensure_ascii=False)}\n".encode())
         for channel_id, unit in zip(selection.ids, selection.channel_units, strict=True):
             known = json.dumps(selection.channel_metadata(channel_id), ensure_ascii=False)
             file.write(f"# channel {channel_id} [{unit}]: {known}\n".encode())
-        file.write((",".join(("time_s", *selection.ids)) + "\n").encode())
+        for column in selection.derived:
+            known = json.dumps({"long_name": column.long_name}, ensure_ascii=False)
+            file.write(f"# derived {column.name} [{column.unit}]: {known}\n".encode())
+        names = ("time_s", *selection.ids, *(column.name for column in selection.derived))
+        file.write((between.join(names) + "\n").encode())
+        at = 0
         for times, values in selection.pieces():
-            file.writelines(lines_of(np.vstack([times, values])))
+            derived = [column.values[at : at + times.size] for column in selection.derived]
+            file.writelines(lines_of(np.vstack([times, values, *derived])))
+            at += times.size
 
 
 def _formatter() -> Formatter:
@@ -47,6 +58,11 @@ def _by_python(columns: NDArray[np.float64]) -> Iterator[bytes]:
     for start in range(0, len(table), _ROWS):
         rows = table[start : start + _ROWS].tolist()
         yield "".join(",".join(map(repr, row)) + "\n" for row in rows).encode()
+
+
+def _with_commas(columns: NDArray[np.float64]) -> Iterator[bytes]:
+    for lines in _by_python(columns):
+        yield lines.replace(b",", b";").replace(b".", b",")
 
 
 def _by_arrow(columns: NDArray[np.float64]) -> Iterator[bytes]:

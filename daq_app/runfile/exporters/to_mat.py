@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import re
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -18,13 +20,16 @@ _MAX_SAMPLES = 2**31 // 8 - 1024
 
 
 def write(path: Path, selection: Selection) -> None:
-    """Variables ``time_s``, the channels (``LV-A01`` becomes ``LV_A01``), ``channels``, ``run``."""
+    """Variables ``time_s``, the channels (``LV-A01`` becomes ``LV_A01``), ``channels``, ``run``.
+
+    With derived data also ``rotation``, ``velocity`` … and the structure array ``results``.
+    """
     if selection.n_samples > _MAX_SAMPLES:
         raise RunFileError(
             f"{selection.run.path} is too long for a MATLAB 5 file",
             advice="Export it in parts (--from, --to).",
         )
-    names = _variable_names(selection.ids)
+    names = _variable_names((*selection.ids, *(column.name for column in selection.derived)))
     run = selection.metadata()
     run_json = json.dumps(run)
     run["events"] = _records(run["events"], ("sample", "kind", "text"))
@@ -44,6 +49,12 @@ def write(path: Path, selection: Selection) -> None:
             }
             channels.append({"id": channel_id, "variable": names[channel_id], "unit": unit, "known": known})
             selection.report((number + 1) / len(selection.ids))
+        for signal in selection.derived:
+            _put(file, names[signal.name], signal.values[:, None])
+        if selection.results:
+            rows = [asdict(row) for row in selection.results]
+            rows = [row | {"sigma": math.nan if row["sigma"] is None else row["sigma"]} for row in rows]
+            _put(file, "results", _records(rows, ("quantity", "source", "n", "value", "sigma", "unit")))
         listing = [{key: row[key] for key in ("id", "variable", "unit")} for row in channels]
         # For programs that read no structures.
         _put(file, "channels_json", json.dumps(listing))
@@ -66,7 +77,7 @@ def _records(rows: list[dict[str, Any]], fields: tuple[str, ...]) -> object:
 def _variable_names(ids: tuple[str, ...]) -> dict[str, str]:
     """MATLAB identifiers, each used once."""
     names: dict[str, str] = {}
-    used = {"run", "run_json", "time_s", "channels", "channels_json"}
+    used = {"run", "run_json", "time_s", "channels", "channels_json", "results"}
     for channel_id in ids:
         stem = re.sub(r"\W", "_", channel_id, flags=re.ASCII)
         stem = (stem if stem[0].isalpha() else f"ch_{stem}")[:56]

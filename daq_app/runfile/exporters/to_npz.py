@@ -26,6 +26,15 @@ def write(path: Path, selection: Selection) -> None:
         "first_sample": np.int64(metadata["first_sample"]),
         "metadata_json": np.array(json.dumps(metadata)),
     }
+    if selection.derived:
+        small["derived_names"] = np.array([column.name for column in selection.derived])
+        small["derived_units"] = np.array([column.unit for column in selection.derived])
+        small["derived"] = np.array([column.values for column in selection.derived])
+    if selection.results:
+        for field in ("quantity", "source", "n", "value", "unit"):
+            small[f"results_{field}"] = np.array([getattr(row, field) for row in selection.results])
+        sigmas = [np.nan if row.sigma is None else row.sigma for row in selection.results]
+        small["results_sigma"] = np.array(sigmas)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
         for name, value in small.items():
             with archive.open(f"{name}.npy", "w") as member:

@@ -12,6 +12,9 @@ from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 from daq_app.runfile.exporters.selection import Selection
 
 GROUP: Final = "Measurement"
+DERIVED_GROUP: Final = "Derived"
+RESULTS_GROUP: Final = "Results"
+_WAVEFORM: Final = ("wf_increment", "wf_start_time", "wf_start_offset", "wf_samples")
 
 
 def write(path: Path, selection: Selection) -> None:
@@ -44,6 +47,7 @@ def write(path: Path, selection: Selection) -> None:
             }
             for channel_id, unit in zip(selection.ids, selection.channel_units, strict=True)
         ]
+        wave = {key: properties[0][key] for key in _WAVEFORM} if properties else {}
         for _, values in selection.pieces():
             channels = [
                 ChannelObject(GROUP, channel_id, row, properties=known_here)
@@ -52,3 +56,24 @@ def write(path: Path, selection: Selection) -> None:
             writer.write_segment([*objects, *channels])
             objects = []
             properties = [{} for _ in properties]
+        for column in selection.derived:
+            known_here = {"unit_string": column.unit, "description": column.long_name, **wave}
+            writer.write_segment(
+                [ChannelObject(DERIVED_GROUP, column.name, column.values, properties=known_here)]
+            )
+        if selection.results:
+            writer.write_segment(_results(selection))
+
+
+def _results(selection: Selection) -> list[Any]:
+    """The tidy table as channels of one group."""
+    rows = selection.results
+    columns: dict[str, Any] = {
+        "quantity": [row.quantity for row in rows],
+        "source": [row.source for row in rows],
+        "n": np.array([row.n for row in rows], dtype=np.int32),
+        "value": np.array([row.value for row in rows]),
+        "sigma": np.array([np.nan if row.sigma is None else row.sigma for row in rows]),
+        "unit": [row.unit for row in rows],
+    }
+    return [ChannelObject(RESULTS_GROUP, name, values) for name, values in columns.items()]
