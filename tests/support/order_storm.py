@@ -15,7 +15,8 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,8 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.acquisition.closing.derive import derive
-from daq_app.acquisition.closing.finaliser import Finaliser
+from daq_app.acquisition.closing.finaliser import Finished
 from daq_app.acquisition.closing.ring_recovery import recover_rings
 from daq_app.acquisition.messages.items import RequestRefused
 from daq_app.acquisition.messages.published import Command, HealthMessage, State, StateMessage
@@ -33,7 +33,7 @@ from daq_app.acquisition.pipeline.reader import Patience
 from daq_app.acquisition.session.session import Session, SessionSettings
 from daq_app.config import Rig, Scaling, load_rig, plan_tasks
 from daq_app.rocking import RotationGeometry, free_rocking
-from daq_app.runfile import Run, open_run, recover
+from daq_app.runfile import Run, finalise, open_run, recover
 from daq_app.runfile.folder import find_runs
 from drivers import Block, DriverError, Opened
 
@@ -133,6 +133,21 @@ class Listener:
             self.health = message
 
 
+class QuickFinaliser:
+    """Makes run files at once and without an analysis: what they hold is what is judged here."""
+
+    def submit(self, job: dict[str, str], then: Callable[[Finished], None] | None = None) -> Future[Finished]:
+        done: Future[Finished] = Future()
+        if job["job"] == "finalise":
+            path = finalise(Path(job["journal"]), Path(job["out"]), None, keep_journal=False)
+            done.set_result(Finished(True, f"Saved as {path.name}", str(path)))
+        else:
+            done.set_result(Finished(True, ""))
+        if then is not None:
+            then(done.result())
+        return done
+
+
 class BadDisk:
     """Makes writes fail while `trouble` is set; files of other programs are not touched."""
 
@@ -162,7 +177,6 @@ class Storm:
     rig: Rig
     rig_text: str
     folder: Path
-    finaliser: Finaliser
     rng: np.random.Generator
     log: list[str] = field(default_factory=list)
     broken: list[str] = field(default_factory=list)
@@ -182,7 +196,7 @@ class Storm:
         )
         kills: list[tuple[Path, int, int]] = []
         with disk.in_place():
-            session = Session(settings, listener, self.finaliser)  # type: ignore[arg-type]
+            session = Session(settings, listener, QuickFinaliser())  # type: ignore[arg-type]
             session.start()
             end = wall.readings.shape[1] // 400 * 400
             while driver.allowed < end:
@@ -312,7 +326,7 @@ class Storm:
 
     def _check_kill(self, wall: Wall, copy: Path, safe: int, sample: int) -> None:
         recover_rings(copy)
-        recover(copy, derive=lambda contents: derive(contents)[0])
+        recover(copy)
         ends = [0]
         spans = []
         for path in find_runs(copy):
@@ -336,33 +350,30 @@ def find_runs_or_none(folder: Path) -> list[Path]:
     return find_runs(folder) if folder.is_dir() else []
 
 
-def storm_once(rig_file: Path, folder: Path, finaliser: Finaliser, seed: int) -> tuple[list[str], list[str]]:
+def storm_once(rig_file: Path, folder: Path, seed: int) -> tuple[list[str], list[str]]:
     """(what did not hold, what happened) of the sequence of a seed."""
     rig = load_rig(rig_file)
     quick = rig.acquisition.model_copy(update={"post_rest_s": 0.5, "max_duration_s": 20.0})
     folder.mkdir(parents=True)
     rng = np.random.default_rng(seed)
     text = rig_file.read_text(encoding="utf-8")
-    storm = Storm(rig.model_copy(update={"acquisition": quick}), text, folder, finaliser, rng)
+    storm = Storm(rig.model_copy(update={"acquisition": quick}), text, folder, rng)
     return storm.run(), storm.log
 
 
 def main(argv: list[str]) -> int:
     """Run so many sequences; 1 if something did not hold."""
     count, start = int(argv[0]) if argv else 200, int(argv[1]) if len(argv) > 1 else 0
-    finaliser = Finaliser()
-    finaliser.start()
     bad = 0
     began = time.monotonic()
     for seed in range(start, start + count):
         with tempfile.TemporaryDirectory() as place:
-            broken, log = storm_once(Path("configs/fr1.toml"), Path(place) / "runs", finaliser, seed)
+            broken, log = storm_once(Path("configs/fr1.toml"), Path(place) / "runs", seed)
         if "-v" in argv:
             print(f"{seed}: {len(log)} orders and faults, {time.monotonic() - began:.0f} s", flush=True)
         if broken:
             bad += 1
             print(f"sequence {seed}:", *broken[:4], *log, sep="\n  ", flush=True)
-    finaliser.close()
     print(f"{count} sequences in {time.monotonic() - began:.0f} s, {bad} of them broke a rule")
     return 1 if bad else 0
 

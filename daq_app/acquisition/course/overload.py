@@ -17,6 +17,8 @@ _RAIL_SHARE = 0.9995
 
 _TRAVEL_SHARE = 0.001
 """Within this share of its travel from either end a sensor stands at its stop: 0.1 mm of 100 mm. Assumed."""
+_BEYOND_SHARE = 0.01
+"""A reading further than this share of the travel beyond its end comes from the line, not from the sensor."""
 TRAVELLING = ("lvdt", "wire", "tiltmeter")
 """Families with a mechanical or stated end of travel."""
 
@@ -47,6 +49,8 @@ class OverloadWatch:
         margin = 0.5 * (1.0 - _RAIL_SHARE) * (high - low)
         self._low, self._high = low + margin, high - margin
         self._travel_low, self._travel_high = travel_in_readings(channels)
+        beyond = _BEYOND_SHARE * (self._travel_high - self._travel_low)
+        self._lowest, self._highest = self._travel_low - beyond, self._travel_high + beyond
         self._now: frozenset[str] = frozenset()
         self._news: tuple[str, ...] = ()
         self.at_end: frozenset[str] = frozenset()
@@ -56,7 +60,8 @@ class OverloadWatch:
         """Ids of the channels that can follow no further in `block`, rig order."""
         largest, smallest = block.readings.max(axis=1), block.readings.min(axis=1)
         railed = (largest >= self._high) | (smallest <= self._low)
-        ended = (largest >= self._travel_high) | (smallest <= self._travel_low)
+        at_high = (largest >= self._travel_high) & (largest <= self._highest)
+        ended = at_high | (smallest <= self._travel_low) & (smallest >= self._lowest)
         reported = set(block.overloaded)
         flags = zip(self._ids, railed | ended, strict=True)
         found = tuple(name for name, flag in flags if flag or name in reported)
