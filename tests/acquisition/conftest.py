@@ -17,6 +17,7 @@ from daq_app.acquisition.closing.finaliser import Finaliser
 from daq_app.acquisition.messages.published import EventMessage, Message, Reply, State, StateMessage
 from daq_app.acquisition.pipeline.reader import Patience
 from daq_app.acquisition.process.simulated import SimulatedServer
+from daq_app.acquisition.session.requests import answer
 from daq_app.acquisition.session.session import Session, SessionSettings
 from daq_app.acquisition.viewers.client import AcquisitionClient
 from daq_app.acquisition.viewers.desk import Desk
@@ -287,7 +288,7 @@ def _handle(session: Session | None, desk: Desk, command: Any) -> Any:
     if command.name == "hello":
         return Reply(ok=True, data={"publisher": desk.addresses.publisher})
     assert session is not None
-    return session.handle(command)
+    return answer(session, command)
 
 
 # -- processes -----------------------------------------------------------------------------------

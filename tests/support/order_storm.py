@@ -30,6 +30,7 @@ from daq_app.acquisition.closing.ring_recovery import recover_rings
 from daq_app.acquisition.messages.items import RequestRefused
 from daq_app.acquisition.messages.published import Command, HealthMessage, State, StateMessage
 from daq_app.acquisition.pipeline.reader import Patience
+from daq_app.acquisition.session.requests import answer
 from daq_app.acquisition.session.session import Session, SessionSettings
 from daq_app.config import Rig, Scaling, load_rig, plan_tasks
 from daq_app.rocking import RotationGeometry, free_rocking
@@ -241,7 +242,7 @@ class Storm:
             arguments["theta0_over_alpha"] = {1: 0.15, 2: 0.25, 3: 0.35, 4: 0.40}[level]
         self.log.append(f"{session.recorder.status.sample}: {name} {arguments.get('test', '')}")
         with suppress(RequestRefused):
-            session.handle(Command(name=name, arguments=arguments))
+            answer(session, Command(name=name, arguments=arguments))
 
     def _break(self, disk: BadDisk) -> None:
         if self.rng.random() < 0.04:
@@ -254,7 +255,7 @@ class Storm:
     @staticmethod
     def _catch_up(session: Session, sample: int) -> None:
         deadline = time.monotonic() + 60.0
-        while session.analyst.sample < sample - 400 and time.monotonic() < deadline:
+        while session.analyst.voice.sample < sample - 400 and time.monotonic() < deadline:
             time.sleep(0.002)
 
     def _kill(self, session: Session, listener: Listener, sample: int, number: int) -> tuple[Path, int, int]:

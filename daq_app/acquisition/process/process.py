@@ -21,6 +21,7 @@ from daq_app.acquisition.messages.items import RequestRefused
 from daq_app.acquisition.messages.options import READY, parse, time_factor
 from daq_app.acquisition.messages.published import Command, Reply
 from daq_app.acquisition.process.hardware import driver_maker, planned_truth
+from daq_app.acquisition.session.requests import answer
 from daq_app.acquisition.viewers.desk import Answer, Desk, DeskError
 from daq_app.acquisition.viewers.session_file import SessionFile, remove_session_file, write_session_file
 from daq_app.config import ConfigError, Rig, TaskPlan, load_rig, plan_tasks
@@ -131,7 +132,7 @@ class Process:
             return Reply(ok=True, text="Rocking-test recorder", data=self._about())
         if command.name == "shutdown":
             return self._shutdown(force=bool(command.arguments.get("force", 0)))
-        return self.session.handle(command)
+        return answer(self.session, command)
 
     def _about(self) -> dict[str, object]:
         """What a viewer needs to know before it listens."""
@@ -152,7 +153,7 @@ class Process:
             "events": [event.model_dump(mode="json") for event in self.session.recent_events],
             "folder": str(self._folder.resolve()),
             "pid": os.getpid(),
-            "state": self.session.analyst.state_message().model_dump(mode="json"),
+            "state": self.session.analyst.voice.message().model_dump(mode="json"),
         }
 
     def _shutdown(self, *, force: bool) -> Answer:

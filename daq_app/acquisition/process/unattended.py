@@ -42,9 +42,9 @@ class Unattended:
             if state is State.SAVED:
                 self.exit_code = 0
             elif state is State.FAILED:
-                self._fail(self.session.analyst.state_text)
+                self._fail(self.session.analyst.voice.text)
         elif state is State.FAILED:
-            self._fail(self.session.analyst.state_text)
+            self._fail(self.session.analyst.voice.text)
         elif state is State.PREVIEWING and self._arm is None:
             self._zero()
         elif self._arm is not None and self._arm.done():

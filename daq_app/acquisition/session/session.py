@@ -11,10 +11,10 @@ from typing import Any, Final, TypeVar
 
 from daq_app.acquisition.closing.finaliser import Finaliser, Finished
 from daq_app.acquisition.closing.result_maker import ResultMaker
-from daq_app.acquisition.course.analyst import UNARMED, Analyst, Surrounding
+from daq_app.acquisition.course.analyst import UNARMED, Analyst
 from daq_app.acquisition.course.header import make_header
-from daq_app.acquisition.course.plan_order import plan_of
 from daq_app.acquisition.course.preflight import check_name, check_space
+from daq_app.acquisition.course.surrounding import Surrounding
 from daq_app.acquisition.course.tare import Tare
 from daq_app.acquisition.messages.items import (
     Ask,
@@ -27,7 +27,7 @@ from daq_app.acquisition.messages.items import (
     SourceEnded,
     Started,
 )
-from daq_app.acquisition.messages.published import Command, EventMessage, Reply, State
+from daq_app.acquisition.messages.published import EventMessage, State
 from daq_app.acquisition.messages.publisher import Publisher
 from daq_app.acquisition.pipeline.reader import Patience, Reader
 from daq_app.acquisition.pipeline.recent import Recent
@@ -36,7 +36,6 @@ from daq_app.acquisition.pipeline.ring import Ring, ring_sessions
 from daq_app.acquisition.pipeline.run_recording import Recorded
 from daq_app.acquisition.session.wakefulness import Wakefulness
 from daq_app.acquisition.session.watchdog import Watchdog
-from daq_app.acquisition.viewers.desk import Answer
 from daq_app.config.planning.plan import TaskPlan
 from daq_app.config.rig import Rig
 from daq_app.runfile import RunFileError, RunHeader, TestPlan
@@ -391,38 +390,3 @@ class Session:
         ask = Ask(name, arguments)
         self.recorder.inbox.put(ask)
         return ask.done
-
-    def handle(self, command: Command) -> Answer:
-        """Answer a viewer's command (not hello and shutdown, which the process answers)."""
-        match command.name:
-            case "preview":
-                return Reply(ok=True, text=self.preview())
-            case "arm":
-                check_name(str(command.arguments.get("test", self.analyst.plan.test)))
-                plan = plan_of(command.arguments, self.analyst.plan)
-                overrule = bool(command.arguments.get("overrule", 0))
-                return _reply_of(self.arm(plan, overrule=overrule), _answered)
-            case "plan":
-                chosen = plan_of(command.arguments, TestPlan())
-                return _reply_of(self.ask("plan", {"plan": chosen}), _answered)
-            case "tare" | "check" | "pull" | "abort" | "stop" | "marker" | "note":
-                return _reply_of(self.ask(command.name, dict(command.arguments)), _answered)
-        raise RequestRefused(
-            f"There is no command '{command.name[:40]}'. There are hello, preview, plan, tare, check, "
-            "pull, arm, abort, stop, marker, note and shutdown"
-        )
-
-
-def _answered(answer: tuple[str, dict[str, Any]]) -> Reply:
-    return Reply(ok=True, text=answer[0], data=answer[1])
-
-
-def _reply_of(asked: Future[_T], say: Callable[[_T], Reply]) -> Future[Reply]:
-    reply: Future[Reply] = Future()
-
-    def pass_on(done: Future[_T]) -> None:
-        error = done.exception()
-        reply.set_result(say(done.result()) if error is None else Reply(ok=False, text=str(error)))
-
-    asked.add_done_callback(pass_on)
-    return reply
