@@ -41,6 +41,10 @@ class Policy:
     further_share: float = 0.05
     """Share of what is explained that a further cause must explain; below, it takes up what the first one's
     form leaves. In own worlds true ones explain 6.7 % or more."""
+    instrument_nats: float = 30.0
+    """Log evidence that an effect on a single instrument must gain. In a development laboratory with ordinary
+    imperfections (13 cases) sound instruments gain 20 at most, faults of own worlds 70 or more; raising it
+    lists weaker faults of one channel instead of naming them."""
     name_probability: float = 0.90
     """Probability from which an answer is named alone; raising it says "cannot tell" more often."""
     set_content: float = 0.95

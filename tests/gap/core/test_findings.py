@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from daq_app.gap.core import Finding, Options, diagnose
+from daq_app.gap.core import Finding, Library, Options, diagnose
 from tests.support.toy_wave import LIBRARY, DecayModel, make_runs
 
 HUM = Finding(
@@ -58,3 +58,20 @@ def test_what_no_effect_explains_is_none_of_these() -> None:
     result = diagnose(DecayModel(), make_runs(11), LIBRARY, Options(), findings=(STRANGE,))
     assert result.decision.verdict == "none_of_these"
     assert STRANGE.words in result.decision.sentence
+
+
+def test_a_single_instrument_that_is_a_little_off_is_listed_and_takes_no_place() -> None:
+    """The same shift once as a cause and once as an effect on one instrument: 20 nats are a finding there."""
+    runs = make_runs(4, slope_k=0.05, shift_s=0.007)
+    as_cause = diagnose(DecayModel(), runs, LIBRARY, Options())
+    assert as_cause.decision.effects == ("shift", "slope")
+    one = replace(LIBRARY["shift"], instrument=True)
+    others = [effect for effect in LIBRARY.values() if effect.name != "shift"]
+    result = diagnose(DecayModel(), runs, Library([*others, one]), Options())
+    assert result.decision.effects == ("slope",)
+    (finding,) = result.findings
+    assert (finding.name, finding.material) == ("shift", False)
+    assert finding.low < 0.007 < finding.high
+    large = make_runs(4, slope_k=0.05, shift_s=0.05)
+    named = diagnose(DecayModel(), large, Library([*others, one]), Options())
+    assert named.decision.effects == ("shift", "slope")

@@ -111,6 +111,12 @@ def fitted(
     """
     problem = Problem(experiment, effects)
     search = Search(problem, problem.start(known), sizes, columns)
+    if not math.isfinite(search.objective):
+        # A linear step may end where the model diverges: there is nothing of the effects to begin with.
+        own = {(q.key, q.run) for q in problem.unknowns if q.effect}
+        search = Search(
+            problem, problem.start({k: u for k, u in known.items() if k not in own}), sizes, columns
+        )
     converged = search.run(4, 4, _LOOSE)
     if polish:
         converged = polished(search)
@@ -160,6 +166,7 @@ def finish(search: Search, converged: bool, exact: bool) -> Fit:
     covariance = linear.covariance
     # No constant of the sizes' own posterior is added: it is nearly the same under every hypothesis.
     evidence = -linear.marginal_at(linear.u) + bound_corrections(linear, covariance)
+    evidence = evidence if math.isfinite(evidence) else -math.inf
     sd = np.sqrt(np.diag(covariance))
     shared: dict[str, tuple[float, float, float]] = {}
     local: list[dict[str, tuple[float, float, float]]] = [{} for _ in problem.runs]

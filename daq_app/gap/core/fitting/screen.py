@@ -91,16 +91,18 @@ class Base:
         if hint is not None:
             own = {key: u for key, u in hint.items() if key not in known}
             hint = {**dict(zip(_keys(self.problem), self.u.tolist(), strict=True)), **own}
+        every = starts(problem, base, dict.fromkeys(known, 0.0))
         robust: list[tuple[Step, _Attached]] = []
         strict: list[tuple[Step, _Attached]] = []
-        tried = starts(problem, base, dict.fromkeys(known, 0.0)) if hint is None else [problem.start(hint)]
-        for u in tried:
+        for u in every if hint is None else [problem.start(hint), *every]:
             lines = [problem.linearise(i, u, None, self.columns, False) for i in range(len(problem.runs))]
             if not all(np.all(np.isfinite(line.residual)) for line in lines):
-                continue
+                continue  # the model diverges there
             for kept, linear in ((robust, self.robust), (strict, self.strict)):
                 attached = _Attached(linear, problem, u, lines, effect.name)
                 kept.append((attached.step(), attached))
+            if hint is not None:
+                break
         first = max(robust, key=lambda entry: entry[0].gain)
         shared = [k for k, q in enumerate(first[1].unknowns) if problem.unknowns[q].run is None]
         spread = np.sqrt(np.diag(np.linalg.inv(first[1].own)))[shared]

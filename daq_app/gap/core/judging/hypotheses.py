@@ -13,14 +13,15 @@ from daq_app.gap.core.fitting.likelihood import Sizes
 from daq_app.gap.core.fitting.parallel import Workers
 from daq_app.gap.core.fitting.screen import Screened, Step
 from daq_app.gap.core.fitting.tasks import FitTask, FormsTask, ScreenTask
-from daq_app.gap.core.judging.evidence import NULL, Hypothesis, Ranked, rank
+from daq_app.gap.core.judging.evidence import NULL, Hypothesis, Ranked, inclusion, rank
 from daq_app.gap.core.judging.other_forms import FreeForm
 from daq_app.gap.core.policy import POLICY, Policy
 
 REFITTED = 6
 """Effects that are refitted by either ranking, with and without the discrepancy of the fit they stand on."""
 LEADS = 2
-"""Best single causes to which a second one is sought."""
+LEAD_SHARE = 0.5
+"""A second cause is sought to the two best single ones, to the second of them if it explains half as much."""
 POLISHED = 3
 POLISH_REACH = 12.0
 """The best three hypotheses within 12 in log evidence are fitted to the end with exact Jacobians."""
@@ -59,8 +60,7 @@ class Hypotheses:
         self._keep(null)
         self._extend(NULL, "single effects", with_probes=True)
         for count in range(2, min(self.options.causes, len(self.policy.prior_count)) + 1):
-            leads = self._best(count - 1)[: LEADS if count == 2 else 1]
-            for lead in leads:
+            for lead in self._leads(count - 1):
                 self._extend(lead, f"{count} effects together")
         self._make_consistent()
         self._polish()
@@ -76,6 +76,14 @@ class Hypotheses:
         """Refitted hypotheses of so many causes, best first."""
         found = [h for h in self.fits if len(h) == count]
         return sorted(found, key=lambda h: -self.fits[h].log_evidence)
+
+    def _leads(self, count: int) -> list[Hypothesis]:
+        """Hypotheses of so many causes that a further one is sought to; none where they are not worth it."""
+        if count == 1:
+            order = self._best(1)[:LEADS]
+            least = LEAD_SHARE * (self.evidence[order[0]] - self.evidence[NULL])
+            return [h for h in order if self.evidence[h] - self.evidence[NULL] >= least]
+        return [h for h in self._best(count)[:1] if self._worth_it(h)]
 
     def _extend(self, base: Hypothesis, text: str, *, with_probes: bool = False) -> None:
         """Screen every further effect on top of a hypothesis, and refit the most promising."""
@@ -161,15 +169,36 @@ class Hypotheses:
 
     def ranked(self) -> list[Ranked]:
         """All hypotheses but those of which one cause explains too little beside the others."""
-        kept = {h: e for h, e in self.evidence.items() if len(h) < 2 or self._worth_it(h)}
+        kept = {h: e for h, e in self.evidence.items() if self._worth_it(h)}
         return rank(kept, self.library, self.policy)
 
+    def of_instruments(self) -> list[tuple[str, float, Fit]]:
+        """Effects on single instruments that are there and explain too little to be causes.
+
+        Each with its probability among all hypotheses, and the best fit that has it.
+        """
+        best = self.ranked()[0].effects
+        found = []
+        for name, probability in inclusion(rank(self.evidence, self.library, self.policy)).items():
+            fits = [fit for h, fit in self.fits.items() if name in h]
+            if self.library[name].instrument and name not in best and fits and probability > 0.5:
+                found.append((name, probability, max(fits, key=lambda fit: fit.log_evidence)))
+        return found
+
     def _worth_it(self, hypothesis: Hypothesis) -> bool:
-        """Whether the last of several causes gains nats and a share of what is explained."""
-        parts = [tuple(name for name in hypothesis if name != left) for left in hypothesis]
-        without = max(self.evidence.get(part, -math.inf) for part in parts)
-        gained = self.evidence[hypothesis] - without
-        explained = self.evidence[hypothesis] - self.evidence[NULL]
+        """Whether each single instrument gains enough, and the last of several causes nats and a share."""
+        evidence = self.evidence[hypothesis]
+        without = {
+            left: self.evidence.get(tuple(name for name in hypothesis if name != left), -math.inf)
+            for left in hypothesis
+        }
+        for name, value in without.items():
+            if self.library[name].instrument and evidence - value < self.policy.instrument_nats:
+                return False
+        if len(hypothesis) < 2:
+            return True
+        explained = evidence - self.evidence[NULL]
+        gained = evidence - max(without.values())
         return gained >= max(self.policy.further_nats, self.policy.further_share * explained)
 
     def free_forms(self, best: Hypothesis) -> list[FreeForm]:
