@@ -113,8 +113,8 @@ def tests_of(campaign: Campaign, truth: CampaignTruth) -> list[PlannedSimulation
     tests, impacts = [], dict.fromkeys(campaign.specimens, 0)
     for number, planned in enumerate(campaign.tests):
         specimen = planned.name.specimen
-        rig, own = campaign.rig_path(specimen), truth.specimens.get(specimen)
-        if rig is None or own is None:
+        rig, specimen_truth = campaign.rig_path(specimen), truth.specimens.get(specimen)
+        if rig is None or specimen_truth is None:
             missing = "rig file" if rig is None else "true r"
             wrong = f"no {missing} is given for {specimen}"
             raise ConfigError(
@@ -125,8 +125,8 @@ def tests_of(campaign: Campaign, truth: CampaignTruth) -> list[PlannedSimulation
                 rig=str(rig),
                 test=str(planned.name),
                 theta0_over_alpha=planned.theta0_over_alpha,
-                r=float(own.r * (1.0 + own.test_scatter * rng.standard_normal())),
-                impact_scatter=own.impact_scatter,
+                r=float(specimen_truth.r * (1.0 + specimen_truth.test_scatter * rng.standard_normal())),
+                impact_scatter=specimen_truth.impact_scatter,
                 seed=truth.seed * 1000 + number,
                 impacts_before=impacts[specimen],
                 effects=truth.effects,
@@ -200,8 +200,12 @@ def _document(truth: CampaignTruth, tests: list[PlannedSimulation]) -> dict[str,
     return {
         "seed": truth.seed,
         "specimens": {
-            name: {"r": own.r, "test_scatter": own.test_scatter, "impact_scatter": own.impact_scatter}
-            for name, own in truth.specimens.items()
+            name: {
+                "r": specimen_truth.r,
+                "test_scatter": specimen_truth.test_scatter,
+                "impact_scatter": specimen_truth.impact_scatter,
+            }
+            for name, specimen_truth in truth.specimens.items()
         },
         "effects": {name: dict(values) for name, values in truth.effects.items()},
         "tests": {test.test: {"r": test.r, "theta0_over_alpha": test.theta0_over_alpha} for test in tests},

@@ -49,9 +49,9 @@ def _built(tests: Sequence[TestSummary]) -> list[CaptionedFigure]:
     specimens = list(dict.fromkeys(test.specimen for test in tests))
     richest = {specimen: _richest_level(tests, specimen) for specimen in specimens}
     for specimen, level in richest.items():
-        own = [t for t in tests if (t.specimen, t.level) == (specimen, level)]
+        of_level = [t for t in tests if (t.specimen, t.level) == (specimen, level)]
         caption = f"Figure 4.1: rotation and angular velocity of {specimen}-{level}; dashed: the repetition"
-        picture = figures.histories(own, f"{specimen}-{level}")
+        picture = figures.histories(of_level, f"{specimen}-{level}")
         found.append(CaptionedFigure(f"figure_4_1_{specimen}_{level}", picture, caption))
     found.append(
         CaptionedFigure(
@@ -61,9 +61,9 @@ def _built(tests: Sequence[TestSummary]) -> list[CaptionedFigure]:
         )
     )
     for specimen, level in richest.items():
-        own = [t for t in tests if (t.specimen, t.level) == (specimen, level)]
+        of_level = [t for t in tests if (t.specimen, t.level) == (specimen, level)]
         caption = f"Figure 4.3: periods Tₙ and rotations φₙ of {specimen}-{level} against the impact n"
-        picture = figures.decay(own, f"{specimen}-{level}")
+        picture = figures.decay(of_level, f"{specimen}-{level}")
         found.append(CaptionedFigure(f"figure_4_3_{specimen}_{level}", picture, caption))
     found.append(
         CaptionedFigure(
@@ -78,8 +78,8 @@ def _built(tests: Sequence[TestSummary]) -> list[CaptionedFigure]:
 
 def _richest_level(tests: Sequence[TestSummary], specimen: str) -> str:
     """The level with most good tests; of equals the one of larger rotation, as the paper shows L3."""
-    own = [test for test in tests if test.specimen == specimen]
+    of_specimen = [test for test in tests if test.specimen == specimen]
     return max(
-        {test.level for test in own},
-        key=lambda level: (sum(t.good for t in own if t.level == level), level),
+        {test.level for test in of_specimen},
+        key=lambda level: (sum(t.good for t in of_specimen if t.level == level), level),
     )

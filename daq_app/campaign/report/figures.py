@@ -58,9 +58,9 @@ def period_against_amplitude(tests: Sequence[TestSummary]) -> Figure:
     specimens = sorted({test.specimen for test in tests})
     amplitudes = np.linspace(0.002, max([0.45, *(t.phi0 * 1.05 for t in tests)]), 300)
     for index, specimen in enumerate(specimens):
-        own = [test for test in tests if test.specimen == specimen and test.good]
+        good_tests = [test for test in tests if test.specimen == specimen and test.good]
         colour = SPECIMEN_COLOURS[index % len(SPECIMEN_COLOURS)]
-        for number, test in enumerate(own):
+        for number, test in enumerate(good_tests):
             count = min(len(test.periods_s), test.phi.size - 1)
             axis.plot(
                 test.phi[1 : count + 1],
@@ -72,8 +72,8 @@ def period_against_amplitude(tests: Sequence[TestSummary]) -> Figure:
                 alpha=0.6,
                 label=f"{specimen} measured" if number == 0 else None,
             )
-        if own:
-            theory = period(amplitudes, own[0].p_rad_s)
+        if good_tests:
+            theory = period(amplitudes, good_tests[0].p_rad_s)
             style = ("-", "--", "-.", ":")[index % 4]
             axis.plot(amplitudes, theory, style, color=colour, lw=1.6, label=f"{specimen} theory (4.1)")
     axis.set_xlabel("peak rotation θ/α")
@@ -124,10 +124,10 @@ def restitution_by_level(tests: Sequence[TestSummary]) -> Figure:
     figure = Figure(figsize=(5.2 * max(len(specimens), 1), 4.6), layout="constrained")
     axes = _axes(figure, 1, max(len(specimens), 1))
     for axis, specimen in zip(axes, specimens, strict=False):
-        own = [test for test in tests if test.specimen == specimen]
-        labels = sorted({_level_label(test) for test in own})
+        of_specimen = [test for test in tests if test.specimen == specimen]
+        labels = sorted({_level_label(test) for test in of_specimen})
         for offset, method in ((-0.14, "CRT"), (0.14, "EAV")):
-            shown = [test for test in own if method in test.methods]
+            shown = [test for test in of_specimen if method in test.methods]
             for good in (True, False):
                 part = [test for test in shown if test.good == good]
                 if not part:
@@ -145,12 +145,12 @@ def restitution_by_level(tests: Sequence[TestSummary]) -> Figure:
                     alpha=1.0 if good else 0.4,
                     label=method if good else f"{method}, left out of the mean",
                 )
-        if own:
-            axis.axhline(own[0].r_max, color="#333333", ls="--", lw=1, label="rₘₐₓ of the block")
+        if of_specimen:
+            axis.axhline(of_specimen[0].r_max, color="#333333", ls="--", lw=1, label="rₘₐₓ of the block")
         axis.set_xticks(range(len(labels)), labels)
         axis.set_xlim(-0.6, len(labels) - 0.4)
         axis.set_xlabel("level")
-        axis.set_title(f"{specimen}, rₘₐₓ = {own[0].r_max:.3f}" if own else specimen)
+        axis.set_title(f"{specimen}, rₘₐₓ = {of_specimen[0].r_max:.3f}" if of_specimen else specimen)
     handles = {
         label: handle
         for axis in axes

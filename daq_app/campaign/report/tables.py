@@ -121,19 +121,19 @@ def table_4_1(tests: Sequence[TestSummary]) -> list[RestitutionRow]:
     """Mean r by specimen and estimator over the good tests."""
     rows: list[RestitutionRow] = []
     for specimen in dict.fromkeys(test.specimen for test in tests):
-        own = [test for test in tests if test.specimen == specimen and test.good]
-        if not own:
+        good_tests = [test for test in tests if test.specimen == specimen and test.good]
+        if not good_tests:
             continue
         rows += [
             RestitutionRow(
                 specimen,
                 method,
-                _mean(own, method, corrected=False),
-                _mean(own, method, corrected=True),
-                own[0].r_max,
+                _mean(good_tests, method, corrected=False),
+                _mean(good_tests, method, corrected=True),
+                good_tests[0].r_max,
             )
             for method in METHODS
-            if any(method in test.methods for test in own)
+            if any(method in test.methods for test in good_tests)
         ]
     return rows
 
@@ -145,16 +145,19 @@ def mean_of_specimens(rows: Sequence[RestitutionRow]) -> list[RestitutionRow]:
     """
     means = []
     for method in METHODS:
-        own = [row for row in rows if row.method == method]
-        if len(own) > 1:
+        of_method = [row for row in rows if row.method == method]
+        if len(of_method) > 1:
             plain, corrected = (
-                GroupMean(sum(values) / len(own), math.nan, math.nan, math.nan, math.nan, tests)
+                GroupMean(sum(values) / len(of_method), math.nan, math.nan, math.nan, math.nan, tests)
                 for values, tests in (
-                    ([row.mean.mean for row in own], sum(row.mean.tests for row in own)),
-                    ([row.corrected.mean for row in own], sum(row.corrected.tests for row in own)),
+                    ([row.mean.mean for row in of_method], sum(row.mean.tests for row in of_method)),
+                    (
+                        [row.corrected.mean for row in of_method],
+                        sum(row.corrected.tests for row in of_method),
+                    ),
                 )
             )
-            r_max = sum(row.r_max for row in own) / len(own)
+            r_max = sum(row.r_max for row in of_method) / len(of_method)
             means.append(RestitutionRow("mean", method, plain, corrected, r_max))
     return means
 
@@ -164,9 +167,9 @@ def repetition_effect(tests: Sequence[TestSummary]) -> list[RepetitionRow]:
     rows = []
     series = dict.fromkeys((t.specimen, t.level) for t in tests if t.repetition and t.good)
     for specimen, level in series:
-        own = [t for t in tests if (t.specimen, t.level) == (specimen, level) and t.good]
-        first = [t for t in own if not t.repetition]
-        repeated = [t for t in own if t.repetition]
+        good_tests = [t for t in tests if (t.specimen, t.level) == (specimen, level) and t.good]
+        first = [t for t in good_tests if not t.repetition]
+        repeated = [t for t in good_tests if t.repetition]
         if not first:
             continue
         for method in METHODS:

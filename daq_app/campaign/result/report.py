@@ -128,8 +128,8 @@ def _table_page(test: TestSummary, rows: Sequence[RepetitionRow]) -> Figure:
         _table(page, (0.05, 0.62, 0.9, 0.22), header, estimates)
     deviation = period_deviation(test)
     if deviation is not None:
-        said = f"The measured periods deviate from theory (4.1) by {100 * deviation:+.1f} % on average."
-        page.text(0.05, 0.65, said.replace("-", "−"), fontsize=10)
+        sentence = f"The measured periods deviate from theory (4.1) by {100 * deviation:+.1f} % on average."
+        page.text(0.05, 0.65, sentence.replace("-", "−"), fontsize=10)
     cells = [
         [
             row.test + ("  (this test)" if row.this else ""),

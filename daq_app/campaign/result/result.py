@@ -88,11 +88,11 @@ def level_of(run: Path) -> tuple[RecordedTest, list[RecordedTest]]:
     this = next((test for test in recorded if test.path is not None and test.path.name == run.name), None)
     if this is None:
         raise NoResult(f"{run.name} holds no release of a named test: there is no result to show")
-    own: TestName = this.name
+    name: TestName = this.name
     earlier = [
         test
         for test in recorded
-        if (test.name.specimen, test.name.level) == (own.specimen, own.level)
+        if (test.name.specimen, test.name.level) == (name.specimen, name.level)
         and test is not this
         and test.released_ns < this.released_ns
         and test.verdict is not TestVerdict.LOST
