@@ -177,10 +177,12 @@ class JournalContents:
 
     def _find_gaps(self) -> tuple[int, tuple[Gap, ...]]:
         """First sample, and everything between first and end that no good frame covers."""
-        said = [f for f in self.frames if f.type is FrameType.GAP and f.n_samples > 0]
-        starts = [span.first for span in self._spans[:1]] + [frame.first_sample for frame in said]
+        recorded = [f for f in self.frames if f.type is FrameType.GAP and f.n_samples > 0]
+        starts = [span.first for span in self._spans[:1]] + [frame.first_sample for frame in recorded]
         first = min(starts, default=0)
-        end = max([first] + [span.end for span in self._spans[-1:]] + [frame.end_sample for frame in said])
+        end = max(
+            [first] + [span.end for span in self._spans[-1:]] + [frame.end_sample for frame in recorded]
+        )
         closing = next((frame for frame in self.frames if frame.type is FrameType.END), None)
         if closing is not None and self._spans:
             end = max(end, closing.first_sample)
@@ -198,7 +200,7 @@ class JournalContents:
                 f"{self.path}: claims that {missing} samples are missing, which cannot be true of a test"
             )
         self._end = end
-        return first, tuple(_explained(holes, said, self._reason))
+        return first, tuple(_explained(holes, recorded, self._reason))
 
     def _reason(self, frame: Frame) -> str:
         if frame.payload_bytes > MAX_TEXT_BYTES:
@@ -248,11 +250,11 @@ class JournalContents:
             self.damage.append(f"{absent} of {numbers[-1] + 1} frames are missing")
 
 
-def _explained(holes: Sequence[tuple[int, int]], said: Sequence[Frame], reason: Any) -> Iterator[Gap]:
+def _explained(holes: Sequence[tuple[int, int]], recorded: Sequence[Frame], reason: Any) -> Iterator[Gap]:
     """Holes cut at the edges of the gaps that the recorder declared, each with its reason."""
     for start, stop in holes:
         position = start
-        for frame in sorted(said, key=lambda f: f.first_sample):
+        for frame in sorted(recorded, key=lambda f: f.first_sample):
             low, high = max(position, frame.first_sample), min(stop, frame.end_sample)
             if low >= high:
                 continue

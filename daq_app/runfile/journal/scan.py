@@ -105,8 +105,8 @@ def _keep_one_journal(scan: Scan, found: list[Frame]) -> None:
     for frame in found:
         weight[frame.tag] += HEADING_BYTES + frame.payload_bytes
     tags_with_header = {frame.tag for frame in found if frame.type is FrameType.HEADER}
-    own = max(tags_with_header, key=lambda tag: weight[tag], default=None)
-    if own is None:
+    heaviest = max(tags_with_header, key=lambda tag: weight[tag], default=None)
+    if heaviest is None:
         raise RunFileError(
             "no header of a journal was found in it", advice="If it is a journal, its first part is lost."
         )
@@ -114,7 +114,7 @@ def _keep_one_journal(scan: Scan, found: list[Frame]) -> None:
     conflicting: set[int] = set()
     highest = -1
     for frame in found:
-        if frame.tag != own:
+        if frame.tag != heaviest:
             scan.foreign += 1
             continue
         twin = by_sequence.get(frame.sequence)
