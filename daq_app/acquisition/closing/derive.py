@@ -52,11 +52,11 @@ def derive(contents: JournalContents) -> tuple[DerivedData | None, str]:
     quality = judge_run(contents, analysis)
     if quality is not None:
         results["quality"] = quality
-    said = ""
+    remark = ""
     if stop - start < contents.n_samples:
         rate_hz = contents.header.rate_hz
-        said = f"Analysed from {start / rate_hz:.0f} s to {stop / rate_hz:.0f} s of this long recording"
-    return DerivedData(contents.first_sample + start, _signals(analysis.series), results=results), said
+        remark = f"Analysed from {start / rate_hz:.0f} s to {stop / rate_hz:.0f} s of this long recording"
+    return DerivedData(contents.first_sample + start, _signals(analysis.series), results=results), remark
 
 
 def _analysed(contents: JournalContents) -> tuple[int, int]:

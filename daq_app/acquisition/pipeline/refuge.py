@@ -26,9 +26,9 @@ def find_refuge(journal: JournalWriter, spares: Sequence[Path], why: str) -> Mov
     comes last: a disk that failed for a moment takes a new file again. Where the content cannot be read, a
     run of its own begins. Answers with what every place said if none takes it; `journal` is as it was then.
     """
-    own = journal.path.parent
-    places = [place for place in spares if place != own] + [own]
-    said = []
+    home = journal.path.parent
+    places = [place for place in spares if place != home] + [home]
+    refusals = []
     for place in places:
         target = _free_name(place, journal.path)
         try:
@@ -36,7 +36,7 @@ def find_refuge(journal: JournalWriter, spares: Sequence[Path], why: str) -> Mov
             journal.move_to(target)
             return Moved(journal, whole=True)
         except (OSError, RunFileError) as error:
-            said.append(f"{place}: {_words(error)}")
+            refusals.append(f"{place}: {_words(error)}")
     header = _continued(journal.header, why)
     for place in places:
         target = _free_name(place, journal.path.with_stem(header.run_id))
@@ -44,7 +44,7 @@ def find_refuge(journal: JournalWriter, spares: Sequence[Path], why: str) -> Mov
             return Moved(open_journal(target, header, ()), whole=False)
         except RunFileError:
             continue
-    return "; ".join(said)
+    return "; ".join(refusals)
 
 
 def open_journal(path: Path, header: RunHeader, spares: Sequence[Path]) -> JournalWriter:
