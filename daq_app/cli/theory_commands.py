@@ -94,8 +94,8 @@ def _block(
         return RigidBlock.rectangular(width, height, weight_kn * 1e3), joint
     given = [None if weight_kn is None else weight_kn * 1e3, radius, inertia, alpha]
     if specimen is not None:
-        own = RigidBlock.from_specimen(specimen)
-        defaults = [own.weight_n, own.r0_m, own.inertia_kg_m2, own.alpha0_rad]
+        surveyed = RigidBlock.from_specimen(specimen)
+        defaults = [surveyed.weight_n, surveyed.r0_m, surveyed.inertia_kg_m2, surveyed.alpha0_rad]
         given = [
             value if value is not None else default for value, default in zip(given, defaults, strict=True)
         ]

@@ -137,9 +137,11 @@ def _merged(channel: object, defaults: dict[str, Any]) -> object:
         merged[key] = {**base, **value} if isinstance(base, dict) and isinstance(value, dict) else value
     assumed = table.get("assumed")
     if isinstance(assumed, list):
-        own = channel.get("assumed", [])
+        declared = channel.get("assumed", [])
         merged["assumed"] = (
-            assumed + [key for key in own if key not in assumed] if isinstance(own, list) else own
+            assumed + [key for key in declared if key not in assumed]
+            if isinstance(declared, list)
+            else declared
         )
     return merged
 

@@ -48,7 +48,7 @@ def excitation_v(channel: Channel) -> float:
 def sensor_row(channel: Channel, height_m: float, offset_scatter: float, seed: int) -> NDArray[np.float64]:
     """The row of one sensor: what the rig file says, plus what differs from sensor to sensor."""
     row = blank_row()
-    own = generator(seed, channel.id, "sensor")
+    rng = generator(seed, channel.id, "sensor")
     row[la.RW_HUM] = 0.0
     row[la.RW_FAMILY] = la.FAMILY_CODE[channel.family]
     row[la.RW_X : la.RW_X + 3] = channel.position_m
@@ -61,32 +61,32 @@ def sensor_row(channel: Channel, height_m: float, offset_scatter: float, seed: i
     row[la.RW_NOISE] = channel.noise_si
     low, high = channel.range_si
     iepe = channel.measurement == "iepe"
-    scatter = offset_scatter * (high - low) * own.standard_normal()
+    scatter = offset_scatter * (high - low) * rng.standard_normal()
     if channel.family == "tiltmeter":
         scatter = min(max(scatter, -_LEVELLED_RAD), _LEVELLED_RAD)
     row[la.RW_OFFSET] = 0.0 if iepe else scatter  # an AC-coupled sensor shows no offset
     row[la.RW_LOW], row[la.RW_HIGH] = low, high
     if channel.family == "accelerometer":
-        _ring(row, channel, height_m, own)
+        _ring(row, channel, height_m, rng)
         if iepe:
             row[la.RW_FILTER] = la.HIGH_PASS
             row[la.RW_FILTER_A] = 1.0 / (2.0 * math.pi * IEPE_CORNER_HZ)
     elif channel.family == "tiltmeter":
         row[la.RW_FILTER] = la.LOW_PASS
         row[la.RW_FILTER_A] = channel.time_constant_s or _DEFAULT_TIME_CONSTANT_S
-        row[la.RW_CROSS] = own.normal(0.0, 0.005)
+        row[la.RW_CROSS] = rng.normal(0.0, 0.005)
     elif channel.time_constant_s > 0.0:
         row[la.RW_FILTER], row[la.RW_FILTER_A] = la.LOW_PASS, channel.time_constant_s
     return row
 
 
-def _ring(row: NDArray[np.float64], channel: Channel, height_m: float, own: np.random.Generator) -> None:
+def _ring(row: NDArray[np.float64], channel: Channel, height_m: float, rng: np.random.Generator) -> None:
     """Two modes of 100–400 Hz, heard louder low on the wall, gone after 10–20 ms."""
     reach = 1.0 - 0.5 * channel.position_m[2] / height_m
-    loud = RING_M_S2 * _RING_BY_AXIS[channel.axis] * reach * own.uniform(0.8, 1.2)
-    low, high = own.uniform(100.0, 190.0), own.uniform(220.0, 400.0)
-    row[la.RW_RING : la.RW_RING + 3] = 0.6 * loud, 2.0 * math.pi * low, 1.0 / own.uniform(0.005, 0.008)
-    row[la.RW_RING + 3 : la.RW_RING + 6] = 0.4 * loud, 2.0 * math.pi * high, 1.0 / own.uniform(0.003, 0.005)
+    loud = RING_M_S2 * _RING_BY_AXIS[channel.axis] * reach * rng.uniform(0.8, 1.2)
+    low, high = rng.uniform(100.0, 190.0), rng.uniform(220.0, 400.0)
+    row[la.RW_RING : la.RW_RING + 3] = 0.6 * loud, 2.0 * math.pi * low, 1.0 / rng.uniform(0.005, 0.008)
+    row[la.RW_RING + 3 : la.RW_RING + 6] = 0.4 * loud, 2.0 * math.pi * high, 1.0 / rng.uniform(0.003, 0.005)
 
 
 def sensor_rows(rig: Rig, seed: int) -> NDArray[np.float64]:
