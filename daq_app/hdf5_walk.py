@@ -94,8 +94,7 @@ def _touch_dataset(dataset: h5py.Dataset) -> None:
         if kind == h5py.h5d.VIRTUAL or creation.get_external_count() or dataset.shape is None:
             return
         if kind == h5py.h5d.CHUNKED:
-            for index in range(dataset.id.get_num_chunks()):
-                dataset.id.get_chunk_info(index)
+            dataset.id.chunk_iter(lambda chunk: None)
     with _harmless():
         is_text = h5py.check_string_dtype(dataset.dtype) is not None
         if dataset.dtype.kind == "O" and not is_text:

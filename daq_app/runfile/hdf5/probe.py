@@ -18,7 +18,7 @@ from daq_app.guarded import end_guarded, start_guarded
 from daq_app.runfile.errors import RunFileError
 
 _WORKER: Final = "daq_app.hdf5_walk"
-CPU_LIMIT_S: Final = 5.0
+CPU_LIMIT_S: Final = 3.0
 """Processor time for one file. A sound run takes 0.1 s; a loop in the HDF5 library never ends."""
 _WALL_LIMIT_S: Final = 60.0
 """For a disk that does not answer, or a machine that is far too busy."""
@@ -35,7 +35,7 @@ def require_harmless(path: Path) -> None:
 @lru_cache(maxsize=1)
 def _prober() -> Prober:
     """One child for all files: it takes half a second to start."""
-    return Prober()
+    return Prober(CPU_LIMIT_S)
 
 
 class Prober:
@@ -47,11 +47,17 @@ class Prober:
         self._child: subprocess.Popen[str] | None = None
         self._answers: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._turn = threading.Lock()
+        self._given_up: dict[tuple[str, int, int], str] = {}
+        """What was wrong with a file of this name, size and time of change: it is not waited for twice."""
 
     def prove(self, path: Path) -> None:
         """See `require_harmless`."""
+        state = path.stat()
+        file = (str(path.absolute()), state.st_size, state.st_mtime_ns)
         with self._turn:
-            trouble = self._ask(path)
+            trouble = self._given_up.get(file) or self._ask(path)
+            if trouble:
+                self._given_up[file] = trouble
         if trouble:
             raise RunFileError(f"{path} is damaged: {trouble}", advice=_ADVICE)
 

@@ -52,9 +52,9 @@ class Run:
     Not for use by several threads at once. Use as a context manager.
     """
 
-    def __init__(self, path: Path, *, just_written: bool = False) -> None:
+    def __init__(self, path: Path, *, just_written: bool = False, just_proven: bool = False) -> None:
         self.path = path
-        self._opened = open_hdf5(path, just_written=just_written)
+        self._opened = open_hdf5(path, just_written=just_written, just_proven=just_proven)
         self._file = self._opened.file
         try:
             with damage_told(path, "the structure of the file"):
@@ -320,13 +320,14 @@ class Run:
 _ADVICE_NAME: Final = "Give the run file itself, for instance runs/FR1-L3-2.h5."
 
 
-def open_run(path: Path | str, *, just_written: bool = False) -> Run:
+def open_run(path: Path | str, *, just_written: bool = False, just_proven: bool = False) -> Run:
     """Open a run file. Raises `RunFileError` if it is missing, cut short, foreign or inconsistent.
 
     A run that this machine did not seal is walked through by a child process first, unless the caller
-    has `just_written` it.
+    has `just_written` it.  Its bytes are proven as they are read, unless the caller
+    has `just_proven` them all.
     """
     path = Path(path)
     if path.is_dir():
         raise RunFileError(f"{path} is a folder", advice=_ADVICE_NAME)
-    return Run(path, just_written=just_written)
+    return Run(path, just_written=just_written, just_proven=just_proven)

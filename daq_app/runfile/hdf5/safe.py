@@ -42,11 +42,12 @@ class OpenedHdf5:
         self.file.close()
 
 
-def open_hdf5(path: Path, *, just_written: bool = False) -> OpenedHdf5:
+def open_hdf5(path: Path, *, just_written: bool = False, just_proven: bool = False) -> OpenedHdf5:
     """Open for reading. Raises `RunFileError` in plain words.
 
     The HDF5 library sees proven bytes only where the file has a seal.  A file that this machine did not
     seal itself is given to a child first (`require_harmless`), unless it was `just_written` by the caller.
+    Blocks are not proven again where the caller has `just_proven` every one of them.
     """
     try:
         seal = seal_of(path)
@@ -57,8 +58,9 @@ def open_hdf5(path: Path, *, just_written: bool = False) -> OpenedHdf5:
     try:
         if not just_written and (seal is None or not made_here(seal)):
             require_harmless(path)
-        source = path if seal is None else ProvenFile(path, seal)
-        locking = {"locking": "best-effort"} if seal is None else {}
+        plain = seal is None or just_proven
+        source = path if plain or seal is None else ProvenFile(path, seal)
+        locking = {"locking": "best-effort"} if plain else {}
         return OpenedHdf5(h5py.File(source, "r", **locking), seal)
     except (OSError, ValueError, RuntimeError, RunFileError) as error:
         with path.open("rb") as file:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from daq_app.runfile.errors import BusyError, RunFileError
-from daq_app.runfile.folder import RUN_SUFFIX, find_journals
+from daq_app.runfile.folder import RUN_SUFFIX, find_journals, find_runs
 from daq_app.runfile.hdf5.read import open_run
 from daq_app.runfile.integrity.saving import finalise_contents, is_run_of
 from daq_app.runfile.integrity.verification import verify_run
@@ -16,12 +16,12 @@ from daq_app.runfile.journal.locks import journal_locked
 from daq_app.runfile.journal.read import JournalContents, read_journal
 from daq_app.runfile.model import DerivedData
 
-Outcome = Literal["recovered", "saved already", "in use", "empty", "failed"]
+Outcome = Literal["recovered", "saved already", "in use", "empty", "failed", "left alone"]
 
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """What became of one journal. The journal itself is never changed."""
+    """What became of one journal, or of a bad run file without one. Neither is ever changed."""
 
     journal: Path
     outcome: Outcome
@@ -49,10 +49,25 @@ def recover(
     """
     path = Path(path)
     if path.is_dir():
-        return tuple(_recover_one(journal, thorough, derive) for journal in find_journals(path))
+        journals = find_journals(path)
+        made = tuple(_recover_one(journal, thorough, derive) for journal in journals)
+        return made + _bad_runs(path, {journal.with_suffix(RUN_SUFFIX) for journal in journals})
     if not path.exists():
         raise RunFileError(f"{path} does not exist", advice="Give a journal or the folder of the runs.")
     return (_recover_one(path, thorough, derive),)
+
+
+def _bad_runs(folder: Path, with_journal: set[Path]) -> tuple[Recovery, ...]:
+    """Run files that cannot be opened and that no journal is there for: they are left alone, and told."""
+    found = []
+    for path in find_runs(folder):
+        if path in with_journal:
+            continue
+        try:
+            open_run(path).close()
+        except (RunFileError, OSError) as error:
+            found.append(Recovery(path, "left alone", str(error)))
+    return tuple(found)
 
 
 def _recover_one(journal: Path, thorough: bool, derive: Derive | None) -> Recovery:

@@ -139,7 +139,7 @@ def verify_run(path: Path) -> VerifyReport:
             problems, notes = _seal_findings(path, seal)
         if problems:
             return VerifyReport(path, "run", tuple(problems), tuple(notes))
-        with open_run(path) as run:
+        with open_run(path, just_proven=seal is not None) as run:
             problems = [*_table_problems(run), *_sample_problems(run)]
             if seal is None:
                 problems += copy_problems(run)
