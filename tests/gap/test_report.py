@@ -88,6 +88,7 @@ def test_the_page_holds_everything_and_says_it_safely(tmp_path):
         "Measured and simulated rotation",
         "How far",
         "Maps of the free forms",
+        "Causes",
         "Parameters",
         "What remains",
     ]

@@ -29,8 +29,6 @@ from daq_app.gap.core.model import Model
 from daq_app.gap.core.result import CannotDiagnose, Cause, Detection, Diagnosis, Estimate
 
 PER_RUN = " (mean of the runs; each has its own)"
-_LISTED = 0.05
-"""Probability from which a cause is listed."""
 
 
 def diagnose(
@@ -195,7 +193,7 @@ class _Study(Hypotheses):
         estimates = self._estimates(found, nuisance=False)
         causes = []
         for name, probability in inclusion(ranked).items():
-            if probability < _LISTED or self.library[name].kind != "effect":
+            if probability < self.policy.listed or self.library[name].kind != "effect":
                 continue
             own = tuple(e for e in estimates if e.name.rpartition(".")[0] == name)
             closes = alone.get(name, math.nan)

@@ -71,6 +71,10 @@ class Policy:
     as not ..."""
     form_share: float = 0.1
     """... or this share of what is explained, whichever is more; no effect's model is better."""
+    own_form: float = 0.05
+    """Departure from its own form, as a share of another form's, that our model of an effect may have."""
+    listed: float = 0.05
+    """Probability from which a cause is listed at all."""
     refused: float = 0.5
     """Probability of something unknown from which the answer is "none of these"."""
     parameters_gap: float = 1.3

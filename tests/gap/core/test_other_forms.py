@@ -12,7 +12,8 @@ from daq_app.gap.core import Confusion, Diagnosis, Library, Options, diagnose
 from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.fitting.screen import Score
 from daq_app.gap.core.judging.evidence import Ranked
-from daq_app.gap.core.judging.other_forms import OWN_FORM, FreeForm, with_other_forms
+from daq_app.gap.core.judging.other_forms import FreeForm, with_other_forms
+from daq_app.gap.core.policy import POLICY
 from tests.support.toy_wave import BEND, LIBRARY, BendingModel, make_runs
 
 SIZED = replace(BEND, typical=1.5)
@@ -63,7 +64,7 @@ def _form(coefficient: float, error: float, strength: float = 1.0) -> FreeForm:
 
 
 def test_evidence_for_another_form_is_that_of_a_coefficient_of_its_size() -> None:
-    own, other = math.hypot(1.0, OWN_FORM * 3.0), math.hypot(1.0, 1.5)
+    own, other = math.hypot(1.0, POLICY.own_form * 3.0), math.hypot(1.0, 1.5)
     named = norm.pdf(2.0, 0.0, own)
     elsewhere = 0.5 * (norm.pdf(2.0, -3.0, other) + norm.pdf(2.0, 3.0, other))
     assert _form(2.0, 1.0, -2.0).log_bayes == pytest.approx(math.log(elsewhere / named))

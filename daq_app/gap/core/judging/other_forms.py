@@ -18,9 +18,8 @@ from scipy.stats import chi2, norm
 from daq_app.gap.core.effects import Effect, Library
 from daq_app.gap.core.fitting.screen import Score
 from daq_app.gap.core.judging.evidence import Ranked, family_of
+from daq_app.gap.core.policy import POLICY
 
-OWN_FORM: Final = 0.05
-"""Departure from its own form, as a share of what another form's is, that our model of an effect may have."""
 _LARGEST: Final = 300.0
 """Logarithm of the largest factor that is told from certainty."""
 
@@ -70,7 +69,7 @@ def _log_bayes(score: Score, typical: float) -> float:
     """
     if typical == 0.0 or not math.isfinite(score.error):
         return math.nan
-    own = math.hypot(score.error, OWN_FORM * typical)
+    own = math.hypot(score.error, POLICY.own_form * typical)
     other = math.hypot(score.error, 0.5 * typical)
     sides = [norm.logpdf(score.coefficient, side * typical, other) for side in (-1.0, 1.0)]
     return float(np.logaddexp(*sides) - math.log(2.0) - norm.logpdf(score.coefficient, 0.0, own))
