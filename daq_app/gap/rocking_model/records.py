@@ -96,6 +96,11 @@ class GapRun:
     """Wall clock of the first sample, which orders the campaign; 0 where it is not known."""
     excluded: tuple[str, ...] = ()
     """Channels that are examined on their own and not used with their family."""
+    gridded: dict[int, FloatArray] = field(default_factory=dict, init=False, repr=False, compare=False)
+    """Channels of this very run on the grid of the regressions, each made once (`motion.rotation.gridded`).
+
+    A run that is made from this one by `replace` begins without any, so that none is ever out of date.
+    """
 
     def indices(self, family: Family, axis: str | None = None) -> list[int]:
         """Places of the channels of a family (and axis), without the excluded ones."""
@@ -126,12 +131,17 @@ class GapRun:
         """The run with these channels back among their family."""
         if not set(ids) & set(self.excluded):
             return self
-        return replace(self, excluded=tuple(name for name in self.excluded if name not in ids))
+        return self._with_excluded(tuple(name for name in self.excluded if name not in ids))
 
     def excluding(self, ids: Iterable[str]) -> GapRun:
         """The run without these channels."""
         more = tuple(name for name in dict.fromkeys(ids) if name not in self.excluded)
-        return replace(self, excluded=self.excluded + more) if more else self
+        return self._with_excluded(self.excluded + more) if more else self
+
+    def _with_excluded(self, ids: tuple[str, ...]) -> GapRun:
+        found = replace(self, excluded=ids)
+        found.gridded.update(self.gridded)  # the channels are the same
+        return found
 
     def aligned(self, index: int) -> FloatArray:
         """A channel at the instants of the sample clock, shape (n,)."""

@@ -15,8 +15,7 @@ from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.noise import coefficient_covariance
-from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ
-from daq_app.gap.rocking_model.motion.rotation import Wire
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Wire
 from daq_app.gap.rocking_model.tolerances import CALIBRATION, CROSSTALK
 
 _SHAPES = ("gain", "lag", "curvature", "drift")

@@ -12,8 +12,8 @@ from daq_app.gap.core import Parameter
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid
-from daq_app.gap.rocking_model.motion.rotation import Rotation
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Rotation
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
 

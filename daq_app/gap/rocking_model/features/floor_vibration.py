@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
-from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid, coarse
-from daq_app.gap.rocking_model.motion.rotation import zeroed
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 
 FREQUENCIES_HZ = np.arange(0.4, 6.0, 0.02)
@@ -84,7 +84,7 @@ def _quiet(run: GapRun, grid: Grid) -> _Quiet | None:
     chosen = run.steady_accelerometers("x")
     if not chosen:
         return None
-    measured = np.mean([coarse(zeroed(run, i), run.rate_hz) for i in chosen], axis=0)
+    measured = np.mean([gridded(run, i) for i in chosen], axis=0)
     height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))
     calm = quiet(run, grid)
     held, resting = calm & (grid.time_s < -0.05), calm & (grid.time_s > grid.rest_s + _REST_MARGIN_S)

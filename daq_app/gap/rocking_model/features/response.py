@@ -9,7 +9,7 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 
 
 def first_order(values: FloatArray, time_constant_s: float, rate_hz: float = GRID_HZ) -> FloatArray:

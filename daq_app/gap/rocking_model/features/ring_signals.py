@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Shares
 from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
-from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
-from daq_app.gap.rocking_model.motion.rotation import Rotation, sooner, wall_rotation, zeroed
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import Rotation, coarse, gridded, wall_rotation
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 from daq_app.gap.rocking_model.tolerances import CALIBRATION
 
@@ -126,7 +126,7 @@ def accelerations(run: GapRun, grid: Grid, chosen: Sequence[int]) -> Acceleratio
     late = late if abs(late) > LATE_S else 0.0
     early = round(late * run.rate_hz)
     z = np.array([run.sensors[i].position_m[2] for i in chosen])
-    measured = np.array([coarse(sooner(zeroed(run, i), early), run.rate_hz) for i in chosen])
+    measured = np.array([gridded(run, i, early) for i in chosen])
     beyond = measured - z[:, None] * grid.alpha + GRAVITY_M_S2 * np.sin(grid.theta)
     pick = _between(grid, ACCELERATION_MASK_S + abs(late))
     return Accelerations(beyond, z @ measured / (z @ z), pick, early / run.rate_hz)

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.ring_signals import Signal
-from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 
 BEND_HZ = np.geomspace(2.0, 42.0, 61)
 TURN_HZ = np.geomspace(1.5, 14.0, 40)

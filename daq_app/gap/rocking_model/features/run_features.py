@@ -15,10 +15,12 @@ from daq_app.gap.rocking_model.features.family import Scene
 from daq_app.gap.rocking_model.features.floor_vibration import quiet
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion import swings as sw
-from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, coarse, make_grid
+from daq_app.gap.rocking_model.motion.motion_grid import make_grid
 from daq_app.gap.rocking_model.motion.release_speed import release_speed
 from daq_app.gap.rocking_model.motion.rotation import (
+    GRID_HZ,
     Rotation,
+    coarse,
     joint_rotation,
     sample_noise,
     wall_rotation,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 
 UPRIGHT_RAD = 1e-4
 """Rotation over which the reaction goes from one edge to the other."""

@@ -13,8 +13,8 @@ from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.channel_shapes import SHAPES, Others
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
-from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
-from daq_app.gap.rocking_model.motion.rotation import sooner, wall_rotation, zeroed
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import coarse, gridded, sooner, wall_rotation, zeroed
 from daq_app.gap.rocking_model.records import GapRun
 
 _SMOOTH_S = 0.04
@@ -70,7 +70,7 @@ def _lvdts(run: GapRun, pick: NDArray[np.bool_]) -> ChannelFamily | None:
     # A face's calibrations that differ along its length look like a twist, of that face alone.
     twist = -place[:, :1] * place[:, 1:2] * np.column_stack([place[:, 0] < 0, place[:, 0] > 0])
     design = np.column_stack([np.ones(len(chosen)), -place[:, 0], twist])
-    signals = np.array([coarse(zeroed(run, i), run.rate_hz) for i in chosen])
+    signals = np.array([gridded(run, i) for i in chosen])
     return ChannelFamily(tuple(run.sensors[i].id for i in chosen), signals, design, pick)
 
 

@@ -12,8 +12,14 @@ from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.motion.late_joint import lateness
-from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, coarse
-from daq_app.gap.rocking_model.motion.rotation import Wire, reaches_its_range, zeroed
+from daq_app.gap.rocking_model.motion.rotation import (
+    GRID_HZ,
+    Wire,
+    coarse,
+    gridded,
+    reaches_its_range,
+    zeroed,
+)
 from daq_app.gap.rocking_model.records import GapRun
 
 _OTHER: dict[Family, Family] = {"lvdt": "wire", "wire": "lvdt"}
@@ -103,7 +109,7 @@ def _rotation(run: GapRun, family: Family) -> FloatArray | None:
         sensor = run.sensors[i]
         if not np.all(np.isfinite(run.channels[i])) or reaches_its_range(run.aligned(i), sensor.range_si):
             continue
-        values = coarse(zeroed(run, i), run.rate_hz)
+        values = gridded(run, i)
         if family == "wire" and sensor.anchor_m is not None:
             values = Wire(sensor, run.survey.half_base_m).rotation(values)
         rows.append((sensor.position_m[0], values))
@@ -148,7 +154,7 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None, rough: float) ->
     sensor = run.sensors[i]
     if rotation is None or not np.all(np.isfinite(run.channels[i])):
         return 0.0, 0.0
-    mine = np.abs(coarse(zeroed(run, i), run.rate_hz))
+    mine = np.abs(gridded(run, i))
     # A channel stops at a reading, wherever its zero has gone since.
     reading = np.abs(coarse(run.aligned(i), run.rate_hz))
     furthest = float(reading.max())

@@ -9,8 +9,8 @@ import numpy as np
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.features.response import first_order
-from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
-from daq_app.gap.rocking_model.motion.rotation import zeroed
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import coarse, zeroed
 from daq_app.gap.rocking_model.records import GapRun
 
 TURNED = 0.03

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.motion.motion_grid import coarse
-from daq_app.gap.rocking_model.motion.rotation import zeroed
+from daq_app.gap.rocking_model.motion.rotation import coarse, gridded
 from daq_app.gap.rocking_model.records import GapRun
 
 
@@ -24,6 +23,6 @@ def crosstalk(run: GapRun, places: Sequence[int]) -> FloatArray:
         own, before = run.sensors[place], run.sensors[place - 1]
         spans = [s.range_si[1] - s.range_si[0] for s in (own, before)]
         if place > 0 and np.all(np.isfinite(spans)) and np.all(np.isfinite(run.channels[place - 1])):
-            row = spans[0] / spans[1] * coarse(zeroed(run, place - 1), run.rate_hz)
+            row = spans[0] / spans[1] * gridded(run, place - 1)
         rows.append(row)
     return np.array(rows)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid, coarse
-from daq_app.gap.rocking_model.motion.rotation import zeroed
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 
 MOST = 14
@@ -36,7 +36,7 @@ def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
     if not chosen or grid.impact_s.size < 3:
         return None
     height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))
-    measured = np.mean([coarse(zeroed(run, i), run.rate_hz) for i in chosen], axis=0)
+    measured = np.mean([gridded(run, i) for i in chosen], axis=0)
     windows = _windows(grid)
     if len(windows) < 3:
         return None

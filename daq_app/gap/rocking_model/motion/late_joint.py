@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, MASK_S, Grid, coarse
-from daq_app.gap.rocking_model.motion.rotation import Rotation, sooner
+from daq_app.gap.rocking_model.motion.motion_grid import MASK_S, Grid
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Rotation, coarse, sooner
 
 MOST_LATE_S = 0.08
 """By how much one family may be late against the other."""

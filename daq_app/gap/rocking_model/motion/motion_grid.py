@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.motion.rotation import coarse
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import Survey
 
-GRID_HZ = 200.0
-"""Regressions run on averages over 5 ms."""
 SMOOTH_HZ = 30.0
 POLYNOMIAL_DEGREE = 8
 SMALLEST_GRID_RAD = 8e-4
@@ -64,14 +63,6 @@ class Grid:
         """Where a base that gives way has followed, (m,): how its step comes about looks like a delay of the
         wires."""
         return np.asarray(self.from_impact_s > SETTLING_S)
-
-
-def coarse(values: FloatArray, rate_hz: float) -> FloatArray:
-    """Averages over the grid's intervals; shape (n,) → (m,)."""
-    step = round(rate_hz / GRID_HZ)
-    m = values.size // step
-    found: FloatArray = values[: m * step].reshape(m, step).mean(axis=1)
-    return found
 
 
 def make_grid(

@@ -14,6 +14,8 @@ from daq_app.gap.rocking_model.records import GapRun, Sensor, Vector3
 from daq_app.rocking.geometry.noise import timing_noise
 from daq_app.rocking.geometry.wires import wire_rotation, wire_shortening
 
+GRID_HZ = 200.0
+"""Regressions run on averages over 5 ms."""
 TAIL_S = 0.3
 """The wall stands at rest at the end of a record; this much of it is the zero of every channel."""
 HOLD_S = 0.5
@@ -48,6 +50,25 @@ def zeroed(run: GapRun, index: int) -> FloatArray:
     values = run.aligned(index)
     tail = values[-max(int(TAIL_S * run.rate_hz), 1) :]
     return values - float(np.nanmean(tail))
+
+
+def coarse(values: FloatArray, rate_hz: float) -> FloatArray:
+    """Averages over the grid's intervals; shape (n,) → (m,)."""
+    step = round(rate_hz / GRID_HZ)
+    m = values.size // step
+    found: FloatArray = values[: m * step].reshape(m, step).mean(axis=1)
+    return found
+
+
+def gridded(run: GapRun, index: int, early: int = 0) -> FloatArray:
+    """A channel less its mean at the end of the record, taken `early` samples sooner, on the grid, (m,)."""
+    if early:
+        return coarse(sooner(zeroed(run, index), early), run.rate_hz)
+    known = run.gridded.get(index)
+    if known is None:
+        known = run.gridded[index] = coarse(zeroed(run, index), run.rate_hz)
+        known.flags.writeable = False
+    return known
 
 
 def sooner(values: FloatArray, samples: int) -> FloatArray:

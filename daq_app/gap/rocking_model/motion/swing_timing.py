@@ -6,8 +6,8 @@ import numpy as np
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S
-from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
-from daq_app.gap.rocking_model.motion.rotation import sooner, zeroed
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import gridded
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 
 LATE_S = 2.5e-3
@@ -45,7 +45,7 @@ def swing_delay(run: GapRun, grid: Grid, of_impacts_s: float | None) -> tuple[fl
 
 def _in_step(run: GapRun, grid: Grid, chosen: list[int], early: int) -> tuple[float, float] | None:
     """(delay, variance) from records that are taken `early` samples sooner."""
-    rows = np.array([coarse(sooner(zeroed(run, i), early), run.rate_hz) for i in chosen])
+    rows = np.array([gridded(run, i, early) for i in chosen])
     places = np.array([run.sensors[i].position_m for i in chosen])
     whole = _at_the_foot(run, grid, rows, places)
     if whole is None:

@@ -11,8 +11,8 @@ from daq_app.gap.rocking_model.features.response import bessel
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import examine, extract
 from daq_app.gap.rocking_model.features.shapes import UPRIGHT_RAD, moment_shape, side_of, slip_shape
-from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid, coarse
-from daq_app.gap.rocking_model.motion.rotation import pivots_off, wires_of
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, coarse, pivots_off, wires_of
 from daq_app.rocking.geometry.wires import wire_shortening
 from tests.support.simulated_wall import simulate
 

@@ -19,10 +19,8 @@ from daq_app.gap.rocking_model.features.response import delay
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
-from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, Grid, coarse
-from daq_app.gap.rocking_model.motion.rotation import (
-    zeroed,
-)
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.motion.swing_timing import swing_delay
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, Survey
 from daq_app.gap.rocking_model.tolerances import CALIBRATION
@@ -42,7 +40,7 @@ def _acceleration_block(scene: Scene) -> Block | None:
     if not chosen:
         return None
     # Means over 5 ms and no filter: one that rings carries an impact past the samples left out around it.
-    measured = coarse(np.mean([zeroed(run, i) for i in chosen], axis=0), run.rate_hz)
+    measured = np.mean([gridded(run, i) for i in chosen], axis=0)
     height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))
     x = float(np.mean([run.sensors[i].position_m[0] for i in chosen]))
     arm = x - np.sign(grid.theta) * run.survey.half_base_m

@@ -20,9 +20,10 @@ from daq_app.gap.rocking_model.features.pivots import pivots
 from daq_app.gap.rocking_model.features.response import bessel, first_order
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.late_joint import in_step
-from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import (
     Rotation,
+    coarse,
 )
 from daq_app.gap.rocking_model.records import GapRun, Survey
 from daq_app.gap.rocking_model.tolerances import CALIBRATION, SKEW_S

@@ -21,9 +21,9 @@ from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size,
 from daq_app.gap.rocking_model.features.response import slow_response
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
-from daq_app.gap.rocking_model.motion.motion_grid import GRID_HZ, coarse
 from daq_app.gap.rocking_model.motion.rotation import (
-    zeroed,
+    GRID_HZ,
+    gridded,
 )
 from daq_app.gap.rocking_model.records import Survey
 from daq_app.gap.rocking_model.tolerances import CALIBRATION, SKEW_S, TILT_CONSTANT
@@ -46,7 +46,7 @@ def _tilt_block(scene: Scene) -> Block | None:
     if not chosen:
         return None
     pick = scene.rocking | (grid.time_s <= 0)
-    measured = [coarse(zeroed(run, i), run.rate_hz) for i in chosen]
+    measured = [gridded(run, i) for i in chosen]
     nominal = np.array([max(run.sensors[i].time_constant_s, _SHORTEST_S) for i in chosen])
     slow = np.array([_time_constant(scene, m, s, pick) for m, s in zip(measured, nominal, strict=True)])
     found = regress(

@@ -21,12 +21,13 @@ from daq_app.gap.rocking_model.features.pivots import travel
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import moment_shape, slip_shape
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
-from daq_app.gap.rocking_model.motion.motion_grid import Grid, coarse
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import (
     Wire,
     anchors_off,
+    coarse,
+    gridded,
     wall_rotation,
-    zeroed,
 )
 from daq_app.gap.rocking_model.records import GapRun, Survey
 from daq_app.gap.rocking_model.tolerances import CALIBRATION
@@ -81,7 +82,7 @@ def _translation_block(scene: Scene) -> Block | None:
     for i in chosen:
         sensor = run.sensors[i]
         ideal = Wire(sensor, run.survey.half_base_m).shortening(grid.theta)
-        shift.append(coarse(zeroed(run, i), run.rate_hz) - ideal)
+        shift.append(gridded(run, i) - ideal)
     design = np.column_stack([np.ones_like(heights), heights])
     at_base = np.linalg.pinv(design)[0]
     moved = at_base @ np.array(shift)
