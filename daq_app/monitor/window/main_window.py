@@ -269,6 +269,9 @@ class MainWindow(QMainWindow):
                 self.orders.adopt_plan(message)
                 self._show_target(message)
                 self._on_state(message)
+                # Both at once: strip and gauge never show the words of two different moments.
+                self.header.refresh(self.colours)
+                self.prepare.gauge.update()
             case CheckMessage():
                 self.prepare.show_check(message.check)
             case EventMessage():
