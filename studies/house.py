@@ -204,7 +204,8 @@ def _numbers(folder: Path) -> Measures:
     for place in DIAGNOSIS:
         for file in sorted((folder / place).rglob("*.py")):
             tree = ast.parse(file.read_text(encoding="utf-8"))
-            named[file.name in POLICY] += len(list(named_constants(tree)))
+            inside = file.name in POLICY
+            named[inside] += len(list(named_constants(tree, fields=inside)))
             bare += len(list(bare_floats(tree)))
     return {
         "gap diagnosis: named numbers outside policy and tolerances": str(named[False]),
@@ -213,8 +214,8 @@ def _numbers(folder: Path) -> Measures:
     }
 
 
-def named_constants(tree: ast.AST) -> Iterator[str]:
-    """Names in capitals that are given a number, at the top of a module or of a class."""
+def named_constants(tree: ast.AST, *, fields: bool = False) -> Iterator[str]:
+    """Names in capitals, or all `fields`, that are given a number at the top of a module or of a class."""
     for holder in ast.walk(tree):
         if not isinstance(holder, ast.Module | ast.ClassDef):
             continue
@@ -226,7 +227,7 @@ def named_constants(tree: ast.AST) -> Iterator[str]:
             else:
                 continue
             for target in targets:
-                if isinstance(target, ast.Name) and target.id.isupper() and _is_number(value):
+                if isinstance(target, ast.Name) and _is_number(value) and (fields or target.id.isupper()):
                     yield target.id
 
 
