@@ -92,5 +92,10 @@ def test_diff_terminals_of_the_9205() -> None:
 
 def test_unknown_product_names_its_neighbours() -> None:
     with pytest.raises(catalogue.UnknownProduct) as caught:
-        catalogue.module("NI-9205")
+        catalogue.module("NI 9205x")
     assert "NI 9205" in caught.value.near
+
+
+@pytest.mark.parametrize("spelling", ["NI-9205", "ni 9205", "NI 9205"])
+def test_a_product_is_found_in_other_spellings(spelling: str) -> None:
+    assert catalogue.module(spelling).name == "NI 9205"

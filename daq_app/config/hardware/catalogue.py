@@ -8,14 +8,20 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, Final, TypeVar
 
-from daq_app.config.hardware.products import CHASSIS, MODULES, ChassisProduct, DeltaSigma, Product, Range
+from daq_app.config.hardware.product_files import ProductSet, built_in
+from daq_app.config.hardware.products import ChassisProduct, DeltaSigma, Product, Range
 from daq_app.config.validation import nearest
 
 PADDING_S = 10e-6
 """Settling time that NI-DAQmx adds between two conversions where there is room (NI cDAQ manuals)."""
 _DEFAULT_TIMEBASE_HZ = 80e6
+PLANNED: Final = frozenset({"voltage", "iepe", "lvdt_native"})
+"""Measurements that a rig file can ask for."""
+_NONE: Final[Mapping[str, Any]] = MappingProxyType({})
 
 
 class UnknownProduct(LookupError):
@@ -27,20 +33,51 @@ class UnknownProduct(LookupError):
         super().__init__(f"{name!r} is not in the hardware catalogue")
 
 
-def module(name: str) -> Product:
-    """The module of that product name. Raises `UnknownProduct`."""
-    try:
-        return MODULES[name]
-    except KeyError:
-        raise UnknownProduct(name, nearest(name, MODULES, n=3)) from None
+BUILT_IN: Final[ProductSet] = built_in()
+MODULES: Final[Mapping[str, Product]] = MappingProxyType(
+    {
+        name: item
+        for name, item in BUILT_IN.products.items()
+        if item.n_ai and item.bus in ("cdaq", "pxie") and item.measurements & PLANNED
+    }
+)
+"""Product name → module that the planner can put channels on."""
+CHASSIS: Final[Mapping[str, ChassisProduct]] = MappingProxyType(
+    {name: item for name, item in BUILT_IN.chassis.items() if item.bus in ("cdaq", "pxie")}
+)
+"""Product name → chassis."""
+_Entry = TypeVar("_Entry")
 
 
-def chassis(name: str) -> ChassisProduct:
-    """The chassis of that product name. Raises `UnknownProduct`."""
-    try:
-        return CHASSIS[name]
-    except KeyError:
-        raise UnknownProduct(name, nearest(name, CHASSIS, n=3)) from None
+def find(name: str, *tables: Mapping[str, _Entry]) -> _Entry | None:
+    """The entry of that name in the first table that has it; ``NI-9205`` and ``ni 9205`` are ``NI 9205``."""
+    for table in tables:
+        if name in table:
+            return table[name]
+    wanted = _spelling(name)
+    return next(
+        (entry for table in tables for known, entry in table.items() if _spelling(known) == wanted), None
+    )
+
+
+def _spelling(name: str) -> str:
+    return name.casefold().replace("-", " ").replace("_", " ").strip()
+
+
+def module(name: str, own: Mapping[str, Product] = _NONE) -> Product:
+    """The module of that product name, first among the user's own. Raises `UnknownProduct`."""
+    found = find(name, own, MODULES, BUILT_IN.products)
+    if found is None:
+        raise UnknownProduct(name, nearest(name, [*own, *MODULES], n=3))
+    return found
+
+
+def chassis(name: str, own: Mapping[str, ChassisProduct] = _NONE) -> ChassisProduct:
+    """The chassis of that product name, first among the user's own. Raises `UnknownProduct`."""
+    found = find(name, own, CHASSIS, BUILT_IN.chassis)
+    if found is None:
+        raise UnknownProduct(name, nearest(name, [*own, *CHASSIS], n=3))
+    return found
 
 
 def device_name(chassis_name: str, bus: str, slot: int) -> str:
@@ -85,13 +122,20 @@ def _delta_sigma_rate(clocks: Sequence[DeltaSigma], requested_hz: float) -> floa
 def coerce_range(product: str | Product, low_v: float, high_v: float) -> Range:
     """The narrowest input range of the module that holds [low, high]. Raises `ValueError` if none does."""
     item = module(product) if isinstance(product, str) else product
-    for low, high in item.ranges_v:
-        if low - 1e-9 <= low_v < high_v <= high + 1e-9:
-            return (low, high)
-    widest = item.ranges_v[-1]
-    raise ValueError(
-        f"{low_v:g} to {high_v:g} V is not within the {widest[0]:g} to {widest[1]:g} V of {item.name}"
-    )
+    try:
+        return coerce_range_of(item.ranges_v, low_v, high_v)
+    except ValueError as error:
+        raise ValueError(f"{error} V of {item.name}") from None
+
+
+def coerce_range_of(ranges: Sequence[Range], low: float, high: float) -> Range:
+    """The first of the ranges (narrowest first) that holds [low, high]. Raises `ValueError`."""
+    for bottom, top in ranges:
+        slack = 1e-9 * max(abs(bottom), abs(top))
+        if bottom - slack <= low < high <= top + slack:
+            return (bottom, top)
+    widest = ranges[-1]
+    raise ValueError(f"{low:g} to {high:g} is not within {widest[0]:g} to {widest[1]:g}")
 
 
 def input_delay_s(product: str | Product, rate_hz: float) -> float:
