@@ -19,7 +19,8 @@ class SignalSource(Protocol):
         """Ideal (unquantised) volts of shape (len(terminals), len(times_s)).
 
         `terminals` are physical channels such as ``cDAQ1Mod1/ai0``; a terminal with nothing wired
-        to it floats near 0 V. `times_s` ascend. For native LVDT and IEPE terminals too the value is
+        to it floats near 0 V, or is NaN throughout: the device then shows what NI's simulated devices
+        show. `times_s` ascend. For native LVDT and IEPE terminals too the value is
         the electrical one (volts; volts per volt of excitation for LVDTs): the device scales.
         """
         ...
@@ -34,3 +35,20 @@ class SignalSource(Protocol):
         Raises `ValueError` in words for a command or argument that is not known.
         """
         ...
+
+
+class NothingWired:
+    """No world at all: every terminal is open. Keeps `SignalSource`."""
+
+    def volts(self, terminals: tuple[str, ...], times_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """NaN throughout, shape (len(terminals), len(times_s))."""
+        return np.full((len(terminals), len(times_s)), np.nan)
+
+    def advance(self, time_s: float) -> None:
+        """Nothing here depends on commands."""
+
+    def command(self, name: str, arguments: dict[str, float | str]) -> dict[str, object]:
+        """`status` and `reset` do nothing; `ValueError` for all others."""
+        if name in ("status", "reset"):
+            return {"state": "nothing wired"}
+        raise ValueError(f"nothing is wired to this bench: it cannot {name}")

@@ -47,14 +47,14 @@ class Code(IntEnum):
     EVERY_N_UNBUFFERED = -200848
     DONE_REGISTERED = -200950
     SIGNAL_REGISTERED = -200949
-    EVERY_N_REGISTERED = -200881
+    EVERY_N_REGISTERED = -200966
     EVENT_WHILE_RUNNING = -200960
     DEVICE_LOST = -201003
     NETWORK_LOST = -201390
     DUPLICATE_TASK = -200089
     TASK_NOT_IN_MAX = -200485
     SCALAR_OF_MANY = -200523
-    EVERY_N_NOT_FOR_INPUT = -200965
+    EVERY_N_NOT_FOR_INPUT = -200980
     SIGNAL_EVENT_UNSUPPORTED = -200987
     UNITS_NOT_CUSTOM = -200447
     SCALE_UNKNOWN = -200378
@@ -64,6 +64,30 @@ class Code(IntEnum):
     SCALE_NO_COEFFICIENTS = -200404
     SCALE_TABLE_LENGTHS = -200350
     NO_SYNC = -201426
+    NO_DEVICE_CONTEXT = -201118
+    SOURCE_TERMINAL_UNKNOWN = -89120
+    DESTINATION_TERMINAL_UNKNOWN = -89121
+    TRIGGER_ON_DEMAND = -200262
+    EVERY_N_OUTPUT_REGISTERED = -200967
+    EVERY_N_NOT_FOR_OUTPUT = -200981
+    ATTRIBUTE_NOT_SUPPORTED = -200197
+    GLOBAL_CHANNEL_UNKNOWN = -200882
+    TIMESTAMP_NOT_ENABLED = -209842
+    SCALE_ATTRIBUTE = -200601
+    TEDS_NOT_DETECTED = -200709
+    TEDS_DATA = -200826
+    TEDS_NOT_CONFIGURABLE = -200791
+    ARRAY_SIZES_DIFFER = -200672
+    SHUNT_CALIBRATION = -201493
+    GET_BEFORE_RESERVED = -200983
+    TWO_PART_ORDER = -201194
+    NOT_YET_WRITTEN = -200292
+    NO_MORE_SPACE = -200293
+    OUTPUT_UNDERFLOW = -200290
+    NO_OUTPUT_CHANNELS = -200459
+    NO_LIMITS = -200695
+    NETWORK_NOT_RESERVED = -201388
+    NETWORK_RESERVED_BY_OTHER = -201420
 
 
 _TEXT: Final[dict[int, str]] = {
@@ -107,7 +131,10 @@ _TEXT: Final[dict[int, str]] = {
     Code.SAMPLES_NOT_YET_AVAILABLE: (
         "Some or all of the samples requested have not yet been acquired.\n\n"
         "To wait for the samples to become available use a longer read timeout or read later in your "
-        "program."
+        "program. To make the samples available sooner, increase the sample rate. If your task uses a "
+        "start trigger, make sure that your start trigger is configured correctly. It is also possible "
+        "that you configured the task for external timing, and no clock was supplied. If this is the "
+        "case, supply an external clock."
     ),
     Code.REF_TRIGGER_WHEN_CONTINUOUS: (
         "Reference trigger is not supported when the sample mode is continuous."
@@ -185,6 +212,14 @@ _TEXT: Final[dict[int, str]] = {
     Code.SCALE_SCALED_EQUAL: "Minimum and maximum of the scaled values cannot be equal.",
     Code.SCALE_NO_COEFFICIENTS: "Coefficients of the polynomial scale are not specified.",
     Code.SCALE_TABLE_LENGTHS: "Table scale has different numbers of pre-scaled and scaled values.",
+    Code.ATTRIBUTE_NOT_SUPPORTED: "Specified property is not supported by this device.",
+    Code.GLOBAL_CHANNEL_UNKNOWN: "There is no global channel of that name in NI MAX.",
+    Code.NO_LIMITS: (
+        "Minimum and maximum of the channel are not set, and there is no default for them: set both."
+    ),
+    Code.TEDS_DATA: "The electronic data sheet (TEDS) of the sensor is damaged, or is no data sheet.",
+    Code.TEDS_NOT_DETECTED: "No TEDS sensor was detected on the physical channel.",
+    Code.NOT_YET_WRITTEN: "Some of the samples to generate have not been written yet.",
     Code.NO_SYNC: (
         "Devices of this task cannot be synchronized: they have no clock in common. Use devices of "
         "one chassis, or of chassis on one time-synchronized network."

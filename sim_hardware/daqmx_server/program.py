@@ -7,6 +7,7 @@ import signal
 import sys
 import threading
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,16 +15,18 @@ import psutil
 
 from daq_app.config.errors import ConfigError
 from daq_app.config.hardware.catalogue import UnknownProduct
+from daq_app.config.hardware.product_files import read_product_files
 from daq_app.config.loader import load_rig
 from daq_app.config.rig import Rig
 from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.bench.clock import BenchClock, PacedClock, SteppedClock
-from sim_hardware.daqmx_server.inventory.devices import Inventory
-from sim_hardware.daqmx_server.inventory.max_export import load_max_export
-from sim_hardware.daqmx_server.services.server import DaqmxServer
+from sim_hardware.daqmx_server.inventory.devices import Inventory, device_from_text
+from sim_hardware.daqmx_server.inventory.max_export import MaxExport, load_max_export
+from sim_hardware.daqmx_server.services.server import DaqmxServer, missing_calls
+from sim_hardware.daqmx_server.services.storage import fill
 from sim_hardware.faults.script import load_faults
 from sim_hardware.marked_line import MarkedLine
-from sim_hardware.signals import SignalSource
+from sim_hardware.signals import NothingWired, SignalSource
 
 _PARENT_POLL_S = 0.5
 
@@ -41,12 +44,14 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     options = argparse.ArgumentParser(
         prog="python -m sim_hardware.daqmx_server",
-        description="Simulated NI-DAQmx device server (gRPC, loopback only) with a rocking wall wired to it.",
-        epilog="example: python -m sim_hardware.daqmx_server --port 0 --config configs/fr1.toml --speed 10",
+        description="Simulated NI-DAQmx device server (gRPC, loopback only): with a rocking wall wired to "
+        "it, or on its own with the devices of an NI MAX export or of product names.",
+        epilog="examples: python -m sim_hardware.daqmx_server --config configs/fr1.toml --speed 10; "
+        "python -m sim_hardware.daqmx_server --device Dev1=PCIe-6363 --port 31763",
     )
     options.add_argument("--port", type=int, default=0, help="TCP port; 0 lets the system choose")
     options.add_argument(
-        "--config", type=Path, required=True, metavar="RIG.toml", help="rig: hardware and wall"
+        "--config", type=Path, metavar="RIG.toml", help="rig: hardware and wall; none: no wall"
     )
     options.add_argument(
         "--speed", type=_speed, default=1.0, help="time factor, or max: time moves with the reads"
@@ -61,11 +66,43 @@ def parser() -> argparse.ArgumentParser:
         "marked: no wall, every sample of an LVDT tells its own place",
     )
     options.add_argument(
-        "--max-export", type=Path, metavar="FILE.ini", help="take the devices from NI MAX, not from the rig"
+        "--max-export",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE.ini",
+        help="take devices, scales, saved tasks and channels from NI MAX, not from the rig; may be repeated",
+    )
+    options.add_argument(
+        "--device",
+        action="append",
+        default=[],
+        metavar="NAME=PRODUCT",
+        help="a device, for instance Dev1=PCIe-6363, cDAQ1=cDAQ-9178, cDAQ1Mod1=NI-9205; may be repeated",
+    )
+    options.add_argument(
+        "--real",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a device that calls itself not simulated: its inputs see its own outputs, not NI's sine",
+    )
+    options.add_argument(
+        "--products",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE.toml",
+        help="product file of your own; may be repeated",
     )
     options.add_argument("--faults", type=Path, metavar="FILE", help="script of faults (TOML or JSON)")
     options.add_argument(
         "--finite", choices=("real", "instant"), default="real", help="clock of finite tasks"
+    )
+    options.add_argument(
+        "--missing",
+        action="store_true",
+        help="print which calls of the service are not simulated",
     )
     options.add_argument("--parent-pid", type=int, help="end when this process has ended")
     return options
@@ -76,16 +113,39 @@ def build_bench(arguments: argparse.Namespace) -> Bench:
 
     Raises `ConfigError`, `UnknownProduct`, or `ValueError` for a wall that makes no sense.
     """
-    rig = load_rig(arguments.config)
-    export = arguments.max_export
-    inventory = Inventory.from_rig(rig) if export is None else load_max_export(export)
+    rig = None if arguments.config is None else load_rig(arguments.config)
+    own = read_product_files(arguments.products)
+    export = load_max_export(*arguments.max_export, own=own) if arguments.max_export else MaxExport()
+    if rig is not None and not arguments.max_export:
+        export.inventory = Inventory.from_rig(rig)
+    for text in arguments.device:
+        export.inventory.add(device_from_text(text, export.inventory, own))
+    for name in arguments.real:
+        device = export.inventory.devices.get(name)
+        if device is None:
+            raise ValueError(f"--real {name}: there is no such device")
+        export.inventory.devices[name] = replace(device, simulated=False)
+    if not export.inventory.devices:
+        raise ValueError("no devices: give --config, --max-export or --device NAME=PRODUCT")
     clock: BenchClock = SteppedClock() if arguments.speed == float("inf") else PacedClock(arguments.speed)
-    bench = Bench(inventory, _wall(rig, arguments), clock, arguments.finite)
+    source = NothingWired() if rig is None else _wall(rig, arguments)
+    bench = Bench(export.inventory, source, clock, arguments.finite)
     faults = load_faults(arguments.faults) if arguments.faults is not None else []
     with bench.changed:
+        fill(bench, export)
         for fault in faults:
             bench.add_fault(fault)
     return bench
+
+
+def _report_unknown(inventory: Inventory) -> None:
+    """Say which devices have no channels, since no product file describes them."""
+    for device in inventory.without_channels():
+        print(
+            f"daqmx_server: {device.name} ({device.product_name}) has no channels: its product is in no "
+            "product file. Write one and give it with --products",
+            file=sys.stderr,
+        )
 
 
 def _wall(rig: Rig, arguments: argparse.Namespace) -> SignalSource:
@@ -118,12 +178,17 @@ def warm_up(bench: Bench, arguments: argparse.Namespace) -> None:
 def main(argv: Sequence[str] | None = None) -> int:
     """Serve until a signal, or until the parent has gone. Exit code 2 for a bad configuration."""
     arguments = parser().parse_args(argv)
+    if arguments.missing:
+        print(*missing_calls(), sep="\n")
+        return 0
     try:
         server = DaqmxServer(build_bench(arguments), arguments.port)
     except (ConfigError, UnknownProduct, ValueError, OSError, RuntimeError) as error:
         print(f"daqmx_server: {error}", file=sys.stderr)
         return 2
-    warm_up(server.bench, arguments)
+    _report_unknown(server.bench.inventory)
+    if arguments.config is not None:
+        warm_up(server.bench, arguments)
     ended = threading.Event()
     for name in ("SIGINT", "SIGTERM", "SIGBREAK"):
         if hasattr(signal, name):

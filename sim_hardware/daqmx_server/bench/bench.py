@@ -5,13 +5,15 @@ from __future__ import annotations
 import datetime as dt
 from concurrent.futures import ThreadPoolExecutor
 from threading import Condition, RLock
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import hightime
 import numpy as np
 
 from sim_hardware.daqmx_server.bench.clock import BenchClock, SteppedClock
+from sim_hardware.daqmx_server.bench.loopback import Loopback, WiredBench
 from sim_hardware.daqmx_server.channels.scale import CustomScale
+from sim_hardware.daqmx_server.channels.teds import DataSheet
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory.devices import Device, Inventory, module_device
 from sim_hardware.daqmx_server.inventory.terminals import plain
@@ -52,16 +54,32 @@ class Bench:
         self.changed = Condition(RLock())
         self.inventory = inventory
         self.source = source
+        self.loopback = Loopback()
+        self.wiring = WiredBench(source.volts, self.loopback, self._is_real)
         self.clock = clock
         self.finite = finite
         self.faults = FaultBoard(clock.now, self._volts_at)
         self.helper = ThreadPoolExecutor(1, thread_name_prefix="samples ahead")
         self.tasks: dict[str, BenchTask] = {}
         self.scales: dict[str, CustomScale] = {}
+        self.routes: dict[str, str] = {}
+        """Destination terminal → source, as the client has connected them."""
+        self.power_up: dict[str, int] = {}
+        """What lines, pulls and logic families are set to at power-up."""
+        self.data_sheets: dict[str, DataSheet] = {}
+        """Data sheets (TEDS) of sensors, by physical channel."""
+        self.calibration: dict[tuple[str, str], Any] = {}
+        """(device, attribute) → value that a client has set."""
+        self.network_reserved: set[str] = set()
+        """Network chassis that this computer has reserved."""
+        self.saved_scales: dict[str, dict[str, str]] = {}
+        self.saved_channels: dict[str, dict[str, str]] = {}
+        self.saved_tasks: dict[str, dict[str, str]] = {}
+        """What NI MAX has saved: name → keys and values of its section."""
         self._owners: dict[str, str] = {}
         self._edges: dict[str, list[tuple[float, bool]]] = {}
         self._swapped: dict[str, Device] = {}
-        self._epoch = hightime.datetime.now(dt.UTC)
+        self._epoch: hightime.datetime | None = None
 
     @property
     def readers_drive_time(self) -> bool:
@@ -70,6 +88,8 @@ class Bench:
 
     def utc(self, time_s: float) -> hightime.datetime:
         """Wall-clock time of an instant of the bench, finer than a float's seconds since 1970 could be."""
+        if self._epoch is None:
+            self._epoch = hightime.datetime.now(dt.UTC) - hightime.timedelta(seconds=self.clock.now())
         return self._epoch + hightime.timedelta(seconds=time_s)
 
     # --- devices --------------------------------------------------------------------------------
@@ -94,6 +114,10 @@ class Bench:
         outage = self.faults.outage([device.name, self.inventory.host_of(device)])
         return outage is not None and outage[1]
 
+    def _is_real(self, name: str) -> bool:
+        device = self.inventory.devices.get(name)
+        return device is not None and not device.simulated
+
     def arrived_s(self, hosts: list[str], now_s: float) -> float:
         """Instant up to which samples have come through: those taken during an outage come after it."""
         outage = self.faults.outage(hosts)
@@ -110,23 +134,29 @@ class Bench:
             elif entry is None and name in self._swapped:
                 self.inventory.devices[name] = self._swapped.pop(name)
 
-    def reserve(self, devices: list[str], owner: str, timed: bool) -> None:
-        """All or nothing; −50103 where somebody else has a device, or the chassis no timing engine left."""
-        for device in devices:
-            other = self._owners.get(device, owner) != owner
+    def reserve(self, resources: list[str], owner: str, timed_inputs: bool) -> None:
+        """All or nothing; −50103 where somebody else has a part of a device, or no timing engine is left.
+
+        A resource is a device's inputs (``Dev1/ai``), an output, a line, or a counter.
+        """
+        for resource in resources:
+            device = resource.partition("/")[0]
+            other = self._owners.get(resource, owner) != owner
             if other or self.faults.active("reserved", device):
                 raise DaqmxError(Code.RESOURCE_RESERVED, f"Device: {device}")
-        if timed:
+        devices = list(dict.fromkeys(resource.partition("/")[0] for resource in resources))
+        if timed_inputs:
             self._check_engines(devices, owner)
-        for device in devices:
-            self._owners[device] = owner
+        for resource in resources:
+            self._owners[resource] = owner
 
     def _check_engines(self, devices: list[str], owner: str) -> None:
         inventory = self.inventory
         for host in {inventory.host_of(inventory.device(device)) for device in devices}:
             engines = inventory.device(host).timing_engines
             modules = [device.name for device in inventory.devices.values() if device.chassis == host]
-            others = {self._owners[name] for name in modules if name in self._owners} - {owner}
+            inputs = [f"{name}/ai" for name in modules]
+            others = {self._owners[name] for name in inputs if name in self._owners} - {owner}
             used = sum(self.tasks[name].is_buffered for name in others if name in self.tasks)
             if engines is not None and used >= engines:
                 raise DaqmxError(Code.RESOURCE_RESERVED, f"Device: {host}\nResource: AI timing engine")

@@ -7,18 +7,15 @@ calls are taken apart by name, and each group of attributes is one small object 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from typing import Any, Final, Protocol
 
 from nidaqmx._stubs import nidaqmx_pb2
 
 from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.channels.metadata import CALL, plain_name
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 
-_CALL: Final = re.compile(
-    r"^(?P<verb>Get|Set|Reset)(?P<group>[A-Za-z]+?)Attribute(?P<type>(?:Ex)?[A-Za-z0-9]*)$"
-)
 Handler = Callable[[Bench, Any], Any]
 
 
@@ -42,7 +39,7 @@ def attribute_handlers(groups: dict[str, AttributeGroup]) -> dict[str, Handler]:
     service = nidaqmx_pb2.DESCRIPTOR.services_by_name["NiDAQmx"]
     out: dict[str, Handler] = {}
     for method in service.methods:
-        match = _CALL.match(method.name)
+        match = CALL.match(method.name)
         if match and match["group"] in groups:
             out[method.name] = _handler(method, match["verb"], groups[match["group"]])
     return out
@@ -50,20 +47,20 @@ def attribute_handlers(groups: dict[str, AttributeGroup]) -> dict[str, Handler]:
 
 def _handler(method: Any, verb: str, group: AttributeGroup) -> Handler:
     enum = method.input_type.fields_by_name["attribute"].enum_type
-    names = {value.number: _plain(value.name) for value in enum.values}
+    names = {value.number: plain_name(value.name) for value in enum.values}
     reply = getattr(nidaqmx_pb2, method.output_type.name)
     is_enum = "value_raw" in method.output_type.fields_by_name
 
     def name_of(request: Any) -> str:
         number = request.attribute_raw or request.attribute
-        if number not in names or not number:
-            return EXTRA_NAMES.get(number, f"Attribute_0x{number:04X}")
-        return names[number]
+        name = names[number] if number and number in names else EXTRA_NAMES.get(number)
+        name = name or f"Attribute_0x{number:04X}"
+        if getattr(request, "device_names", "") and not name.startswith(_BY_DEVICE):
+            raise DaqmxError(Code.NO_DEVICE_CONTEXT, f"Property: DAQmx_{name}")
+        return name
 
     def get(bench: Bench, request: Any) -> Any:
         value = group.get(bench, request, name_of(request))
-        if isinstance(value, list | tuple):
-            return reply(value=value, value_raw=value) if is_enum else reply(value=value)
         return reply(value=value, value_raw=value) if is_enum else reply(value=value)
 
     def set_(bench: Bench, request: Any) -> Any:
@@ -77,13 +74,10 @@ def _handler(method: Any, verb: str, group: AttributeGroup) -> Handler:
     return {"Get": get, "Set": set_, "Reset": reset}[verb]
 
 
+_BY_DEVICE: Final = "AI_CONV"
+"""Timing attributes that each device of a task has for itself."""
 EXTRA_NAMES: Final = {0x31E8: "DEFAULT_NUMBER_OF_SAMPLES_TO_READ"}
 """Attributes that the client asks for by number though the enums do not list them."""
-
-
-def _plain(name: str) -> str:
-    """``CHANNEL_RESET_ATTRIBUTE_AI_MAX`` → ``AI_MAX``."""
-    return name.split("ATTRIBUTE_", 1)[1]
 
 
 def _value(request: Any) -> Any:

@@ -84,7 +84,8 @@ def every_n_samples(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
     with bench.changed:
         task = task_named(bench, request.task.name)
         _check_interval(task, interval, kind)
-        stream = EventStream(bench, request, context, "every_n", Code.EVERY_N_REGISTERED)
+        already = Code.EVERY_N_OUTPUT_REGISTERED if task.is_output else Code.EVERY_N_REGISTERED
+        stream = EventStream(bench, request, context, "every_n", already)
     context.send_initial_metadata(())
     event = pb.RegisterEveryNSamplesEventResponse(
         every_n_samples_event_type=kind, every_n_samples_event_type_raw=kind, n_samples=interval
@@ -114,10 +115,10 @@ def every_n_samples(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
 def _check_interval(task: Task, interval: int, kind: int) -> None:
     if interval == 0:
         raise DaqmxError(Code.EVERY_N_ZERO)
-    if kind != EveryNSamplesEventType.ACQUIRED_INTO_BUFFER.value:
+    if task.is_output and kind == EveryNSamplesEventType.ACQUIRED_INTO_BUFFER.value:
+        raise DaqmxError(Code.EVERY_N_NOT_FOR_OUTPUT)
+    if not task.is_output and kind != EveryNSamplesEventType.ACQUIRED_INTO_BUFFER.value:
         raise DaqmxError(Code.EVERY_N_NOT_FOR_INPUT)
-    if not task.is_buffered:
-        raise DaqmxError(Code.EVERY_N_UNBUFFERED)
 
 
 def done(bench: Bench, request: Any, context: Any) -> Iterator[Any]:

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from ni.protobuf.types.precision_timestamp_conversion import hightime_datetime_to_protobuf
 from nidaqmx._stubs import nidaqmx_pb2 as pb
-from nidaqmx.constants import FillMode
+from nidaqmx.constants import FillMode, WaveformAttributeMode
 from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.bench.bench import Bench
@@ -106,13 +106,17 @@ def read_waveforms(bench: Bench, request: Any) -> Any:
     """Readings with the instant of the first sample, the interval, name and unit of each channel."""
     task = task_named(bench, request.task.name)
     got = read(task, request.num_samps_per_chan, request.timeout)
+    mode = fields_of(request)["waveform_attribute_mode"]
     reply = pb.ReadAnalogWaveformsResponse(status=got.status, samps_per_chan_read=got.count)
     for values, channel in zip(task.scan.readings(got.codes, got.rows), _chosen(task, got), strict=True):
-        waveform = reply.waveforms.add(dt=1.0 / task.timing.rate_hz if task.is_buffered else 0.0)
+        waveform = reply.waveforms.add()
         waveform.y_data.extend(values.tolist())
-        waveform.t0.CopyFrom(hightime_datetime_to_protobuf(bench.utc(got.first_time_s)))
-        waveform.attributes["NI_ChannelName"].string_value = channel.name
-        waveform.attributes["NI_UnitDescription"].string_value = channel.unit_name
+        if mode & WaveformAttributeMode.TIMING.value:
+            waveform.dt = 1.0 / task.timing.rate_hz if task.is_buffered else 0.0
+            waveform.t0.CopyFrom(hightime_datetime_to_protobuf(bench.utc(got.first_time_s)))
+        if mode & WaveformAttributeMode.EXTENDED_PROPERTIES.value:
+            waveform.attributes["NI_ChannelName"].string_value = channel.name
+            waveform.attributes["NI_UnitDescription"].string_value = channel.unit_name
     return reply
 
 

@@ -12,28 +12,40 @@ import session_pb2_grpc
 from nidaqmx._stubs import nidaqmx_pb2
 
 from sim_hardware.daqmx_server.bench.bench import Bench
-from sim_hardware.daqmx_server.errors import DaqmxError
+from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.services.attributes import AttributeGroup, Handler, attribute_handlers
+from sim_hardware.daqmx_server.services.bridge_calibration import bridge_handlers
 from sim_hardware.daqmx_server.services.channel_attributes import ChannelGroup
 from sim_hardware.daqmx_server.services.control_service import control_handler
+from sim_hardware.daqmx_server.services.counter_reads import counter_read_handlers
 from sim_hardware.daqmx_server.services.device_attributes import (
+    CalibrationGroup,
     DeviceGroup,
     PhysicalChannelGroup,
     SystemGroup,
 )
+from sim_hardware.daqmx_server.services.digital_reads import digital_read_handlers
 from sim_hardware.daqmx_server.services.events import STREAMS
 from sim_hardware.daqmx_server.services.gate import Gate
 from sim_hardware.daqmx_server.services.read_calls import read_handlers
 from sim_hardware.daqmx_server.services.scale_calls import ScaleGroup, scale_handlers
-from sim_hardware.daqmx_server.services.sessions import SessionError, session_handlers
+from sim_hardware.daqmx_server.services.sessions import SessionError, SessionExistsError, session_handlers
+from sim_hardware.daqmx_server.services.storage import SavedGroup, storage_handlers
+from sim_hardware.daqmx_server.services.system_calls import system_handlers
 from sim_hardware.daqmx_server.services.task_attributes import (
     EXPORT,
     READ,
+    REAL_TIME,
     TIMING,
     TRIGGER,
+    WRITE,
     BufferGroup,
     TaskGroup,
 )
+from sim_hardware.daqmx_server.services.teds_calls import teds_handlers
+from sim_hardware.daqmx_server.services.timing_calls import timing_handlers
+from sim_hardware.daqmx_server.services.watchdog_calls import WatchdogGroup, watchdog_handlers
+from sim_hardware.daqmx_server.services.write_calls import write_handlers
 
 _THREADS: Final = 64
 _MAX_MESSAGE: Final = 256 * 1024 * 1024
@@ -50,8 +62,32 @@ _GROUPS: Final[dict[str, AttributeGroup]] = {
     "SystemInfo": SystemGroup(),
     "Device": DeviceGroup(),
     "Scale": ScaleGroup(),
+    "Write": WRITE,
+    "RealTime": REAL_TIME,
+    "CalInfo": CalibrationGroup(),
+    "Watchdog": WatchdogGroup(),
+    "PersistedTask": SavedGroup("saved_tasks", "task_name", Code.TASK_NOT_IN_MAX),
+    "PersistedChan": SavedGroup("saved_channels", "channel", Code.GLOBAL_CHANNEL_UNKNOWN),
+    "PersistedScale": SavedGroup("saved_scales", "scale_name", Code.SCALE_UNKNOWN),
     "PhysicalChan": PhysicalChannelGroup(),
 }
+
+
+_PARTS: Final = (
+    session_handlers,
+    timing_handlers,
+    scale_handlers,
+    read_handlers,
+    digital_read_handlers,
+    counter_read_handlers,
+    write_handlers,
+    system_handlers,
+    watchdog_handlers,
+    storage_handlers,
+    bridge_handlers,
+    teds_handlers,
+)
+"""Calls that are no attributes, by what they are about."""
 
 
 def _serialise(reply: Any) -> bytes:
@@ -67,6 +103,8 @@ def _fail(context: Any, error: Exception, task: str) -> None:
             metadata.append(("ni-samps-per-chan-read", str(error.samples_read)))
         context.set_trailing_metadata(tuple(metadata))
         context.abort(grpc.StatusCode.UNKNOWN, error.text(task))
+    if isinstance(error, SessionExistsError):
+        context.abort(grpc.StatusCode.ALREADY_EXISTS, str(error))
     context.abort(grpc.StatusCode.FAILED_PRECONDITION, str(error))
 
 
@@ -82,7 +120,7 @@ def _unary(bench: Bench, gate: Gate, handler: Handler) -> Callable[[Any, Any], A
         try:
             with bench.changed:
                 reply = handler(bench, request)
-        except (DaqmxError, SessionError) as error:
+        except (DaqmxError, SessionError, SessionExistsError) as error:
             gate.pass_through()
             _fail(context, error, _task_of(request))
         gate.pass_through()
@@ -106,9 +144,19 @@ def _stream(
     return call
 
 
+def missing_calls() -> list[str]:
+    """Calls of NI's service without a handler."""
+    known = {*attribute_handlers(_GROUPS), *STREAMS}
+    for part in _PARTS:
+        known |= set(part())
+    return [method.name for method in _SERVICE.methods if method.name not in known]
+
+
 def daqmx_handler(bench: Bench, gate: Gate) -> grpc.GenericRpcHandler:
     """NI's NiDAQmx service; calls without a handler answer UNIMPLEMENTED by themselves."""
-    handlers = attribute_handlers(_GROUPS) | session_handlers() | scale_handlers() | read_handlers()
+    handlers = attribute_handlers(_GROUPS)
+    for part in _PARTS:
+        handlers |= part()
     methods: dict[str, grpc.RpcMethodHandler] = {}
     for method in _SERVICE.methods:
         request_type: Any = getattr(nidaqmx_pb2, method.input_type.name)

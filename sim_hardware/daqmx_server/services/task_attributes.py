@@ -1,70 +1,88 @@
-"""Attributes of tasks and of their timing, triggers, reads, buffers and exported signals."""
+"""Attributes of tasks and of their timing, triggers, reads, writes, buffers and exported signals."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, Final
 
-from nidaqmx.constants import (
-    AcquisitionType,
-    Edge,
-    LoggingMode,
-    LoggingOperation,
-    OverwriteMode,
-    ReadRelativeTo,
-    SampleTimingType,
-    WaitMode,
-)
+from nidaqmx import constants
+from nidaqmx.constants import Edge, ReadRelativeTo, SampleTimingType
 
 from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.channels import metadata
+from sim_hardware.daqmx_server.errors import Code, DaqmxError
+from sim_hardware.daqmx_server.inventory.devices import channel_list
+from sim_hardware.daqmx_server.inventory.terminals import full_name
 from sim_hardware.daqmx_server.services.attributes import unsupported
+from sim_hardware.daqmx_server.services.timestamps import timestamp
 from sim_hardware.daqmx_server.tasks.reading import default_count
 from sim_hardware.daqmx_server.tasks.task import Task, task_named
 from sim_hardware.daqmx_server.timing import triggers
 
+Derived = dict[str, Callable[[Task], Any]]
+
 
 class SettingsGroup:
-    """Attributes that a task keeps as plain values, with defaults, and some that are derived.
+    """Attributes that a task keeps as plain values: types and defaults by NI's metadata, some derived.
 
-    A default of None means: applicable, but there is no value until it is set (then −200452).
+    `defaults` are those that are not the zero of their type; `absent` are attributes of hardware that is
+    not simulated (−200452).
     """
 
     def __init__(
         self,
+        group: str,
         settings: Callable[[Task], dict[str, Any]],
         defaults: dict[str, Any],
-        derived: dict[str, Callable[[Task], Any]],
+        derived: Derived,
         while_running: frozenset[str] = frozenset(),
+        absent: frozenset[str] = frozenset(),
     ) -> None:
+        self._group = group
         self._settings = settings
         self._defaults = defaults
         self._derived = derived
         self._while_running = while_running
+        self._absent = absent
 
     def get(self, bench: Bench, request: Any, name: str) -> Any:
         task = task_named(bench, request.task.name)
         if name in self._derived:
             return self._derived[name](task)
+        self._check(name)
         value = self._settings(task).get(name, self._defaults.get(name))
-        if value is None:
-            raise unsupported(name)
-        return value
+        return metadata.default_of(self._group, name) if value is None else value
 
     def set(self, bench: Bench, request: Any, name: str, value: Any) -> None:
         task = self._changing(bench, request, name)
+        if isinstance(value, int) and not metadata.is_value(self._group, name, value):
+            raise DaqmxError(Code.INVALID_VALUE, f"Property: DAQmx_{name}\nRequested Value: {value}")
         self._settings(task)[name] = value
 
     def reset(self, bench: Bench, request: Any, name: str) -> None:
         task = self._changing(bench, request, name)
         self._settings(task).pop(name, None)
+        if name in _TRIGGER_TYPES:
+            self._settings(task)[name] = triggers.NONE
 
     def _changing(self, bench: Bench, request: Any, name: str) -> Task:
         task = task_named(bench, request.task.name)
-        if name not in self._defaults:
+        self._check(name)
+        no_trigger = task.io in ("CI", "CO") and name.startswith(("REF_TRIG", "HSHK_TRIG"))
+        if name not in metadata.resettable(self._group) or no_trigger:
             raise unsupported(name)
         if name not in self._while_running:
             task.configure()
         return task
+
+    def _check(self, name: str) -> None:
+        known = metadata.attributes_of(self._group)
+        if (name not in known and name not in self._defaults) or name in self._absent:
+            raise unsupported(name)
+
+
+_TRIGGER_TYPES: Final = ("START_TRIG_TYPE", "REF_TRIG_TYPE")
 
 
 def _samples_now(task: Task, of: str) -> int:
@@ -99,22 +117,22 @@ def _relative_to(task: Task) -> int:
     return int(task.reading.get("RELATIVE_TO", default.value))
 
 
+def line_bytes(task: Task) -> int:
+    """Bytes per channel of a read or write by lines: one per line of the widest channel."""
+    return max((len(channel.lines) for channel in task.channels), default=0)
+
+
 READ: Final = SettingsGroup(
+    "Read",
     lambda task: task.reading,
     defaults={
-        "READ_ALL_AVAIL_SAMP": False,
         "AUTO_START": True,
-        "OVERWRITE": OverwriteMode.DO_NOT_OVERWRITE_UNREAD_SAMPLES.value,
-        "RELATIVE_TO": 0,
-        "OFFSET": 0,
-        "WAIT_MODE": WaitMode.SLEEP.value,
+        "OVERWRITE": constants.OverwriteMode.DO_NOT_OVERWRITE_UNREAD_SAMPLES.value,
+        "WAIT_MODE": constants.WaitMode.SLEEP.value,
         "SLEEP_TIME": 0.001,
-        "CHANNELS_TO_READ": "",
-        "LOGGING_MODE": LoggingMode.OFF.value,
-        "LOGGING_FILE_PATH": "",
-        "LOGGING_PAUSE": False,
-        "LOGGING_TDMS_GROUP_NAME": "",
-        "LOGGING_TDMS_OPERATION": LoggingOperation.OPEN_OR_CREATE.value,
+        "LOGGING_MODE": constants.LoggingMode.OFF.value,
+        "LOGGING_TDMS_OPERATION": constants.LoggingOperation.OPEN_OR_CREATE.value,
+        "LOGGING_FILE_WRITE_SIZE": 4_294_967_295,
     },
     derived={
         "AVAIL_SAMP_PER_CHAN": lambda task: _samples_now(task, "available"),
@@ -123,6 +141,7 @@ READ: Final = SettingsGroup(
         "DEFAULT_NUMBER_OF_SAMPLES_TO_READ": default_count,
         "NUM_CHANS": lambda task: len(task.read_rows() or task.channels),
         "RAW_DATA_WIDTH": lambda task: sum(c.raw_bytes for c in task.channels),
+        "DIGITAL_LINES_BYTES_PER_CHAN": line_bytes,
         "CHANNELS_TO_READ": _channels_to_read,
         "RELATIVE_TO": _relative_to,
         "OVERLOADED_CHANS_EXIST": _overloads_exist,
@@ -138,120 +157,214 @@ READ: Final = SettingsGroup(
             "WAIT_MODE",
             "SLEEP_TIME",
             "LOGGING_PAUSE",
+            "LOGGING_FILE_PATH",
         }
     ),
 )
 
 
-def _sample_clock_terminal(task: Task) -> str:
-    return f"/{task.hosts[0]}/ai/SampleClock" if task.hosts else ""
+def _generated(task: Task) -> int:
+    return 0 if task.run is None else task.run.acquired(task.bench.clock.glance())
 
 
-def _convert_rate(task: Task) -> float:
-    period = task.timing.convert_period_s()
-    if period == 0:
-        raise unsupported("AIConv_Rate")
-    return 1.0 / period
+def _space(task: Task) -> int:
+    return max((task.output_buffer or task.buffer_size) - task.generation.written + _generated(task), 0)
 
 
-def _clocked(value: Callable[[Task], Any], name: str) -> Callable[[Task], Any]:
-    def get(task: Task) -> Any:
-        if not task.is_buffered:
-            raise unsupported(name)
-        return value(task)
+WRITE: Final = SettingsGroup(
+    "Write",
+    lambda task: task.writing,
+    defaults={
+        "REGEN_MODE": constants.RegenerationMode.ALLOW_REGENERATION.value,
+        "RELATIVE_TO": constants.WriteRelativeTo.CURRENT_WRITE_POSITION.value,
+        "WAIT_MODE": constants.WaitMode.SLEEP.value,
+        "SLEEP_TIME": 0.001,
+    },
+    derived={
+        "NUM_CHANS": lambda task: len(task.channels),
+        "RAW_DATA_WIDTH": lambda task: sum(c.raw_bytes for c in task.channels),
+        "DIGITAL_LINES_BYTES_PER_CHAN": line_bytes,
+        "CURR_WRITE_POS": lambda task: task.generation.written,
+        "TOTAL_SAMP_PER_CHAN_GENERATED": _generated,
+        "SPACE_AVAIL": _space,
+    },
+    while_running=frozenset({"RELATIVE_TO", "OFFSET", "WAIT_MODE", "SLEEP_TIME", "NEXT_WRITE_IS_LAST"}),
+)
+
+
+def _terminal(name: str) -> Callable[[Task], str]:
+    """A terminal of the task's own engine, such as ``/Dev1/ai/SampleClock``."""
+
+    def get(task: Task) -> str:
+        if not task.hosts:
+            raise unsupported(f"{name}_Term")
+        return f"/{task.hosts[0]}/{task.io.lower()}/{name}"
 
     return get
 
 
+def _source(task: Task) -> str:
+    """The sample clock's source in NI's spelling; −89120 for a terminal that no device has."""
+    host = task.host
+    if host is None or not task.timing.source_is_foreign:
+        on_card = host is not None and not host.is_chassis
+        return _terminal("SampleClockTimebase")(task) if on_card else "OnboardClock"
+    return full_name(task.bench.inventory, host, task.timing.source, Code.SOURCE_TERMINAL_UNKNOWN)
+
+
+def _count(task: Task) -> int:
+    task.timing.verify_count()
+    return task.timing.samples_per_channel
+
+
+def _convert_period(task: Task) -> float:
+    period = task.timing.convert_period_s()
+    if period == 0:
+        raise unsupported("AIConv_Rate")
+    return period
+
+
+def _convert_divisor(task: Task) -> int:
+    """Divisor of the timebase that makes the convert clock, never faster than asked."""
+    set_to = task.timing.settings.get("AI_CONV_TIMEBASE_DIV")
+    if set_to is not None:
+        return int(set_to)
+    return math.floor(_convert_period(task) * task.timing.timebase_hz * (1 + 1e-12)) + 1
+
+
+def _first_sample(task: Task) -> Any:
+    """UTC of the first sample; −200983 before there is one."""
+    run = task.run
+    if run is None or run.times is None:
+        raise DaqmxError(Code.GET_BEFORE_RESERVED, "Property: DAQmx_FirstSampTimestamp_Val")
+    return timestamp(task.bench.utc(run.times.first_s))
+
+
+def _lines(name: str) -> Callable[[Task], str]:
+    return lambda task: ", ".join(channel_list(str(task.timing.settings.get(name, ""))))
+
+
 TIMING: Final = SettingsGroup(
+    "Timing",
     lambda task: task.timing.settings,
     defaults={
         "SAMP_TIMING_TYPE": SampleTimingType.ON_DEMAND.value,
-        "SAMP_QUANT_SAMP_MODE": AcquisitionType.FINITE.value,
-        "SAMP_QUANT_SAMP_PER_CHAN": 1000,
-        "SAMP_CLK_RATE": 1000.0,
-        "SAMP_CLK_SRC": "",
+        "SAMP_QUANT_SAMP_MODE": constants.AcquisitionType.FINITE.value,
         "SAMP_CLK_ACTIVE_EDGE": Edge.RISING.value,
-        "REF_CLK_SRC": "",
-        "AI_CONV_RATE": 0.0,
+        "AI_CONV_ACTIVE_EDGE": Edge.RISING.value,
+        "FIRST_SAMP_TIMESTAMP_TIMESCALE": constants.Timescale.USE_HOST.value,
+        "FIRST_SAMP_CLK_TIMESCALE": constants.Timescale.USE_HOST.value,
     },
     derived={
-        "SAMP_CLK_RATE": _clocked(lambda task: task.timing.rate_hz, "SampClk_Rate"),
+        "SAMP_QUANT_SAMP_PER_CHAN": _count,
+        "SAMP_CLK_RATE": lambda task: task.timing.rate_hz,
         "SAMP_CLK_MAX_RATE": lambda task: task.timing.max_rate_hz,
-        "SAMP_CLK_SRC": _clocked(
-            lambda task: task.timing.source if task.timing.source_is_foreign else "OnboardClock",
-            "SampClk_Src",
-        ),
-        "SAMP_CLK_TERM": _clocked(_sample_clock_terminal, "SampClk_Term"),
-        "SAMP_CLK_TIMEBASE_RATE": _clocked(lambda task: task.timing.timebase_hz, "SampClk_Timebase_Rate"),
-        "AI_CONV_RATE": _convert_rate,
+        "SAMP_CLK_SRC": _source,
+        "SAMP_CLK_TERM": _terminal("SampleClock"),
+        "SAMP_CLK_TIMEBASE_RATE": lambda task: task.timing.timebase_hz,
+        "SAMP_CLK_TIMEBASE_SRC": _terminal("SampleClockTimebase"),
+        "SAMP_CLK_TIMEBASE_DIV": lambda task: round(task.timing.timebase_hz / task.timing.rate_hz),
+        "AI_CONV_RATE": lambda task: 1.0 / _convert_period(task),
+        "AI_CONV_TIMEBASE_DIV": _convert_divisor,
         "AI_CONV_MAX_RATE": lambda task: max(
-            (c.product.aggregate_rate_hz or c.product.max_rate_hz for c in task.channels), default=0.0
+            (c.product.aggregate_rate_hz or c.product.max_rate_hz for c in task.timing.inputs), default=0.0
+        ),
+        "FIRST_SAMP_TIMESTAMP_VAL": _first_sample,
+        "CHANGE_DETECT_DI_RISING_EDGE_PHYSICAL_CHANS": _lines("CHANGE_DETECT_DI_RISING_EDGE_PHYSICAL_CHANS"),
+        "CHANGE_DETECT_DI_FALLING_EDGE_PHYSICAL_CHANS": _lines(
+            "CHANGE_DETECT_DI_FALLING_EDGE_PHYSICAL_CHANS"
         ),
     },
 )
 
 
-def _trigger_term(which: str) -> Callable[[Task], str]:
+def _trigger_source(name: str) -> Callable[[Task], str]:
+    """Source of a digital edge in NI's spelling; as it was given where no device has it."""
+
     def get(task: Task) -> str:
-        if not task.hosts:
-            raise unsupported(f"{which}Trig_Term")
-        return f"/{task.hosts[0]}/ai/{which}Trigger"
+        given = str(task.trigger.get(name, ""))
+        host = task.host
+        try:
+            return given if host is None else full_name(task.bench.inventory, host, given, Code.INVALID_VALUE)
+        except DaqmxError:
+            return given
 
     return get
 
 
 TRIGGER: Final = SettingsGroup(
+    "Trig",
     lambda task: task.trigger,
     defaults={
         "START_TRIG_TYPE": triggers.NONE,
         "REF_TRIG_TYPE": triggers.NONE,
-        "START_TRIG_DELAY": 0.0,
-        "START_TRIG_DELAY_UNITS": 10364,
+        "PAUSE_TRIG_TYPE": triggers.NONE,
+        "ARM_START_TRIG_TYPE": triggers.NONE,
+        "START_TRIG_DELAY_UNITS": constants.DigitalWidthUnits.SAMPLE_CLOCK_PERIODS.value,
         "REF_TRIG_PRETRIG_SAMPLES": 2,
-        **{f"DIG_EDGE_{which}_TRIG_SRC": "" for which in ("START", "REF")},
         **{f"DIG_EDGE_{which}_TRIG_EDGE": Edge.RISING.value for which in ("START", "REF")},
-        **{f"ANLG_EDGE_{which}_TRIG_SRC": "" for which in ("START", "REF")},
         **{f"ANLG_EDGE_{which}_TRIG_SLOPE": Edge.RISING.value for which in ("START", "REF")},
-        **{f"ANLG_EDGE_{which}_TRIG_LVL": 0.0 for which in ("START", "REF")},
-        **{f"ANLG_EDGE_{which}_TRIG_HYST": 0.0 for which in ("START", "REF")},
-        **{f"ANLG_WIN_{which}_TRIG_SRC": "" for which in ("START", "REF")},
         **{f"ANLG_WIN_{which}_TRIG_WHEN": 10163 for which in ("START", "REF")},
-        **{f"ANLG_WIN_{which}_TRIG_TOP": 0.0 for which in ("START", "REF")},
-        **{f"ANLG_WIN_{which}_TRIG_BTM": 0.0 for which in ("START", "REF")},
+        **{
+            f"{which}_TIMESCALE": constants.Timescale.USE_HOST.value
+            for which in (
+                "START_TRIG_TIMESTAMP",
+                "REF_TRIG_TIMESTAMP",
+                "ARM_START_TRIG_TIMESTAMP",
+                "START_TRIG",
+                "ARM_START_TRIG",
+            )
+        },
     },
-    derived={"START_TRIG_TERM": _trigger_term("Start"), "REF_TRIG_TERM": _trigger_term("Reference")},
+    derived={
+        "START_TRIG_TERM": _terminal("StartTrigger"),
+        "REF_TRIG_TERM": _terminal("ReferenceTrigger"),
+        **{
+            f"{kind}_{which}_TRIG_SRC": _trigger_source(f"{kind}_{which}_TRIG_SRC")
+            for kind in ("DIG_EDGE", "ANLG_EDGE", "ANLG_WIN")
+            for which in ("START", "REF")
+        },
+        "START_TRIG_TIMESTAMP_VAL": _first_sample,
+        "REF_TRIG_TIMESTAMP_VAL": _first_sample,
+        "ARM_START_TRIG_TIMESTAMP_VAL": _first_sample,
+    },
 )
 
-EXPORT: Final = SettingsGroup(
-    lambda task: task.exported,
-    defaults={"START_TRIG_OUTPUT_TERM": "", "REF_TRIG_OUTPUT_TERM": "", "SAMP_CLK_OUTPUT_TERM": ""},
-    derived={},
-)
+REAL_TIME: Final = SettingsGroup("RealTime", lambda task: task.real_time, defaults={}, derived={})
+EXPORT: Final = SettingsGroup("ExportedSignal", lambda task: task.exported, defaults={}, derived={})
 
 
 class BufferGroup:
-    """Size of the input buffer."""
+    """Sizes of the buffers."""
 
     def get(self, bench: Bench, request: Any, name: str) -> int:
         task = task_named(bench, request.task.name)
         if name == "INPUT_BUF_SIZE":
             return task.buffer_size if task.is_buffered else 0
+        if name == "OUTPUT_BUF_SIZE":
+            return task.output_buffer or task.buffer_size
         if name == "INPUT_ONBRD_BUF_SIZE":
             return 127 if task.channels and task.channels[0].device.chassis else 4095
-        raise unsupported(f"Buf_{name}")
+        return 8191
 
     def set(self, bench: Bench, request: Any, name: str, value: int) -> None:
         task = self._changing(bench, request, name)
-        task.input_buffer = int(value)
+        if name == "INPUT_BUF_SIZE":
+            task.input_buffer = int(value)
+        else:
+            task.output_buffer = int(value)
 
     def reset(self, bench: Bench, request: Any, name: str) -> None:
-        self._changing(bench, request, name).input_buffer = None
+        task = self._changing(bench, request, name)
+        if name == "INPUT_BUF_SIZE":
+            task.input_buffer = None
+        else:
+            task.output_buffer = None
 
     @staticmethod
     def _changing(bench: Bench, request: Any, name: str) -> Task:
         task = task_named(bench, request.task.name)
-        if name != "INPUT_BUF_SIZE":
+        if name != ("OUTPUT_BUF_SIZE" if task.is_output else "INPUT_BUF_SIZE"):
             raise unsupported(f"Buf_{name}")
         task.configure()
         return task

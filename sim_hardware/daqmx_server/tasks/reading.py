@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from nidaqmx.constants import AcquisitionType, ReadRelativeTo
 from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
+from sim_hardware.daqmx_server.tasks.samplers import on_demand_sampler
 from sim_hardware.daqmx_server.tasks.task import State, Task
 from sim_hardware.daqmx_server.timing.acquisition import Run, overwritten
-from sim_hardware.daqmx_server.timing.sampling import SampleTimes
 
 ALL_AVAILABLE = -1
+_CURRENT = ReadRelativeTo.CURRENT_READ_POSITION.value
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
     """Outcome of a read: `status` is 0, or −200284 together with the samples that had come."""
 
-    codes: NDArray[np.int32]
+    codes: NDArray[Any]
     """(channels to read, samples)"""
     rows: list[int] | None
     status: int
@@ -47,6 +49,16 @@ def default_count(task: Task) -> int:
     return task.run.available(task.bench.clock.now())
 
 
+def _within_run(task: Task, asked: int) -> int:
+    """What is left of a finite acquisition, where more is asked for; all that is asked where none is left."""
+    if not task.is_buffered or task.timing.mode != AcquisitionType.FINITE.value:
+        return asked
+    taken = 0 if task.run is None else task.run.read_position
+    following = task.reading.get("RELATIVE_TO", _CURRENT) == _CURRENT and not task.reading.get("OFFSET", 0)
+    left = task.timing.samples_per_channel - taken
+    return min(asked, left) if following and left > 0 else asked
+
+
 def read(task: Task, asked: int, timeout_s: float, room: int | None = None) -> Reading:
     """Take `asked` samples per channel, waiting for them; the bench's lock is held (and let go in waiting).
 
@@ -54,7 +66,7 @@ def read(task: Task, asked: int, timeout_s: float, room: int | None = None) -> R
     """
     _ready(task)
     rows = task.read_rows()
-    count = default_count(task) if asked == ALL_AVAILABLE else asked
+    count = default_count(task) if asked == ALL_AVAILABLE else _within_run(task, asked)
     n_rows = len(task.channels) if rows is None else len(rows)
     if room is not None and room < count * n_rows:
         raise DaqmxError(Code.READ_BUFFER_TOO_SMALL)
@@ -77,8 +89,9 @@ def read(task: Task, asked: int, timeout_s: float, room: int | None = None) -> R
     if exchange is not None:
         exchange.done(task)
     first = task.bench.clock.now() if run.times is None else run.times.time_of(run.base + start)
-    task.overloads.update(task.scan.overloaded(codes, rows))
-    task.log_read(codes, rows, start)
+    if task.io == "AI":
+        task.overloads.update(task.scan.overloaded(codes, rows))
+        task.log_read(codes, rows, start)
     _end_automatic(task, run)
     task.bench.changed.notify_all()
     late = not in_time or taken < count
@@ -147,9 +160,6 @@ class _Exchange:
         task.resume = self.resume
 
 
-_CURRENT = ReadRelativeTo.CURRENT_READ_POSITION.value
-
-
 def _ready(task: Task) -> None:
     if not task.channels:
         raise DaqmxError(Code.NO_INPUT_CHANNELS)
@@ -207,10 +217,11 @@ def _on_demand(task: Task, count: int, rows: list[int] | None) -> Reading:
     """Software-timed samples: taken now, one after the other at the module's own pace."""
     task.bench.clock.power_on()
     now = task.bench.clock.glance()
-    sampler = task.make_sampler(SampleTimes(now, max(task.timing.max_rate_hz, 1.0)))
-    codes = sampler.codes(0, count)
+    codes = on_demand_sampler(task, now).codes(0, count)
+    task.taken_on_demand += count
     codes = codes if rows is None else codes[rows]
-    task.overloads.update(task.scan.overloaded(codes, rows))
+    if task.io == "AI":
+        task.overloads.update(task.scan.overloaded(codes, rows))
     if task.auto_started:
         task.stop()
     return Reading(codes, rows, 0, now)

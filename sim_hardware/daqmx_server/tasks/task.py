@@ -12,12 +12,21 @@ from numpy.typing import NDArray
 from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.inventory.devices import channel_list
+from sim_hardware.daqmx_server.inventory.devices import Device, channel_list
+from sim_hardware.daqmx_server.inventory.terminals import full_name
+from sim_hardware.daqmx_server.tasks.generation import Generation
+from sim_hardware.daqmx_server.tasks.samplers import (
+    on_demand_sampler,
+    play,
+    pulse_times_s,
+    sampler_of,
+    stop_playing,
+)
 from sim_hardware.daqmx_server.tasks.tdms_log import TdmsLog
 from sim_hardware.daqmx_server.timing import triggers
 from sim_hardware.daqmx_server.timing.acquisition import ReferenceSearch, Run, RunPlan
 from sim_hardware.daqmx_server.timing.routing import edges_of
-from sim_hardware.daqmx_server.timing.sampling import Sampler, SampleTimes
+from sim_hardware.daqmx_server.timing.sampling import BlockSource, SampleTimes
 from sim_hardware.daqmx_server.timing.scan import Scan
 from sim_hardware.daqmx_server.timing.task_timing import TaskTiming
 
@@ -44,8 +53,14 @@ class Task:
         self.reading: dict[str, Any] = {}
         self.exported: dict[str, Any] = {}
         self.real_time: dict[str, Any] = {}
+        self.writing: dict[str, Any] = {}
+        self.watchdog: dict[str, Any] = {}
         self.log = TdmsLog(self.reading)
+        self.generation = Generation(self.writing)
         self.input_buffer: int | None = None
+        self.output_buffer: int | None = None
+        self.taken_on_demand = 0
+        """Software-timed samples so far."""
         self.state = State.UNVERIFIED
         self.run: Run | None = None
         self.auto_started = False
@@ -58,6 +73,8 @@ class Task:
         self.resume: int | None = None
         self._explicit = State.UNVERIFIED
         self._scan: Scan | None = None
+        self.armed_s = 0.0
+        """Instant of the last start."""
 
     # --- configuration ------------------------------------------------------------------------
 
@@ -86,6 +103,9 @@ class Task:
 
     def channels_named(self, text: str) -> list[VirtualChannel]:
         """Channels of a list; all of them for an empty one."""
+        whole = [channel for channel in self.channels if channel.name == text]
+        if whole:
+            return whole
         return [self.channel(name) for name in channel_list(text)] if text else list(self.channels)
 
     def read_rows(self) -> list[int] | None:
@@ -98,19 +118,65 @@ class Task:
         return list(dict.fromkeys(channel.device.name for channel in self.channels))
 
     @property
+    def resources(self) -> list[str]:
+        """Parts of devices that this task needs for itself; inputs that only look need none."""
+        out: list[str] = []
+        for channel in self.channels:
+            if channel.io == "AI":
+                out.append(f"{channel.device.name}/ai")
+            elif channel.io == "DI":
+                reads_back = channel.attributes.get("DI_TRISTATE") is False
+                out += [] if reads_back else list(channel.lines)
+            else:
+                out += channel.lines or (channel.physical,)
+        return list(dict.fromkeys(out))
+
+    @property
     def hosts(self) -> list[str]:
         """Owners of the clocks and triggers of this task's devices, the first one first."""
         return list(dict.fromkeys(self.bench.inventory.host_of(channel.device) for channel in self.channels))
 
     @property
     def is_buffered(self) -> bool:
-        return bool(self.timing.timing_type != SampleTimingType.ON_DEMAND.value)
+        return self.io == "CO" or bool(self.timing.timing_type != SampleTimingType.ON_DEMAND.value)
+
+    @property
+    def is_reserved(self) -> bool:
+        """Whether the task holds its devices, and so may drive their lines."""
+        return self.state >= State.RESERVED
+
+    @property
+    def io(self) -> str:
+        """Kind of the task's channels (AI, AO, DI, DO, CI, CO); empty without channels."""
+        return self.channels[0].io if self.channels else ""
+
+    @property
+    def is_output(self) -> bool:
+        return self.io in ("AO", "DO", "CO")
+
+    @property
+    def pulse_rate_hz(self) -> float:
+        """Frequency of a task that puts out pulses; 0 for any other."""
+        if self.io != "CO":
+            return 0.0
+        low_s, high_s = pulse_times_s(self.channels[0])
+        return 1.0 / (low_s + high_s)
+
+    def live_value(self, channel: VirtualChannel, name: str) -> Any:
+        """Value of an attribute that the running hardware decides; None for the others."""
+        if name == "CO_PULSE_DONE":
+            return self.run is None or self.run.is_done(self.bench.clock.glance())
+        if name == "CI_COUNT" and self.run is None and self.state is State.RUNNING:
+            return int(on_demand_sampler(self, self.bench.clock.glance()).codes(0, 1)[0, 0])
+        return None
 
     @property
     def buffer_size(self) -> int:
         """Samples per channel of the circular buffer: as set, or NI's default for the rate."""
-        if self.input_buffer is not None:
+        if self.input_buffer is not None and not self.is_output:
             return self.input_buffer
+        if self.is_output:
+            return max(int(self.generation.samples.shape[1]), self.output_buffer or 0)
         samples = self.timing.samples_per_channel
         if self.timing.mode == AcquisitionType.FINITE.value:
             return samples
@@ -152,7 +218,7 @@ class Task:
             self.state = max(self.state, State.VERIFIED)
         if target >= State.RESERVED and self.state < State.RESERVED:
             self.check_devices()
-            self.bench.reserve(self.devices, self.name, timed=self.is_buffered)
+            self.bench.reserve(self.resources, self.name, self.io == "AI" and self.is_buffered)
             self.state = State.RESERVED
         if target >= State.COMMITTED and self.state < State.COMMITTED:
             self.state = State.COMMITTED
@@ -164,7 +230,10 @@ class Task:
         self.check_devices()
         for channel in self.channels:
             channel.verify()
+        if "every_n" in self.events and not self.is_buffered:
+            raise DaqmxError(Code.EVERY_N_UNBUFFERED)
         self._check_mix()
+        self._check_terminals()
         self.timing.verify()
         self.log.check()
         if (
@@ -187,6 +256,29 @@ class Task:
         if len(hosts) > 1 and not (on_network or on_backplane):
             raise DaqmxError(Code.NO_SYNC, f"Device Names: {', '.join(self.devices)}")
 
+    def _check_terminals(self) -> None:
+        """−89120 or −89121 for clock sources, triggers and exports that no device has."""
+        host = self.host
+        if host is None:
+            return
+        inventory = self.bench.inventory
+        if self.timing.source_is_foreign:
+            full_name(inventory, host, self.timing.source, Code.SOURCE_TERMINAL_UNKNOWN)
+        for which in ("START", "REF"):
+            if self.trigger[f"{which}_TRIG_TYPE"] == triggers.DIGITAL:
+                source = triggers.source_of(self.trigger, which)
+                full_name(inventory, host, source, Code.SOURCE_TERMINAL_UNKNOWN)
+        for name, terminals in self.exported.items():
+            if name.endswith("_OUTPUT_TERM"):
+                for terminal in channel_list(str(terminals)):
+                    full_name(inventory, host, terminal, Code.DESTINATION_TERMINAL_UNKNOWN)
+
+    @property
+    def host(self) -> Device | None:
+        """The device that owns the task's clocks and triggers."""
+        hosts = self.hosts
+        return self.bench.inventory.devices.get(hosts[0]) if hosts else None
+
     def check_devices(self) -> None:
         """Raise if a device of the task has gone; a run that loses one has failed for good."""
         for device in {channel.device.name: channel.device for channel in self.channels}.values():
@@ -204,6 +296,10 @@ class Task:
             self.advance(State.COMMITTED)
             if self.is_buffered:
                 self._set_running()
+            elif self.is_output:
+                self.bench.clock.power_on()
+            else:
+                self.armed_s = self.bench.clock.power_on()
         except DaqmxError:
             self._fall_back(self._explicit)
             raise
@@ -214,8 +310,11 @@ class Task:
     def _set_running(self) -> None:
         # A task that waits for another one's clock or edge does not set the world going by itself.
         clock = self.bench.clock
-        self.run = self._make_run(clock.now() if self.timing.waits_for_others else clock.power_on())
+        self.armed_s = clock.now() if self.timing.waits_for_others else clock.power_on()
+        self.run = self._make_run(self.armed_s)
         self.run.look(clock.now())
+        if self.io in ("AO", "DO"):
+            play(self, self.run)
 
     def stop(self) -> None:
         """Back to the state the client had put the task into before the start."""
@@ -227,6 +326,8 @@ class Task:
                 if other is not self and other.run is not None and other.timing.source_task() is self:
                     other.run.halt(now)
             self.run.aborted = True
+            if self.io in ("AO", "DO"):
+                stop_playing(self, now)
         self.log.close()
         self.run = None
         self._fall_back(self._explicit)
@@ -282,7 +383,7 @@ class Task:
         ref = self.trigger["REF_TRIG_TYPE"] != triggers.NONE
         plan = RunPlan(
             rate_hz=self.timing.rate_hz,
-            total=self.timing.samples_per_channel if finite else None,
+            total=self._total() if finite else None,
             pretrigger=int(self.trigger["REF_TRIG_PRETRIG_SAMPLES"]) if ref else None,
             buffer=self.buffer_size,
             overwrite=self.reading.get("OVERWRITE") == OverwriteMode.OVERWRITE_UNREAD_SAMPLES.value,
@@ -302,6 +403,12 @@ class Task:
         """Instants of the task's edges at a (plain) terminal, as far as they have happened."""
         return edges_of(self, terminal)
 
+    def _total(self) -> int:
+        """Samples per channel of a finite run; a counter output without timing makes one pulse."""
+        if self.timing.timing_type == SampleTimingType.ON_DEMAND.value:
+            return 1
+        return self.timing.samples_per_channel
+
     def disturbed(self) -> None:
         """The world or its faults have changed: samples ahead of now are made afresh."""
         if self.run is None:
@@ -314,14 +421,14 @@ class Task:
     def scan(self) -> Scan:
         """Converters, instants and scaling of the channels."""
         if self._scan is None:
-            self._scan = Scan(self.channels, self.timing.time_offsets_s())
+            self._scan = Scan(self.timing.inputs, self.timing.time_offsets_s())
         return self._scan
 
-    def make_sampler(self, times: SampleTimes) -> Sampler:
-        bench = self.bench
-        return Sampler(bench.source, bench.faults, self.scan.inputs, times, bench.helper)
+    def make_sampler(self, times: SampleTimes) -> BlockSource:
+        """Samples of the task's channels, whatever they measure, by that clock."""
+        return sampler_of(self, times)
 
-    def log_read(self, codes: NDArray[np.int32], rows: list[int] | None, first: int) -> None:
+    def log_read(self, codes: NDArray[Any], rows: list[int] | None, first: int) -> None:
         """Give a block that has been read to DAQmx's own recorder, if that is on."""
         if self.log.enabled and codes.shape[1]:
             chosen = self.channels if rows is None else [self.channels[row] for row in rows]
@@ -333,7 +440,9 @@ class Task:
                 self.timing.rate_hz,
             )
 
-    def trigger_readings(self, sampler: Sampler, source: str, start: int, stop: int) -> NDArray[np.float64]:
+    def trigger_readings(
+        self, sampler: BlockSource, source: str, start: int, stop: int
+    ) -> NDArray[np.float64]:
         """Readings of the channel an analogue trigger listens to."""
         row = self.channels.index(self._trigger_channel(source))
         return self.scan.readings(sampler.codes(start, stop)[[row]], [row]).ravel()

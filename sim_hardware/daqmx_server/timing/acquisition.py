@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.timing.sampling import Sampler, SampleTimes
+from sim_hardware.daqmx_server.timing.sampling import BlockSource, SampleTimes
 from sim_hardware.daqmx_server.timing.triggers import CrossingSearch
 
 
@@ -46,7 +46,7 @@ class Run:
         self,
         plan: RunPlan,
         start_rule: StartRule,
-        make_sampler: Callable[[SampleTimes], Sampler],
+        make_sampler: Callable[[SampleTimes], BlockSource],
         ref_search: Callable[[Run, float], int | None] | None = None,
         arrived: Callable[[float], float] = lambda now_s: now_s,
     ) -> None:
@@ -62,7 +62,7 @@ class Run:
         self._ref_sample: int | None = None
         self._end_s = np.inf
         self.times: SampleTimes | None = None
-        self.sampler: Sampler | None = None
+        self.sampler: BlockSource | None = None
 
     # --- time ---------------------------------------------------------------------------------
 
@@ -80,6 +80,11 @@ class Run:
         if self.times is not None:
             self.times = times
             self.sampler = self._make_sampler(times)
+
+    def pulse_rate_changed(self, now_s: float, done: int, rate_hz: float) -> None:
+        """A counter output goes on at another frequency from now on."""
+        if self.times is not None:
+            self.times = SampleTimes(now_s - done / rate_hz, rate_hz)
 
     def halt(self, now_s: float) -> None:
         """No further samples: the clock that feeds this run has gone."""
@@ -161,7 +166,7 @@ class Run:
         self.failure = overwritten(position, offset)
         raise self.failure
 
-    def block(self, position: int, count: int, rows: Sequence[int] | None = None) -> NDArray[np.int32]:
+    def block(self, position: int, count: int, rows: Sequence[int] | None = None) -> NDArray[Any]:
         """Codes of `count` samples from a position, shape (channels, count)."""
         assert self.sampler is not None
         codes = self.sampler.codes(self.base + position, self.base + position + count)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any, Final, Protocol
 
+from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.inventory.devices import channel_list
 from sim_hardware.daqmx_server.inventory.terminals import plain
 from sim_hardware.daqmx_server.timing.acquisition import Run
 
-_ENGINES: Final = ("ai", "te0", "te1", "te2")
+_TIMING_ENGINES: Final = ("te0", "te1", "te2")
 _EXPORTS: Final = {
     "StartTrigger": "START_TRIG_OUTPUT_TERM",
     "ReferenceTrigger": "REF_TRIG_OUTPUT_TERM",
@@ -21,6 +22,10 @@ class SignalTask(Protocol):
 
     exported: dict[str, Any]
     run: Run | None
+    channels: list[VirtualChannel]
+
+    @property
+    def io(self) -> str: ...
 
     @property
     def hosts(self) -> list[str]: ...
@@ -31,10 +36,29 @@ class SignalTask(Protocol):
 
 def terminals_of(task: SignalTask, signal: str) -> set[str]:
     """Plain names of the terminals at which a signal of the task appears."""
-    owners = [(host, engine) for host in task.hosts for engine in _ENGINES]
-    owners += [(device, "ai") for device in task.devices]
+    kind = task.io.lower() or "ai"
+    if kind == "co":
+        return _pulse_terminals(task) if signal == "SampleClock" else set()
+    engines = (kind, *_TIMING_ENGINES)
+    owners = [(host, engine) for host in task.hosts for engine in engines]
+    owners += [(device, kind) for device in task.devices]
     out = {plain(f"{owner}/{engine}/{signal}") for owner, engine in owners}
     return out | {plain(term) for term in channel_list(str(task.exported.get(_EXPORTS[signal], "")))}
+
+
+def _pulse_terminals(task: SignalTask) -> set[str]:
+    """Where the pulses of a counter output appear: inside the device, and at its output terminal."""
+    out: set[str] = set()
+    for channel in task.channels:
+        host = task.hosts[0]
+        out.add(plain(f"{host}/Ctr{channel.number}InternalOutput"))
+        out.add(plain(str(channel.attributes.get("CO_PULSE_TERM") or f"{host}/{counter_output(channel)}")))
+    return out
+
+
+def counter_output(channel: VirtualChannel) -> str:
+    """Default output terminal of a counter: PFI12 … PFI15 on cards with four counters (GK)."""
+    return f"PFI{12 + channel.number}"
 
 
 def edges_of(task: SignalTask, terminal: str) -> list[float]:

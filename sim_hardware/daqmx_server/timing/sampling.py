@@ -10,14 +10,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.channels.converter import Converter
 from sim_hardware.faults.model import ClockChange
-from sim_hardware.signals import SignalSource
+
+_SINE_SAMPLES: Final = 100
 
 
 class SampleTimes:
@@ -51,6 +52,10 @@ class SampleTimes:
             out = self._times[piece] + np.where(rates > 0, (index - self._counts[piece]) / rates, np.inf)
         return np.where(index == self._counts[piece], self._times[piece], out)
 
+    def later(self, delay_s: float) -> SampleTimes:
+        """The same clock, each sample later by a delay."""
+        return SampleTimes(self.first_s + delay_s, self.rate_hz, self._changes)
+
     def from_sample(self, index: int) -> SampleTimes:
         """The same clock, counted from a later sample."""
         return SampleTimes(self.time_of(index), self.rate_hz, self._changes)
@@ -77,6 +82,14 @@ class Input:
     """Skew minus input delay: sample k shows the instant ``time of k + time_offset_s``."""
     hold_s: float = 0.0
     """A slow converter's own period: between its conversions it repeats the last one."""
+    shown: tuple[float, float] = (-1.0, 1.0)
+    """Ends of the sine that a simulated device shows where nothing is wired, electrical quantity."""
+
+
+class Wiring(Protocol):
+    """Whatever is wired to the terminals (`SignalSource.volts`)."""
+
+    def volts(self, terminals: tuple[str, ...], times_s: NDArray[np.float64]) -> NDArray[np.float64]: ...
 
 
 class Distortion(Protocol):
@@ -89,12 +102,20 @@ class Distortion(Protocol):
         ...
 
 
+class BlockSource(Protocol):
+    """Samples of a task by index."""
+
+    def codes(self, start: int, stop: int) -> NDArray[Any]:
+        """Samples start … stop−1, shape (channels, samples)."""
+        ...
+
+
 class Sampler:
     """Codes of a task's inputs by sample index."""
 
     def __init__(
         self,
-        source: SignalSource,
+        source: Wiring,
         distortion: Distortion,
         inputs: Sequence[Input],
         times: SampleTimes,
@@ -149,6 +170,14 @@ class Sampler:
             self._ahead = (number + 1, self._helper.submit(self._make, number + 1))
         return codes
 
+    def _sines(self, inputs: Sequence[Input], start: int, count: int) -> NDArray[np.float64]:
+        """NI's sine between the channel's minimum and maximum, one period in `_SINE_SAMPLES` samples."""
+        phase = 2.0 * np.pi * np.arange(start, start + count) / _SINE_SAMPLES
+        ends = np.array([entry.shown for entry in inputs])
+        middle, half = ends.mean(axis=1), 0.5 * (ends[:, 1] - ends[:, 0])
+        sines: NDArray[np.float64] = middle[:, None] + half[:, None] * np.sin(phase)
+        return sines
+
     def _make(self, number: int) -> NDArray[np.int32]:
         start, stop = number * self._chunk, (number + 1) * self._chunk
         instants = self.times.at(np.arange(start, stop))
@@ -159,6 +188,9 @@ class Sampler:
             if hold:
                 times = np.floor(times / hold + 1e-9) * hold
             ideal = self._source.volts(terminals, times)
+            open_rows = np.flatnonzero(np.isnan(ideal[:, :1]).any(axis=1))
+            if len(open_rows):
+                ideal[open_rows] = self._sines([self._inputs[rows[row]] for row in open_rows], start, taken)
             volts[rows, :taken] = self._distortion.distort(terminals, times, ideal)
         np.subtract(volts, self._middle, out=volts)
         np.multiply(volts, self._scale, out=volts)

@@ -7,18 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
+from sim_hardware.daqmx_server.channels.analog_input import AnalogInput
 from sim_hardware.daqmx_server.timing.sampling import Input
 
 
 class Scan:
     """Settled when a task is verified: channels do not change while it runs."""
 
-    def __init__(self, channels: Sequence[VirtualChannel], time_offsets_s: Sequence[float]) -> None:
+    def __init__(self, channels: Sequence[AnalogInput], time_offsets_s: Sequence[float]) -> None:
         self._channels = tuple(channels)
         converters = [channel.converter for channel in channels]
         self.inputs = tuple(
-            Input(channel.physical, converter, offset, channel.hold_s)
+            Input(channel.physical, converter, offset, channel.hold_s, channel.limits_electrical)
             for channel, converter, offset in zip(channels, converters, time_offsets_s, strict=True)
         )
         units = np.array([channel.unit_per_electrical for channel in channels])

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from typing import Any, Protocol, cast
 
 import numpy as np
-from nidaqmx.constants import AcquisitionType, DigitalWidthUnits, SampleTimingType
+from nidaqmx.constants import AcquisitionType, DigitalWidthUnits, Edge, SampleTimingType
 from numpy.typing import NDArray
 
 from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.products import Product
 from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.channels.analog_input import AnalogInput
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory.terminals import plain
 from sim_hardware.daqmx_server.timing import triggers
 from sim_hardware.daqmx_server.timing.acquisition import StartRule
 from sim_hardware.daqmx_server.timing.routing import SignalTask, terminals_of
-from sim_hardware.daqmx_server.timing.sampling import Sampler, SampleTimes
+from sim_hardware.daqmx_server.timing.sampling import BlockSource, SampleTimes
 from sim_hardware.daqmx_server.timing.triggers import CrossingSearch
 
 _RATE_OF_SLOW_MODULES_HZ = 100e3
@@ -37,10 +39,18 @@ class TimedTask(SignalTask, Protocol):
     @property
     def is_buffered(self) -> bool: ...
 
-    def make_sampler(self, times: SampleTimes) -> Sampler: ...
+    @property
+    def is_reserved(self) -> bool: ...
+
+    @property
+    def pulse_rate_hz(self) -> float:
+        """Frequency of a task that puts out pulses; 0 for any other."""
+        ...
+
+    def make_sampler(self, times: SampleTimes) -> BlockSource: ...
 
     def trigger_readings(
-        self, sampler: Sampler, source: str, start: int, stop: int
+        self, sampler: BlockSource, source: str, start: int, stop: int
     ) -> NDArray[np.float64]: ...
 
 
@@ -68,15 +78,33 @@ class TaskTiming:
         return str(self.settings.get("SAMP_CLK_SRC", ""))
 
     @property
+    def inputs(self) -> list[AnalogInput]:
+        """The task's channels, where they are analogue inputs."""
+        return [channel for channel in self._task.channels if isinstance(channel, AnalogInput)]
+
+    @property
+    def asked_rate_hz(self) -> float:
+        """The rate that the client asked for, directly or as a divisor of the timebase."""
+        if "SAMP_CLK_TIMEBASE_DIV" in self.settings:
+            return self.timebase_hz / int(self.settings["SAMP_CLK_TIMEBASE_DIV"])
+        return float(self.settings.get("SAMP_CLK_RATE", 1000.0))
+
+    @property
     def rate_hz(self) -> float:
         """The rate the hardware makes of the one asked for: the slowest-dividing module decides."""
-        asked = float(self.settings.get("SAMP_CLK_RATE", 1000.0))
+        asked = self.asked_rate_hz
         forced = self._task.bench.faults.forced_rate_hz([*self._task.hosts, *self._task.devices])
         if forced is not None:
             return forced
-        products = {channel.product.name: channel.product for channel in self._task.channels}
-        if not products or self.source_is_foreign or asked <= 0:
+        pulses = self._task.pulse_rate_hz
+        if pulses:
+            return pulses
+        inputs = self.inputs
+        if not self._task.channels or self.source_is_foreign or asked <= 0:
             return asked
+        if not inputs:
+            return self.timebase_hz / max(1, math.floor(self.timebase_hz / asked * (1 + 1e-12)))
+        products = {channel.product.name: channel.product for channel in inputs}
         try:
             return catalogue.coerce_rate(list(products.values()), asked)
         except ValueError:
@@ -84,21 +112,28 @@ class TaskTiming:
 
     @property
     def max_rate_hz(self) -> float:
-        """Fastest rate of this set of channels."""
+        """Fastest rate of this set of channels; 0 where nothing is known to limit it."""
         counts = Counter(channel.device.name for channel in self._task.channels)
         limits = []
         for channel in self._task.channels:
             product, n = channel.product, counts[channel.device.name]
-            if product.converter == "slow":
-                continue  # it repeats its last value at any rate
-            single = product.max_rate_hz
-            limits.append(min(single, product.aggregate_rate_hz / n) if product.aggregate_rate_hz else single)
-        return min(limits, default=_RATE_OF_SLOW_MODULES_HZ if counts else 0.0)
+            if channel.io in ("DI", "DO"):
+                limits.append(product.ports.max_rate_hz)
+            elif channel.io == "AO":
+                limits.append(product.outputs.max_rate_hz)
+            elif channel.io in ("CI", "CO"):
+                limits.append(product.counters.max_rate_hz)
+            elif product.converter != "slow":  # a slow one repeats its last value at any rate
+                single = product.max_rate_hz
+                shared = product.aggregate_rate_hz
+                limits.append(min(single, shared / n) if shared else single)
+        known = [limit for limit in limits if limit > 0]
+        return min(known, default=_RATE_OF_SLOW_MODULES_HZ if counts else 0.0)
 
     @property
     def timebase_hz(self) -> float:
         """The clock that the sample clock is divided from."""
-        clocks = [c.product.delta_sigma.timebase_hz for c in self._task.channels if c.product.delta_sigma]
+        clocks = [c.product.delta_sigma.timebase_hz for c in self.inputs if c.product.delta_sigma]
         cards = [c.product.timebase_hz for c in self._task.channels]
         return max(clocks, default=0.0) or max(cards, default=0.0) or 80e6
 
@@ -114,13 +149,10 @@ class TaskTiming:
     def verify(self) -> None:
         """Raise what NI-DAQmx raises for a clock that these channels cannot have."""
         if not self._task.is_buffered:
+            if self._task.trigger["START_TRIG_TYPE"] in (triggers.ANALOG, triggers.WINDOW):
+                raise DaqmxError(Code.TRIGGER_ON_DEMAND)
             return
-        if self.samples_per_channel < _FEWEST_SAMPLES and self.mode == AcquisitionType.FINITE.value:
-            raise DaqmxError(
-                Code.INVALID_VALUE,
-                f"Property: DAQmx_SampQuant_SampPerChan\nRequested Value: {self.samples_per_channel}\n"
-                f"Minimum Value: {_FEWEST_SAMPLES}",
-            )
+        self.verify_count()
         if not self.rate_hz > 0:
             raise DaqmxError(
                 Code.INVALID_VALUE, f"Property: DAQmx_SampClk_Rate\nRequested Value: {self.rate_hz}"
@@ -131,9 +163,29 @@ class TaskTiming:
                 f"Property: DAQmx_SampClk_Rate\nRequested Value: {self.rate_hz}\n"
                 f"Maximum Value: {self.max_rate_hz}",
             )
-        n_channels = max(Counter(c.device.name for c in self._task.channels).values())
+        self._verify_convert_clock()
+
+    def verify_count(self) -> None:
+        """−200077 for fewer than two samples per channel of a clocked finite task."""
+        clocked = self.timing_type == SampleTimingType.SAMPLE_CLOCK.value
+        if (
+            clocked
+            and self.samples_per_channel < _FEWEST_SAMPLES
+            and self.mode == AcquisitionType.FINITE.value
+        ):
+            raise DaqmxError(
+                Code.INVALID_VALUE,
+                f"Property: DAQmx_SampQuant_SampPerChan\nRequested Value: {self.samples_per_channel}\n"
+                f"Minimum Value: {_FEWEST_SAMPLES}",
+            )
+
+    def _verify_convert_clock(self) -> None:
+        inputs = self.inputs
+        if not inputs:
+            return
+        n_channels = max(Counter(c.device.name for c in inputs).values())
         period = self.convert_period_s()
-        fastest = max(c.product.min_convert_period_s for c in self._task.channels)
+        fastest = max(c.product.min_convert_period_s for c in inputs)
         if period and not fastest * (1 - 1e-9) <= period <= (1 + 1e-9) / (self.rate_hz * n_channels):
             raise DaqmxError(
                 Code.INVALID_VALUE,
@@ -145,8 +197,10 @@ class TaskTiming:
         """Time between the conversions of the first multiplexed device; 0 if there is none."""
         if "AI_CONV_RATE" in self.settings:
             return 1.0 / float(self.settings["AI_CONV_RATE"])
-        devices = {c.device.name: c.product for c in self._task.channels}
-        counts = Counter(c.device.name for c in self._task.channels)
+        if "AI_CONV_TIMEBASE_DIV" in self.settings:
+            return int(self.settings["AI_CONV_TIMEBASE_DIV"]) / self.timebase_hz
+        devices = {c.device.name: c.product for c in self.inputs}
+        counts = Counter(c.device.name for c in self.inputs)
         periods = catalogue.convert_periods_s(
             [(p, counts[name]) for name, p in devices.items()], self.rate_hz
         )
@@ -155,13 +209,14 @@ class TaskTiming:
     def time_offsets_s(self) -> list[float]:
         """Per channel: multiplexer skew by place in the device's scan list, minus the converter's lag."""
         rate = self.rate_hz
-        scan = [(c.device.name, c.product) for c in self._task.channels]
+        inputs = self.inputs
+        scan = [(c.device.name, c.product) for c in inputs]
         skews = catalogue.task_skews_s(scan, rate)
         if "AI_CONV_RATE" in self.settings:
             skews = _skews_at(scan, 1.0 / float(self.settings["AI_CONV_RATE"]))
         return [
             skew - catalogue.input_delay_s(channel.product, rate)
-            for skew, channel in zip(skews, self._task.channels, strict=True)
+            for skew, channel in zip(skews, inputs, strict=True)
         ]
 
     def clock_from(self, first_s: float, rate_hz: float) -> SampleTimes:
@@ -171,17 +226,23 @@ class TaskTiming:
         return SampleTimes(first_s, rate_hz, self._task.bench.faults.clock_changes(places))
 
     def source_task(self) -> TimedTask | None:
-        """The task whose sample clock this one uses."""
+        """The task whose sample clock this one uses: one that runs before one that only holds its devices.
+
+        A task that has reserved nothing drives no line.
+        """
         if not self.source_is_foreign:
             return None
-        for other in cast("dict[str, TimedTask]", self._task.bench.tasks).values():
-            if (
-                other is not self._task
-                and not other.timing.source_is_foreign
-                and plain(self.source) in terminals_of(other, "SampleClock")
-            ):
-                return other
-        return None
+        wanted = plain(self.source)
+        drivers = [
+            other
+            for other in cast("dict[str, TimedTask]", self._task.bench.tasks).values()
+            if other is not self._task
+            and other.is_reserved
+            and not other.timing.source_is_foreign
+            and wanted in terminals_of(other, "SampleClock")
+        ]
+        running = [other for other in drivers if other.run is not None]
+        return next(iter(running or drivers), None)
 
     def start_rule(self, armed_s: float) -> StartRule:
         """How the instant of the first sample is found, once and for all at the start of the task."""
@@ -268,6 +329,8 @@ class _SharedClock:
         if master is None or master.run is None or master.run.times is None:
             return None
         times = master.run.times
+        if self._task.timing.settings.get("SAMP_CLK_ACTIVE_EDGE") == Edge.FALLING.value:
+            times = times.later(0.5 / times.rate_hz)
         armed = self._armed_s
         if self._task.trigger["START_TRIG_TYPE"] == triggers.DIGITAL:
             edge = _start_edge(self._task, armed)

@@ -105,7 +105,9 @@ def test_what_cannot_be_registered(rig: Rig) -> None:
         def callback(*arguments: object) -> int:
             return 0
 
-        assert code(lambda: task.register_every_n_samples_acquired_into_buffer_event(10, callback)) == -200848
+        task.register_every_n_samples_acquired_into_buffer_event(10, callback)
+        assert code(task.start) == -200848
+        task.register_every_n_samples_acquired_into_buffer_event(10, None)
         continuous(task)
         assert code(lambda: task.register_every_n_samples_acquired_into_buffer_event(0, callback)) == -200880
         assert code(lambda: task.register_signal_event(Signal.CHANGE_DETECTION_EVENT, callback)) == -200987

@@ -199,13 +199,13 @@ Channels = Old/v0
 def test_inventory_of_an_ni_max_export(tmp_path: Path, encoding: str) -> None:
     path = tmp_path / "lab.ini"
     path.write_text(_EXPORT, encoding=encoding)
-    inventory = load_max_export(path)
+    inventory = load_max_export(path).inventory
     assert list(inventory.devices) == ["Card", "Lab", "LabMod1", "LabMod2"]
     card, chassis, module, counter = inventory.devices.values()
     assert (card.serial, card.product_number, len(card.physical_channels)) == (0x1A2B3C4D, 0x7435C4C4, 32)
     assert chassis.is_chassis
     assert (module.chassis, module.slot, module.serial) == ("Lab", 1, 0x1F00AA)
-    assert (counter.product_name, counter.physical_channels) == ("NI 9361", ())
+    assert (counter.product_name, counter.physical_channels, len(counter.counters)) == ("NI 9361", (), 8)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,90 @@
+"""What devices put out, and where it is seen again: analogue outputs and digital lines over time."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Values = NDArray[np.float64]
+Player = Callable[[Values], Values]
+"""Values put out at instants; NaN before the output has begun."""
+_KEPT: Final = 4096
+"""Changes that a terminal remembers: late readers see the past as it was."""
+
+
+class Loopback:
+    """Levels of output terminals: held values, and the generations that run at present."""
+
+    def __init__(self) -> None:
+        self._held: dict[str, tuple[list[float], list[float]]] = {}
+        self._players: dict[str, Player] = {}
+
+    def hold(self, terminal: str, time_s: float, value: float) -> None:
+        """The terminal has this value from now on."""
+        times, values = self._held.setdefault(terminal, ([], []))
+        times.append(time_s)
+        values.append(value)
+        if len(times) > _KEPT:
+            del times[0], values[0]
+
+    def play(self, terminal: str, player: Player) -> None:
+        """A generation drives the terminal until `stop`."""
+        self._players[terminal] = player
+
+    def stop(self, terminal: str, time_s: float) -> None:
+        """The generation ends; the terminal keeps its last value."""
+        player = self._players.pop(terminal, None)
+        if player is not None:
+            last = float(player(np.array([time_s]))[0])
+            if not np.isnan(last):
+                self.hold(terminal, time_s, last)
+
+    def at(self, terminal: str, times_s: Values) -> Values:
+        """Values at instants; 0 before anything was put out."""
+        times, values = self._held.get(terminal, ([], []))
+        known = np.array([0.0, *values])
+        out = known[np.array([bisect_right(times, float(t)) for t in times_s], dtype=np.intp)]
+        player = self._players.get(terminal)
+        if player is not None:
+            played = player(times_s)
+            out = np.where(np.isnan(played), out, played)
+        return np.asarray(out)
+
+    def now(self, terminal: str, time_s: float) -> float:
+        return float(self.at(terminal, np.array([time_s]))[0])
+
+
+class WiredBench:
+    """A signal source that also shows a device's own outputs at its internal channels.
+
+    Devices that are not simulated see 0 V where nothing is wired; simulated ones are left open (NaN).
+    """
+
+    def __init__(self, source: _Volts, loopback: Loopback, is_real: Callable[[str], bool]) -> None:
+        self._source = source
+        self._loopback = loopback
+        self._is_real = is_real
+
+    def volts(self, terminals: tuple[str, ...], times_s: Values) -> Values:
+        """(len(terminals), len(times_s)), as `SignalSource.volts`."""
+        internal = [row for row, terminal in enumerate(terminals) if "/_" in terminal]
+        if not internal:
+            ideal = self._source(terminals, times_s)
+        else:
+            ideal = np.full((len(terminals), len(times_s)), np.nan)
+            outside = [row for row in range(len(terminals)) if row not in internal]
+            if outside:
+                ideal[outside] = self._source(tuple(terminals[row] for row in outside), times_s)
+        for row, terminal in enumerate(terminals):
+            device, _, rest = terminal.partition("/")
+            if len(times_s) and np.isnan(ideal[row, 0]) and self._is_real(device):
+                output = f"{device}/{rest.split('_')[1]}" if rest.startswith("_ao") else ""
+                ideal[row] = self._loopback.at(output, times_s) if output else 0.0
+        return ideal
+
+
+_Volts = Callable[[tuple[str, ...], Values], Values]

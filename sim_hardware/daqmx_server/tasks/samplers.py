@@ -1,0 +1,132 @@
+"""What a task reads and puts out, by the kind of its channels."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
+from sim_hardware.daqmx_server.inventory.terminals import plain
+from sim_hardware.daqmx_server.tasks.generation import Generation
+from sim_hardware.daqmx_server.timing.acquisition import Run
+from sim_hardware.daqmx_server.timing.counting import TIMEBASE_HZ, CounterSampler, Pulses
+from sim_hardware.daqmx_server.timing.digital import DigitalSampler
+from sim_hardware.daqmx_server.timing.routing import terminals_of
+from sim_hardware.daqmx_server.timing.sampling import BlockSource, Sampler, SampleTimes
+from sim_hardware.daqmx_server.timing.scan import Scan
+from sim_hardware.daqmx_server.timing.task_timing import TaskTiming
+
+
+class ChannelTask(Protocol):
+    """A task as far as its samples are concerned."""
+
+    bench: Bench
+    channels: list[VirtualChannel]
+    exported: dict[str, Any]
+    generation: Generation
+    run: Run | None
+    timing: TaskTiming
+    armed_s: float
+    taken_on_demand: int
+
+    @property
+    def io(self) -> str: ...
+
+    @property
+    def hosts(self) -> list[str]: ...
+
+    @property
+    def devices(self) -> list[str]: ...
+
+    @property
+    def scan(self) -> Scan: ...
+
+
+class NoSamples:
+    """An output task has nothing to read."""
+
+    def codes(self, start: int, stop: int) -> NDArray[Any]:
+        return np.zeros((0, stop - start))
+
+
+def sampler_of(task: ChannelTask, times: SampleTimes) -> BlockSource:
+    """Samples of the task's channels by a clock."""
+    bench = task.bench
+    if task.io == "DI":
+        return DigitalSampler(task.channels, times, bench.loopback)
+    if task.io == "CI":
+        return CounterSampler(task.channels, times, task.armed_s, lambda channel: pulses_at(task, channel))
+    if task.io == "AI":
+        return Sampler(bench.wiring, bench.faults, task.scan.inputs, times, bench.helper)
+    return NoSamples()
+
+
+def on_demand_sampler(task: ChannelTask, now_s: float) -> BlockSource:
+    """Samples taken by software, one after the other at the device's own pace."""
+    times = SampleTimes(now_s, max(task.timing.max_rate_hz, 1.0))
+    if task.io == "DI":
+        return DigitalSampler(task.channels, times, task.bench.loopback, task.taken_on_demand)
+    return sampler_of(task, times)
+
+
+def pulse_times_s(channel: VirtualChannel) -> tuple[float, float]:
+    """Low and high time of a counter output, s."""
+    attributes = channel.attributes
+    if channel.measurement == "PULSE_FREQUENCY":
+        period = 1.0 / float(attributes["CO_PULSE_FREQ"])
+        high = period * float(attributes["CO_PULSE_DUTY_CYC"])
+        return period - high, high
+    if channel.measurement == "PULSE_TIME":
+        return float(attributes["CO_PULSE_LOW_TIME"]), float(attributes["CO_PULSE_HIGH_TIME"])
+    ticks = int(attributes["CO_PULSE_LOW_TICKS"]), int(attributes["CO_PULSE_HIGH_TICKS"])
+    return ticks[0] / TIMEBASE_HZ, ticks[1] / TIMEBASE_HZ
+
+
+def pulses_at(task: ChannelTask, channel: VirtualChannel) -> Pulses | None:
+    """The train that reaches a counter input: of the counter output whose terminal it listens to."""
+    group = channel.kind.group
+    keys = [key for key in channel.attributes if key.startswith(group) and key.endswith("_TERM")]
+    wanted = {plain(str(channel.attributes[key])) for key in keys}
+    for other in cast("dict[str, ChannelTask]", task.bench.tasks).values():
+        run = other.run
+        if other.io != "CO" or run is None or run.times is None:
+            continue
+        if wanted & terminals_of(other, "SampleClock"):
+            low_s, high_s = pulse_times_s(other.channels[0])
+            total = run.last_sample()
+            return Pulses(run.times.first_s, low_s, high_s, np.inf if total is None else float(total))
+    return None
+
+
+def play(task: ChannelTask, run: Run) -> None:
+    """The written samples drive the outputs from the run's first clock on."""
+
+    def player(row: int, bit: int | None) -> Any:
+        def values(instants: NDArray[np.float64]) -> NDArray[np.float64]:
+            run.look(task.bench.clock.now())
+            if run.times is None or not task.generation.samples.size:
+                return np.full(len(instants), np.nan)
+            out = task.generation.at(row, run.times, instants, run.plan.total)
+            if bit is None:
+                return out
+            words = np.nan_to_num(out).astype(np.int64)
+            return np.where(np.isnan(out), np.nan, words >> bit & 1)
+
+        return values
+
+    for row, channel in enumerate(task.channels):
+        if task.io == "AO":
+            task.bench.loopback.play(channel.physical, player(row, None))
+        for bit, line in enumerate(channel.lines):
+            task.bench.loopback.play(line, player(row, bit))
+    task.bench.world_changed()
+
+
+def stop_playing(task: ChannelTask, now_s: float) -> None:
+    """The outputs keep the value they have now."""
+    for channel in task.channels:
+        for terminal in channel.lines or (channel.physical,):
+            task.bench.loopback.stop(terminal, now_s)
