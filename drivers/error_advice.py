@@ -40,8 +40,16 @@ _OVERWRITTEN = Advice(
     recoverable=True,
 )
 _TOO_FAST = Advice(
-    "The device could not hand over its samples in time",
-    "Use a direct USB or network port, lower rate_hz or spread the channels over two chassis",
+    "The device could not hand over its samples in time, and its own memory ran over",
+    "The tasks are started again and the gap is recorded. If it happens again, use a direct USB or "
+    "network port, lower rate_hz or spread the channels over two chassis",
+    recoverable=True,
+)
+_OUT_OF_STEP = Advice(
+    "The chassis or its modules lost the clock that they share",
+    "The tasks are started again and the gap is recorded. If it happens again, check the network switch, "
+    "its time synchronisation and the cables between the chassis",
+    recoverable=True,
 )
 _NO_SUCH_CHANNEL = Advice(
     "A terminal of the rig file does not exist on that module, or the module cannot measure that quantity",
@@ -52,7 +60,9 @@ BY_CODE: Final[dict[int, Advice]] = {
     -200279: _OVERWRITTEN,
     -200222: Advice(
         "The acquisition stopped because its buffer was full of samples that nobody had read",
-        "Start the acquisition again; close other programs or raise acquisition.buffer_s",
+        "The tasks are started again and the gap is recorded; close other programs or raise "
+        "acquisition.buffer_s",
+        recoverable=True,
     ),
     -200284: Advice(
         "No new samples arrived in time",
@@ -98,7 +108,13 @@ BY_CODE: Final[dict[int, Advice]] = {
     -200019: _TOO_FAST,
     -200361: _TOO_FAST,
     -200714: _TOO_FAST,
-    -200141: _TOO_FAST,
+    -200141: Advice(
+        "A counter received more edges than it could count before they were read",
+        "Lower the frequency at the counter's input, or read the counter more often",
+    ),
+    -201273: _OUT_OF_STEP,
+    -201423: _OUT_OF_STEP,
+    -209838: _OUT_OF_STEP,
     -50405: _LOST,
     -50401: _LOST,
     -200175: _LOST,
@@ -135,8 +151,12 @@ BY_CODE: Final[dict[int, Advice]] = {
 
 _UNKNOWN = Advice(
     "NI-DAQmx reported an error",
-    "Look the code up in NI MAX or on ni.com; what had been read is saved",
+    "Reading is tried again and a gap is recorded. Look the code up in NI MAX or on ni.com; what had been "
+    "read is saved",
+    recoverable=True,
 )
+_STOPPED: Final = frozenset({-200088, -200222, -200361, -200019, -200714, -201273, -201423, -209838})
+"""Codes of a task that has stopped for good, though its device is there: it has to be started again."""
 
 BY_GRPC_STATUS: Final[dict[str, Advice]] = {
     "UNAVAILABLE": Advice(
@@ -214,7 +234,7 @@ def has_ended(error: ni_errors.Error) -> bool:
     if isinstance(error, ni_errors.RpcError):
         return getattr(error.rpc_code, "name", "") not in _AWAY_STATUS
     if isinstance(error, ni_errors.DaqError):
-        return advice_for(int(error.error_code)) is _LOST or int(error.error_code) in (-200088, -200222)
+        return advice_for(int(error.error_code)) is _LOST or int(error.error_code) in _STOPPED
     return False
 
 
