@@ -214,6 +214,8 @@ _TEXT: Final[dict[int, str]] = {
     Code.SCALE_TABLE_LENGTHS: "Table scale has different numbers of pre-scaled and scaled values.",
     Code.ATTRIBUTE_NOT_SUPPORTED: "Specified property is not supported by this device.",
     Code.GLOBAL_CHANNEL_UNKNOWN: "There is no global channel of that name in NI MAX.",
+    Code.TIMESTAMP_NOT_ENABLED: "The time stamp of this event is not enabled in the task.",
+    Code.NO_MORE_SPACE: "There is no room for more samples behind the last one of the generation.",
     Code.NO_LIMITS: (
         "Minimum and maximum of the channel are not set, and there is no default for them: set both."
     ),
