@@ -72,8 +72,8 @@ def table_4_1(bodies: dict[str, RigidBlock]) -> list[str]:
     lines.append(f"  mean              {mean:11.4f}  {block:10.4f}  0.933")
     return [
         *lines,
-        "  The printed r_max (0.931, 0.935, 0.933) are not (1.2), which the paper names: they equal the block",
-        "  form 1 − 2 m R² sin²α / I_O, cut after the third digit.",
+        "  The printed r_max (0.931, 0.935, 0.933) are not (1.2), which the paper names: they equal the",
+        "  block form 1 − 2 m R² sin²α / I_O, cut after the third digit.",
         "  CRT/r_max of FR2 is 0.99 with (1.2) as it stands, 1.00 with the printed 0.935.",
     ]
 
