@@ -8,8 +8,8 @@ import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.oscillations.rings import ring_columns
 from daq_app.gap.rocking_model.features.response import responded
-from daq_app.gap.rocking_model.features.rings import ring_columns
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, TAIL_S, Wire
 from daq_app.gap.rocking_model.records import Sensor

@@ -13,9 +13,9 @@ from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.channel_response import channel
 from daq_app.gap.rocking_model.features.families import sensor_families
 from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE, Predict, Size
-from daq_app.gap.rocking_model.features.floor_response import floor
 from daq_app.gap.rocking_model.features.memo import Memo
-from daq_app.gap.rocking_model.features.ring_response import bending, turning
+from daq_app.gap.rocking_model.features.oscillations.floor_response import floor
+from daq_app.gap.rocking_model.features.oscillations.ring_response import bending, turning
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.records import Survey
 from daq_app.gap.rocking_model.tolerances import CROSSTALK

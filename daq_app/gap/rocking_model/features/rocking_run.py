@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from daq_app.gap.core import FeatureSet, Label
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
-from daq_app.gap.rocking_model.features.floor_vibration import Vibration
 from daq_app.gap.rocking_model.features.marks import Mark
+from daq_app.gap.rocking_model.features.oscillations.floor_vibration import Vibration
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Wire
 from daq_app.gap.rocking_model.motion.swings import Swings

@@ -12,7 +12,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import scalar_block
 from daq_app.gap.rocking_model.features.families import sensor_families
 from daq_app.gap.rocking_model.features.family import Scene
-from daq_app.gap.rocking_model.features.floor_vibration import quiet
+from daq_app.gap.rocking_model.features.oscillations.floor_vibration import quiet
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion import swings as sw
 from daq_app.gap.rocking_model.motion.motion_grid import make_grid

@@ -16,8 +16,8 @@ from scipy.optimize import nnls
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.marks import Mark
-from daq_app.gap.rocking_model.features.ring_signals import accelerations
-from daq_app.gap.rocking_model.features.rings import Ring, cleaner, ring_columns
+from daq_app.gap.rocking_model.features.oscillations.ring_signals import accelerations
+from daq_app.gap.rocking_model.features.oscillations.rings import Ring, cleaner, ring_columns
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
 

@@ -11,7 +11,7 @@ from daq_app.gap.core import Parameter, Prediction, Run, Scatter
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.coefficients import block_coefficients, sensor_priors
 from daq_app.gap.rocking_model.features.families.lvdts import FACE_SKEW
-from daq_app.gap.rocking_model.features.floor_response import with_measured_inputs
+from daq_app.gap.rocking_model.features.oscillations.floor_response import with_measured_inputs
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.prediction.free_forms import free_times, with_uneven_loss
 from daq_app.gap.rocking_model.prediction.true_motion import pause_at_impact, true_rotations

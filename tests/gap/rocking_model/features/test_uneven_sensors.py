@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from daq_app.gap.rocking_model.features.ring_response import bending, turning
+from daq_app.gap.rocking_model.features.oscillations.ring_response import bending, turning
 from daq_app.gap.rocking_model.study import prepare
 from tests.support.simulated_wall import simulate
 

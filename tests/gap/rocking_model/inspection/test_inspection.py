@@ -9,7 +9,7 @@ import pytest
 
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.coefficients import block_coefficients
-from daq_app.gap.rocking_model.features.rings import ring_columns
+from daq_app.gap.rocking_model.features.oscillations.rings import ring_columns
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.findings import findings_of
 from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels, found_marks

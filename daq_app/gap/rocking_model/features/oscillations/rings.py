@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.features.block import Block
-from daq_app.gap.rocking_model.features.ring_signals import Signal
+from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 

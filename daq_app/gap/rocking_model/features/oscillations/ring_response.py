@@ -9,8 +9,8 @@ import numpy as np
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block, Shares
 from daq_app.gap.rocking_model.features.differences import difference_of
+from daq_app.gap.rocking_model.features.oscillations.rings import ring_columns
 from daq_app.gap.rocking_model.features.response import delay, transfer
-from daq_app.gap.rocking_model.features.rings import ring_columns
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 
 
