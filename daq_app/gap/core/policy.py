@@ -22,6 +22,10 @@ class Policy:
     """Acceleration of a burst of the floor, m/s², from which it is material: a hundredth of g turns a wall by
     less than its impacts scatter (assumed); raising it hides weak traffic."""
 
+    finding_crossed: float = 0.07
+    """Share of the rotation across an instrument's axis from which it is material: a mount that is turned by
+    4°, twice what a rough laboratory has (assumed); raising it hides crosstalk."""
+
     # The model's own discrepancy
     usual_discrepancy: float = 1.0
     """Scale of the half-Cauchy prior of a group's discrepancy, in nominal sd (Gelman, Bayesian Analysis 1,

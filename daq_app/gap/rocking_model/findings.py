@@ -62,7 +62,8 @@ def _finding(key: str, marks: Sequence[Mark], runs: int) -> Finding:
 def _is_material(kind: str, size: float, in_noise: float) -> bool:
     if kind in _IN_NOISE:
         return in_noise > POLICY.finding_in_noise
-    return kind != "shaking" or size > POLICY.finding_shaking
+    least = {"shaking": POLICY.finding_shaking, "crossed": POLICY.finding_crossed}
+    return size > least.get(kind, 0.0)
 
 
 def _median_with_sd(marks: Sequence[Mark]) -> tuple[float, float]:
