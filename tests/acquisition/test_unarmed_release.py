@@ -87,6 +87,28 @@ def test_an_order_to_arm_just_after_the_release_takes_the_whole_of_it(live: Live
         assert {"released", "rocking", "at_rest"} <= {event.kind for event in run.events}
 
 
+def test_what_looked_like_a_release_and_had_no_impact_gives_way_to_the_next_test(
+    live: Lives, wall_test: Any
+) -> None:
+    """A rope that slips: the wall falls back a little and is held again, and nobody waits for its rest."""
+    slips = wall_test.readings[:, : wall_test.release_sample + 1500]
+    held = wall_test.readings[:, wall_test.release_sample - 4 * RATE_HZ : wall_test.release_sample]
+    caught = np.tile(held - held.mean(axis=1, keepdims=True), 2) + slips[:, -1:]
+    lab = live()
+    lab.driver._wall = type(wall_test)(
+        np.hstack([slips, caught]), wall_test.release_sample, wall_test.rest_sample, wall_test.theta0_rad
+    )
+    zero(lab)
+    lab.driver.let(wall_test.release_sample + 4 * RATE_HZ)
+    lab.wait_for_state(State.RELEASED)
+    lab.wait_for(lambda m: getattr(m, "first_sample", 0) >= wall_test.release_sample + 3 * RATE_HZ)
+    reply = lab.ask("arm", test="FR1-L3-1")
+    assert reply.ok, reply.text
+    assert lab.wait_for_state(State.ARMED, State.HOLDING).test == "FR1-L3-1"
+    folder = Path(str(reply.data["journal"])).parent
+    assert list(folder.glob("unarmed_*")), "what was recorded is kept"
+
+
 def test_a_wall_that_was_never_held_still_is_recorded_and_ended_too(live: Lives, wall_test: Any) -> None:
     """A rope that breaks during the pull."""
     held = slice(wall_test.release_sample - 5 * RATE_HZ - 2400, wall_test.release_sample)

@@ -137,6 +137,11 @@ class Acquisition:
             lambda m: isinstance(m, HealthMessage) and m.buffer_samples > 0, self._mark, "samples"
         )
         reply = self.client.request("arm", timeout_s=LIMIT_S, test=test)
+        if "recorded already" in reply.text:  # the wall was moved before, and nobody had armed
+            self.client.request("stop", timeout_s=LIMIT_S)
+            self.state(State.SAVED)
+            self.mark()
+            reply = self.client.request("arm", timeout_s=LIMIT_S, test=test)
         if not reply.ok:  # the hardware is open, and the session is about to hear of it
             assert "Nothing is being sampled" in reply.text, reply.text
             self.state(State.PREVIEWING)

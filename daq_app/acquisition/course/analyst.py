@@ -50,6 +50,8 @@ _SAME_RATE: Final = 1e-6
 UNARMED: Final = "unarmed"
 """Stands for the test's name in the run of a release that nobody armed."""
 _MOVING: Final = frozenset({State.RELEASED, State.ROCKING})
+_SETTLE_S: Final = 2.0
+"""Time within which the first impact follows a release from any level (half a second from 0.40 α), s."""
 
 
 class Analyst(threading.Thread):
@@ -167,9 +169,15 @@ class Analyst(threading.Thread):
         self._judge()
 
     def _keep_unarmed(self, events: Sequence[PhaseEvent]) -> None:
-        """A release that nobody armed is recorded all the same, from some time before it."""
+        """A release that nobody armed is recorded all the same, from some time before it.
+
+        Beside a sensor that has just failed, a leap of the rotation is no release yet: the first impact says
+        that it was one, and the ring still has what came before.
+        """
         assert self._opened is not None
-        moving = [event for event in events if event.kind in ("release", "impact")]
+        moving = [
+            e for e in events if e.kind == "impact" or (e.kind == "release" and not self._sensors_fail())
+        ]
         if not moving or self._live is None:
             return
         self.voice.test, self.voice.run_path = UNARMED, ""
@@ -177,6 +185,23 @@ class Analyst(threading.Thread):
         self._sequence = course
         self._around.keep(round(moving[0].sample), self.tare)
         self._follow(course, events[events.index(moving[0]) :])
+
+    def _sensors_fail(self) -> bool:
+        """Whether a rail is reached, or something new has been wrong with a sensor within `_SETTLE_S`."""
+        assert self._opened is not None
+        if self._sensors is None:
+            return False
+        quiet = self.voice.sample - self._sensors.told_sample
+        return bool(self.overloaded) or quiet < _SETTLE_S * self._opened.rate_hz
+
+    @property
+    def gives_way(self) -> bool:
+        """Whether what is recorded is no test: nobody armed it, and no impact follows within `_SETTLE_S`."""
+        course, opened = self._sequence, self._opened
+        if course is None or opened is None or course.armed or course.state is not State.RELEASED:
+            return False
+        released = course.release_sample
+        return released is not None and self.voice.sample - released > _SETTLE_S * opened.rate_hz
 
     def _follow(self, course: Course, events: Sequence[PhaseEvent]) -> None:
         for event in events:
@@ -338,6 +363,9 @@ class Analyst(threading.Thread):
     def _prepare(self, ask: Ask) -> None:
         if self._preparation is None:
             raise RequestRefused("Nothing is being sampled; start the preview first")
+        if ask.name == "arm" and self.gives_way and self._sequence is not None:
+            words = "No impact followed, so this was no release; a test is armed now"
+            self._finish(self._sequence.end("stopped", self.voice.sample, words))
         ask.done.add_done_callback(lambda _done: self._after_preparation(ask.name))
         self._preparation.order(ask, recording=self._sequence is not None)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from daq_app.acquisition.course.channel_watch import ChannelWatch
@@ -19,6 +20,8 @@ class SensorNews:
     def __init__(self, rig: Rig, opened: Opened, note: Note) -> None:
         self.overloaded: tuple[str, ...] = ()
         """Channels that can follow no further in the last block."""
+        self.told_sample = -math.inf
+        """Sample of the last block in which something new was wrong with a sensor."""
         self._note = note
         self._overload = OverloadWatch(rig.channels, opened.ranges)
         self._channels = ChannelWatch(rig, opened.rate_hz, opened.ranges)
@@ -27,8 +30,10 @@ class SensorNews:
         """Tell what is new in a block. `moving`: impacts ring and leap; only what is no motion is told."""
         self.overloaded = self._overload.check(block)
         for kind, text in self._overload.news():
+            self.told_sample = block.first_sample
             self._note(kind, text, "warning", None, None)
         for doubt in self._channels.check(block, moving=moving, at_end=self._overload.at_end):
+            self.told_sample = block.first_sample
             data: dict[str, float | str] = {"channel": doubt.channel_id, "doubt": doubt.name}
             self._note("channel", doubt.text, "warning", doubt.sample, data)
 

@@ -304,7 +304,7 @@ class Session:
         check_name(plan.test)
         if self.opened is None:
             raise RequestRefused("Nothing is being sampled. Start the preview first")
-        if self.recording:
+        if self.recording and not self.analyst.gives_way:
             raise RequestRefused("A run is being recorded already. Stop or abort it before the next one")
         check_space(self._settings.folder, self._settings.rig, self.opened.rate_hz)
         return self.ask("arm", {"plan": plan, "overrule": overrule})
