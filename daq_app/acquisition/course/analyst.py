@@ -196,12 +196,14 @@ class Analyst(threading.Thread):
 
     @property
     def gives_way(self) -> bool:
-        """Whether what is recorded is no test: nobody armed it, and no impact follows within `_SETTLE_S`."""
+        """Whether a test may be armed: nothing is recorded, or what nobody armed and no impact followed."""
         course, opened = self._sequence, self._opened
-        if course is None or opened is None or course.armed or course.state is not State.RELEASED:
-            return False
+        if course is None or opened is None:
+            return True
         released = course.release_sample
-        return released is not None and self.voice.sample - released > _SETTLE_S * opened.rate_hz
+        if course.armed or course.state is not State.RELEASED or released is None:
+            return False
+        return self.voice.sample - released > _SETTLE_S * opened.rate_hz
 
     def _follow(self, course: Course, events: Sequence[PhaseEvent]) -> None:
         for event in events:
