@@ -14,7 +14,7 @@ from daq_app.monitor.data.session import Session
 from daq_app.monitor.plots.estimate_plots import PeriodPlot, PhasePlane, RestitutionPlot, side_by_side
 from daq_app.monitor.plots.motion_plots import MotionPlots
 from daq_app.monitor.plots.strip_panel import StripPanel
-from daq_app.monitor.widgets.counters import AlarmLevels, Counters
+from daq_app.monitor.widgets.counters import Counters
 from daq_app.monitor.widgets.labels import role_label, set_role
 from daq_app.monitor.widgets.theme import Colours
 
@@ -22,10 +22,10 @@ from daq_app.monitor.widgets.theme import Colours
 class LivePage(QWidget):
     """Everything that moves. The window calls `draw_frame` 40 times and `draw_slow` 6 times a second."""
 
-    def __init__(self, session: Session, levels: AlarmLevels, parent: QWidget | None = None) -> None:
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
-        self.counters = Counters(session, levels)
+        self.counters = Counters(session)
         self.motion = MotionPlots(session)
         self.restitution = RestitutionPlot(session)
         self.phase = PhasePlane(session)

@@ -15,14 +15,6 @@ from daq_app.monitor.widgets.labels import DASH, Tile, number, restitution_text
 
 
 @dataclass(frozen=True, slots=True)
-class AlarmLevels:
-    """Rotation over α at which the margin to overturning is shown as a warning and as an alarm."""
-
-    warning: float = 0.50
-    alarm: float = 0.65
-
-
-@dataclass(frozen=True, slots=True)
 class TileText:
     """What a tile shows."""
 
@@ -42,7 +34,7 @@ CAPTIONS = {
 }
 
 
-def tile_texts(session: Session, levels: AlarmLevels) -> dict[str, TileText]:
+def tile_texts(session: Session) -> dict[str, TileText]:
     """The figures by tile; a measured value that is not live is a dash."""
     alpha = session.alpha_rad
     live = session.fresh(MotionMessage)
@@ -53,15 +45,15 @@ def tile_texts(session: Session, levels: AlarmLevels) -> dict[str, TileText]:
         number(rotation * 1e3, 1, "mrad"), f"θ/α = {number(ratio, 3)}" if math.isfinite(ratio) else "not live"
     )
     margin = session.overturning_margin
-    if not math.isfinite(margin):
+    if session.rig is None or not math.isfinite(margin):
         texts["margin"] = TileText(DASH, "not live")
     else:
-        used = 1.0 - margin
-        role = "bad" if used >= levels.alarm else "warning" if used >= levels.warning else "good"
+        used, limits = 1.0 - margin, session.rig.acquisition
+        role = "bad" if used >= limits.alarm_ratio else "warning" if used >= limits.warning_ratio else "good"
         words = {
             "bad": "⚠ ALARM: keep clear",
             "warning": "⚠ high rotation",
-            "good": f"alarm at θ/α {levels.alarm:g}",
+            "good": f"alarm at θ/α {limits.alarm_ratio:g}",
         }
         texts["margin"] = TileText(f"{100 * margin:.0f} %", words[role], role)
     estimate = session.estimate
@@ -96,10 +88,9 @@ def tile_texts(session: Session, levels: AlarmLevels) -> dict[str, TileText]:
 class Counters(QWidget):
     """The tiles."""
 
-    def __init__(self, session: Session, levels: AlarmLevels, parent: QWidget | None = None) -> None:
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
-        self.levels = levels
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(6)
@@ -118,5 +109,5 @@ class Counters(QWidget):
 
     def refresh(self) -> None:
         """Bring the tiles up to date."""
-        for name, text in tile_texts(self._session, self.levels).items():
+        for name, text in tile_texts(self._session).items():
             self.tiles[name].show_value(text.value, text.detail, text.role)

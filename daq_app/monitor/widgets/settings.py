@@ -10,8 +10,6 @@ import platformdirs
 from PySide6.QtCore import QByteArray, QSettings
 from PySide6.QtWidgets import QSplitter, QWidget
 
-from daq_app.monitor.widgets.counters import AlarmLevels
-
 TYPE_SIZES: Final = (9.0, 10.0, 11.5, 13.0, 15.0)
 _RECENT: Final = 8
 
@@ -58,14 +56,6 @@ class WindowSettings:
     @type_size.setter
     def type_size(self, points: float) -> None:
         self._store.setValue("type_size", points)
-
-    @property
-    def alarm_levels(self) -> AlarmLevels:
-        """θ/α at which the margin to overturning warns and alarms; edited in the file."""
-        default = AlarmLevels()
-        warning = self._number("overturning/warning_ratio", default.warning)
-        alarm = self._number("overturning/alarm_ratio", default.alarm)
-        return AlarmLevels(warning, alarm) if 0 < warning <= alarm < 1 else default
 
     @property
     def recent_rigs(self) -> list[Path]:

@@ -76,7 +76,7 @@ class MainWindow(QMainWindow):
         self._released = False
         """Whether the wall was let go since the last arming: an aborted arming has no result."""
 
-        self.live = LivePage(self.session, settings.alarm_levels)
+        self.live = LivePage(self.session)
         self.prepare = PreparePage(self.session, self.background)
         self.campaign = CampaignPage(self.background)
         self.replay = ReplayPage(self.background)
