@@ -216,7 +216,7 @@ FAULTS: list[Fault] = [
     ),
     (
         "unknown module",
-        lambda t: modules(t)[2].update(product="NI-9205"),
+        lambda t: modules(t)[2].update(product="NI 92055"),
         "hardware.chassis[0] (cDAQ1).modules[2].product",
         "not in the hardware catalogue",
         "Did you mean NI 9205",

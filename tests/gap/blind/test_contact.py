@@ -130,7 +130,7 @@ def test_sensors_see_the_same_rocking_from_either_world(rig: Rig, wall: Wall) ->
     mechanics = build(wall, {}, release)
     contact, events = rock(wall, {}, release), integrate(mechanics, release)
     time = np.arange(-0.5, contact.impacts[0].time - 0.02, 1.0 / 4000.0)
-    scenes = contact_stage(contact, wall, time), stage(mechanics, events, {}, time)
+    scenes = contact_stage(contact, wall, {}, time), stage(mechanics, events, {}, time)
     place, rng = Place(0.0, 0.05), np.random.default_rng(1)
     mine, theirs = (quiet_signals(rig, scene, (), rng, place) for scene in scenes)
     for row, channel in enumerate(rig.channels):

@@ -22,13 +22,13 @@ def _scaled(factors: dict[str, float], effects: dict[str, dict[str, float]] | No
     return runs
 
 
-def test_a_gain_of_one_accelerometer_along_z_is_named() -> None:
+def test_a_gain_of_one_accelerometer_along_z_is_a_finding_about_it_and_no_cause() -> None:
     result = diagnose_runs(
         _scaled({"AC-7": 1.06}), only=("gain@AC-7", "drift@AC-7", "gain@accelerometer", "pivot_shift")
     )
-    assert result.decision.verdict == "effect"
-    assert result.decision.effects == ("gain@AC-7",)
-    found = next(p for p in result.effect_parameters if p.name == "gain@AC-7.error")
+    assert result.decision.effects == ()
+    (found,) = (finding for finding in result.findings if finding.name == "gain@AC-7")
+    assert found.probability > 0.95
     assert found.low < 0.06 < found.high
     assert found.high - found.low < 0.04
 
