@@ -16,7 +16,7 @@ from daq_app.acquisition.messages.published import (
     StateMessage,
 )
 from daq_app.monitor.data.session import Published, Session
-from daq_app.monitor.widgets.counters import AlarmLevels, tile_texts
+from daq_app.monitor.widgets.counters import tile_texts
 from daq_app.monitor.widgets.labels import DASH, number, size_text
 from daq_app.monitor.window.health_bar import health_texts
 
@@ -30,12 +30,12 @@ def session(clock, rig):
 
 def test_a_value_is_live_for_half_a_second_and_then_a_dash(session, clock, stand_in, play):
     play(session, clock, stand_in, 3.0)
-    assert tile_texts(session, AlarmLevels())["rotation"].value.endswith("mrad")
+    assert tile_texts(session)["rotation"].value.endswith("mrad")
     clock.now += 0.49
     assert session.fresh(MotionMessage) and not session.data_missing
     clock.now += 0.02
-    assert tile_texts(session, AlarmLevels())["rotation"].value == DASH
-    assert tile_texts(session, AlarmLevels())["margin"].value == DASH
+    assert tile_texts(session)["rotation"].value == DASH
+    assert tile_texts(session)["margin"].value == DASH
     assert session.data_missing
     assert math.isnan(session.overturning_margin)
     assert session.current_state is State.PREVIEWING
@@ -45,7 +45,7 @@ def test_a_value_is_live_for_half_a_second_and_then_a_dash(session, clock, stand
 
 def test_the_figures_of_a_test_agree_with_the_motion(session, clock, stand_in, play, rig):
     play(session, clock, stand_in, stand_in.release_s + 4.0)
-    texts = tile_texts(session, AlarmLevels())
+    texts = tile_texts(session)
     impacts = int(np.sum(stand_in.motion.impacts_s <= stand_in.release_s + 4.0))
     assert texts["impacts"].value == str(impacts)
     assert texts["peak"].value == "0.350"
@@ -139,7 +139,7 @@ def test_margin_alarms_by_word_and_role(session, clock, rig):
             tilt_rad=theta,
         )
         session.feed(Published(motion, clock.now))
-        text = tile_texts(session, AlarmLevels())["margin"]
+        text = tile_texts(session)["margin"]
         assert (text.role, word in text.detail) == (role, True)
         clock.now += 0.1
 
@@ -156,7 +156,7 @@ def test_an_estimate_without_points_shows_no_r(session, clock):
         r_max=0.93,
     )
     session.feed(Published(estimate, clock.now))
-    text = tile_texts(session, AlarmLevels())["eav"]
+    text = tile_texts(session)["eav"]
     assert (text.value, text.detail) == (DASH, "needs three impacts")
 
 

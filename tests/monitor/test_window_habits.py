@@ -24,10 +24,9 @@ def test_theme_type_size_and_layout_are_remembered(qtbot, settings, tmp_path):
 
 def test_nonsense_in_the_settings_file_falls_back(tmp_path):
     path = tmp_path / "window.ini"
-    path.write_text("[General]\ntheme=pink\ntype_size=huge\n[overturning]\nalarm_ratio=7\n", encoding="utf-8")
+    path.write_text("[General]\ntheme=pink\ntype_size=huge\n", encoding="utf-8")
     settings = WindowSettings(path)
     assert (settings.theme, settings.type_size) == ("dark", 10.0)
-    assert settings.alarm_levels.alarm == 0.65
 
 
 def test_axes_say_what_they_show_also_after_a_change_of_theme(window, stand_in, play):
