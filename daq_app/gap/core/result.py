@@ -1,4 +1,4 @@
-"""The result of a diagnosis, and its JSON (format version 2, see docs/explanation/gap-method.md)."""
+"""The result of a diagnosis, and its JSON (format version 2, see docs/reference/gap-result.md)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """What can be put to the test: functions that take the folder of a case and return a result.
 
-The result is the JSON of ``daq-app gap diagnose`` (docs/explanation/gap-method.md). A diagnoser is named
+The result is the JSON of ``daq-app gap diagnose`` (docs/reference/gap-result.md). A diagnoser is named
 ``module:function`` and runs in a process of its own that is given nothing but the case's files.
 """
 
