@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from daq_app.acquisition.course.judgement import PULLED, Situation, judge
+from daq_app.acquisition.course.voice.judgement import PULLED, Situation, judge
 from daq_app.acquisition.messages.published import Call, Judgement, State
 from daq_app.config.rig import Acquisition
 from daq_app.runfile import TestPlan

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from daq_app.acquisition.closing.finaliser import Finished
 from daq_app.acquisition.course.sequence import Change, Sequence
+from daq_app.acquisition.course.unarmed import KEPT_BEFORE_S, UNARMED
 from daq_app.acquisition.course.unheld_release import UnheldReleaseWatch
 from daq_app.acquisition.messages.items import End
 from daq_app.acquisition.pipeline.ring import ring_sessions
@@ -40,10 +41,7 @@ from daq_app.runfile import (
 from daq_app.runfile.folder import find_journals, find_runs
 from daq_app.runfile.journal.locks import journal_locked
 
-KEPT_BEFORE_S: Final = 60.0
-"""How much lies before the release in the run that is made."""
 _BLOCK: Final = 400
-UNARMED: Final = "unarmed"
 
 
 def recover_rings(folder: Path) -> list[Finished]:

@@ -9,18 +9,20 @@ import math
 import queue
 import threading
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
-from daq_app.acquisition.course.hold_clock import HoldClock
-from daq_app.acquisition.course.judgement import PULLED, Situation
 from daq_app.acquisition.course.live import LiveView
+from daq_app.acquisition.course.orders import Orders
 from daq_app.acquisition.course.preparation import Preparation, Surroundings
 from daq_app.acquisition.course.sensor_news import SensorNews
 from daq_app.acquisition.course.sequence import Change
 from daq_app.acquisition.course.sequence import Sequence as Course
-from daq_app.acquisition.course.state_voice import REPEAT_S, StateVoice
 from daq_app.acquisition.course.surrounding import Surrounding
 from daq_app.acquisition.course.tare import Tare
+from daq_app.acquisition.course.unarmed import SETTLE_S, UNARMED, from_the_release, gives_way
+from daq_app.acquisition.course.voice.hold_clock import HoldClock
+from daq_app.acquisition.course.voice.judgement import PULLED, Situation
+from daq_app.acquisition.course.voice.state_voice import REPEAT_S, StateVoice
 from daq_app.acquisition.messages.items import (
     Arrived,
     Ask,
@@ -47,11 +49,7 @@ from daq_app.runfile import TestPlan
 from drivers import Block, Opened
 
 _SAME_RATE: Final = 1e-6
-UNARMED: Final = "unarmed"
-"""Stands for the test's name in the run of a release that nobody armed."""
 _MOVING: Final = frozenset({State.RELEASED, State.ROCKING})
-_SETTLE_S: Final = 2.0
-"""Time within which the first impact follows a release from any level (half a second from 0.40 α), s."""
 
 
 class Analyst(threading.Thread):
@@ -87,6 +85,12 @@ class Analyst(threading.Thread):
         """The zero of the last preparation, for whoever asks while nothing is sampled."""
         self._hold = HoldClock()
         self._aborted = False
+        self._orders = Orders(
+            self.voice,
+            finish=self._finish,
+            judge=lambda: self._judge(force=True),
+            note=lambda kind, text: self._note(kind, text, "info"),
+        )
 
     def run(self) -> None:
         """Until None comes."""
@@ -169,41 +173,28 @@ class Analyst(threading.Thread):
         self._judge()
 
     def _keep_unarmed(self, events: Sequence[PhaseEvent]) -> None:
-        """A release that nobody armed is recorded all the same, from some time before it.
-
-        Beside a sensor that has just failed, a leap of the rotation is no release yet: the first impact says
-        that it was one, and the ring still has what came before.
-        """
-        assert self._opened is not None
-        moving = [
-            e for e in events if e.kind == "impact" or (e.kind == "release" and not self._sensors_fail())
-        ]
-        if not moving or self._live is None:
+        """A release that nobody armed is recorded all the same, from some time before it."""
+        moving = from_the_release(events, doubtful=self._sensors_fail())
+        if not moving or self._opened is None:
             return
         self.voice.test, self.voice.run_path = UNARMED, ""
         course = Course(self._rig.acquisition, self._opened.rate_hz, self.voice.sample, math.inf, armed=False)
         self._sequence = course
         self._around.keep(round(moving[0].sample), self.tare)
-        self._follow(course, events[events.index(moving[0]) :])
+        self._follow(course, moving)
 
     def _sensors_fail(self) -> bool:
-        """Whether a rail is reached, or something new has been wrong with a sensor within `_SETTLE_S`."""
+        """Whether a rail is reached, or something new has been wrong with a sensor within `SETTLE_S`."""
         assert self._opened is not None
         if self._sensors is None:
             return False
         quiet = self.voice.sample - self._sensors.told_sample
-        return bool(self.overloaded) or quiet < _SETTLE_S * self._opened.rate_hz
+        return bool(self.overloaded) or quiet < SETTLE_S * self._opened.rate_hz
 
     @property
     def gives_way(self) -> bool:
-        """Whether a test may be armed: nothing is recorded, or what nobody armed and no impact followed."""
-        course, opened = self._sequence, self._opened
-        if course is None or opened is None:
-            return True
-        released = course.release_sample
-        if course.armed or course.state is not State.RELEASED or released is None:
-            return False
-        return self.voice.sample - released > _SETTLE_S * opened.rate_hz
+        """Whether a test may be armed now."""
+        return self._opened is None or gives_way(self._sequence, self.voice.sample, self._opened.rate_hz)
 
     def _follow(self, course: Course, events: Sequence[PhaseEvent]) -> None:
         for event in events:
@@ -307,44 +298,9 @@ class Analyst(threading.Thread):
             if ask.name in ("tare", "check", "pull", "arm"):
                 self._prepare(ask)
                 return
-            ask.done.set_result(self._answer(ask))
+            ask.done.set_result(self._orders.answer(ask, self._sequence))
         except RequestRefused as error:
             ask.done.set_exception(error)
-
-    def _answer(self, ask: Ask) -> tuple[str, dict[str, Any]]:
-        match ask.name:
-            case "plan":
-                if self._sequence is not None:
-                    raise RequestRefused(
-                        f"{self.voice.test} is being recorded: its plan is locked. Choose the next test then"
-                    )
-                self.voice.plan = ask.arguments["plan"]
-                self._judge(force=True)
-                return f"{self.voice.plan.test or 'No test'} is chosen", {}
-            case "stop":
-                sequence = self._recording()
-                self._finish(sequence.end("stopped", self.voice.sample, "Stopped by the operator"))
-                return "Stopped; the run is being saved", {}
-            case "abort":
-                sequence = self._recording()
-                if not sequence.before_release:
-                    raise RequestRefused(
-                        "The wall has been released: the test counts. Use stop to end the recording now"
-                    )
-                self._finish(
-                    sequence.end("aborted", self.voice.sample, "Aborted by the operator before release")
-                )
-                return "Aborted; what was recorded is kept as an aborted run", {}
-            case "marker" | "note":
-                text = str(ask.arguments.get("text", "")).strip() or ask.name
-                self._note(ask.name, text[:2000], "info")
-                return f"{ask.name} at sample {self.voice.sample}", {"sample": self.voice.sample}
-        raise RequestRefused(f"There is no request '{ask.name}'")
-
-    def _recording(self) -> Course:
-        if self._sequence is None:
-            raise RequestRefused("No test is being recorded")
-        return self._sequence
 
     @property
     def tare(self) -> Tare:

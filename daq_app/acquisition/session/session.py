@@ -11,11 +11,12 @@ from typing import Any, Final, TypeVar
 
 from daq_app.acquisition.closing.finaliser import Finaliser, Finished
 from daq_app.acquisition.closing.result_maker import ResultMaker
-from daq_app.acquisition.course.analyst import UNARMED, Analyst
+from daq_app.acquisition.course.analyst import Analyst
 from daq_app.acquisition.course.header import make_header
 from daq_app.acquisition.course.preflight import check_name, check_space
 from daq_app.acquisition.course.surrounding import Surrounding
 from daq_app.acquisition.course.tare import Tare
+from daq_app.acquisition.course.unarmed import KEPT_BEFORE_S, UNARMED
 from daq_app.acquisition.messages.items import (
     Ask,
     Begin,
@@ -43,8 +44,6 @@ from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX, find_journals
 from drivers import BackupRecorder, Driver, DriverError, Opened
 
 _T = TypeVar("_T")
-KEPT_BEFORE_S: Final = 60.0
-"""How much lies before a release that nobody armed, in its run, as far as the rig's ring_s allows."""
 _RESULT_S: Final = 120.0
 """How long the end of the process waits for results that are being made."""
 _DISK_BEHIND_S: Final = 1.5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Final
 
-from daq_app.acquisition.course.judgement import Situation, judge
+from daq_app.acquisition.course.voice.judgement import Situation, judge
 from daq_app.acquisition.messages.published import Judgement, State, StateMessage
 from daq_app.acquisition.messages.publisher import Publisher
 from daq_app.config.rig import Acquisition
