@@ -116,7 +116,7 @@ class RealRate:
     """The whole acquisition process while it records at 4000 Hz with a viewer attached."""
 
     processor_percent: float
-    """Of one core: client, recorder, analysis and publisher."""
+    """Share of one core that client, recorder, analysis and publisher take."""
     to_disk_p99_ms: float
     lost_samples: int
     memory_mb: float

@@ -19,7 +19,7 @@ class Case:
     """What it is taken for; empty for nothing missing."""
     truth: Drawn
     named: str
-    """Of the measurement that the library names for the pair."""
+    """Name of the measurement that the library names for the pair."""
     little: Recorded
     before: str
     more: Recorded

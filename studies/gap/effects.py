@@ -94,7 +94,7 @@ WHY: dict[str, str] = {
     "filter_delay@lvdt": "See lag@lvdt.",
     "filter_delay@wire": "See lag@lvdt.",
 }
-"""Of misses of the study that is on the page: the cause, of a case or of one seed of it (`case-seed`)."""
+"""Causes of the misses on the page, by case or by one seed of it (`case-seed`)."""
 NOTE = (
     "Seed 1 is not unseen: crushing, yaw, clock and saturation@wire missed with it at first, and what was "
     "found to be wrong was mended."

@@ -42,7 +42,7 @@ BLOCK = 5
 SUBSTEPS = 8
 FULL_V = 9.995
 NOISE_V = 0.02
-"""Of one reading of the level."""
+"""Noise of one reading of the level, V."""
 PROBE_LEVELS_V = (0.0, 3.0, 6.0, 9.0, 12.0, 15.0)
 _NO_LIMIT = 1e9
 _RECORDS = (("estimation", 0, 2), ("validation", 1, 3))

@@ -241,7 +241,7 @@ class Judge:
                 return "hang"
 
     def _memory(self) -> int:
-        """Of the largest process: the verifying one or the child that walks through files for it."""
+        """Memory of the largest process: the verifying one or the child that walks through files for it."""
         sizes = [0]
         with contextlib.suppress(psutil.Error):
             process = psutil.Process(self._process.pid)

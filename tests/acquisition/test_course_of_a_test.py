@@ -74,7 +74,7 @@ def test_samples_come_in_small_pieces_only_while_the_wall_moves(live: Lives, wal
     lab.zero_and_arm()
 
     def sizes_up_to(sample: int, since: int) -> set[int]:
-        """Of the reads in between, without the one that was waited for when it became otherwise."""
+        """What the reads in between gave, without the one that was waited for when it became otherwise."""
         lab.driver.let(sample)
         lab.wait_for(lambda message: isinstance(message, HealthMessage) and message.sample > sample - 400)
         return {size for first, size in lab.driver.sizes.items() if since + 400 <= first < sample - 400}

@@ -16,7 +16,7 @@ from daq_app.runfile import open_run, verify
 
 pytestmark = pytest.mark.heavy
 LIMIT_S = 300.0
-"""Of one wait: for a hang, not for a slow machine."""
+"""Limit of one wait: for a hang, not for a slow machine."""
 LIMIT_MS = round(1e3 * LIMIT_S)
 
 WINDOW = """

@@ -18,7 +18,7 @@ from tests.support.processes import quick_context
 from tests.support.saboteur import run_sabotaged
 
 SPEED = 2
-"""Of the simulated devices: a buffer of 20 s lasts 10 s then, also for a machine that is busy."""
+"""Speed of the simulated devices' clock: a buffer of 20 s lasts 10 s then, also on a busy machine."""
 RATE_HZ = 4000
 LIMIT_S = 120.0
 

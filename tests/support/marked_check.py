@@ -103,7 +103,7 @@ class _Walk:
         good = lags[worst <= 1.0]
         if not good.size:
             return None
-        # Of the lags that fit this sample the one closest to the lag before: time does not leap by itself.
+        # The lag that fits this sample and is closest to the lag before: time does not leap by itself.
         previous = self._lag or 0
         distance = (good - previous + PERIOD_SAMPLES // 2) % PERIOD_SAMPLES - PERIOD_SAMPLES // 2
         return previous + int(distance[np.argmin(np.abs(distance))])

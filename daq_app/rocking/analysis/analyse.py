@@ -52,8 +52,8 @@ class AnalysisOptions:
     bias_runs: int = 6
     """Simulated tests behind the methods' bias; 0 leaves it out."""
     seed: int | None = None
-    """Of the noise in the simulated tests. None: the record's label decides, so that the corrections of a
-    campaign's tests share no error, and one record has one bias however it is analysed."""
+    """Seed of the noise in the simulated tests. None: the record's label decides, so that the corrections of
+    a campaign's tests share no error, and one record has one bias however it is analysed."""
     keep_series: bool = True
 
 

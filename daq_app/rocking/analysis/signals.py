@@ -45,7 +45,7 @@ class Signals:
     openings_m: Floats
     """Brought onto the wires' instants."""
     rotation_rad: Floats
-    """Of the family that leads; NaN in gaps."""
+    """Rotation of the family that leads; NaN in gaps."""
     wire_rotation_rad: Floats
     """From the wires; NaN in gaps."""
     lead: Lead
@@ -96,7 +96,7 @@ class TestTimes:
 
     events: tuple[PhaseEvent, ...]
     release_s: float | None
-    """Of the last release that led to impacts; on the time base of the rotation."""
+    """Time of the last release that led to impacts, on the time base of the rotation."""
     hold_rad: float
     impacts_s: tuple[float, ...]
     rest_s: float | None

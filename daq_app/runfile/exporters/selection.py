@@ -43,7 +43,7 @@ class Selection:
     """Rotation, velocity, phase and what else was computed; none where nothing was."""
     results: tuple[ResultRow, ...] = ()
     decimal: Decimal = "point"
-    """Of text formats: comma goes with semicolons between columns."""
+    """Decimal sign of text formats: a comma goes with semicolons between columns."""
 
     @classmethod
     def of(

@@ -45,7 +45,7 @@ class Judged:
     truth: tuple[str, ...]
     families: tuple[str, ...]
     strength: float
-    """Of the weakest effect, in standard deviations (detectability); infinite for null cases."""
+    """Strength of the weakest effect, in standard deviations (detectability); infinite for null cases."""
     decision: str
     named: tuple[str, ...]
     """Effects of the answer; empty for answers that name none."""

@@ -27,7 +27,7 @@ class Shock:
     form: ShockForm = "half_sine"
     length_s: float = 0.002
     ring_hz: float = 140.0
-    """Of the softest mount; the others are stiffer by multiples of 37 Hz."""
+    """Frequency of the softest mount; the others are stiffer by multiples of 37 Hz."""
     ring_decay_s: float = 0.006
     ring_gain_1_s: float = 300.0
     """Acceleration of the ringing per jump of velocity."""

@@ -20,7 +20,7 @@ _SHARP_M: Final = 1e-3
 """Radius of an edge that counts as sharp."""
 _PADS: Final = 25
 _BED_DAMPING: Final = 1.0
-"""Of the wall's bounce on the whole bed, of critical: so a wall loses about what it loses on stone."""
+"""Damping of the wall's bounce on the whole bed, share of critical: it loses about what it loses on stone."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,7 +42,7 @@ class Release:
     omega0: float
     hold_s: float
     seed: int
-    """Of the floor's phase and of the impact scatter in this run."""
+    """Seed of the floor's phase and of the impact scatter in this run."""
     index: int = 0
     """Place in the campaign, from 0."""
     impacts_before: int = 0
