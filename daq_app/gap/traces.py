@@ -21,10 +21,11 @@ from scipy.signal import bessel, bilinear, lfilter
 
 from daq_app.gap.core import CannotDiagnose, Diagnosis
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.motion.hold import from_hold
 from daq_app.gap.rocking_model.motion.rotation import (
     Wire,
     anchors_off,
-    joint_rotation,
+    sample_noise,
     wall_rotation,
     wires_of,
     zeroed,
@@ -77,7 +78,7 @@ def traces(result: Diagnosis, runs: Sequence[GapRun], most: int = 2) -> list[Tra
     found = []
     for run in runs:
         try:
-            found.append((run, *_rotations(run, result)))
+            found.append(_rotations(run, result))
         except CannotDiagnose:
             continue
     found.sort(key=lambda entry: -abs(float(entry[1].peak_rad[0])))
@@ -94,40 +95,23 @@ def _effects_of(result: Diagnosis) -> dict[str, dict[str, float]]:
     return effects
 
 
-def _rotations(run: GapRun, result: Diagnosis) -> tuple[Swings, FloatArray, float, str, FloatArray, float]:
-    """(swings and impacts of the true motion, start of the cut record, family shown, its θ, its response)."""
+def _rotations(run: GapRun, result: Diagnosis) -> tuple[GapRun, Swings, FloatArray, str, FloatArray, float]:
+    """(run from its hold on, swings and impacts of the true motion, family shown, its θ, its response)."""
     families = {name.partition("@")[2] for name in _effects_of(result)}
     shown = next((f for f in ("wire", "tiltmeter", "lvdt") if f in families), "lvdt")
-    lvdts = joint_rotation(run).theta
-    cut = _start_of_hold(run, lvdts)
+    run, joint = from_hold(run)
     rows, heights, _ = wall_rotation(run)
-    wires = np.average(rows, axis=0, weights=heights**2) if len(rows) else lvdts
+    wires = np.average(rows, axis=0, weights=heights**2) if len(rows) else joint.theta
     # What the effect does not touch tells the motion; what it touches is shown.
-    true = wires if shown == "lvdt" and "lvdt" in families else lvdts
-    swings = find_swings(true[cut:], _noise(true), run.rate_hz, run.name)
-    chosen = {"lvdt": lvdts, "wire": wires, "tiltmeter": lvdts}[shown]
+    true = wires if shown == "lvdt" and "lvdt" in families else joint.theta
+    swings = find_swings(true, sample_noise(true, run.rate_hz), run.rate_hz, run.name)
+    chosen = {"lvdt": joint.theta, "wire": wires, "tiltmeter": joint.theta}[shown]
     response = 0.0
     if shown == "tiltmeter":
         rows_of = run.indices("tiltmeter", "x")
         chosen = np.mean([zeroed(run, i) for i in rows_of], axis=0)
         response = run.sensors[rows_of[0]].time_constant_s
-    impacts_s = _impacts(true[cut:], swings, run.rate_hz)
-    return swings, impacts_s, cut / run.rate_hz, shown, chosen, response
-
-
-def _noise(theta: FloatArray) -> float:
-    rest = theta[-1000:]
-    return float(np.std(np.diff(rest)) / math.sqrt(2.0)) + 1e-12
-
-
-def _start_of_hold(run: GapRun, theta: FloatArray) -> int:
-    """Sample one second before the wall leaves its largest rotation."""
-    size = np.abs(theta)
-    held = np.flatnonzero(size >= 0.98 * size.max())
-    after = np.flatnonzero(size < 0.5 * size.max())
-    after = after[after > held[0]]
-    release = int(held[held < after[0]][-1]) if after.size else int(held[-1])
-    return max(0, release - round(run.rate_hz))
+    return run, swings, _impacts(true, swings, run.rate_hz), shown, chosen, response
 
 
 def _trace(
@@ -135,7 +119,6 @@ def _trace(
     run: GapRun,
     swings: Swings,
     impacts_s: FloatArray,
-    start_s: float,
     shown: str,
     theta: FloatArray,
     slow_s: float,
@@ -159,7 +142,7 @@ def _trace(
     else:
         baseline = follow(run.survey, {}, bend=False)  # "other parameters": than those of the rig file
     time = np.arange(-_BEFORE_S, float(swings.peak_s[-1]), 1.0 / TRACE_HZ)
-    samples = np.arange(theta.size) / run.rate_hz - (start_s + swings.release_s)
+    samples = np.arange(theta.size) / run.rate_hz - swings.release_s
     heights = np.array([run.sensors[i].position_m[2] for i in run.indices("wire")] or [1.0])
     see = partial(
         _seen,

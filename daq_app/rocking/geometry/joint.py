@@ -1,9 +1,8 @@
-"""The base joint from the LVDTs on both faces: opening profile, rotation, pivot, contact, twist.
+"""The base joint from the LVDTs on both faces: rotation, opening, pivot, contact, twist.
 
-Each face gets a straight line over the wall's length; the two lines give, at every instant, the
-rotation (slope across the thickness), the neutral axis (where the opening is zero: the pivot), the
-length in contact (from the neutral axis to the edge it turns on) and the twist (how the rotation
-changes along the wall). Nothing is assumed about where the pivot is.
+At every instant a point (x, y) of the joint is open by u − x sin θ − x y κ: u is the opening in the middle, θ
+the rotation, κ its change along the wall. Where the opening is zero lies the neutral axis (the pivot), and
+the joint is in contact from there to the edge that the wall turns on; where the pivot is, nobody assumes.
 """
 
 from __future__ import annotations
@@ -19,9 +18,15 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 _RANGE_MARGIN = 0.005
+"""Share of the range, at either end, in which a reading counts as cut off: calibrations are off by 1 %."""
 _PIVOT_FROM_RAD = 4e-3
 """Below this rotation the neutral axis is the quotient of two small numbers."""
-_SUSPECT_RATIO = 6.0
+_OUTLIER_RATIO = 6.0
+"""Times the median misfit of the others from which an LVDT is left out (assumed).
+
+Raising it lets a loose one turn the joint."""
+_FEWEST = 6
+"""LVDTs that always stay: of fewer nobody can say which one is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +34,8 @@ class JointMotion:
     """State of the base joint at every sample, arrays (n,); NaN where too few LVDTs are in range."""
 
     rotation_rad: Floats
+    lift_m: Floats
+    """Opening at the middle of the base."""
     neutral_axis_m: Floats
     """x of zero opening at mid length; NaN below 4 mrad."""
     contact_m: Floats
@@ -36,7 +43,7 @@ class JointMotion:
     twist_rad_per_m: Floats
     """Change of the rotation along y."""
     suspects: tuple[str, ...]
-    """LVDTs left out because they do not fit the line of their face."""
+    """LVDTs left out because they do not fit the plane through the others."""
     clipped: tuple[str, ...]
     """LVDTs that reached the end of their range at some time."""
 
@@ -46,9 +53,10 @@ class BaseJoint:
     """LVDT geometry of a rig."""
 
     ids: tuple[str, ...]
-    x_m: Floats
-    y_m: Floats
+    position_m: Floats
+    """(lvdts, 3) points of the wall that the LVDTs touch; z above the joint."""
     noise_m: Floats
+    """(lvdts,)"""
     ranges_m: Floats
     """(lvdts, 2)"""
     half_width_m: float
@@ -58,93 +66,115 @@ class BaseJoint:
         """LVDTs of a rig; `ValueError` unless each face has at least two at different places."""
         channels: list[Channel] = [c for c in rig.of_family("lvdt") if ids is None or c.id in ids]
         position = np.array([channel.position_m for channel in channels], dtype=np.float64).reshape(-1, 3)
-        for face, name in ((position[:, 0] < 0, "−x"), (position[:, 0] > 0, "+x")):
-            if np.unique(position[face, 1]).size < 2:
-                raise ValueError(f"the base joint needs two LVDTs or more along the face at {name}")
-        return cls(
+        joint = cls(
             tuple(channel.id for channel in channels),
-            position[:, 0],
-            position[:, 1],
+            position,
             np.array([channel.noise_si for channel in channels]),
-            np.array([channel.range_si for channel in channels]),
+            np.array([channel.range_si for channel in channels]).reshape(-1, 2),
             rig.specimen.base_width_m / 2.0,
         )
+        for side, name in ((-1, "−x"), (1, "+x")):
+            if joint.places_on_face(side) < 2:
+                raise ValueError(f"the base joint needs two LVDTs or more along the face at {name}")
+        return joint
+
+    @property
+    def x_m(self) -> Floats:
+        """(lvdts,) across the wall: negative on one face, positive on the other."""
+        return self.position_m[:, 0]
+
+    def places_on_face(self, side: int, used: Bools | slice = slice(None)) -> int:
+        """Different y at which LVDTs stand on the face at −x (−1) or +x (1)."""
+        position = self.position_m[used]
+        return int(np.unique(position[np.sign(position[:, 0]) == side, 1]).size)
 
     def motion(self, openings_m: Floats) -> JointMotion:
-        """(lvdts, n) openings in m to the joint's motion."""
-        low, high = self.ranges_m[:, :1], self.ranges_m[:, 1:]
-        margin = _RANGE_MARGIN * (high - low)
-        with np.errstate(invalid="ignore"):
-            valid = (openings_m > low + margin) & (openings_m < high - margin)
-        clipped = np.isfinite(openings_m) & ~valid
-        suspects = self._suspects(openings_m, valid)
-        valid &= ~suspects[:, None]
-        left, right = self.x_m < 0, self.x_m > 0
-        at_left, along_left = _line(self.y_m[left], openings_m[left], valid[left])
-        at_right, along_right = _line(self.y_m[right], openings_m[right], valid[right])
-        x_left, x_right = float(self.x_m[left].mean()), float(self.x_m[right].mean())
-        width = x_right - x_left
-        sine = (at_left - at_right) / width
+        """(lvdts, n) openings in m to the joint's motion, from the LVDTs that are in range at each sample."""
+        at_end = at_range_end(openings_m, self.ranges_m[:, :1], self.ranges_m[:, 1:])
+        valid = np.isfinite(openings_m) & ~at_end
+        step = max(1, openings_m.shape[1] // 2000)
+        left_out = self.find_outliers(openings_m[:, ::step], valid[:, ::step], self.noise_m)
+        valid[left_out] = False
+        lift, sine, twist = self._plane_of_valid(openings_m, valid)
         with np.errstate(invalid="ignore", divide="ignore"):
             rotation = np.arcsin(np.clip(sine, -1.0, 1.0))
-            axis = np.where(np.abs(rotation) > _PIVOT_FROM_RAD, x_left + at_left / sine, np.nan)
-        contact = self.half_width_m - axis * np.sign(rotation)
+            axis = np.where(np.abs(rotation) > _PIVOT_FROM_RAD, lift / sine, np.nan)
+        ids = np.array(self.ids)
         return JointMotion(
             rotation_rad=rotation,
+            lift_m=lift,
             neutral_axis_m=axis,
-            contact_m=contact,
-            twist_rad_per_m=(along_left - along_right) / width,
-            suspects=tuple(np.array(self.ids)[suspects].tolist()),
-            clipped=tuple(np.array(self.ids)[clipped.any(axis=1)].tolist()),
+            contact_m=self.half_width_m - axis * np.sign(rotation),
+            twist_rad_per_m=twist,
+            suspects=tuple(ids[left_out].tolist()),
+            clipped=tuple(ids[at_end.any(axis=1)].tolist()),
         )
 
-    def rotation_noise_rad(self) -> float:
-        """Expected white noise of the rotation, one sample, all LVDTs in range."""
-        left, right = self.x_m < 0, self.x_m > 0
-        variance = sum(
-            float(np.sum(self.noise_m[face] ** 2)) / np.count_nonzero(face) ** 2 for face in (left, right)
-        )
-        return float(np.sqrt(variance) / (self.x_m[right].mean() - self.x_m[left].mean()))
+    def _plane_of_valid(self, openings_m: Floats, valid: Bools) -> Floats:
+        """(u, sin θ, κ), (3, n), each sample from the LVDTs that are valid (lvdts, n) at it."""
+        plane = np.full((3, openings_m.shape[1]), np.nan)
+        changes = np.flatnonzero(np.any(valid[:, 1:] != valid[:, :-1], axis=0)) + 1
+        starts = np.concatenate(([0], changes))[: plane.shape[1]]
+        patterns, pattern_of_start = np.unique(valid[:, starts], axis=1, return_inverse=True)
+        pattern = np.repeat(pattern_of_start, np.diff(starts, append=plane.shape[1]))
+        for k, used in enumerate(patterns.T):
+            if min(self.places_on_face(side, used) for side in (-1, 1)) >= 2:
+                samples = pattern == k
+                plane[:, samples] = self.plane(openings_m[np.ix_(used, samples)], used)
+        return plane
 
-    def _suspects(self, openings_m: Floats, valid: Bools) -> Bools:
-        """LVDTs whose misfit to their face's line is far above that of their neighbours."""
-        suspects = np.zeros(len(self.ids), dtype=bool)
-        step = max(1, openings_m.shape[1] // 2000)
-        some, mask = openings_m[:, ::step], valid[:, ::step]
-        for face in (np.flatnonzero(self.x_m < 0), np.flatnonzero(self.x_m > 0)):
-            good = list(face)
-            # One at a time, worst first: a bad one drags the line and makes neighbours look bad.
-            for _ in range(len(face) // 4):
-                at, along = _line(self.y_m[good], some[good], mask[good])
-                misfit = some[good] - at - self.y_m[good][:, None] * along
-                misfit = np.where(mask[good], misfit, np.nan)
-                seen = np.isfinite(misfit).any(axis=1)
-                rms = np.full(len(good), np.inf)
-                rms[seen] = np.sqrt(np.nanmean(misfit[seen] ** 2, axis=1))
-                worst = int(np.argmax(rms))
-                if len(good) <= 3 or rms[worst] <= _SUSPECT_RATIO * max(
-                    float(np.median(rms)), self.noise_m[good[worst]]
-                ):
-                    break
-                suspects[good.pop(worst)] = True
-        return suspects
+    def plane(self, openings_m: Floats, used: Bools | slice = slice(None)) -> Floats:
+        """(u, sin θ, κ), (3, n), least squares through the openings (k, n) of the k LVDTs `used`.
+
+        A point at the height z above the joint sinks by z (1 − cos θ) as the wall turns, which is put back.
+        """
+        inverse = np.linalg.pinv(self._design(used))
+        plane = inverse @ openings_m
+        height = self.position_m[used, 2]
+        if height.any():
+            cosine = np.sqrt(1.0 - np.clip(plane[1], -1.0, 1.0) ** 2)
+            plane += np.outer(inverse @ height, 1.0 - cosine)
+        return plane
+
+    def find_outliers(self, openings_m: Floats, valid: Bools, tolerated_m: Floats | float) -> list[int]:
+        """Places of the LVDTs that do not fit the plane through the others.
+
+        `openings_m`, `valid`: (lvdts, n); an LVDT that is never valid is not judged. `tolerated_m`: rms
+        misfit, m, up to which an LVDT stays, whatever the others leave.
+        """
+        tolerated = np.broadcast_to(tolerated_m, len(self.ids))
+        good = np.flatnonzero(valid.any(axis=1))
+        found: list[int] = []
+        # One at a time, worst first: a bad one turns the plane and makes its neighbours look bad.
+        while good.size > _FEWEST:
+            whole = valid[good].all(axis=0)
+            if not whole.any():
+                break
+            design, openings = self._design(good), openings_m[np.ix_(good, whole)]
+            hat = design @ np.linalg.pinv(design)
+            # Each beside what the others alone make of it.
+            off = _rms(openings - hat @ openings) / np.maximum(1.0 - np.diag(hat), 1e-9)
+            worst = int(np.argmax(off))
+            others = np.delete(np.arange(good.size), worst)
+            plane = np.linalg.pinv(design[others]) @ openings[others]
+            usual = float(np.median(_rms(openings[others] - design[others] @ plane)))
+            if off[worst] <= max(_OUTLIER_RATIO * usual, tolerated[good[worst]]):
+                break
+            found.append(int(good[worst]))
+            good = good[others]
+        return found
+
+    def _design(self, used: Bools | NDArray[np.intp] | slice) -> Floats:
+        x, y, _ = self.position_m[used].T
+        return np.column_stack([np.ones_like(x), -x, -x * y])
 
 
-def _line(y_m: Floats, openings_m: Floats, valid: Bools) -> tuple[Floats, Floats]:
-    """Opening at y = 0 and its slope along y, least squares over the valid LVDTs, per sample."""
-    if valid.all():
-        count = float(y_m.size)
-        mean_y = float(y_m.mean())
-        square = float(np.sum((y_m - mean_y) ** 2))
-        along = (y_m - mean_y) @ openings_m / square
-        return openings_m.sum(axis=0) / count - along * mean_y, along
-    weight = valid.astype(np.float64)
-    values = np.where(valid, openings_m, 0.0)
-    s0, s1, s2 = weight.sum(axis=0), y_m @ weight, (y_m**2) @ weight
-    t0, t1 = values.sum(axis=0), y_m @ values
-    determinant = s0 * s2 - s1 * s1
-    with np.errstate(invalid="ignore", divide="ignore"):
-        good = (s0 >= 3) & (determinant > 1e-9)
-        along = np.where(good, (s0 * t1 - s1 * t0) / determinant, np.nan)
-        at = np.where(good, (s2 * t0 - s1 * t1) / determinant, np.nan)
-    return at, along
+def _rms(rows: Floats) -> Floats:
+    return np.asarray(np.sqrt(np.mean(rows**2, axis=1)))
+
+
+def at_range_end(readings: Floats, low: Floats | float, high: Floats | float) -> Bools:
+    """Whether readings, not zeroed, are at the end of their channel's range `low` … `high`; False for NaN."""
+    margin = _RANGE_MARGIN * np.subtract(high, low)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((readings <= low + margin) | (readings >= high - margin))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.gap.core import CannotDiagnose, FeatureSet, Label
+from daq_app.gap.core import FeatureSet, Label
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import scalar_block
 from daq_app.gap.rocking_model.features.families import sensor_families
@@ -15,13 +15,11 @@ from daq_app.gap.rocking_model.features.family import Scene
 from daq_app.gap.rocking_model.features.oscillations.floor_vibration import quiet
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion import swings as sw
+from daq_app.gap.rocking_model.motion.hold import from_hold
 from daq_app.gap.rocking_model.motion.motion_grid import make_grid
 from daq_app.gap.rocking_model.motion.release_speed import release_speed
 from daq_app.gap.rocking_model.motion.rotation import (
-    GRID_HZ,
     Rotation,
-    coarse,
-    joint_rotation,
     sample_noise,
     wall_rotation,
     wires_of,
@@ -56,7 +54,7 @@ def examine(run: GapRun, reference: str = "") -> Examined:
     `reference` ``wire`` overrides the LVDTs, ``late`` as well, but keeps what their joint shows of itself.
     """
     wanted = reference
-    run, joint = _from_hold(run)
+    run, joint = from_hold(run)
     reference, theta, noise, notes = _reference(run, joint, wanted)
     swings = sw.find_swings(theta, noise, run.rate_hz, run.name)
     grid = make_grid(theta, joint.valid, swings, run.rate_hz, run.survey)
@@ -96,39 +94,6 @@ def examine(run: GapRun, reference: str = "") -> Examined:
         wires=wires_of(run),
     )
     return Examined(run, joint, features.with_blocks(blocks), wanted)
-
-
-BEFORE_RELEASE_S = 2.0
-
-
-def _from_hold(run: GapRun) -> tuple[GapRun, Rotation]:
-    """The record from two seconds before the release on: the pull and the wait before are no test."""
-    joint = joint_rotation(run)
-    step = max(round(run.rate_hz / GRID_HZ), 1)
-    theta = np.abs(coarse(joint.theta, run.rate_hz))
-    largest = float(theta.max())
-    if largest == 0.0:
-        raise CannotDiagnose(
-            f"Run {run.name}: the LVDTs read nothing but their zero.",
-            "Check their wiring and supply; the rotation of the joint is read from them.",
-        )
-    below = np.flatnonzero(theta < 0.5 * largest)
-    # The release ends the first stay near the largest rotation; a later peak never comes that high.
-    after = below[below > np.flatnonzero(theta > 0.98 * largest)[0]]
-    fall = int(after[0]) if after.size else theta.size
-    # A wall that is pulled quickly overshoots and sways about the rotation at which it is then held.
-    near = np.flatnonzero(theta[:fall] > 0.85 * largest)
-    plateau = float(np.median(theta[near]))
-    release = int(near[theta[near] > 0.98 * plateau][-1])
-    # The pull must not be taken for the hold: at most as long as the wall has been held still.
-    pulled = np.flatnonzero(theta[:release] < 0.93 * plateau)
-    still = release - int(pulled[-1]) if pulled.size else release
-    wanted = min(BEFORE_RELEASE_S * run.rate_hz, max(still * step - 0.1 * run.rate_hz, run.rate_hz))
-    start = int(release * step - wanted)
-    if start < 0.5 * run.rate_hz:
-        return run, joint
-    cut = replace(run, channels=np.ascontiguousarray(run.channels[:, start:]))
-    return cut, joint_rotation(cut)
 
 
 def _reference(run: GapRun, joint: Rotation, wanted: str) -> tuple[str, FloatArray, float, tuple[str, ...]]:

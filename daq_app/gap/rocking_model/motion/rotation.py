@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.records import GapRun, Sensor, Vector3
+from daq_app.rocking.geometry.joint import BaseJoint, at_range_end
 from daq_app.rocking.geometry.noise import timing_noise
 from daq_app.rocking.geometry.wires import wire_rotation, wire_shortening
 
@@ -20,6 +21,13 @@ TAIL_S = 0.3
 """The wall stands at rest at the end of a record; this much of it is the zero of every channel."""
 HOLD_S = 0.5
 NOISE_S = 0.45
+FEWEST_LVDTS = 6
+"""LVDTs from which the joint is read; with fewer one wrong channel cannot be told from a wall that twists."""
+_TOLERATED_SHARE = 0.02
+"""Rms misfit of an LVDT, over the rms opening of all, up to which it stays in the joint.
+
+What is off by less is found and named by the inspection; raising it lets a bad channel turn the rotation.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +51,11 @@ class Rotation:
     def whole(self) -> bool:
         """Whether the rotation is known at every sample."""
         return bool(self.valid.all())
+
+    def from_sample(self, start: int) -> Rotation:
+        """The rotation without the samples before `start`."""
+        series = {name: getattr(self, name)[start:] for name in ("theta", "lift", "twist", "valid")}
+        return replace(self, **series)
 
 
 def zeroed(run: GapRun, index: int) -> FloatArray:
@@ -83,71 +96,55 @@ def sample_noise(values: FloatArray, rate_hz: float) -> float:
 
 
 def joint_rotation(run: GapRun) -> Rotation:
-    """θ from the openings of the base joint: opening = u_z − x sin θ − (twist) x y, per sample.
+    """θ from the openings of the base joint.
 
-    Channels that disagree with the plane through the others are left out; samples at which a
-    channel reaches its declared range are marked.
+    Channels that disagree with the plane through the others are left out; samples at which a channel reaches
+    its declared range are marked. Raises `CannotDiagnose` where too few channels read.
     """
-    chosen = run.indices("lvdt")
-    data = {i: zeroed(run, i) for i in chosen}
-    left_out = [i for i in chosen if not np.all(np.isfinite(data[i]))]
-    clipped = {i: _clipped(run.aligned(i), run.sensors[i].range_si) for i in chosen}
-    while True:
-        used = [i for i in chosen if i not in left_out]
-        faces = {np.sign(run.sensors[i].position_m[0]) for i in used}
-        if len(used) < 6 or len(faces) < 2:
-            raise CannotDiagnose(
-                f"Run {run.name}: only {len(used)} LVDTs are usable.",
-                "Check their ranges and wiring; the rotation of the joint needs both faces.",
-            )
-        x = np.array([run.sensors[i].position_m[0] for i in used])
-        y = np.array([run.sensors[i].position_m[1] for i in used])
-        design = np.column_stack([np.ones_like(x), -x, -x * y])
-        values = np.array([data[i] for i in used])
-        plane = np.linalg.pinv(design) @ values
-        misfit = values - design @ plane
-        valid = ~np.any([clipped[i] for i in used], axis=0)
-        worst = _outlier(used, misfit[:, valid], values)
-        if worst is None:
-            break
-        left_out.append(worst)
-    theta = np.arcsin(np.clip(plane[1], -0.9, 0.9))
-    z = np.array([run.sensors[i].position_m[2] for i in used])
-    if z.any():
-        # A point above the joint sinks by z (1 − cos θ) as the wall turns.
-        plane = np.linalg.pinv(design) @ (values + np.outer(z, 1.0 - np.cos(theta)))
+    chosen = np.array(run.indices("lvdt"), dtype=np.intp)
+    sensors = [run.sensors[i] for i in chosen]
+    joint = BaseJoint(
+        tuple(sensor.id for sensor in sensors),
+        np.array([sensor.position_m for sensor in sensors]).reshape(-1, 3),
+        np.array([sensor.noise_si for sensor in sensors]),
+        np.array([sensor.range_si for sensor in sensors]).reshape(-1, 2),
+        run.survey.half_base_m,
+    )
+    shape = (chosen.size, run.channels.shape[1])
+    openings = np.array([zeroed(run, i) for i in chosen]).reshape(shape)
+    in_range = np.array([~_clipped(run.aligned(i), run.sensors[i].range_si) for i in chosen]).reshape(shape)
+    used = np.isfinite(openings).all(axis=1)
+    if used.any():
+        tolerated = _TOLERATED_SHARE * float(np.sqrt(np.mean(openings[used] ** 2)))
+        used[joint.find_outliers(openings, in_range & used[:, None], tolerated)] = False
+    if used.sum() < FEWEST_LVDTS or min(joint.places_on_face(side, used) for side in (-1, 1)) < 2:
+        raise CannotDiagnose(
+            f"Run {run.name}: only {used.sum()} LVDTs are usable.",
+            "Check their ranges and wiring; the rotation of the joint needs both faces.",
+        )
+    lift, sine, twist = joint.plane(openings[used], used)
+    theta = np.arcsin(np.clip(sine, -0.9, 0.9))
+    ids = np.array(joint.ids)
     return Rotation(
         theta,
-        plane[0],
-        plane[2],
+        lift,
+        twist,
         sample_noise(theta, run.rate_hz),
-        tuple(run.sensors[i].id for i in used),
-        tuple(run.sensors[i].id for i in left_out),
-        valid,
+        tuple(ids[used].tolist()),
+        tuple(ids[~used].tolist()),
+        in_range[used].all(axis=0),
     )
 
 
 def _clipped(values: FloatArray, limits: tuple[float, float]) -> NDArray[np.bool_]:
     """Samples at which a channel is at its declared range, with a little room on either side in time."""
-    if not np.all(np.isfinite(limits)):
-        return np.zeros(values.size, dtype=bool)
-    margin = 0.002 * (limits[1] - limits[0])
-    at_end = (values >= limits[1] - margin) | (values <= limits[0] + margin)
+    at_end = at_range_end(values, *limits)
     return np.asarray(np.convolve(at_end, np.ones(81), "same") > 0) if at_end.any() else at_end
 
 
 def reaches_its_range(values: FloatArray, limits: tuple[float, float]) -> bool:
     """Whether a channel is ever at the end of its declared range."""
-    return bool(_clipped(values, limits).any())
-
-
-def _outlier(used: list[int], misfit: FloatArray, values: FloatArray) -> int | None:
-    """The channel that disagrees most with the others, if it does so grossly."""
-    rms = np.sqrt(np.mean(misfit**2, axis=1))
-    size = float(np.sqrt(np.mean(values**2)))
-    limit = max(6.0 * float(np.median(rms)), 0.02 * size)
-    k = int(np.argmax(rms))
-    return used[k] if rms[k] > limit and len(used) > 6 else None
+    return bool(at_range_end(values, *limits).any())
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,7 +219,7 @@ def wall_rotation(run: GapRun) -> tuple[FloatArray, FloatArray, tuple[str, ...]]
     for i in run.indices("wire"):
         sensor = run.sensors[i]
         raw = run.aligned(i)
-        if sensor.anchor_m is None or not np.all(np.isfinite(raw)) or _clipped(raw, sensor.range_si).any():
+        if sensor.anchor_m is None or not np.all(np.isfinite(raw)) or reaches_its_range(raw, sensor.range_si):
             continue
         theta = Wire(sensor, run.survey.half_base_m).rotation(zeroed(run, i))
         if not np.all(np.isfinite(theta)):
