@@ -60,7 +60,7 @@ def codes(check):
 def test_healthy_sensors_are_go(rig, quiet, conditions):
     check = check_at_rest(rig, quiet, conditions)
     assert check.verdict is Verdict.GO, codes(check)
-    assert check.summary == "All 41 channels are good."
+    assert check.summary == "All 41 channels are good at rest."
     ratios = [c.noise_si / c.expected_noise_si for c in check.channels]
     assert 0.9 < min(ratios) <= max(ratios) < 1.1
 

@@ -209,7 +209,7 @@ def test_a_window_opened_in_mid_run_dates_the_recording_from_its_arming(window):
         {"kind": "armed", "sample": 40_000, "text": "Armed", "severity": "info"},
         {"kind": "recovered", "sample": 0, "text": "Left by an earlier session", "severity": "warning"},
     ]
-    window._adopt_past(past)
+    window.adoption.take({"events": past})
     assert window.notices.current == ("warning", "Left by an earlier session")
     window.session.feed(Published(StateMessage(state=State.ROCKING), window.clock.now))
     window.session.feed(Published(recorded(60_400, safe=60_000), window.clock.now))

@@ -100,7 +100,7 @@ def test_a_no_go_must_be_overruled_on_purpose_and_in_time(qtbot, window, monkeyp
     window.orders._overrule_timer.setInterval(1)
     window.orders._overrule_timer.start()
     qtbot.waitUntil(lambda: not window.orders._overrule_timer.isActive())
-    assert any("was not pressed again" in line for line in window.notices.log)
+    assert any("was not pressed again" in told.text for told in window.notices.log)
     window.orders.arm()
     assert asked[-1][1]["overrule"] == 0.0, "what has run out must be asked for again"
 
@@ -113,7 +113,8 @@ def test_a_warning_leaves_when_its_trouble_is_over_and_stays_in_the_log(window):
     assert window.notices.current == ("error", "no samples")
     window._after(begins.model_copy(update={"text": "samples again", "severity": "info"}))
     assert ("error", "no samples") not in window.notices._queue
-    assert any("no samples" in line for line in window.notices.log)
+    told = next(told for told in window.notices.log if told.text == "no samples")
+    assert told.over is not None and told.over >= told.at
 
 
 def test_a_note_is_typed_in_a_line_not_in_a_box(qtbot, window, monkeypatch):

@@ -93,7 +93,7 @@ def test_from_the_check_to_the_next_test(qtbot, acquisition, configs, settings):
     window._on_slow()
     window.actions_bar.buttons["arm"].click()
     reach(State.ARMED)
-    assert window.stack.currentWidget() is prepare, "the gauge stays in front while the wall is pulled"
+    assert window.stack.currentWidget() is window.test, "the gauge is in front while the wall is pulled"
     until(lambda: session.recording_on_disk)
     window._on_slow()
     assert window.header.words["recording"] == "Recording"

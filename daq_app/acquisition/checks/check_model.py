@@ -92,13 +92,25 @@ class SensorCheck:
         total = len(self.channels)
         rig = " ".join(finding.text for finding in self.rig_findings)
         if not bad and not doubtful and not rig:
-            return f"All {total} channels are good."
+            return self._good_summary(total)
         parts = []
         if bad:
             parts.append(f"{bad} of {total} channels must be mended.")
         if doubtful:
             parts.append(f"{doubtful} of {total} deserve{'s' if doubtful == 1 else ''} a look.")
         return " ".join([*parts, rig]).strip()
+
+    def _good_summary(self, total: int) -> str:
+        """Nothing is wrong: how much of that was judged. What a pull does not move is judged at rest only."""
+        if self.pull_rotation_rad is None:
+            return f"All {total} channels are good at rest."
+        at_rest_only = sum(channel.pull_ratio is None for channel in self.channels)
+        if not at_rest_only:
+            return f"All {total} channels are good, at rest and in the pull."
+        return (
+            f"{total - at_rest_only} of {total} channels are good, at rest and in the pull; "
+            f"the pull does not judge {at_rest_only}, which are good at rest."
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-able, for the run's record."""

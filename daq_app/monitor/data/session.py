@@ -254,6 +254,17 @@ class Session:
         return self.state.judgement if self.state is not None and self.linked else Judgement()
 
     @property
+    def tilt_ratio(self) -> float:
+        """|θ|/α by the tiltmeters, as the recorder judges it; NaN when it is not live."""
+        return abs(self.tilt_rad) / self.alpha_rad if self.fresh(MotionMessage) else math.nan
+
+    @property
+    def live_judgement(self) -> Judgement:
+        """The judgement with the ratio of this moment: the recorder repeats its own once a second."""
+        ratio = self.tilt_ratio
+        return self.judgement.model_copy(update={"ratio": ratio if math.isfinite(ratio) else None})
+
+    @property
     def data_missing(self) -> bool:
         """The clock should run, and no block has come for too long: the display is not live."""
         return self.current_state in RUNNING and not self.fresh(BlockMessage)

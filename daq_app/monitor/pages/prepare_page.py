@@ -12,12 +12,12 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLay
 
 from daq_app.acquisition.checks.check_model import SensorCheck
 from daq_app.config.rig import Rig
+from daq_app.monitor.course.pull_gauge import PullGauge
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.session import RECORDING, Session
 from daq_app.monitor.widgets.actions import BETWEEN_TESTS
 from daq_app.monitor.widgets.check_table import SHAPES, TONES, CheckTable
 from daq_app.monitor.widgets.labels import role_label, set_role
-from daq_app.monitor.widgets.pull_gauge import PullGauge
 from daq_app.monitor.widgets.shapes import Sign
 from daq_app.monitor.widgets.test_card import TestCard
 from daq_app.monitor.widgets.theme import DARK, Colours, font

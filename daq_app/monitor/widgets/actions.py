@@ -80,9 +80,12 @@ ACTIONS: Final = (
 
 
 class ActionBar(QWidget):
-    """The orders as buttons with their keys. Emits `ordered(name)`."""
+    """The orders as buttons with their keys."""
 
     ordered = Signal(str)
+    """The name of an order that was given."""
+    refused = Signal(str)
+    """The text of an order whose key was pressed while it makes no sense."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -99,7 +102,7 @@ class ActionBar(QWidget):
             set_role(button, action.role)
             button.clicked.connect(lambda _checked=False, a=action: self._order(a))
             shortcut = QShortcut(QKeySequence(action.key), self)
-            shortcut.activated.connect(button.click)
+            shortcut.activated.connect(lambda a=action: self.press(a))
             self.buttons[action.name] = button
             layout.addWidget(button)
 
@@ -110,6 +113,14 @@ class ActionBar(QWidget):
             self.buttons[action.name].setEnabled(enabled)
             if action.name in self._asked and not self._is_asked(action):
                 self._withdraw(action)
+
+    def press(self, action: Action) -> None:
+        """The key of an action was pressed."""
+        button = self.buttons[action.name]
+        if button.isEnabled():
+            button.click()
+        else:
+            self.refused.emit(action.text)
 
     def _is_asked(self, action: Action) -> bool:
         return self._clock() - self._asked.get(action.name, -1e9) <= CONFIRM_WITHIN_S

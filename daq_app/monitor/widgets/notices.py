@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import time
+import datetime as dt
 from collections import deque
+from dataclasses import dataclass
 from typing import Final, Literal
 
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
 
 from daq_app.monitor.widgets.labels import role_label
@@ -14,23 +15,41 @@ from daq_app.monitor.widgets.shapes import Sign
 from daq_app.monitor.widgets.theme import Colours
 
 INFO_MS: Final = 8000
+LOG_MESSAGES: Final = 1000
+"""Messages kept in the log: more than any test day has."""
 Severity = Literal["info", "warning", "error"]
 _SHAPES: dict[str, str] = {"info": "disc", "warning": "triangle", "error": "cross"}
 _TONES: dict[str, str] = {"info": "accent", "warning": "warning", "error": "bad"}
 
 
+@dataclass(slots=True)
+class Told:
+    """One message of the log."""
+
+    at: dt.datetime
+    severity: Severity
+    text: str
+    trouble: str = ""
+    """What it is about, where its end is told as well."""
+    over: dt.datetime | None = None
+    """When that was over."""
+
+
 class NoticeLine(QFrame):
     """Shows the newest notice; hidden while there is none. Errors stay in front of what is milder."""
+
+    logged = Signal()
+    """The log has changed."""
+    changed = Signal()
+    """Another notice is in front, or none."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("bar")
         self._colours: Colours | None = None
         self._queue: deque[tuple[Severity, str]] = deque(maxlen=50)
-        self._troubles: dict[str, str] = {}
-        """Text of a warning → what it is about, where its end is told as well."""
-        self.log: deque[str] = deque(maxlen=200)
-        """Everything that was told, with the time of day, newest last."""
+        self.log: deque[Told] = deque(maxlen=LOG_MESSAGES)
+        """Everything that was told, newest last."""
         self._sign = Sign(18)
         self._text = QLabel()
         self._text.setWordWrap(True)
@@ -64,10 +83,8 @@ class NoticeLine(QFrame):
         """
         if not text or any(text == waiting for _, waiting in self._queue):
             return
-        self.log.append(f"{time.strftime('%H:%M:%S')}  {severity}  {text}")
-        self.setToolTip("\n".join(list(self.log)[-20:]))
-        if trouble and severity != "info":
-            self._troubles[text] = trouble
+        self.log.append(Told(dt.datetime.now(), severity, text, trouble if severity != "info" else ""))
+        self.logged.emit()
         if severity == "info":
             # What is good to know gives way to the next such line by itself.
             for old in [notice for notice in self._queue if notice[0] == "info"]:
@@ -80,9 +97,11 @@ class NoticeLine(QFrame):
 
     def settle(self, trouble: str) -> None:
         """That trouble is over: its warnings leave; the log keeps them."""
-        for old in [notice for notice in self._queue if self._troubles.get(notice[1]) == trouble]:
-            self._queue.remove(old)
-        self._troubles = {text: about for text, about in self._troubles.items() if about != trouble}
+        for told in [told for told in self.log if told.trouble == trouble and told.over is None]:
+            told.over = dt.datetime.now()
+            if (told.severity, told.text) in self._queue:
+                self._queue.remove((told.severity, told.text))
+        self.logged.emit()
         self._show()
 
     def _let_info_go(self) -> None:
@@ -103,6 +122,7 @@ class NoticeLine(QFrame):
         return self._queue[0] if self._queue else None
 
     def _show(self) -> None:
+        self.changed.emit()
         if not self._queue:
             self.hide()
             return

@@ -58,6 +58,15 @@ class WindowSettings:
         self._store.setValue("type_size", points)
 
     @property
+    def sounds(self) -> bool:
+        """Whether sounds are to be heard."""
+        return self._text("sounds", "on") == "on"
+
+    @sounds.setter
+    def sounds(self, on: bool) -> None:
+        self._store.setValue("sounds", "on" if on else "off")
+
+    @property
     def recent_rigs(self) -> list[Path]:
         """Rig files that were opened, the newest first."""
         return [Path(part) for part in self._text("recent_rigs", "").split("|") if part]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from daq_app.acquisition.messages.published import Judgement, State, Tone
+from daq_app.acquisition.messages.published import Call, Judgement, State, Tone
 
 Shape = Literal["ring", "eye", "triangle", "square", "diamond", "disc", "bar", "arrow", "tick", "cross"]
 
@@ -48,4 +48,6 @@ def look_of(state: State | None, judgement: Judgement) -> StateLook:
     if state is None:
         return UNLINKED
     shape: Shape = "cross" if judgement.alarm else SHAPES[state]
+    if state is State.SAVED and judgement.call is not Call.LOOK and not judgement.alarm:
+        shape = SHAPES[State.PREVIEWING]  # an arming that was given up is nothing to tick off
     return StateLook(judgement.word, judgement.do, shape, judgement.tone)

@@ -11,6 +11,8 @@ from typing import Final, Literal
 from PySide6.QtGui import QColor, QFont, QPalette
 from PySide6.QtWidgets import QApplication, QWidget
 
+USUAL_POINTS: Final = 10.0
+"""Type size for which fixed sizes are written down."""
 ThemeName = Literal["dark", "light"]
 
 FONT_FAMILIES: Final = ["Inter", "Segoe UI", "Noto Sans", "DejaVu Sans"]
@@ -43,6 +45,17 @@ class Colours:
     wire: str
     accelerometer: str
     tiltmeter: str
+    points: float = 10.0
+    """Base type size: everything that is drawn by hand grows with it."""
+
+    @property
+    def scale(self) -> float:
+        """Base type size over the usual one: sizes in pixels that hold text are multiplied by it."""
+        return self.points / USUAL_POINTS
+
+    def font(self, points: float, *, bold: bool = False) -> QFont:
+        """A font that is `points` large at the usual type size, and grows with it."""
+        return font(points * self.scale, bold=bold)
 
     def family(self, family: str) -> str:
         """Colour of a sensor family."""
@@ -150,6 +163,9 @@ def _stylesheet(c: Colours, base: float) -> str:
     QToolTip {{ background: {c.raised}; color: {c.text}; border: 1px solid {c.line}; padding: 4px; }}
     QFrame#card {{ background: {c.surface}; border: 1px solid {c.line}; border-radius: 6px; }}
     QFrame#bar {{ background: {c.surface}; border: none; }}
+    QLabel[scale="state"] {{ font-size: {base * 2.1:.1f}pt; font-weight: 600; }}
+    QLabel[scale="verdict"] {{ font-size: {base * 1.9:.1f}pt; font-weight: 600; }}
+    QLabel[scale="name"] {{ font-size: {base * 1.5:.1f}pt; font-weight: 600; }}
     QLabel[role="muted"] {{ color: {c.muted}; }}
     QLabel[role="title"] {{ font-size: {base * 1.7:.1f}pt; font-weight: 600; }}
     QLabel[role="heading"] {{ color: {c.muted}; font-size: {base * 0.95:.1f}pt; font-weight: 600; }}

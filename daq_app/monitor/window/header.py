@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
-from daq_app.acquisition.messages.published import HealthMessage, State, StateMessage
-from daq_app.monitor.data.session import RECORDING, Session
+from daq_app.acquisition.messages.published import State, StateMessage
+from daq_app.monitor.course.recording_light import recording_light
+from daq_app.monitor.data.session import Session
 from daq_app.monitor.widgets.labels import role_label, set_role
 from daq_app.monitor.widgets.shapes import Sign
 from daq_app.monitor.widgets.state_look import look_of
-from daq_app.monitor.widgets.theme import Colours, font
+from daq_app.monitor.widgets.theme import Colours
 
 
 class Header(QFrame):
@@ -21,14 +22,14 @@ class Header(QFrame):
         self._session = session
         self._sign = Sign(34)
         self._word = QLabel()
-        self._word.setFont(font(21, bold=True))
+        self._word.setProperty("scale", "state")
         self._test = QLabel()
-        self._test.setFont(font(15, bold=True))
+        self._test.setProperty("scale", "name")
         self._sentence = role_label("", "muted")
         self._sentence.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._light = Sign(22)
         self._light_word = QLabel()
-        self._light_word.setFont(font(15, bold=True))
+        self._light_word.setProperty("scale", "name")
         self._light_detail = role_label("", "muted")
         self._light_detail.setMinimumWidth(170)
 
@@ -70,23 +71,8 @@ class Header(QFrame):
         self._sentence.setToolTip(sentence)
         wrong = session.data_missing or state is None or bool(judgement.alarm)
         set_role(self._sentence, "bad" if wrong else "muted")
-        self._refresh_light(state, colours)
-
-    def _refresh_light(self, state: State | None, colours: Colours) -> None:
-        session = self._session
-        if session.recording_on_disk:
-            self._show_light("disc", colours.bad, "Recording", f"{session.safe_s:.1f} s safe on disk")
-        elif state in RECORDING and session.fresh(HealthMessage) and session.safe_s > 0:
-            behind = f"{session.unsafe_s:.1f} s wait for the disk"
-            self._show_light("triangle", colours.warning, "Disk is slow", behind)
-        elif state in RECORDING:
-            self._show_light("triangle", colours.warning, "Not confirmed", "no sample confirmed on disk")
-        elif state is State.SAVED and session.judgement.word == "Aborted":
-            self._show_light("ring", colours.muted, "Not recording", "the aborted arming is kept")
-        elif state is State.SAVED:
-            self._show_light("tick", colours.good, "On disk", "checked and closed")
-        else:
-            self._show_light("ring", colours.muted, "Not recording", "")
+        light = recording_light(session)
+        self._show_light(light.shape, str(getattr(colours, light.tone)), light.word, light.detail)
 
     def _show_light(self, shape: str, colour: str, word: str, detail: str) -> None:
         self._light.show_shape(shape, colour)

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,19 +27,23 @@ from daq_app.acquisition.messages.published import (
     StateMessage,
 )
 from daq_app.campaign.plan import Campaign
-from daq_app.config import ConfigError, parse_rig
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.link import Link
 from daq_app.monitor.data.session import RECORDING, Session
 from daq_app.monitor.pages.campaign_page import CampaignPage
 from daq_app.monitor.pages.gap_page import GapPage
 from daq_app.monitor.pages.live_page import LivePage
+from daq_app.monitor.pages.messages_page import MessagesPage
 from daq_app.monitor.pages.prepare_page import PreparePage, Zero
 from daq_app.monitor.pages.replay_page import ReplayPage
 from daq_app.monitor.pages.result_page import ResultPage
+from daq_app.monitor.pages.test_page import TestPage
+from daq_app.monitor.widgets.notices import NoticeLine
 from daq_app.monitor.widgets.settings import TYPE_SIZES, WindowSettings
 from daq_app.monitor.widgets.theme import THEMES, Colours, apply_theme
+from daq_app.monitor.window.adoption import Adoption
 from daq_app.monitor.window.orders import Orders
+from daq_app.monitor.window.test_display import TestDisplay
 from daq_app.monitor.window.window_frame import WindowFrame
 
 FRAME_MS: Final = 25
@@ -67,12 +72,8 @@ class MainWindow(QMainWindow):
         self.longest_stall_s = 0.0
         """Longest time between two frames so far: how long the window was deaf at worst."""
         self._last_frame_s = math.nan
-        self._rig_text = ""
         self._state_before: State | None = None
         self._was_live: tuple[bool, ...] = ()
-        self._told_past = False
-        self._recorder_makes_results = False
-        self._runs_folder: Path | None = None
         self._released = False
         """Whether the wall was let go since the last arming: an aborted arming has no result."""
 
@@ -83,23 +84,26 @@ class MainWindow(QMainWindow):
         self.result = ResultPage(self._analyses)
         self._diagnoses = Background(self)
         self.gap = GapPage(self._diagnoses)
-        live_pages: dict[str, QWidget] = {"Prepare": self.prepare, "Live": self.live}
+        self.test = TestPage(self.session)
+        self.notices = NoticeLine()
+        self.messages = MessagesPage(self.notices)
+        live_pages: dict[str, QWidget] = {"Prepare": self.prepare, "Test": self.test, "Live": self.live}
         self.pages: dict[str, QWidget] = {
             **(live_pages if link is not None else {}),
             "Campaign": self.campaign,
             "Result": self.result,
             "Replay": self.replay,
             "Gap": self.gap,
+            "Messages": self.messages,
         }
-        self.frame = WindowFrame(self.session, self.pages, live=link is not None)
-        self.header, self.notices, self.note_entry = (
-            self.frame.header,
-            self.frame.notices,
-            self.frame.note_entry,
-        )
+        self.frame = WindowFrame(self.session, self.pages, self.notices, live=link is not None)
+        self.header, self.note_entry = self.frame.header, self.frame.note_entry
         self.actions_bar, self.health = self.frame.actions_bar, self.frame.health
         self.stack, self.rail = self.frame.stack, self.frame.rail
         self.setCentralWidget(self.frame)
+        self.display = TestDisplay(self.session, self.test, self.frame, settings, self)
+        may_command = link is not None and link.may_command
+        self.adoption = Adoption(self.session, self.prepare, self.gap, self.notices, may_command=may_command)
         self.splitters = {
             "live_upper": self.live.upper,
             "live_whole": self.live.whole,
@@ -136,6 +140,7 @@ class MainWindow(QMainWindow):
 
     def _connect(self) -> None:
         self.actions_bar.ordered.connect(self._on_order)
+        self.actions_bar.refused.connect(self._on_refused)
         self.rail.page_wanted.connect(lambda place: self.show_page(list(self.pages.values())[place]))
         self.rail.theme_wanted.connect(self.toggle_theme)
         self.rail.size_wanted.connect(self.change_type_size)
@@ -162,7 +167,7 @@ class MainWindow(QMainWindow):
         self.prepare.refresh()
         self.show_page(self.prepare)
         if not button.isEnabled():
-            self.notices.tell("info", f"{button.text()}: not now. {self.session.judgement.do}")
+            self._on_refused(button.text())
         button.click()
 
     def show_page(self, page: QWidget) -> None:
@@ -175,11 +180,20 @@ class MainWindow(QMainWindow):
         """Apply theme and type size to everything."""
         app = QApplication.instance()
         assert isinstance(app, QApplication)
-        self.colours = THEMES[self.settings.theme]
+        self.colours = replace(THEMES[self.settings.theme], points=self.settings.type_size)
         apply_theme(app, self, self.colours, self.settings.type_size)
         self.frame.set_type_size(self.settings.type_size)
-        for page in (self.prepare, self.live, self.campaign, self.result, self.replay, self.gap):
+        for page in (
+            self.prepare,
+            self.live,
+            self.campaign,
+            self.result,
+            self.replay,
+            self.gap,
+            self.messages,
+        ):
             page.restyle(self.colours)
+        self.display.restyle(self.colours)
         self.notices.restyle(self.colours)
 
     def toggle_theme(self) -> None:
@@ -197,45 +211,12 @@ class MainWindow(QMainWindow):
 
     def _adopt(self, about: Mapping[str, Any]) -> None:
         """Take over what the acquisition says of itself."""
-        text = str(about.get("rig_text", ""))
-        rate_hz = float(about.get("rate_hz", 0.0) or 0.0)
-        if text and text != self._rig_text:
-            try:
-                rig = parse_rig(text, str(about.get("rig_name", "rig")))
-            except ConfigError as error:
-                self.notices.tell("error", f"The acquisition's rig file cannot be read here: {error}")
-                return
-            self._rig_text = text
-            self.session.set_rig(rig, rate_hz or rig.acquisition.rate_hz)
-            self.prepare.set_rig(rig)
+        rig = self.adoption.take_rig(about)
+        if rig is not None:
             self.setWindowTitle(f"{rig.name} – Rocking-test recorder")
-        ours = about.get("simulated") and self.link is not None and self.link.may_command
-        self.prepare.wall.set_address(str(about.get("connection", "")) if ours else "")
-        folder = str(about.get("folder", ""))
-        self._runs_folder = Path(folder) if folder else None
-        if self._runs_folder is not None and self._runs_folder != self.gap.folder:
-            self.gap.set_folder(self._runs_folder)
-        self.prepare.planned_rate_hz = float(about.get("planned_rate_hz", 0.0) or 0.0)
-        if "tare" in about:
-            self.prepare.set_zero(Zero(dict(about["tare"]), dict(about.get("tare_record", {}))))
-            self.session.set_zeroed(bool(about["tare"]))
-        if "check" in about:
-            self.prepare.show_check(CheckMessage.model_validate({"check": about["check"]}).check)
-        if about.get("state"):
-            self._after(StateMessage.model_validate(about["state"]))
-        self._recorder_makes_results = bool(about.get("makes_results"))
-        self._adopt_past(about.get("events", []))
-
-    def _adopt_past(self, events: Sequence[Any]) -> None:
-        """What was said before this window came: warnings are told now, the arming dates the run."""
-        if self._told_past:
-            return
-        self._told_past = True
-        past = [EventMessage.model_validate(event) for event in events]
-        self.session.adopt_past(past)
-        for event in past:
-            if event.severity != "info":
-                self.notices.tell(event.severity, event.text)
+        state = self.adoption.take(about)
+        if state is not None:
+            self._after(state)
 
     def _on_frame(self) -> None:
         now = time.monotonic()
@@ -250,6 +231,7 @@ class MainWindow(QMainWindow):
             self._on_slow()
         if self.stack.currentWidget() is self.live:
             self.live.draw_frame()
+        self.display.frame()
 
     def _take_in(self) -> None:
         if self.link is not None:
@@ -262,6 +244,7 @@ class MainWindow(QMainWindow):
         self._take_in()
         if self.stack.currentWidget() is self.live:
             self.live.show_estimate()
+        self.display.show_estimate()
 
     def _after(self, message: object) -> None:
         match message:
@@ -294,8 +277,9 @@ class MainWindow(QMainWindow):
             self._released = False
         if message.state in (State.RELEASED, State.ROCKING):
             self._released = True
-        if message.state is State.RELEASED:
-            self.show_page(self.live)
+        # The gauge is in front from the arming to the end; an operator who chose Live keeps it.
+        if message.state in (State.ARMED, State.RELEASED) and self.stack.currentWidget() is not self.live:
+            self.show_page(self.test)
         if message.state is State.PREVIEWING and before in (State.IDLE, None) and self.link is not None:
             self.link.request("hello")
         if message.state is State.SAVED and before is State.SAVING:
@@ -311,12 +295,13 @@ class MainWindow(QMainWindow):
         self.replay.open(run)
         if self._released:
             self.show_page(self.result)
-            self.result.open(run, soon=self._recorder_makes_results)
+            self.result.open(run, soon=self.adoption.makes_results)
             self.gap.after_run(run)
 
     def _on_slow(self) -> None:
         self.header.refresh(self.colours)
         self.health.refresh()
+        self.display.refresh()
         may_command = self.link is not None and self.link.may_command
         self.actions_bar.refresh(
             self.session.current_state, sampling=self.session.sampling, may_command=may_command
@@ -340,6 +325,13 @@ class MainWindow(QMainWindow):
 
     # -- orders ----------------------------------------------------------------------------------
 
+    def _on_refused(self, text: str) -> None:
+        """A key was pressed whose order makes no sense now: silence would look as if it had been obeyed."""
+        if self.link is None or not self.link.may_command:
+            self.notices.tell("info", f"{text}: this window may watch, not command.")
+        else:
+            self.notices.tell("info", f"{text}: not now. {self.session.judgement.do}".strip())
+
     def _on_order(self, name: str) -> None:
         if name == "note":
             self.note_entry.ask()
@@ -357,7 +349,7 @@ class MainWindow(QMainWindow):
 
     def set_campaign(self, campaign: Campaign, folder: Path | None = None) -> None:
         """Follow a campaign; the runs lie in `folder`, else where the acquisition puts them."""
-        self.orders.set_campaign(campaign, folder or self._runs_folder)
+        self.orders.set_campaign(campaign, folder or self.adoption.runs_folder)
 
     def _on_reply(self, name: str, reply: Reply) -> None:
         self.orders.on_reply(name, reply)
@@ -378,6 +370,7 @@ class MainWindow(QMainWindow):
         """Remember the layout and hang up; a run under way goes on without the window."""
         self._frame_timer.stop()
         self._slow_timer.stop()
+        self.display.close()
         self.settings.save_layout(self, self.splitters)
         if self.link is not None:
             idle = self.session.current_state not in RECORDING | {State.SAVING}

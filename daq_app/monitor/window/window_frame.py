@@ -30,11 +30,13 @@ ONE_ROW_UP_TO: Final = 10.5
 class WindowFrame(QWidget):
     """The window's content: one page at a time in `stack`, everything else always there."""
 
-    def __init__(self, session: Session, pages: dict[str, QWidget], *, live: bool) -> None:
+    def __init__(
+        self, session: Session, pages: dict[str, QWidget], notices: NoticeLine, *, live: bool
+    ) -> None:
         """`live` False: a window for looking at runs, without the parts that speak of the present."""
         super().__init__()
         self.header = Header(session)
-        self.notices = NoticeLine()
+        self.notices = notices
         self.note_entry = NoteEntry()
         self.actions_bar = ActionBar()
         self.health = HealthBar(session)

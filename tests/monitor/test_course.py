@@ -1,0 +1,189 @@
+"""The picture of the test's course and what is heard with it: all words are there, whole, and true."""
+
+from __future__ import annotations
+
+import pytest
+
+from daq_app.acquisition.messages.published import Call, EventMessage, Judgement, State, StateMessage
+from daq_app.monitor.course.course_view import CourseView
+from daq_app.monitor.course.cues import Cue, CueWatch
+from daq_app.monitor.course.sounds import PATTERNS_MS, Sounds
+from daq_app.monitor.data.session import Published
+from daq_app.monitor.pages.messages_page import MessagesPage
+from daq_app.monitor.widgets.notices import NoticeLine
+from tests.support.quiet_link import QuietLink
+
+HOLD = Judgement(
+    call=Call.HOLD,
+    word="Holding",
+    do="On target: hold still, 2 s more.",
+    tone="good",
+    gauge="On target: hold",
+    target=0.35,
+    low=0.3325,
+    high=0.3675,
+    held_s=1.2,
+    hold_s=3.0,
+)
+
+
+@pytest.fixture
+def live_window(qtbot, settings, configs, clock):
+    from daq_app.monitor.window.main_window import MainWindow
+
+    window = MainWindow(QuietLink(configs / "fr1.toml"), settings)
+    qtbot.addWidget(window)
+    window._frame_timer.stop()
+    window._slow_timer.stop()
+    window.session.clock = clock
+    return window
+
+
+def say(session, clock, state, judgement) -> None:
+    session.feed(Published(StateMessage(state=state, judgement=judgement), clock.now))
+
+
+@pytest.mark.parametrize(("width", "height"), [(1200, 600), (700, 420), (1920, 1080)])
+@pytest.mark.parametrize("moving", [False, True])
+def test_nothing_on_the_picture_is_wider_than_its_place(qtbot, window, stand_in, play, width, height, moving):
+    play(window.session, window.clock, stand_in, stand_in.release_s + (3.0 if moving else -1.0))
+    if not moving:
+        say(window.session, window.clock, State.HOLDING, HOLD)
+    view = CourseView(window.session)
+    view.footer = "⚠ A message that is rather long, as those are that say what happened and what to do."
+    qtbot.addWidget(view)
+    view.resize(width, height)
+    view.grab()
+    for written in view.written.written:
+        assert written.needs.width() <= written.box.width() + 1, written
+        assert written.needs.height() <= written.box.height() + 1, written
+    shown = " ".join(view.texts)
+    if moving:
+        estimate = window.session.estimate
+        assert f"{estimate.eav_mean:.3f}" in shown and f"{estimate.crt_mean:.3f}" in shown
+        assert str(len(estimate.impact_samples)) in view.texts
+    else:
+        assert {"Holding", "On target: hold", "2 s", HOLD.do} <= set(view.texts)
+
+
+def test_figures_that_are_not_live_are_dashes(qtbot, window, stand_in, play):
+    play(window.session, window.clock, stand_in, stand_in.release_s - 1.0)
+    window.clock.now += 1.0
+    view = CourseView(window.session)
+    qtbot.addWidget(view)
+    view.grab()
+    assert "The rotation is not live" in view.texts
+    assert view.texts.count("–") == 5
+
+
+def test_each_change_is_heard_once_and_danger_until_it_is_over(window, clock):
+    session, watch = window.session, CueWatch()
+    pull = HOLD.model_copy(update={"call": Call.PULL})
+    stop = HOLD.model_copy(update={"call": Call.STOP, "alarm": "STOP"})
+    free = Judgement(call=Call.KEEP_CLEAR)
+
+    def heard(state, judgement):
+        say(session, clock, state, judgement)
+        return watch.look(session)
+
+    assert heard(State.ARMED, pull) == []
+    assert heard(State.HOLDING, HOLD) == [Cue.ON_TARGET]
+    assert heard(State.HOLDING, HOLD.model_copy(update={"call": Call.RELEASE})) == []
+    assert heard(State.ARMED, stop) == [Cue.ALARM]
+    assert heard(State.ARMED, stop) == []
+    clock.now += 3.1
+    assert heard(State.ARMED, stop) == [Cue.ALARM]
+    assert heard(State.RELEASED, free) == [Cue.RELEASED]
+    assert heard(State.ROCKING, free) == []
+    assert heard(State.AT_REST, Judgement(call=Call.WAIT)) == [Cue.AT_REST]
+
+
+def test_a_recording_that_stops_reaching_the_disk_is_heard(window, stand_in, play):
+    session, watch = window.session, CueWatch()
+    play(session, window.clock, stand_in, stand_in.release_s - 1.0)
+    assert Cue.RECORDING_LOST not in watch.look(session)
+    window.clock.now += 1.0
+    assert watch.look(session)[0] is Cue.RECORDING_LOST
+    window.clock.now += 5.0
+    assert session.current_state is None
+    assert watch.look(session)[0] is Cue.RECORDING_LOST, "a lost link in a test is no less grave"
+
+
+def test_cues_differ_and_can_be_switched_off(qtbot):
+    assert len(set(PATTERNS_MS.values())) == len(Cue)
+    beeps: list[int] = []
+    sounds = Sounds(lambda: beeps.append(1))
+    sounds.play([Cue.RELEASED])
+    qtbot.waitUntil(lambda: len(beeps) == len(PATTERNS_MS[Cue.RELEASED]))
+    sounds.on = False
+    sounds.play([Cue.ALARM])
+    qtbot.wait(20)
+    assert len(beeps) == len(PATTERNS_MS[Cue.RELEASED])
+
+
+def test_arming_and_release_bring_the_gauge_and_live_stays_where_it_was_chosen(live_window, clock):
+    window = live_window
+    for chosen, expected in ((window.campaign, window.test), (window.live, window.live)):
+        for state in (State.ARMED, State.RELEASED):
+            window.show_page(chosen)
+            window._after(StateMessage(state=state))
+            assert window.stack.currentWidget() is expected
+        window._after(StateMessage(state=State.PREVIEWING))
+
+
+def test_the_full_screen_opens_gives_orders_and_goes_back(qtbot, live_window, clock):
+    from PySide6.QtCore import Qt
+
+    window = live_window
+    window.show()
+    say(window.session, clock, State.ARMED, HOLD)
+    window._on_slow()
+    window.display.toggle()
+    screen = window.display.full_screen
+    assert screen.covers, "one display: the picture covers the window"
+    with qtbot.waitActive(screen):
+        screen.activateWindow()
+    window.notices.tell("warning", "the disk is slow")
+    window.display.refresh()
+    assert "the disk is slow" in screen.view.footer
+    window.notices.dismiss()
+    window.display.refresh()
+    assert "Abort  F8" in screen.view.footer
+    for _ in range(2):
+        qtbot.keyClick(screen, Qt.Key.Key_F8)
+    assert ("abort", {}) in window.link.orders
+    with qtbot.waitSignal(screen.closed):
+        qtbot.keyClick(screen, Qt.Key.Key_Escape)
+    assert window.display.full_screen is None
+    assert window.test.list_displays()[0].startswith("Display 1")
+
+
+def test_a_key_that_makes_no_sense_now_is_answered(qtbot, live_window, clock):
+    say(live_window.session, clock, State.ARMED, HOLD)
+    live_window._on_slow()
+    from daq_app.monitor.widgets.actions import ACTIONS
+
+    live_window.actions_bar.press(next(action for action in ACTIONS if action.name == "next"))
+    assert live_window.notices.current == ("info", f"Next test: not now. {HOLD.do}")
+
+
+def test_the_log_keeps_what_was_told_and_when_it_was_over(qtbot):
+    notices = NoticeLine()
+    page = MessagesPage(notices)
+    for part in (notices, page):
+        qtbot.addWidget(part)
+    notices.tell("error", "no samples", "alarm silence")
+    notices.tell("info", "zero taken")
+    notices.settle("alarm silence")
+    model = page.table.model()
+    rows = [[model.index(row, column).data() for column in range(4)] for row in range(model.rowCount())]
+    assert [row[3] for row in rows] == ["zero taken", "no samples"]
+    assert rows[0][1] == "" and rows[1][1] >= rows[1][0]
+    assert notices.current == ("info", "zero taken")
+
+
+def test_a_warning_that_is_over_leaves_the_line(live_window):
+    begins = EventMessage(kind="disk", sample=1, text="the disk is slow", severity="warning")
+    live_window._after(begins)
+    live_window._after(begins.model_copy(update={"text": "caught up", "severity": "info"}))
+    assert live_window.notices.current != ("warning", "the disk is slow")
