@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import datetime as dt
 import math
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -260,6 +261,12 @@ class Rig(Table):
         return tuple(channel for channel in self.channels if channel.family == family)
 
 
+def names(channels: Sequence[Channel]) -> str:
+    """Ids of channels in a sentence: all of four, else the ends of the list and how many there are."""
+    ids = [channel.id for channel in channels]
+    return ", ".join(ids) if len(ids) <= 4 else f"{', '.join(ids[:2])} … {ids[-1]} ({len(ids)} channels)"
+
+
 __all__ = [
     "G_M_S2",
     "Acquisition",
@@ -276,4 +283,5 @@ __all__ = [
     "Specimen",
     "Table",
     "Vector3",
+    "names",
 ]

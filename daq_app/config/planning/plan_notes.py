@@ -9,8 +9,9 @@ from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.inventory import Device
 from daq_app.config.hardware.reach import LARGEST_LEVEL, range_ends_at
 from daq_app.config.hardware.wiring import MAX_SOURCE_IMPEDANCE_OHM, terminal_of
+from daq_app.config.planning.geometry_notes import geometry_notes
 from daq_app.config.planning.plan import PlannedTask, PlanNote
-from daq_app.config.rig import Channel, Rig
+from daq_app.config.rig import Channel, Rig, names
 
 _DUE_SOON_DAYS = 30
 
@@ -27,6 +28,7 @@ def plan_notes(
         *_impedance_notes(rig, devices),
         *_potentiometer_notes(rig),
         *_range_notes(rig),
+        *geometry_notes(rig),
         *_certificate_notes(rig, today),
         *_task_notes(tasks, devices),
     ]
@@ -39,11 +41,6 @@ def _info(where: str, text: str) -> PlanNote:
 
 def _warning(where: str, text: str) -> PlanNote:
     return PlanNote("warning", where, text)
-
-
-def _names(channels: Sequence[Channel]) -> str:
-    ids = [channel.id for channel in channels]
-    return ", ".join(ids) if len(ids) <= 4 else f"{', '.join(ids[:2])} … {ids[-1]} ({len(ids)} channels)"
 
 
 def _device(channel: Channel, devices: Mapping[str, Device]) -> Device:
@@ -106,7 +103,7 @@ def _coupling_notes(rig: Rig) -> Iterator[PlanNote]:
     iepe = [channel for channel in rig.channels if channel.measurement == "iepe"]
     if iepe:
         yield _info(
-            _names(iepe),
+            names(iepe),
             "IEPE inputs are AC-coupled: they show impacts, but neither gravity nor slow rocking",
         )
 
@@ -120,7 +117,7 @@ def _impedance_notes(rig: Rig, devices: Mapping[str, Device]) -> Iterator[PlanNo
     ]
     if ghosting:
         yield _warning(
-            _names(ghosting),
+            names(ghosting),
             f"source impedance above {MAX_SOURCE_IMPEDANCE_OHM:g} Ω on a multiplexed module: each reading "
             "keeps part of the channel before (ghosting). Buffer these sensors",
         )
@@ -130,7 +127,7 @@ def _potentiometer_notes(rig: Rig) -> Iterator[PlanNote]:
     wires = [c for c in rig.of_family("wire") if c.excitation.kind == "external_voltage"]
     if wires:
         yield _info(
-            _names(wires),
+            names(wires),
             "read as plain voltages of an external supply that is not sampled itself: a supply that drifts "
             "by 0.1 % moves the zero by 0.1 % of the voltage. Use a regulated supply; tare before each test",
         )
@@ -142,7 +139,7 @@ def _range_notes(rig: Rig) -> Iterator[PlanNote]:
     short = [(channel, end) for channel, end in ends if end < LARGEST_LEVEL]
     if short:
         yield _warning(
-            _names([channel for channel, _ in short]),
+            names([channel for channel, _ in short]),
             f"will clip: the first range ends at θ/α = {min(end for _, end in short):.2f}, and releases go "
             f"up to {LARGEST_LEVEL:.2f}. Mount the sensor with more stroke, or check range_si",
         )
@@ -153,14 +150,14 @@ def _certificate_notes(rig: Rig, today: dt.date) -> Iterator[PlanNote]:
     if overdue:
         earliest = min(c.certificate.due for c in overdue)
         yield _warning(
-            _names(overdue),
+            names(overdue),
             f"calibration certificate overdue (since {earliest.isoformat()}). Recalibrate, or write the "
             "new certificate into the rig file",
         )
     soon = [c for c in rig.channels if 0 <= (c.certificate.due - today).days <= _DUE_SOON_DAYS]
     if soon:
         earliest = min(c.certificate.due for c in soon)
-        yield _info(_names(soon), f"calibration due soon ({earliest.isoformat()})")
+        yield _info(names(soon), f"calibration due soon ({earliest.isoformat()})")
 
 
 def _task_notes(tasks: Sequence[PlannedTask], devices: Mapping[str, Device]) -> Iterator[PlanNote]:
