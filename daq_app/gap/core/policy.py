@@ -43,8 +43,12 @@ class Policy:
     further_nats: float = 8.0
     """Log evidence that a further cause must gain. In own worlds false ones gain 2 at most, true ones 54."""
     further_share: float = 0.05
-    """Share of what is explained that a further cause must explain; below, it takes up what the first one's
-    form leaves. In own worlds true ones explain 6.7 % or more."""
+    """Share of what is explained that a further cause must explain, or else clear what it improves
+    (`further_leaves`); one that does neither takes up what the form of the first leaves."""
+    further_leaves: float = 0.2
+    """Share of the misfit, in nats, that a further cause may leave in the groups of features that it
+    improves, to count however much another one explains. A true one leaves next to nothing (development
+    laboratories); raising it lets a further cause mend the form of the first."""
     instrument_nats: float = 30.0
     """Log evidence that an effect on a single instrument must gain. In a development laboratory with ordinary
     imperfections (13 cases) sound instruments gain 20 at most, faults of own worlds 70 or more; raising it

@@ -15,6 +15,7 @@ from daq_app.gap.core.fitting.screen import Screened, Step
 from daq_app.gap.core.fitting.tasks import FitTask, FormsTask, ScreenTask
 from daq_app.gap.core.judging.evidence import NULL, Hypothesis, Ranked, inclusion, rank
 from daq_app.gap.core.judging.other_forms import FreeForm
+from daq_app.gap.core.judging.remainder import misfit_nats
 from daq_app.gap.core.policy import POLICY, Policy
 
 REFITTED = 6
@@ -186,7 +187,7 @@ class Hypotheses:
         return found
 
     def _worth_it(self, hypothesis: Hypothesis) -> bool:
-        """Whether each single instrument gains enough, and the last of several causes nats and a share."""
+        """Whether each single instrument gains enough, and the last of several causes explains enough."""
         evidence = self.evidence[hypothesis]
         without = {
             left: self.evidence.get(tuple(name for name in hypothesis if name != left), -math.inf)
@@ -198,8 +199,22 @@ class Hypotheses:
         if len(hypothesis) < 2:
             return True
         explained = evidence - self.evidence[NULL]
-        gained = evidence - max(without.values())
-        return gained >= max(self.policy.further_nats, self.policy.further_share * explained)
+        last = max(without, key=lambda name: without[name])
+        gained = evidence - without[last]
+        if gained < self.policy.further_nats:
+            return False
+        return gained >= self.policy.further_share * explained or self._clears(hypothesis, last)
+
+    def _clears(self, hypothesis: Hypothesis, last: str) -> bool:
+        """Whether a cause leaves next to nothing of the misfit in the groups of features that it improves."""
+        before = self.fits.get(tuple(name for name in hypothesis if name != last))
+        after = self.fits.get(hypothesis)
+        if before is None or after is None:
+            return False
+        misfits = [misfit_nats(self.experiment, fit.sizes, self.policy) for fit in (before, after)]
+        improved = misfits[1] < misfits[0]
+        left, had = float(misfits[1][improved].sum()), float(misfits[0][improved].sum())
+        return had > 0.0 and left <= self.policy.further_leaves * had
 
     def free_forms(self, best: Hypothesis) -> list[FreeForm]:
         """What each probe of the families of the best hypothesis, and each departure from the forms of its

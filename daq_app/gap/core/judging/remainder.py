@@ -127,6 +127,13 @@ def _size(white: Sequence[FloatArray]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(white) ** 2)))
 
 
+def misfit_nats(experiment: Experiment, sizes: Sizes, policy: Policy) -> FloatArray:
+    """What the misfit of each group beyond the usual discrepancy costs, n ln(ν/ν₀), shape (group,)."""
+    count = sum(np.bincount(index, minlength=len(experiment.groups)) for index in experiment.groups.index)
+    beyond = np.maximum(np.sqrt(sizes.discrepancy) / policy.usual_discrepancy, 1.0)
+    return np.asarray(count * np.log(beyond), dtype=np.float64)
+
+
 def _groups(
     experiment: Experiment, best: Fit, white: Sequence[FloatArray], policy: Policy
 ) -> tuple[GroupRest, ...]:
@@ -136,10 +143,10 @@ def _groups(
         square += np.bincount(index, z**2, len(groups))
         count += np.bincount(index, minlength=len(groups))
     found = []
-    for (channel, observable), n, nu, s in zip(
-        groups.names, count, np.sqrt(best.sizes.discrepancy), square, strict=True
+    costs = misfit_nats(experiment, best.sizes, policy)
+    for (channel, observable), n, nu, s, nats in zip(
+        groups.names, count, np.sqrt(best.sizes.discrepancy), square, costs.tolist(), strict=True
     ):
-        nats = float(n) * math.log(max(float(nu) / policy.usual_discrepancy, 1.0))
         size = math.sqrt(float(s) / max(float(n), 1.0))
         found.append(GroupRest(channel, observable, int(n), float(nu), size, nats))
     return tuple(sorted(found, key=lambda g: (-g.nats, -g.in_noise)))
