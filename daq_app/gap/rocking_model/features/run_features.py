@@ -144,7 +144,7 @@ def _times(
         used = len(sw.RELEASE_FRACTIONS) if k == 0 else len(sw.FRACTIONS)
         for j in range(1, used):
             phase = "release" if k == 0 else "swing"
-            add(f"fall time {j}" if k else f"first fall time {j}", phase, k, j - 1, k, j)
+            add(f"fall time {j}" if k else "first fall time", phase, k, j - 1, k, j)
         if k > 0:
             for j in range(1, used):
                 add(f"rise time {j}", "swing", k, count + j, k, count + j - 1)

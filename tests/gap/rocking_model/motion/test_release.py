@@ -72,10 +72,6 @@ def test_how_evenly_a_wall_is_let_go_is_found() -> None:
     assert result.sigmas["scatter of releases"] < 8e-5
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the scatter of the releases has no cap, and takes up a cable that grips at each pull",
-)
 def test_a_cable_that_holds_on_is_found_beside_sensors_that_are_slow() -> None:
     """It grips at the same share of every pull: a free scatter of the releases takes up all that it does."""
     effects = ("slow_response@lvdt", "residual_cable")
