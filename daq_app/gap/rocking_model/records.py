@@ -13,6 +13,7 @@ import numpy as np
 from daq_app.config.rig import Channel, Family, Rig, Specimen
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.run_cache import RunCache
 from daq_app.runfile import open_run
 
 GRAVITY_M_S2 = 9.81
@@ -96,8 +97,8 @@ class GapRun:
     """Wall clock of the first sample, which orders the campaign; 0 where it is not known."""
     excluded: tuple[str, ...] = ()
     """Channels that are examined on their own and not used with their family."""
-    gridded: dict[int, FloatArray] = field(default_factory=dict, init=False, repr=False, compare=False)
-    """Channels of this very run on the grid of the regressions, each made once (`motion.rotation.gridded`).
+    cache: RunCache = field(default_factory=RunCache, init=False, repr=False, compare=False)
+    """Channels of this very run on the grid of the regressions, and rotations of its wires.
 
     A run that is made from this one by `replace` begins without any, so that none is ever out of date.
     """
@@ -140,7 +141,7 @@ class GapRun:
 
     def _with_excluded(self, ids: tuple[str, ...]) -> GapRun:
         found = replace(self, excluded=ids)
-        found.gridded.update(self.gridded)  # the channels are the same
+        object.__setattr__(found, "cache", self.cache)  # the channels are the same
         return found
 
     def aligned(self, index: int) -> FloatArray:

@@ -59,7 +59,7 @@ def test_a_loss_of_either_side_is_damping_on_one_and_a_push_on_the_other(run: Ro
         p.name: p.mean
         for p in (*RockingModel(run.survey).nuisance, *RockingModel(run.survey).local_nuisance(run))
     }
-    vector = kernel_vector(run, values)[1]
+    vector = kernel_vector(run, values)
     true, levels = run.swings.peak_rad, run.swings.levels
     plain = half_cycle_table(run, vector, true, levels)
     damped = vector.copy()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
@@ -72,9 +73,8 @@ def _ringing(run: RockingRun, block: Block, values: Mapping[str, float]) -> Floa
         size = values.get(key, 0.0)
         if ring is None or size == 0.0:
             continue
-        if (block.family, key) not in run.cache:
-            run.cache[block.family, key] = _ringing_of_one(run, block.wire, ring, key)
-        parts.append(size * run.cache[block.family, key])
+        make = partial(_ringing_of_one, run, block.wire, ring, key)
+        parts.append(size * run.cache.constant((block.family, key), make))
     return np.asarray(np.sum(parts, axis=0)) if parts else None
 
 

@@ -13,7 +13,6 @@ from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.channel_response import channel
 from daq_app.gap.rocking_model.features.families import sensor_families
 from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE, Predict, Size
-from daq_app.gap.rocking_model.features.memo import Memo
 from daq_app.gap.rocking_model.features.oscillations.floor_response import floor
 from daq_app.gap.rocking_model.features.oscillations.ring_response import bending, turning
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
@@ -54,17 +53,16 @@ def block_coefficients(run: RockingRun, values: Mapping[str, float]) -> tuple[Fl
     """Predicted coefficients of all blocks of a run, and the unit of their scatter, each (k,)."""
     if not run.blocks:
         return np.zeros(0), np.zeros(0)
-    if "units" not in run.cache:
-        units = [np.array([repeatability(block, i) for i in range(len(block.names))]) for block in run.blocks]
-        run.cache["units"] = units, np.concatenate(units)
-    whole: FloatArray
-    units, whole = run.cache["units"]
-    memos: list[Memo] = run.cache.setdefault("memos", [Memo() for _ in run.blocks])
+    units = run.cache.constant("units", lambda: [_units(block) for block in run.blocks])
     predicted = [
-        memo.of(values, partial(_coefficients, run, block, unit))
-        for block, unit, memo in zip(run.blocks, units, memos, strict=True)
+        run.cache.part(place, values, partial(_coefficients, run, block, unit))
+        for place, (block, unit) in enumerate(zip(run.blocks, units, strict=True))
     ]
-    return np.concatenate(predicted), whole
+    return np.concatenate(predicted), np.concatenate(units)
+
+
+def _units(block: Block) -> FloatArray:
+    return np.array([repeatability(block, i) for i in range(len(block.names))])
 
 
 def _coefficients(run: RockingRun, block: Block, unit: FloatArray, values: Mapping[str, float]) -> FloatArray:
@@ -130,11 +128,3 @@ def sensor_priors(survey: Survey) -> tuple[Parameter, ...]:
         CROSSTALK_SHARE, 0.0, CROSSTALK, "1", meaning="crosstalk from the channel scanned before", linear=True
     )
     return (*own, *biases, *unequal, shared)
-
-
-@cache
-def leaves_reference(name: str) -> bool:
-    """Whether a parameter is one of the sensors' that does not change the reference rotation."""
-    nominal = Survey("", 0.2, 2.0, 0.3, 3.0)
-    kept = frozenset().union(*(family.references for family in sensor_families()))
-    return name not in kept and name in {p.name for p in sensor_priors(nominal)}

@@ -9,7 +9,6 @@ import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
-from daq_app.gap.rocking_model.features.memo import any_of
 from daq_app.gap.rocking_model.features.response import bessel, first_order, resonator, slow_response
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape
@@ -29,9 +28,9 @@ _FAMILY_EFFECTS = (
 
 
 @cache
-def _family_keys(family: str) -> dict[str, None]:
+def _family_keys(family: str) -> tuple[str, ...]:
     """Parameters that say which effects there are on a family."""
-    return dict.fromkeys(f"{name}@{family}.{parameter}" for name, parameter in _FAMILY_EFFECTS)
+    return tuple(f"{name}@{family}.{parameter}" for name, parameter in _FAMILY_EFFECTS)
 
 
 def family_difference(run: RockingRun, family: str, values: Mapping[str, float]) -> FloatArray | None:
@@ -39,9 +38,8 @@ def family_difference(run: RockingRun, family: str, values: Mapping[str, float])
     shown = run.grid.theta
     if family == "wire" and family != run.reference and "sliding.c" in values:
         # A slip is a step to whatever the wires answer with.
-        if "slips" not in run.cache:
-            run.cache["slips"] = slip_shape(run.grid) / run.wire_height_m
-        shown = shown + values["sliding.c"] * run.cache["slips"]
+        slips = run.cache.constant("slips", lambda: slip_shape(run.grid) / run.wire_height_m)
+        shown = shown + values["sliding.c"] * slips
     total = _added(run, family, values, shown)
     if total is None or family != run.reference:
         return total
@@ -54,7 +52,7 @@ def family_difference(run: RockingRun, family: str, values: Mapping[str, float])
 
 def _added(run: RockingRun, family: str, values: Mapping[str, float], theta: FloatArray) -> FloatArray | None:
     """What a family's sensor effects add to the rotation `theta`; None for nothing."""
-    if not any_of(values, _family_keys(family)):
+    if not any(key in values for key in _family_keys(family)):
         return None
     time_s = run.grid.time_s
     parts: list[FloatArray] = []
@@ -102,11 +100,7 @@ def unit_coefficients(
     run: RockingRun, block: Block, name: str, shape: Callable[[], FloatArray]
 ) -> FloatArray:
     """Coefficients of a fixed shape, worked out once per run."""
-    key = (block.family, name)
-    if key not in run.cache:
-        run.cache[key] = block.coefficients(shape())
-    found: FloatArray = run.cache[key]
-    return found
+    return run.cache.constant((block.family, name), lambda: block.coefficients(shape()))
 
 
 def base_rotation(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:

@@ -89,13 +89,12 @@ class SensorFamily:
     """One sensor family in the diagnosis.
 
     `observe`: blocks of a run. `predict`: by the block's rule (`Block.rule`). `sizes`: by (block,
-    coefficient). `priors`: parameters of the sensors that all runs share. `references`: names of those
-    priors that change the reference rotation as well. `probes`: by block, the effect family of its free form.
+    coefficient). `priors`: parameters of the sensors that all runs share. `probes`: by block, the effect
+    family of its free form.
     """
 
     observe: Callable[[Scene], Iterable[Block | None]]
     predict: Mapping[str, Predict]
     sizes: Mapping[tuple[str, str], Size] = field(default_factory=dict)
     priors: Callable[[Survey], tuple[Parameter, ...]] = lambda survey: ()
-    references: frozenset[str] = frozenset()
     probes: Mapping[str, str] = field(default_factory=dict)

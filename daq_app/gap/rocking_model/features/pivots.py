@@ -33,9 +33,7 @@ def travel(run: RockingRun, block: Block, values: Mapping[str, float], of_base: 
     """
     theta = run.grid.theta
     inwards, apart = pivots(run, values)
-    if "pivots" not in run.cache:
-        run.cache["pivots"] = pivots_off(run.wires, theta)
-    each: FloatArray = run.cache["pivots"][of_base]
+    each = run.cache.constant("pivots", lambda: pivots_off(run.wires, theta))[of_base]
     found = inwards * unit_coefficients(run, block, "travel", lambda: each)
     found = found + apart * unit_coefficients(run, block, "lopsided travel", lambda: side_of(theta) * each)
     if "winkler.theta_c" in values:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Wire
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import Survey, Wiring
+from daq_app.gap.rocking_model.run_cache import RunCache
 
 _SMALLEST_LOADING = 1e-3
 
@@ -61,14 +61,14 @@ class RockingRun:
     """What was put right in all runs before anything was read from them."""
     marks: tuple[Mark, ...] = ()
     """What the run shows of conditions of the electronics."""
-    cache: dict[Any, Any] = field(default_factory=dict, compare=False)
+    cache: RunCache = field(default_factory=RunCache, compare=False)
 
     def rotation_alone(self) -> RockingRun:
         """The run with what θ(t) says only."""
         n = len(self.places) + self.peaks.size
         old = self.features
         features = FeatureSet(old.values[:n], old.sd[:n], old.labels[:n], old.independent_fraction)
-        return replace(self, features=features, blocks=(), block_loadings=np.zeros((n, 0)), cache={})
+        return replace(self, features=features, blocks=(), block_loadings=np.zeros((n, 0)), cache=RunCache())
 
     def with_blocks(self, more: Sequence[Block]) -> RockingRun:
         """The run with further blocks of features after those it has."""
@@ -88,7 +88,7 @@ class RockingRun:
         first = len(self.places) + self.peaks.size
         loadings = _block_loadings(blocks, first, len(values))
         features = FeatureSet(np.array(values), np.array(sds), tuple(labels))
-        return replace(self, features=features, blocks=blocks, block_loadings=loadings, cache={})
+        return replace(self, features=features, blocks=blocks, block_loadings=loadings, cache=RunCache())
 
 
 def _block_loadings(blocks: tuple[Block, ...], first: int, n: int) -> FloatArray:

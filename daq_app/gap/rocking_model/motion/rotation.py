@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,11 +78,13 @@ def gridded(run: GapRun, index: int, early: int = 0) -> FloatArray:
     """A channel less its mean at the end of the record, taken `early` samples sooner, on the grid, (m,)."""
     if early:
         return coarse(sooner(zeroed(run, index), early), run.rate_hz)
-    known = run.gridded.get(index)
-    if known is None:
-        known = run.gridded[index] = coarse(zeroed(run, index), run.rate_hz)
-        known.flags.writeable = False
-    return known
+
+    def make() -> FloatArray:
+        values = coarse(zeroed(run, index), run.rate_hz)
+        values.flags.writeable = False
+        return values
+
+    return run.cache.constant(("grid", index), make)
 
 
 def sooner(values: FloatArray, samples: int) -> FloatArray:
@@ -217,14 +220,18 @@ def wall_rotation(run: GapRun) -> tuple[FloatArray, FloatArray, tuple[str, ...]]
     """
     rows, heights, names = [], [], []
     for i in run.indices("wire"):
-        sensor = run.sensors[i]
-        raw = run.aligned(i)
-        if sensor.anchor_m is None or not np.all(np.isfinite(raw)) or reaches_its_range(raw, sensor.range_si):
-            continue
-        theta = Wire(sensor, run.survey.half_base_m).rotation(zeroed(run, i))
-        if not np.all(np.isfinite(theta)):
-            continue  # no rotation explains what it reads
-        rows.append(theta)
-        heights.append(sensor.position_m[2])
-        names.append(sensor.id)
+        theta = run.cache.constant(("wire", i), partial(_rotation_of_wire, run, i))
+        if theta is not None:
+            rows.append(theta)
+            heights.append(run.sensors[i].position_m[2])
+            names.append(run.sensors[i].id)
     return np.array(rows), np.array(heights), tuple(names)
+
+
+def _rotation_of_wire(run: GapRun, index: int) -> FloatArray | None:
+    """θ, (n,), of a wire that reads; None where no rotation explains what it reads."""
+    sensor, raw = run.sensors[index], run.aligned(index)
+    if sensor.anchor_m is None or not np.all(np.isfinite(raw)) or reaches_its_range(raw, sensor.range_si):
+        return None
+    theta = Wire(sensor, run.survey.half_base_m).rotation(zeroed(run, index))
+    return theta if np.all(np.isfinite(theta)) else None

@@ -23,7 +23,7 @@ def free_times(run: RockingRun, values: Mapping[str, float]) -> FloatArray:
     restoring, loss = "free_restoring.t0" in values, "free_dissipation.t0" in values
     if not (restoring or loss):
         return total
-    kind, low, share, direction = _free_basis(run)
+    kind, low, share, direction = run.cache.constant("free basis", lambda: _free_basis(run))
     if restoring:
         knots = np.array([values[f"free_restoring.t{i}"] for i in range(9)])
         first = knots[3 * kind + low]
@@ -37,20 +37,17 @@ def free_times(run: RockingRun, values: Mapping[str, float]) -> FloatArray:
 
 def _free_basis(run: RockingRun) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray, FloatArray]:
     """Per time feature: part of the half-cycle (upper, lower, turning), knot, share, fall or rise."""
-    if "free basis" not in run.cache:
-        count = run.swings.levels.shape[1]
-        ka, a, kb, b = run.places.T
-        falls = (a < count) & (b < count)
-        turning = (ka != kb) | ((a >= count) & (b < count))
-        nearer = np.where(falls, b, a - count)
-        kind = np.where(turning, 2, np.clip(nearer, 1, 2) - 1)
-        size = np.abs(run.swings.peak_rad[ka]) / run.survey.alpha_rad
-        place = np.interp(size, (0.0, 0.15, 0.4), (0.0, 1.0, 2.0))
-        low = np.minimum(place.astype(int), 1)
-        direction = np.where(turning, 0.0, np.where(falls, 1.0, -1.0))
-        run.cache["free basis"] = (kind, low, place - low, direction)
-    found: tuple[NDArray[np.intp], NDArray[np.intp], FloatArray, FloatArray] = run.cache["free basis"]
-    return found
+    count = run.swings.levels.shape[1]
+    ka, a, kb, b = run.places.T
+    falls = (a < count) & (b < count)
+    turning = (ka != kb) | ((a >= count) & (b < count))
+    nearer = np.where(falls, b, a - count)
+    kind = np.where(turning, 2, np.clip(nearer, 1, 2) - 1)
+    size = np.abs(run.swings.peak_rad[ka]) / run.survey.alpha_rad
+    place = np.interp(size, (0.0, 0.15, 0.4), (0.0, 1.0, 2.0))
+    low = np.minimum(place.astype(int), 1)
+    direction = np.where(turning, 0.0, np.where(falls, 1.0, -1.0))
+    return kind, low, place - low, direction
 
 
 def with_uneven_loss(

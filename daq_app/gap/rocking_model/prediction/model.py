@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import lru_cache
+from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.prediction.free_forms import free_times, with_uneven_loss
 from daq_app.gap.rocking_model.prediction.true_motion import pause_at_impact, true_rotations
 from daq_app.gap.rocking_model.prediction.vector import (
-    acts_on,
     half_cycle_table,
     kernel_vector,
     restitution_of,
@@ -30,13 +29,6 @@ SCATTER_RELEASE = "scatter of releases"
 SCATTER_SENSOR = "scatter of sensors"
 PUSH_RAD_S = 3e-4
 """Speed that a clean release may leave; nobody lets go of five tonnes without touching them."""
-_REMEMBERED = 6
-
-
-@lru_cache(maxsize=1024)
-def _acting(part: str, names: tuple[str, ...], reference: str) -> tuple[str, ...]:
-    """Those of the values that a part of the prediction depends on."""
-    return tuple(name for name in names if acts_on(part, name, reference))
 
 
 class RockingModel:
@@ -109,7 +101,7 @@ class RockingModel:
         predicted = np.empty(len(run.features))
         loading_r = np.zeros(len(run.features))
         count = len(run.places)
-        predicted[:count], peaks, slopes = self._remembered(run, "swings", values, self._swings)
+        predicted[:count], peaks, slopes = run.cache.part("swings", values, partial(self._swings, run))
         last = count + run.peaks.size
         predicted[count:last] = peaks
         loading_r[count:last] = 1.0 / slopes
@@ -120,46 +112,23 @@ class RockingModel:
     @staticmethod
     def _fixed_scatters(run: RockingRun, units: FloatArray) -> dict[str, FloatArray]:
         """Loadings that no parameter changes, worked out once per run; `units` are those of the blocks."""
-        if "loadings" not in run.cache:
+
+        def make() -> dict[str, FloatArray]:
             times, releases, sensors = (np.zeros(len(run.features)) for _ in range(3))
             count = len(run.places)
             times[:count] = 1.0
             releases[:count] = (run.places[:, 0] == 0) & (run.places[:, 2] == 0)
             sensors[count + run.peaks.size :] = units
-            run.cache["loadings"] = {SCATTER_TIME: times, SCATTER_RELEASE: releases, SCATTER_SENSOR: sensors}
-        found: dict[str, FloatArray] = run.cache["loadings"]
-        return found
+            return {SCATTER_TIME: times, SCATTER_RELEASE: releases, SCATTER_SENSOR: sensors}
 
-    @staticmethod
-    def _remembered(
-        run: RockingRun,
-        part: str,
-        values: Mapping[str, float],
-        work_out: Callable[[RockingRun, Mapping[str, float]], tuple[FloatArray, ...]],
-    ) -> tuple[FloatArray, ...]:
-        """A part of the prediction, kept for the last few values of what it depends on.
-
-        Differences move one parameter at a time, and most parameters move one part only.
-        """
-        kept: dict[tuple[tuple[str, ...], tuple[float, ...]], tuple[FloatArray, ...]] = run.cache.setdefault(
-            part, {}
-        )
-        chosen = _acting(part, tuple(values), run.reference)
-        key = (chosen, tuple(map(values.__getitem__, chosen)))
-        found = kept.get(key)
-        if found is None:
-            if len(kept) >= _REMEMBERED:
-                del kept[next(iter(kept))]
-            found = kept[key] = work_out(run, values)
-        return found
+        return run.cache.constant("loadings", make)
 
     def _swings(
         self, run: RockingRun, values: Mapping[str, float]
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Times (T,), log peaks (P,) and d ln speed / d ln peak (P,)."""
-        key, vector, clock = kernel_vector(run, values)
-        true, levels = true_rotations(run, values)
-        table = self._half_cycles(run, vector, true, levels, key)
+        # r and what else acts at impacts only moves none of the half-cycles.
+        vector, true, levels, table = run.cache.part("half-cycles", values, partial(_half_cycles, run))
         table = with_uneven_loss(run, values, vector, true, levels, table)
         count = levels.shape[1]
         first = shooting.FIRST_CROSSING
@@ -173,7 +142,7 @@ class RockingModel:
         across = run.across
         k = places[across, 0]
         times[across] += table[k, shooting.FALL_S] + pause[k] + table[k + 1, shooting.RISE_S]
-        times = times / clock + free_times(run, values)
+        times = times / (1.0 + values.get("clock.error", 0.0)) + free_times(run, values)
         if run.reference == "lvdt":
             # Before an impact one face opens, after it the other.
             times[across] += np.sign(true[places[across, 0]]) * values[FACE_SKEW]
@@ -191,17 +160,14 @@ class RockingModel:
         measured = np.log(np.abs(run.swings.peak_rad[k]))
         return times, measured - excess / slopes, slopes
 
-    @staticmethod
-    def _half_cycles(
-        run: RockingRun, vector: FloatArray, true: FloatArray, levels: FloatArray, key: bytes
-    ) -> FloatArray:
-        """The simulator's half-cycles; remembered for the last parameters, since many do not move them."""
-        if run.cache.get("key") == key:
-            known: FloatArray = run.cache["table"]
-            return known
-        table = half_cycle_table(run, vector, true, levels)
-        run.cache["key"], run.cache["table"] = key, table
-        return table
+
+def _half_cycles(
+    run: RockingRun, values: Mapping[str, float]
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """(kernel vector, true peaks (n,), their levels (n, F), the simulator's half-cycles (n, 5 + 2F))."""
+    vector = kernel_vector(run, values)
+    true, levels = true_rotations(run, values)
+    return vector, true, levels, half_cycle_table(run, vector, true, levels)
 
 
 class UnscatteredModel(RockingModel):

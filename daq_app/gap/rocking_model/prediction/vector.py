@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.coefficients import leaves_reference
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from sim_hardware.dynamics import parameters as par
 from sim_hardware.dynamics import shooting
@@ -18,8 +16,14 @@ from sim_hardware.dynamics.effects import MOTION_EFFECTS
 
 TOLERANCE = 1e-10
 """Local error of the integrator, relative to the half-cycle: times good to nanoseconds."""
+_OF_IMPACTS = (par.R_SLOPE, par.R_SLOPE_SPEED, par.R_ASYMMETRY, par.CRUSH_R)
+_BESIDE = ("flexible_wall", "yaw", "twist", "sliding")
+"""Effects that do not move the rotation of the joint."""
 _INDEX = {
-    f"{spec.name}.{p.name}": p.index for spec in MOTION_EFFECTS for p in spec.parameters if p.index >= 0
+    f"{spec.name}.{p.name}": p.index
+    for spec in MOTION_EFFECTS
+    for p in spec.parameters
+    if p.index >= 0 and p.index not in _OF_IMPACTS and spec.name not in _BESIDE
 }
 _DEFAULTS = {
     spec.name: [(p.index, p.default) for p in spec.parameters if p.default is not None and p.index >= 0]
@@ -32,61 +36,28 @@ _MIDDLE_SPEED = 0.36
 slope, so that the priors of r and of its slope say nothing of it."""
 
 
-_STILL = ("flexible_wall.", "yaw.", "twist.", "sliding.")
-"""Effects that do not move the rotation of the joint."""
-_SWINGS_ONLY = frozenset(("p", "r", "theta0", "omega0", "viscous.zeta", "coulomb.mu")) | {
-    "slope_power.c",
-    "slope_square.c",
-    "loss_power.mu",
-    "loss_growth.zeta",
-    "loss_side.zeta",
-}
-
-
-@cache
-def acts_on(part: str, key: str, reference: str) -> bool:
-    """Whether a value moves the ``swings`` or the ``blocks`` of a prediction; yes unless known otherwise."""
-    if part == "blocks":
-        return key not in _SWINGS_ONLY
-    if leaves_reference(key) or key.startswith(_STILL):
-        return False
-    if key.startswith("cal_") and key != "cal_wire":
-        return False  # of one channel, which is not used with its family
-    return "@" not in key or key.rpartition(".")[0].rpartition("@")[2] == reference
-
-
-@lru_cache(maxsize=1024)
-def _entries(names: tuple[str, ...]) -> tuple[tuple[tuple[str, int], ...], tuple[str, ...]]:
-    """Of the names of values: those with a place in the vector, and those that act on what is measured."""
-    moving = tuple((name, _INDEX[name]) for name in names if name in _INDEX)
-    own = ("zero", "theta0", "cal_wire", "face_a", "face_b")
-    return moving, tuple(name for name in names if name in own or "@" in name)
-
-
-def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> tuple[bytes, FloatArray, float]:
-    """(key, vector, clock factor): the key names everything that the half-cycles depend on."""
+def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> FloatArray:
+    """Parameter vector of the simulator's half-cycles, which know no impact and so no r."""
     vector = np.zeros(par.N_PARAMETERS)
     alpha = values["alpha"]
     vector[par.ALPHA], vector[par.P] = alpha, values["p"]
     vector[par.R0] = values["half_base"] / math.sin(alpha)
-    vector[par.RESTITUTION] = values["r"]
+    vector[par.RESTITUTION] = 1.0
     vector[par.TOLERANCE] = TOLERANCE
     vector[par.REST_AMPLITUDE] = par.REST_AMPLITUDE_RAD
     vector[par.DURATION] = 1e9
     vector[par.IMPACTS_BEFORE] = run.impacts_before
-    moving, measuring = _entries(tuple(values))
-    for key, index in moving:
+    for key, index in _INDEX.items():
+        value = values.get(key)
+        if value is None:
+            continue
         for other, default in _DEFAULTS[key.rpartition(".")[0]]:
             if vector[other] == 0.0:
                 vector[other] = default
-        vector[index] = values[key]
+        vector[index] = value
     vector[par.OMEGA0] += values["omega0"]
     vector[par.COULOMB] += values.get("loss_power.mu", 0.0)
-    measured = [values[key] for key in measuring]
-    dynamic = vector.copy()
-    dynamic[[par.RESTITUTION, par.R_SLOPE, par.R_ASYMMETRY, par.CRUSH_R]] = 0.0
-    identity = dynamic.tobytes() + np.asarray(measured, dtype=float).tobytes()
-    return identity, vector, 1.0 + values.get("clock.error", 0.0)
+    return vector
 
 
 def half_cycle_table(run: RockingRun, vector: FloatArray, true: FloatArray, levels: FloatArray) -> FloatArray:

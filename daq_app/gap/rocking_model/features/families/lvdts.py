@@ -164,6 +164,5 @@ FAMILY = SensorFamily(
         ("twist", "follows rotation"): Size(1.5e-4),
     },
     _priors,
-    frozenset(("face_a", "face_b", FACE_SKEW)),
     {"joint": "interface"},
 )

@@ -158,6 +158,5 @@ FAMILY = SensorFamily(
         ("base", "follows rotation"): Size(3e-4),
     },
     _priors,
-    frozenset(("cal_wire",)),
     {"wire": "sensor", "base": "contact"},
 )

@@ -72,12 +72,13 @@ def _of_the_other(run: RockingRun, block: Block, values: Mapping[str, float]) ->
     if other is None or not any(abs(_moved(other, s, values)) > _EVEN for s in block.shares):
         return found
     frequency, zeta, _ = other.ring
-    key = (block.family, "the other ring")
-    if key not in run.cache:
-        run.cache[key] = block.projection @ ring_columns(run.grid, frequency, zeta)
+    columns = run.cache.constant(
+        (block.family, "the other ring"),
+        lambda: block.projection @ ring_columns(run.grid, frequency, zeta),
+    )
     for k, c in enumerate(_ring_coefficients(run, block, other, values)):
         size = (2.0 * np.pi * frequency) ** 2 if block.names[k].endswith("accelerometers") else 1.0
-        found[k] = size * float(run.cache[key][k] @ (c.real, c.imag))
+        found[k] = size * float(columns[k] @ (c.real, c.imag))
     return found
 
 

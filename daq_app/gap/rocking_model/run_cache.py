@@ -1,0 +1,87 @@
+"""The one cache of the rocking model: what is worked out of a run, kept while nothing it depends on changes.
+
+A fit moves one value at a time, and most parts of a prediction depend on few. What a part depends on is
+not declared but seen: it is given its values through a mapping that notes what is asked for. A part that
+is a pure function of its values asks for the same ones as long as they are the same, so the note is complete.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from typing import Any, Generic, TypeVar, cast
+
+_KEPT = 6
+"""Results kept of each part: a fit goes back to its last values after every step of its differences."""
+T = TypeVar("T")
+
+
+class RunCache:
+    """What has been worked out of one run; a run that is changed begins with an empty one."""
+
+    def __init__(self) -> None:
+        self._constants: dict[Hashable, object] = {}
+        self._parts: dict[Hashable, _Part[Any]] = {}
+
+    def constant(self, key: Hashable, make: Callable[[], T]) -> T:
+        """What the run alone decides, made once."""
+        if key not in self._constants:
+            self._constants[key] = make()
+        return cast(T, self._constants[key])
+
+    def part(self, key: Hashable, values: Mapping[str, float], make: Callable[[Mapping[str, float]], T]) -> T:
+        """What `make` makes of the values; worked out only if something that it asks for is new."""
+        if key not in self._parts:
+            self._parts[key] = _Part[T]()
+        return cast(T, self._parts[key].of(values, make))
+
+
+class _Part(Generic[T]):
+    """The last few results of one part: names asked for, their values, all names where listed, result."""
+
+    def __init__(self) -> None:
+        self._known: list[tuple[tuple[str, ...], tuple[float | None, ...], tuple[str, ...] | None, T]] = []
+
+    def of(self, values: Mapping[str, float], make: Callable[[Mapping[str, float]], T]) -> T:
+        get = values.get
+        for keys, given, names, result in reversed(self._known):
+            if tuple(map(get, keys)) == given and (names is None or names == tuple(values)):
+                return result
+        watched = _Watched(values)
+        result = make(watched)
+        keys = tuple(watched.asked)
+        if len(self._known) >= _KEPT:
+            del self._known[0]
+        names = tuple(values) if watched.listed else None
+        self._known.append((keys, tuple(map(get, keys)), names, result))
+        return result
+
+
+class _Watched(Mapping[str, float]):
+    """Values that note which of them were asked for."""
+
+    def __init__(self, values: Mapping[str, float]) -> None:
+        self._values = values
+        self.asked: dict[str, None] = {}
+        self.listed = False
+        """Whether the names themselves were asked for."""
+
+    def __getitem__(self, key: str) -> float:
+        self.asked[key] = None
+        return self._values[key]
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """As a dict's; the mapping's own would raise and catch an error for every effect that is absent."""
+        self.asked[key] = None
+        return self._values.get(key, default)
+
+    def __contains__(self, key: object) -> bool:
+        self.asked[str(key)] = None
+        return key in self._values
+
+    def __iter__(self) -> Iterator[str]:
+        self.listed = True
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        self.listed = True
+        return len(self._values)
