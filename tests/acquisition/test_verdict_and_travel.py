@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from daq_app.acquisition.closing.derive import derive
-from daq_app.acquisition.course.channel_watch import ChannelWatch
-from daq_app.acquisition.course.overload import OverloadWatch
+from daq_app.acquisition.course.sensors.channel_watch import ChannelWatch
+from daq_app.acquisition.course.sensors.overload import OverloadWatch
 from daq_app.config import Scaling
 from daq_app.runfile import CheckRecord, JournalWriter, RunHeader, TestPlan, read_journal
 from drivers import Block

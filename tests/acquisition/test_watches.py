@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from daq_app.acquisition.course.channel_watch import ChannelWatch, Doubt
+from daq_app.acquisition.course.sensors.channel_watch import ChannelWatch, Doubt
 from daq_app.acquisition.pipeline.clock_watch import ClockNews, ClockWatch
 from daq_app.acquisition.session.machine_watch import LOW_MEMORY_BYTES, MachineNews, MachineWatch
 from daq_app.config import Rig, Scaling

@@ -14,7 +14,7 @@ from typing import Final
 from daq_app.acquisition.course.live import LiveView
 from daq_app.acquisition.course.orders import Orders
 from daq_app.acquisition.course.preparation import Preparation, Surroundings
-from daq_app.acquisition.course.sensor_news import SensorNews
+from daq_app.acquisition.course.sensors.sensor_news import SensorNews
 from daq_app.acquisition.course.sequence import Change
 from daq_app.acquisition.course.sequence import Sequence as Course
 from daq_app.acquisition.course.surrounding import Surrounding

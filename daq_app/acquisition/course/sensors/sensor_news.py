@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from daq_app.acquisition.course.channel_watch import ChannelWatch
-from daq_app.acquisition.course.overload import OverloadWatch
+from daq_app.acquisition.course.sensors.channel_watch import ChannelWatch
+from daq_app.acquisition.course.sensors.overload import OverloadWatch
 from daq_app.config.rig import Rig
 from drivers import Block, Opened
 
