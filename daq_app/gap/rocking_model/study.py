@@ -24,10 +24,8 @@ from daq_app.gap.rocking_model.inspection.inspect_runs import (
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.prediction.model import RockingModel, UnscatteredModel
 from daq_app.gap.rocking_model.records import GapRun, check_consistent
+from daq_app.gap.rocking_model.tolerances import FAR_FROM_SURVEY
 from daq_app.workers import warm_up
-
-FAR_FROM_SURVEY = 4.0
-"""Prior sd by which α, p or the base may differ from the survey before the rig file is doubted."""
 
 
 def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:

@@ -33,14 +33,11 @@ from daq_app.gap.rocking_model.inspection.second_axis import second_axis
 from daq_app.gap.rocking_model.inspection.stairs import beside_stairs
 from daq_app.gap.rocking_model.inspection.vertical import odd_vertical, vertical_block
 from daq_app.gap.rocking_model.inspection.wiring import mend
-from daq_app.gap.rocking_model.motion import swing_timing
 from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.records import GapRun, Wiring
+from daq_app.gap.rocking_model.tolerances import COUNT_SD, LATE_S
 
-LATE_S = 2.5e-3
-"""Lag between LVDTs and wires from which it matters which of them the motion is read from."""
 _SPOILING = ("quantisation", "dropout", "saturation", "spikes")
-_COUNT_SD = 0.05
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer", "tiltmeter")
 
 
@@ -102,8 +99,8 @@ def _wiring_marks(wiring: Wiring, families: dict[str, Family]) -> list[Mark]:
         if shown[b] != a or a < b
     ]
     return [
-        Mark(first, f"{', '.join(turned) or 'channels'} reversed", "1", float(len(turned)), _COUNT_SD),
-        Mark(second, ", ".join(words) or "channels exchanged", "1", float(wiring.places), _COUNT_SD),
+        Mark(first, f"{', '.join(turned) or 'channels'} reversed", "1", float(len(turned)), COUNT_SD),
+        Mark(second, ", ".join(words) or "channels exchanged", "1", float(wiring.places), COUNT_SD),
     ]
 
 
@@ -147,7 +144,7 @@ def _coefficient(run: RockingRun, family: str, name: str) -> float | None:
 def _late(run: RockingRun) -> float:
     """How late the accelerometers are, s, where that is more than their timing leaves open."""
     delay = _coefficient(run, "swing timing", "delay") or 0.0
-    return delay if abs(delay) > swing_timing.LATE_S else 0.0
+    return delay if abs(delay) > LATE_S else 0.0
 
 
 def without_suspects(
@@ -173,9 +170,7 @@ def without_suspects(
     if gross:
         odd["lvdt"] = tuple(sorted({*odd.get("lvdt", ()), *gross}))
     more = [
-        Mark(
-            f"disagreement@{family}", f"disagreement ({', '.join(names)})", "1", float(len(names)), _COUNT_SD
-        )
+        Mark(f"disagreement@{family}", f"disagreement ({', '.join(names)})", "1", float(len(names)), COUNT_SD)
         for family, names in odd.items()
     ]
     turned = second_axis([e.run for e in again], [e.features.grid for e in again])

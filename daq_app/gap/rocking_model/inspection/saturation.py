@@ -21,16 +21,9 @@ from daq_app.gap.rocking_model.motion.rotation import (
     zeroed,
 )
 from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.tolerances import BEYOND_FAMILY, GOES_ON, IN_PROPORTION, LIMIT_SD
 
 _OTHER: dict[Family, Family] = {"lvdt": "wire", "wire": "lvdt"}
-_BELOW = (0.3, 0.85)
-"""Part of a channel's travel over which it must be in proportion to the rotation."""
-LIMIT_SD = 0.01
-"""Relative error of a limit."""
-_GOES_ON = 1.025
-"""How much further the rotation must go on than the channel."""
-_BEYOND = 1.02
-"""How much further than those of its family that stop a channel may go that stops where they do."""
 
 
 def saturated(
@@ -70,7 +63,7 @@ def saturated(
             limits |= {
                 name: common
                 for name, far in zip(ids, reach, strict=True)
-                if name not in limits and far < _BEYOND * common
+                if name not in limits and far < BEYOND_FAMILY * common
             }
         # Where several clip, those that travel furthest stand for them; zeros differ, so their middle does.
         furthest = max((limits[ids[k]] for k in clipped), default=0.0)
@@ -132,7 +125,7 @@ def _in_step(mine: FloatArray | None, other: FloatArray | None) -> FloatArray | 
         return other
     place = np.arange(other.size, dtype=float)
     timed = np.interp(place - lateness(mine, other), place, other)
-    below = np.abs(mine) < _BELOW[1] * np.abs(mine).max()
+    below = np.abs(mine) < IN_PROPORTION[1] * np.abs(mine).max()
     columns = np.column_stack([place - place[-1], mine, np.ones_like(mine)])
     drift = np.linalg.lstsq(columns[below], (timed - mine)[below], rcond=None)[0][0]
     return np.asarray(timed - drift * columns[:, 0])
@@ -170,14 +163,14 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None, rough: float) ->
     side = np.sign(rotation[int(np.argmax(reading))])
     same = np.sign(rotation) == side
     largest = float(mine[same].max(initial=0.0))
-    below = same & (mine > _BELOW[0] * largest) & (mine < _BELOW[1] * largest)
+    below = same & (mine > IN_PROPORTION[0] * largest) & (mine < IN_PROPORTION[1] * largest)
     top = same & (mine > 0.985 * largest)
     if below.sum() < 20 or top.sum() < round(0.05 * GRID_HZ):
         return 0.0, furthest
     gain = float(np.median(mine[below] / np.maximum(expected[below], 1e-9)))
     reach = gain * expected[top]
     noise = float(np.std(mine[-40:]))
-    goes_on = float(np.quantile(reach, 0.98)) > (_GOES_ON + rough) * largest
+    goes_on = float(np.quantile(reach, 0.98)) > (GOES_ON + rough) * largest
     # Standing still while the rotation moves on is clipping; following at another rate is not.
     travel = float(np.quantile(reach, 0.99) - np.quantile(reach, 0.01))
     moved = float(np.quantile(mine[top], 0.95) - np.quantile(mine[top], 0.05))

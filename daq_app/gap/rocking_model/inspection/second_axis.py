@@ -12,11 +12,7 @@ from daq_app.gap.rocking_model.features.response import first_order
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import coarse, zeroed
 from daq_app.gap.rocking_model.records import GapRun
-
-TURNED = 0.03
-"""Share of the rotation in the second axis up to which the instrument is turned on its mount, by 1.7°."""
-_MOUNT_SD = 0.01
-"""Standard deviation of that share for an instrument mounted with care."""
+from daq_app.gap.rocking_model.tolerances import MOUNT_SD, TURNED
 
 
 def second_axis(runs: Sequence[GapRun], grids: Sequence[Grid]) -> list[list[Mark]]:
@@ -31,7 +27,7 @@ def second_axis(runs: Sequence[GapRun], grids: Sequence[Grid]) -> list[list[Mark
             continue
         key = f"crossed@{runs[0].sensors[place].id}"
         for row, share in zip(marks, shares, strict=True):
-            row.append(Mark(key, "share of the rotation", "1", abs(share), _MOUNT_SD))
+            row.append(Mark(key, "share of the rotation", "1", abs(share), MOUNT_SD))
     return marks
 
 

@@ -16,20 +16,17 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.response import first_order
 from daq_app.gap.rocking_model.motion.rotation import zeroed
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Wiring
+from daq_app.gap.rocking_model.tolerances import (
+    EXCHANGE_EACH,
+    EXCHANGE_GAIN,
+    EXCHANGE_MISFIT,
+    FAR_FROM_UPRIGHT,
+    REVERSED_BELOW,
+)
 
 WORK_HZ = 100.0
 LOW_PASS_HZ = 12.0
 """Impacts ring above this."""
-REVERSED_BELOW = -0.4
-"""Slope of a channel on what it should show, below which it is called reversed."""
-EXCHANGE_GAIN = 0.15
-"""Putting plugs back must leave less than this share of the misfit of the channels …"""
-EXCHANGE_MISFIT = 0.03
-"""… which must be more than this share of a signal."""
-AWAY = 0.25
-"""Share of the largest rotation from which an impact is far enough."""
-_MOVED = 1e-3
-"""Misfit that a channel must lose to be called moved: channels that show the same stay where they are."""
 
 
 def mend(runs: list[GapRun]) -> tuple[list[GapRun], Wiring]:
@@ -118,7 +115,7 @@ def _order(misfit: FloatArray) -> tuple[list[int], int]:
     if known.size < 2 or float(np.trace(table)) <= EXCHANGE_MISFIT:
         return order, 0
     at = np.arange(known.size)
-    _, best = linear_sum_assignment(table + _MOVED * (1.0 - np.eye(known.size)))
+    _, best = linear_sum_assignment(table + EXCHANGE_EACH * (1.0 - np.eye(known.size)))
     # Those that stay where they are misfit before and after: they say nothing about the others' plugs.
     moved = at != best
     straight, after = float(table[at, at][moved].sum()), float(table[at, best][moved].sum())
@@ -129,7 +126,7 @@ def _order(misfit: FloatArray) -> tuple[list[int], int]:
         order[int(i)] = int(j)
     turned = [float(np.trace(np.roll(misfit, k, axis=1))) for k in range(1, n)]
     # Sensors that show the same may be exchanged or not: the turn that fits as well is the simpler story.
-    fits = [k for k, total in enumerate(turned, start=1) if known.size == n and total < left + _MOVED]
+    fits = [k for k, total in enumerate(turned, start=1) if known.size == n and total < left + EXCHANGE_EACH]
     return order, fits[0] if fits else 1
 
 
@@ -153,7 +150,7 @@ def _compare(run: GapRun) -> tuple[FloatArray, FloatArray, list[str]]:
     if theta is None:
         return np.zeros((0, 0)), np.zeros((0, 0)), []
     acceleration = np.gradient(np.gradient(theta, step / run.rate_hz), step / run.rate_hz)
-    away = np.abs(theta) > AWAY * np.max(np.abs(theta))
+    away = np.abs(theta) > FAR_FROM_UPRIGHT * np.max(np.abs(theta))
     measured, expected, ids = [], [], []
     for i, values in smooth.items():
         shape = _expected(run, i, theta, acceleration)

@@ -12,6 +12,7 @@ import numpy as np
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import Survey
+from daq_app.gap.rocking_model.tolerances import RELEASE_SPEED_RAD_S
 
 BEFORE_S, AFTER_S = 0.06, 0.10
 SEARCHED_S = 0.05
@@ -19,8 +20,6 @@ _STEPS = 41
 _WORK_HZ = 1000.0
 _PROFILED = 401
 _SPEEDS_RAD_S = np.linspace(-0.08, 0.08, 321)
-TOLERANCE_RAD_S = 1e-3
-"""What the form of the very first motion (a cable that gives way, a slow sensor) may feign."""
 
 
 def release_speed(
@@ -53,7 +52,7 @@ def release_speed(
     told = _told(seen, time_s, survey.p_rad_s, float(found[1]), variance)
     # Thrown up the wall rises v²/2a above its hold; what the hold sways by is as good as that.
     swayed = 2.0 * swings.hold_sd * abs(found[2]) / max(abs(found[1]), 1e-6)
-    return float(found[1]), float(np.linalg.norm([told, swayed, TOLERANCE_RAD_S]))
+    return float(found[1]), float(np.linalg.norm([told, swayed, RELEASE_SPEED_RAD_S]))
 
 
 def _told(seen: FloatArray, time_s: FloatArray, p: float, speed: float, variance: float) -> float:

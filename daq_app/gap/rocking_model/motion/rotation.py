@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.records import GapRun, Sensor, Vector3
+from daq_app.gap.rocking_model.tolerances import FEWEST_LVDTS, LVDT_MISFIT
 from daq_app.rocking.geometry.joint import BaseJoint, at_range_end
 from daq_app.rocking.geometry.noise import timing_noise
 from daq_app.rocking.geometry.wires import wire_rotation, wire_shortening
@@ -22,13 +23,6 @@ TAIL_S = 0.3
 """The wall stands at rest at the end of a record; this much of it is the zero of every channel."""
 HOLD_S = 0.5
 NOISE_S = 0.45
-FEWEST_LVDTS = 6
-"""LVDTs from which the joint is read; with fewer one wrong channel cannot be told from a wall that twists."""
-_TOLERATED_SHARE = 0.02
-"""Rms misfit of an LVDT, over the rms opening of all, up to which it stays in the joint.
-
-What is off by less is found and named by the inspection; raising it lets a bad channel turn the rotation.
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +112,7 @@ def joint_rotation(run: GapRun) -> Rotation:
     in_range = np.array([~_clipped(run.aligned(i), run.sensors[i].range_si) for i in chosen]).reshape(shape)
     used = np.isfinite(openings).all(axis=1)
     if used.any():
-        tolerated = _TOLERATED_SHARE * float(np.sqrt(np.mean(openings[used] ** 2)))
+        tolerated = LVDT_MISFIT * float(np.sqrt(np.mean(openings[used] ** 2)))
         used[joint.find_outliers(openings, in_range & used[:, None], tolerated)] = False
     if used.sum() < FEWEST_LVDTS or min(joint.places_on_face(side, used) for side in (-1, 1)) < 2:
         raise CannotDiagnose(

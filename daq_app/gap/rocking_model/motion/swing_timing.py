@@ -9,15 +9,8 @@ from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import gridded
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
+from daq_app.gap.rocking_model.tolerances import ACCELEROMETER_SPREAD_M, DELAY_FORM, DELAY_WITHOUT_ONE, LATE_S
 
-LATE_S = 2.5e-3
-"""Delay, as the impacts show it, from which the record is put in step before it is looked at closer."""
-FORM_ERROR = 0.02
-"""Share of a delay that a response of another form than a pure delay is told wrong by."""
-SPREAD_M = 0.5
-"""Heights over which accelerometers must be spread to tell rotation from what all of them show."""
-_SOUND = 3.0
-"""Standard deviations by which the delay may change without one accelerometer."""
 _ROUNDS = 3
 
 
@@ -56,16 +49,16 @@ def _in_step(run: GapRun, grid: Grid, chosen: list[int], early: int) -> tuple[fl
         without = _at_the_foot(run, grid, rows[others], places[others])
         if without is not None:
             # The lowest one has most of the say. Where the others do not bear it out, nobody knows better.
-            chance = _SOUND**2 * abs(without[1] - whole[1])
+            chance = DELAY_WITHOUT_ONE**2 * abs(without[1] - whole[1])
             variance = max(variance, whole[1] + (without[0] - delay) ** 2 - chance)
     undone = early / run.rate_hz
-    return undone + delay, variance + (FORM_ERROR * undone) ** 2
+    return undone + delay, variance + (DELAY_FORM * undone) ** 2
 
 
 def _at_the_foot(run: GapRun, grid: Grid, rows: FloatArray, places: FloatArray) -> tuple[float, float] | None:
     """(delay, variance) of what accelerometers, (k, m) at (k, 3), show when extrapolated to the foot."""
     z = places[:, 2]
-    if z.size < 3 or np.ptp(z) < SPREAD_M:
+    if z.size < 3 or np.ptp(z) < ACCELEROMETER_SPREAD_M:
         return None
     weights = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
     arm = float(weights @ places[:, 0]) - np.sign(grid.theta) * run.survey.half_base_m

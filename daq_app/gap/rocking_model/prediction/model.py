@@ -21,14 +21,13 @@ from daq_app.gap.rocking_model.prediction.vector import (
     restitution_of,
 )
 from daq_app.gap.rocking_model.records import Survey
+from daq_app.gap.rocking_model.tolerances import PUSH_RAD_S
 from sim_hardware.dynamics import shooting
 
 SCATTER_R = "scatter of r"
 SCATTER_TIME = "scatter of times"
 SCATTER_RELEASE = "scatter of releases"
 SCATTER_SENSOR = "scatter of sensors"
-PUSH_RAD_S = 3e-4
-"""Speed that a clean release may leave; nobody lets go of five tonnes without touching them."""
 
 
 class RockingModel:

@@ -17,10 +17,9 @@ from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
+from daq_app.gap.rocking_model.tolerances import FLOOR_GAIN
 
 FREQUENCIES_HZ = np.arange(0.4, 6.0, 0.02)
-SMALLEST_GAIN = 6.0
-"""Gain in log likelihood per run, on average, below which there is no vibration to speak of."""
 _REST_MARGIN_S = 0.3
 _SHORTEST, _ENOUGH = 60, 120
 """Samples of the grid in a part that is used, and in both."""
@@ -58,7 +57,7 @@ def find_vibration(runs: Sequence[GapRun], grids: Sequence[Grid]) -> list[Vibrat
         return [None] * len(runs)
     gain = np.sum([_gain(d, FREQUENCIES_HZ) for d in usable], axis=0)
     best = float(FREQUENCIES_HZ[int(np.argmax(gain))])
-    found = float(gain.max()) > SMALLEST_GAIN * len(usable)
+    found = float(gain.max()) > FLOOR_GAIN * len(usable)
     fine = best + np.linspace(-0.03, 0.03, 31)
     sharp = np.sum([_gain(d, fine) for d in usable], axis=0)
     best = float(fine[int(np.argmax(sharp))])
