@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from daq_app.config.rig import Family
@@ -20,6 +22,8 @@ from daq_app.gap.rocking_model.records import GapRun
 from daq_app.rocking.geometry.noise import white_noise
 
 MAINS_HZ = 50.0
+_SLOW_S = 0.1
+"""Means over which a record that is turned back by the mains frequency keeps 0.6 Hz to a per cent."""
 REST_S = 0.45
 """Rest at the end of a record from which noise is read, s."""
 LOUD = 4.0
@@ -95,15 +99,31 @@ def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray |
     loud = np.abs(high) > LOUD * float(np.hypot(noise, amplitude))
     calm = np.convolve(loud, np.ones(2 * round(AROUND_S * rate_hz) + 1), "same") < 0.5
     calm = calm if calm.sum() > count else np.ones_like(calm)
-    frequencies = np.linspace(MAINS_HZ - 0.6, MAINS_HZ + 0.6, 25)
-    quiet = np.where(calm, high, 0.0)
-    power = [float(np.abs(np.sum(quiet * np.exp(-2j * np.pi * f * t)))) for f in frequencies]
-    best = float(frequencies[int(np.argmax(power))])
-    whole = _wave_columns(t, best)[:, :2]
+    whole = _wave_columns(t, _sharpened(np.where(calm, high, 0.0), rate_hz))[:, :2]
     wave = whole @ np.linalg.lstsq(whole[calm], high[calm], rcond=None)[0]
     # A little hum is on every long cable. It is taken out, but it is nothing to be explained.
     shown = amplitude if amplitude > USUAL_HUM * noise else 0.0
     return shown, float(sd), np.asarray(wave, dtype=float)
+
+
+def _sharpened(values: FloatArray, rate_hz: float) -> float:
+    """The frequency near that of the mains at which a record has most power, Hz.
+
+    Turned back by the mains frequency, what is left goes round slowly: means over 0.1 s keep it.
+    """
+    block = round(_SLOW_S * rate_hz)
+    count = values.size // block
+    turned = (values * _mains_phasor(values.size, rate_hz))[: count * block]
+    slow = turned.reshape(count, block).mean(axis=1)
+    offsets = np.linspace(-0.6, 0.6, 25)
+    angles = 2.0 * np.pi * np.outer(offsets, _SLOW_S * np.arange(count))
+    return MAINS_HZ + float(offsets[int(np.argmax(np.abs(np.exp(-1j * angles) @ slow)))])
+
+
+@lru_cache(maxsize=2)
+def _mains_phasor(count: int, rate_hz: float) -> NDArray[np.complex128]:
+    """exp(−2πi f t) of the mains frequency, shape (count,)."""
+    return np.exp(-2j * np.pi * MAINS_HZ * np.arange(count) / rate_hz)
 
 
 def _wave_columns(t: FloatArray, frequency: float) -> FloatArray:
