@@ -72,8 +72,12 @@ class Policy:
     unknown_nats: float = 20.0
     """Nats of discrepancy beyond the usual at which what remains matters as likely as not. In own worlds
     known causes leave 1 at most, unknown ones 29 or more; ordinary laboratories leave some."""
+    unknown_misfit: float = 25.0
+    """Discrepancy of one group, in nominal sd, that is as likely something unknown as the model's own. In
+    development laboratories known causes leave 11 at most, unknown ones of that kind 45 or more; raising it
+    hides what a strong cause outshines."""
     unknown_steepness: float = 4.0
-    """Slope of the logistic in the logarithm of either; raising it makes the gate a step."""
+    """Slope of the logistic in the logarithm of each; raising it makes the gate a step."""
     form_nats: float = 6.0
     """Gain of a free form on top of the best hypothesis, in log posterior, that is as likely another form
     as not ..."""

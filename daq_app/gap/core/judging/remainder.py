@@ -87,7 +87,8 @@ def remainder(
     nats = math.fsum(group.nats for group in groups)
     explained = max(best.log_evidence - null.log_evidence, 0.0)
     share = nats / max(nats + explained, 1e-9)
-    rest, form = _unknown(share, nats, policy), ""
+    largest = max((group.discrepancy for group in groups), default=0.0)
+    rest, form = _unknown(share, nats, largest, policy), ""
     gain = max((f.excess for f in forms), default=0.0)
     if gain > 0.0 and best.effects:
         bar = max(policy.form_nats, policy.form_share * explained)
@@ -97,11 +98,15 @@ def remainder(
     return Remainder(nominal, before, after, nats, share, groups, rest, form)
 
 
-def _unknown(share: float, nats: float, policy: Policy) -> float:
-    """Probability of something unknown behind a remainder of that share and size."""
+def _unknown(share: float, nats: float, largest: float, policy: Policy) -> float:
+    """Probability of something unknown behind a remainder of that share and size.
+
+    A share that matters, or one group whose discrepancy (`largest`) is more than any model is wrong by.
+    """
     counts = _logistic(math.log(max(share, 1e-6) / policy.unknown_share), policy)
     matters = _logistic(math.log(max(nats, 1e-6) / policy.unknown_nats), policy)
-    return counts * matters
+    gross = _logistic(math.log(max(largest, 1e-6) / policy.unknown_misfit), policy)
+    return 1.0 - (1.0 - counts * matters) * (1.0 - gross)
 
 
 def _logistic(distance: float, policy: Policy) -> float:

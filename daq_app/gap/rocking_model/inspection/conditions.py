@@ -123,7 +123,8 @@ def _sharpened(values: FloatArray, rate_hz: float) -> float:
 @lru_cache(maxsize=2)
 def _mains_phasor(count: int, rate_hz: float) -> NDArray[np.complex128]:
     """exp(−2πi f t) of the mains frequency, shape (count,)."""
-    return np.exp(-2j * np.pi * MAINS_HZ * np.arange(count) / rate_hz)
+    turning: NDArray[np.complex128] = np.exp(-2j * np.pi * MAINS_HZ * np.arange(count) / rate_hz)
+    return turning
 
 
 def _wave_columns(t: FloatArray, frequency: float) -> FloatArray:
