@@ -22,9 +22,9 @@ class Policy:
     """Acceleration of a burst of the floor, m/s², from which it is material: a hundredth of g turns a wall by
     less than its impacts scatter (assumed); raising it hides weak traffic."""
 
-    finding_crossed: float = 0.07
+    finding_crossed: float = 0.1
     """Share of the rotation across an instrument's axis from which it is material: a mount that is turned by
-    4°, twice what a rough laboratory has (assumed); raising it hides crosstalk."""
+    6°, three sd of what a rough laboratory has (assumed); raising it hides crosstalk."""
 
     # The model's own discrepancy
     usual_discrepancy: float = 1.0

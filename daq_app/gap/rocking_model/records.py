@@ -34,6 +34,8 @@ class Sensor:
     noise_si: float = 0.0
     time_constant_s: float = 0.0
     ac_coupled: bool = False
+    si_per_reading: float = math.nan
+    """Signed; NaN where it is not known."""
 
     @classmethod
     def from_channel(cls, channel: Channel) -> Sensor:
@@ -47,6 +49,7 @@ class Sensor:
             channel.noise_si,
             channel.time_constant_s,
             channel.measurement == "iepe",
+            channel.polarity / channel.sensitivity_reading_per_si,
         )
 
 

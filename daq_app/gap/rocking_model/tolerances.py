@@ -21,6 +21,12 @@ Multiplexed modules leave 0.1–1 % behind long cables (assumed). Raising it hid
 in the shape of another family's signal.
 """
 
+MOUNT_RAD = 0.02
+"""Sd of the angle, rad, by which an accelerometer is turned on its mount: a degree by eye (assumed).
+
+Raising it hides gain errors of accelerometers along z and low on the wall, whose own signals are small.
+"""
+
 SKEW_S = 1.5e-4
 """Sd of the time, s, by which channels of a family are sampled apart beyond what the task plan says.
 

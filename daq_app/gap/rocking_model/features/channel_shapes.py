@@ -16,7 +16,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.noise import coefficient_covariance
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Wire
-from daq_app.gap.rocking_model.tolerances import CALIBRATION, CROSSTALK
+from daq_app.gap.rocking_model.tolerances import CALIBRATION
 
 _SHAPES = ("gain", "lag", "curvature", "drift")
 SHAPES: dict[Family, tuple[str, ...]] = {
@@ -64,8 +64,9 @@ class Others:
     """Half-cycles, in each of which the same steps come back."""
     sided: bool = False
     """Whether its side is among the shapes."""
-    crosstalk: FloatArray | None = None
-    """What a full crosstalk from the channel that is scanned before this one would add to it, (m,), SI."""
+    imperfections: FloatArray | None = None
+    """What one sd of each ordinary imperfection adds to what this channel shows beyond the others, (k, m),
+    SI: crosstalk from the channels that are scanned before, mounts that are turned."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,9 +110,9 @@ def deviation(beside: Others) -> Deviation:
     covariance = coefficient_covariance(left, inverse[kept], beside.pick, columns.shape[1])
     if beside.rough > 0.0:
         covariance = covariance * max(beside.repeats, 1)
-    if beside.crosstalk is not None:
-        shared = CROSSTALK * (inverse[kept] @ beside.crosstalk[beside.pick])
-        covariance = covariance + np.outer(shared, shared)
+    if beside.imperfections is not None:
+        shared = inverse[kept] @ beside.imperfections[:, beside.pick].T
+        covariance = covariance + shared @ shared.T
     return Deviation(
         (inverse @ difference)[kept],
         covariance,
@@ -123,14 +124,15 @@ def deviation(beside: Others) -> Deviation:
 
 
 def _leaked(left: FloatArray, columns: FloatArray, beside: Others) -> FloatArray:
-    """What crosstalk of up to three sd explains of what the shapes leave, both (n,)."""
-    if beside.crosstalk is None:
+    """What ordinary imperfections explain of what the shapes leave, both (n,): their posterior mean."""
+    if beside.imperfections is None:
         return np.zeros_like(left)
     basis = np.linalg.qr(columns / (np.abs(columns).max(axis=0) + 1e-300))[0]
-    own = beside.crosstalk[beside.pick]
+    own = beside.imperfections[:, beside.pick].T
     own = own - basis @ (basis.T @ own)
-    share = float(own @ left) / max(float(own @ own), 1e-300)
-    return np.asarray(np.clip(share, -3.0 * CROSSTALK, 3.0 * CROSSTALK) * own)
+    noise = float(left @ left) / left.size
+    sizes = np.linalg.solve(own.T @ own + noise * np.eye(own.shape[1]), own.T @ left)
+    return np.asarray(own @ sizes)
 
 
 def usual_remains(of_channels: Sequence[float]) -> float:

@@ -81,7 +81,12 @@ class Scene:
 
 def with_crosstalk(block: Block | None, added: FloatArray) -> Block | None:
     """The block with what a full crosstalk of its channels, (m,) in the series' unit, does to it."""
-    return block and replace(block, systematic={CROSSTALK_SHARE: block.coefficients(added)})
+    return block and with_systematic(block, CROSSTALK_SHARE, added)
+
+
+def with_systematic(block: Block, parameter: str, added: FloatArray) -> Block:
+    """The block with what a parameter of one adds to its series, (m,) in the series' unit."""
+    return replace(block, systematic={**block.systematic, parameter: block.coefficients(added)})
 
 
 @dataclass(frozen=True, slots=True)

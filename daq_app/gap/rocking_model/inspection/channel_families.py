@@ -14,8 +14,10 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.channel_shapes import SHAPES, Others
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rigid_body import across_axes
 from daq_app.gap.rocking_model.motion.rotation import coarse, gridded, sooner, wall_rotation, zeroed
 from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.tolerances import CROSSTALK, MOUNT_RAD
 
 _SMOOTH_S = 0.04
 """Window over which accelerations are averaged: with 30 ms of ringing it stays within the mask of 50 ms."""
@@ -32,8 +34,10 @@ class ChannelFamily:
     step: float = 0.0
     repeats: int = 1
     sided: bool = False
-    crosstalk: FloatArray | None = None
-    """What a full crosstalk from the channel that is scanned before would add to each signal."""
+    leaked: FloatArray | None = None
+    """What one sd of crosstalk from the channel that is scanned before adds to each signal; common to all."""
+    turned: FloatArray | None = None
+    """What a mount that is turned by one sd adds to each signal; each has an angle of its own."""
 
 
 def channel_family(
@@ -58,7 +62,8 @@ def channel_family(
         step=step,
         repeats=grid.impact_s.size,
         sided="side" in SHAPES[family],
-        crosstalk=crosstalk(run, places),
+        leaked=CROSSTALK * crosstalk(run, places),
+        turned=MOUNT_RAD * across_axes(run, grid, places) if family == "accelerometer" else None,
     )
 
 
@@ -102,8 +107,14 @@ def beside(data: ChannelFamily, name: str, without: tuple[str, ...]) -> Others:
     own = float(np.sqrt(np.mean(expected**2))) + 1e-300
     spread = float(np.sqrt(1.0 + np.sum((weights * sizes / own) ** 2)))
     rough = data.step / np.sqrt(12.0) * float(np.sqrt(1.0 + np.sum(weights**2)))
-    shared = None if data.crosstalk is None else data.crosstalk[place]
-    return Others(data.signals[place], expected, data.pick, spread, rough, data.repeats, data.sided, shared)
+    # The imperfections of the others are in the prediction.
+    rows = [] if data.leaked is None else [data.leaked[place] - weights @ data.leaked[others]]
+    if data.turned is not None:
+        rows += [data.turned[place], *(weights[:, None] * data.turned[others])]
+    own_and_others = np.array(rows) if rows else None
+    return Others(
+        data.signals[place], expected, data.pick, spread, rough, data.repeats, data.sided, own_and_others
+    )
 
 
 def smoothed(run: GapRun, chosen: Sequence[int], late_s: float = 0.0) -> FloatArray:

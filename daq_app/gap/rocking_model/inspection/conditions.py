@@ -40,6 +40,8 @@ FROZEN_S = 0.008
 """Equal readings in a row for longer than this are no chance."""
 SPIKE_SIZE = 9.0
 """A sample this many noise sd off its neighbours is a spike."""
+SPIKY_PER_S = 0.3
+"""Lone samples a second, on the mean of all runs, that no ordinary channel has (assumed: 0.2 at most)."""
 RANGE_MARGIN = 0.03
 """Share of the range next to its end where a reading may stand still: the sensor is at its stop."""
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer")
@@ -229,11 +231,15 @@ def marks_of(runs: Sequence[GapRun], conditions: Sequence[dict[str, Condition]])
         if not ids:
             continue
         noise = float(np.median([[c.noise_si for c in row] for row in rows]))
+        # Every channel has a lone sample now and then: what counts is how many it has in all runs.
+        spiky = np.mean([[c.spikes_per_s for c in row] for row in rows], axis=0) > SPIKY_PER_S
         table = {
             "hum": [[(c.hum_si, c.hum_sd, c.hum_si > 0.0) for c in row] for row in rows],
             "quantisation": [[(c.step_si, c.step_sd, c.step_si > 0) for c in row] for row in rows],
             "dropout": [[(c.frozen_share, c.frozen_sd, c.frozen_share > 1e-3) for c in row] for row in rows],
-            "spikes": [[(c.spikes_per_s, 0.05, c.spikes_per_s > 0.3) for c in row] for row in rows],
+            "spikes": [
+                [(c.spikes_per_s, 0.05, often) for c, often in zip(row, spiky, strict=True)] for row in rows
+            ],
         }
         for name, cells in table.items():
             if family == "accelerometer" and name != "hum":

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.channel_shapes import (
     TOLERANCE,
@@ -22,8 +23,11 @@ from daq_app.gap.rocking_model.features.channel_shapes import (
 )
 from daq_app.gap.rocking_model.inspection.channel_families import smoothed
 from daq_app.gap.rocking_model.inspection.channel_faults import SUSPECT
+from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rigid_body import across_axes, lever_arm
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
+from daq_app.gap.rocking_model.tolerances import CROSSTALK, MOUNT_RAD
 
 _SOUND_SHARE = 0.4
 """Share of the worst one's size that the others may show: what the wall does differently (an edge that is not
@@ -74,10 +78,22 @@ def _vertical(run: GapRun, grid: Grid, late_s: float) -> dict[str, Others]:
     pick = (grid.time_s > 0.0) & (grid.time_s < grid.impact_s[-1]) & ~grid.near_impact
     shown = np.sqrt(np.mean(signals**2, axis=1)) / (np.sqrt(np.mean(turning**2)) + 1e-300)
     spread = float(np.sqrt(1.0 + np.sum((weights * shown) ** 2)))
+    leaked, turned = _imperfections(run, grid, along_x)
     found = {}
     for i, measured in zip(along_z, smoothed(run, along_z, late_s), strict=True):
-        x, _, z = run.sensors[i].position_m
-        lever = x - run.survey.half_base_m * np.sign(grid.theta)
-        upright = GRAVITY_M_S2 * (np.cos(grid.theta) - 1.0) - grid.omega**2 * z
-        found[run.sensors[i].id] = Others(measured, upright - turning * lever, pick, spread)
+        lever = lever_arm(run.sensors[i], grid, run.survey.half_base_m)
+        upright = GRAVITY_M_S2 * (np.cos(grid.theta) - 1.0) - grid.omega**2 * run.sensors[i].position_m[2]
+        # Those of the accelerometers along x are in the prediction, as far as they look like turning.
+        own_leaked, own_turned = _imperfections(run, grid, [i])
+        rows = np.vstack(
+            [own_leaked + lever * (weights @ leaked), own_turned, weights[:, None] * turned * lever]
+        )
+        found[run.sensors[i].id] = Others(
+            measured, upright - turning * lever, pick, spread, imperfections=rows
+        )
     return found
+
+
+def _imperfections(run: GapRun, grid: Grid, places: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    """What one sd of crosstalk and of a turned mount adds to each accelerometer, (k, m) each, m/s²."""
+    return CROSSTALK * crosstalk(run, places), MOUNT_RAD * across_axes(run, grid, places)

@@ -8,21 +8,29 @@ import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.rotation import coarse, gridded
-from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.records import GapRun, Sensor
 
 
 def crosstalk(run: GapRun, places: Sequence[int]) -> FloatArray:
     """What a full crosstalk would add to each of these channels, (k, m) on the grid, SI.
 
-    The channel scanned before in shares of its range, times the range of the channel itself: equal volts.
-    Zero for the first channel, where a range is not known, and where the channel before did not read.
+    Equal volts: by the sensitivities, or where these are not known by the ranges. Zero for the first channel,
+    where neither is known, and where the channel before did not read.
     """
     rows = []
     for place in places:
         row = np.zeros(coarse(run.channels[place], run.rate_hz).size)
-        own, before = run.sensors[place], run.sensors[place - 1]
-        spans = [s.range_si[1] - s.range_si[0] for s in (own, before)]
-        if place > 0 and np.all(np.isfinite(spans)) and np.all(np.isfinite(run.channels[place - 1])):
-            row = spans[0] / spans[1] * gridded(run, place - 1)
+        scale = _same_volts(run.sensors[place], run.sensors[place - 1])
+        if place > 0 and np.isfinite(scale) and np.all(np.isfinite(run.channels[place - 1])):
+            row = scale * gridded(run, place - 1)
         rows.append(row)
     return np.array(rows)
+
+
+def _same_volts(own: Sensor, before: Sensor) -> float:
+    """SI of a channel per SI of the one before it, for one voltage."""
+    scale = own.si_per_reading / before.si_per_reading
+    if np.isfinite(scale):
+        return scale
+    spans = [sensor.range_si[1] - sensor.range_si[0] for sensor in (own, before)]
+    return spans[0] / spans[1]

@@ -14,17 +14,26 @@ from daq_app.gap.rocking_model.features.differences import (
     base_rotation,
     own_gain,
 )
-from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size, with_crosstalk
+from daq_app.gap.rocking_model.features.family import (
+    Scene,
+    SensorFamily,
+    Size,
+    with_crosstalk,
+    with_systematic,
+)
 from daq_app.gap.rocking_model.features.response import delay
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rigid_body import across_axes
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.motion.swing_timing import swing_delay
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, Survey
-from daq_app.gap.rocking_model.tolerances import CALIBRATION
+from daq_app.gap.rocking_model.tolerances import CALIBRATION, MOUNT_RAD
 
+_TURNED = "turned_accelerometers"
+"""Parameter of the mean angle by which the accelerometers along x are turned on their mounts, rad."""
 SWAY_HZ = 8.0
 """Low-pass limit for the sway of a held wall, Hz (assumed); raising it adds noise to its acceleration."""
 
@@ -61,7 +70,8 @@ def _acceleration_block(scene: Scene) -> Block | None:
         expected = gravity + inertia - grid.omega**2 * arm
         columns["gain of gravity"], columns["gain of inertia"] = (gravity, "1"), (inertia, "1")
     # No lag here: between impacts the specific force hardly changes. The impacts themselves tell it.
-    return with_crosstalk(regress("accelerometer", measured - expected, columns, pick, ("zero",)), leaked)
+    found = with_crosstalk(regress("accelerometer", measured - expected, columns, pick, ("zero",)), leaked)
+    return found and with_systematic(found, _TURNED, across_axes(run, grid, chosen).mean(axis=0))
 
 
 def _sway(grid: Grid) -> FloatArray:
@@ -114,6 +124,14 @@ def _priors(survey: Survey) -> tuple[Parameter, ...]:
     return (
         Parameter(
             "cal_accelerometer", 0.0, CALIBRATION / 2, "1", meaning="calibration of the accelerometers"
+        ),
+        Parameter(
+            _TURNED,
+            0.0,
+            MOUNT_RAD / 2,
+            "rad",
+            meaning="mean angle by which the accelerometers are turned on their mounts",
+            linear=True,
         ),
         Parameter(
             "onset",
