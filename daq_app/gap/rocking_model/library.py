@@ -76,8 +76,9 @@ SMALLEST = {("residual_cable", "slack"): 4e-3}
 _FREQUENCIES_HZ = {"flexible_wall": (2.0, 42.0), "yaw": (1.5, 14.0), "twist": (1.5, 14.0)}
 """Frequencies at which ring-downs are looked for (`rings`): slender walls on soft beds ring below 5 Hz, squat
 ones above 30 Hz, which the simulator's usual ranges leave out."""
-_WIDER = {("yaw", "kick"): 0.4, ("twist", "kick"): 0.4, ("flexible_wall", "gain"): 0.02}
-"""Reach of strengths that have no usual size: how hard an impact kicks depends on its very form."""
+_WIDER = {("yaw", "kick"): 0.4, ("twist", "kick"): 0.4, ("flexible_wall", "gain"): 0.2}
+"""Reach of strengths that have no usual size: how hard an impact kicks depends on its very form, and how far
+the wall bends goes with one over its frequency."""
 _DRIFT_REACH = {"lvdt": 1e-3, "wire": 2e-3, "tiltmeter": 1e-3, "accelerometer": 1e-2}
 
 
@@ -121,6 +122,10 @@ def _parameter(spec: EffectSpec, parameter: SpecParameter) -> Parameter:
 _FORMS = {
     "compliance": (
         Parameter("fall", 0.5, 0.4, "1", 0.0, 1.0, meaning="share that falls with the overturning moment"),
+    ),
+    # An impact kicks a wall at its base, or stops a wall whose own inertia goes on bending it.
+    "flexible_wall": (
+        Parameter("forced", 0.5, 0.4, "1", 0.0, 1.0, meaning="share of its own inertia in its bending"),
     ),
     # Nobody knows how a hand or a winch lets go: from a force that dies away to one paid out evenly.
     "slow_release": (Parameter("even", 0.5, 0.4, "1", 0.0, 1.0, meaning="how evenly the force falls"),),

@@ -9,6 +9,7 @@ import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.oscillations.ring_response import bent_form, bent_wall
 from daq_app.gap.rocking_model.features.oscillations.rings import ring_columns
 from daq_app.gap.rocking_model.features.response import responded
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
@@ -57,7 +58,7 @@ def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
     return found
 
 
-_RINGS = (("bending", "flexible_wall.gain"), ("turning", "yaw.kick"), ("turning", "twist.kick"))
+_TURNS = ("yaw.kick", "twist.kick")
 
 
 def _ringing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray | None:
@@ -67,27 +68,32 @@ def _ringing(run: RockingRun, block: Block, values: Mapping[str, float]) -> Floa
     """
     if block.wire is None:
         return None
+    sizes = dict(bent_wall(run, values))
+    if any(b.kind == "turning" for b in run.blocks):
+        sizes |= {key: values.get(key, 0.0) for key in _TURNS}
     parts = []
-    for family, key in _RINGS:
-        ring = next((b for b in run.blocks if b.family == family), None)
-        size = values.get(key, 0.0)
-        if ring is None or size == 0.0:
+    for form, size in sizes.items():
+        if size == 0.0:
             continue
-        make = partial(_ringing_of_one, run, block.wire, ring, key)
-        parts.append(size * run.cache.constant((block.family, key), make))
+        make = partial(_ringing_of_one, run, block.wire, form)
+        parts.append(size * run.cache.constant((block.family, form), make))
     return np.asarray(np.sum(parts, axis=0)) if parts else None
 
 
-def _ringing_of_one(run: RockingRun, wire: Wire, ring: Block, key: str) -> FloatArray:
-    """The same for a strength of one, at the frequency and damping that the runs show."""
-    frequency, zeta, rate = ring.ring
-    wave = np.sinc(frequency / rate) * ring_columns(run.grid, frequency, zeta)[:, 0]
+def _ringing_of_one(run: RockingRun, wire: Wire, form: str) -> FloatArray:
+    """The same of one form, for a strength of one, at the frequency and damping that the runs show."""
+    if form in _TURNS:
+        frequency, zeta, rate = next(b.ring for b in run.blocks if b.kind == "turning")
+        natural = 2.0 * np.pi * frequency
+        wave = np.sinc(frequency / rate) * ring_columns(run.grid, frequency, zeta)[:, 0] / natural
+    else:
+        wave = bent_form(run, form)
 
     def moved(sensor: Sensor) -> float:
         _, y, z = sensor.position_m
-        if key.startswith("flexible_wall"):
+        if form not in _TURNS:
             return float((z / run.survey.height_m) ** 2)
-        return (y * z if key.startswith("twist") else -y) / (2.0 * np.pi * frequency)
+        return float(y * z if form.startswith("twist") else -y)
 
     others = [w.sensor for w in run.wires if w.sensor.id != wire.sensor.id]
     heights = np.array([sensor.position_m[2] for sensor in others])

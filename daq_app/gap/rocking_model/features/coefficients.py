@@ -125,6 +125,6 @@ def sensor_priors(survey: Survey) -> tuple[Parameter, ...]:
         for name in _RINGS
     )
     shared = Parameter(
-        CROSSTALK_SHARE, 0.0, CROSSTALK, "1", meaning="crosstalk from the channel scanned before", linear=True
+        CROSSTALK_SHARE, 0.0, CROSSTALK, "1", meaning="crosstalk from the channel scanned before"
     )
     return (*own, *biases, *unequal, shared)

@@ -9,6 +9,7 @@ import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE
 from daq_app.gap.rocking_model.features.response import bessel, first_order, resonator, slow_response
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape
@@ -91,9 +92,19 @@ def difference_of(run: RockingRun, first: str, second: str, values: Mapping[str,
     return a if b is None else a - b
 
 
+def face_gain(values: Mapping[str, float], face: str) -> float:
+    """Relative error of what one face of the joint reads.
+
+    An LVDT is scanned after another one of its own face, but for the first: what that leaves behind is gain.
+    """
+    return values[face] + values[CROSSTALK_SHARE]
+
+
 def own_gain(run: RockingRun, values: Mapping[str, float]) -> float:
     """Calibration of the reference family on average of both sides."""
-    return 0.5 * (values["face_a"] + values["face_b"]) if run.reference == "lvdt" else values["cal_wire"]
+    if run.reference != "lvdt":
+        return values["cal_wire"]
+    return 0.5 * (face_gain(values, "face_a") + face_gain(values, "face_b"))
 
 
 def unit_coefficients(

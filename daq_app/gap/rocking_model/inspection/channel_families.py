@@ -17,7 +17,7 @@ from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rigid_body import across_axes
 from daq_app.gap.rocking_model.motion.rotation import coarse, gridded, sooner, wall_rotation, zeroed
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances import CROSSTALK, MOUNT_RAD
+from daq_app.gap.rocking_model.tolerances import CALIBRATION, CROSSTALK, MOUNT_RAD
 
 _SMOOTH_S = 0.04
 """Window over which accelerations are averaged: with 30 ms of ringing it stays within the mask of 50 ms."""
@@ -100,7 +100,8 @@ def beside(data: ChannelFamily, name: str, without: tuple[str, ...]) -> Others:
     """A channel beside what the others of its family, less some, make of it."""
     place = data.ids.index(name)
     others = [i for i, other in enumerate(data.ids) if other != name and other not in without]
-    weights = data.design[place] @ np.linalg.pinv(data.design[others])
+    errors = _usual_errors(data)[others]
+    weights = data.design[place] @ np.linalg.pinv(data.design[others] / errors[:, None]) / errors
     expected = weights @ data.signals[others]
     # A channel far from the others is predicted by a difference of them: their errors grow.
     sizes = np.sqrt(np.mean(data.signals[others] ** 2, axis=1))
@@ -115,6 +116,14 @@ def beside(data: ChannelFamily, name: str, without: tuple[str, ...]) -> Others:
     return Others(
         data.signals[place], expected, data.pick, spread, rough, data.repeats, data.sided, own_and_others
     )
+
+
+def _usual_errors(data: ChannelFamily) -> FloatArray:
+    """What each channel is usually off by, (k,), up to a factor: one that is scanned after another family's
+    large voltage says little of the others."""
+    usual = CALIBRATION * float(np.sqrt(np.mean(data.signals**2))) + 1e-300
+    leaked = 0.0 if data.leaked is None else np.mean(data.leaked**2, axis=1)
+    return np.asarray(np.sqrt(usual**2 + leaked) * np.ones(len(data.ids)))
 
 
 def smoothed(run: GapRun, chosen: Sequence[int], late_s: float = 0.0) -> FloatArray:

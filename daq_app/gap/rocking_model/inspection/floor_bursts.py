@@ -17,7 +17,7 @@ from scipy.optimize import nnls
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.features.oscillations.ring_signals import accelerations
-from daq_app.gap.rocking_model.features.oscillations.rings import Ring, cleaner, ring_columns
+from daq_app.gap.rocking_model.features.oscillations.rings import Ring, cleaner, forced_column, ring_columns
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
 
@@ -45,7 +45,7 @@ class _HalfCycle:
     jump: float
     """Of the angular velocity at the impact before."""
     columns: FloatArray
-    """What the accelerometers show by the floor's shape, and the ring-down's sine and cosine, (n, 1 or 3)."""
+    """What the accelerometers show by the floor's shape, and the ring-down's shapes, (n, 1 or 4)."""
     free: int
     """Samples less the coefficients of the curve."""
 
@@ -111,7 +111,8 @@ def _half_cycles(run: GapRun, grid: Grid, survey: Survey, ring: Ring | None) -> 
     seen = accelerations(run, grid, chosen)
     columns = (np.linalg.pinv(np.column_stack(shapes))[0] @ seen.beyond)[:, None]
     if ring is not None:
-        columns = np.column_stack([columns, ring_columns(grid, ring.frequency_hz, ring.zeta)])
+        forced = forced_column(grid, ring.frequency_hz, ring.zeta, accelerations=True)
+        columns = np.column_stack([columns, ring_columns(grid, ring.frequency_hz, ring.zeta), forced])
     found = []
     for part, basis in cleaner(grid, seen.pick, slow=False):
         if part.size < _SHORTEST:

@@ -15,6 +15,8 @@ MOST = 14
 """Impacts used: the first ones are the loudest."""
 WINDOW_S = 0.11
 REACH_S = 0.065
+_SLOW_SHAPES = 5
+"""Powers of time that are free around each impact: as much as a wall does that rings below 7 Hz."""
 _SHARP_S = 8e-3
 """Half width of the misfit's dip up to which it is that of impacts, whatever their form."""
 _NEAR_S = 3e-3
@@ -76,7 +78,7 @@ def _windows(grid: Grid) -> list[tuple[slice, FloatArray]]:
         if part.start < 0 or part.stop > grid.time_s.size:
             continue
         x = np.linspace(-1.0, 1.0, part.stop - part.start)
-        found.append((part, np.linalg.qr(np.vander(x, 2))[0]))
+        found.append((part, np.linalg.qr(np.vander(x, _SLOW_SHAPES))[0]))
         if len(found) == MOST:
             break
     return found

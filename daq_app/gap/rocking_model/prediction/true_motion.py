@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.differences import face_gain
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.rotation import anchors_off
 
@@ -19,7 +20,7 @@ def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
     gain = np.full(peaks.shape, 1.0 + values.get(f"gain@{name}.error", 0.0))
     if name == "lvdt":
         # The face that opens is the one that measures: x < 0 for a positive rotation.
-        gain = gain * (1.0 + np.where(side > 0, values["face_a"], values["face_b"]))
+        gain = gain * (1.0 + np.where(side > 0, face_gain(values, "face_a"), face_gain(values, "face_b")))
     else:
         gain = gain * (1.0 + values["cal_wire"])
     rest = run.swings.rest_s - run.swings.release_s

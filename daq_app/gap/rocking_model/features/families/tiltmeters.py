@@ -15,6 +15,7 @@ from daq_app.gap.rocking_model.features.block import Block, regress
 from daq_app.gap.rocking_model.features.differences import (
     base_rotation,
     difference_of,
+    face_gain,
     unit_coefficients,
 )
 from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size, with_crosstalk
@@ -110,10 +111,12 @@ def _predict(run: RockingRun, block: Block, values: Mapping[str, float]) -> Floa
 
     found = values["cal_tiltmeter"] * unit_coefficients(run, block, "theta", lambda: seen(theta))
     # Each face of the joint has its own calibration: the slow response makes their difference a drift.
-    first, second = ("face_a", "face_b") if run.reference == "lvdt" else ("cal_wire", "cal_wire")
+    first, second = values["cal_wire"], values["cal_wire"]
+    if run.reference == "lvdt":
+        first, second = face_gain(values, "face_a"), face_gain(values, "face_b")
     positive = unit_coefficients(run, block, "positive", lambda: seen(np.maximum(theta, 0.0)))
     negative = unit_coefficients(run, block, "negative", lambda: seen(np.minimum(theta, 0.0)))
-    found = found - values[first] * positive - values[second] * negative
+    found = found - first * positive - second * negative
     if "compliance.phi" in values:
         found = found + base_rotation(run, block, values)
     series = difference_of(run, "tiltmeter", run.reference, values)

@@ -14,9 +14,11 @@ from daq_app.gap.rocking_model.features.block import Block, regress
 from daq_app.gap.rocking_model.features.differences import (
     base_rotation,
     difference_of,
+    face_gain,
     unit_coefficients,
 )
 from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size, with_crosstalk
+from daq_app.gap.rocking_model.features.oscillations.ring_response import bent_form, bent_wall
 from daq_app.gap.rocking_model.features.pivots import travel
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import moment_shape, slip_shape
@@ -99,10 +101,10 @@ def _translation_block(scene: Scene) -> Block | None:
 def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     theta = run.grid.theta
     found = values["cal_wire"] * unit_coefficients(run, block, "theta", lambda: theta)
-    found = found - values["face_a"] * unit_coefficients(
+    found = found - face_gain(values, "face_a") * unit_coefficients(
         run, block, "positive", lambda: np.maximum(theta, 0.0)
     )
-    found = found - values["face_b"] * unit_coefficients(
+    found = found - face_gain(values, "face_b") * unit_coefficients(
         run, block, "negative", lambda: np.minimum(theta, 0.0)
     )
     found = found + values["wire_even"] * unit_coefficients(run, block, "even", lambda: theta**2)
@@ -112,9 +114,24 @@ def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) ->
         found = found + values["sliding.c"] / run.wire_height_m * unit_coefficients(
             run, block, "slip", partial(slip_shape, run.grid)
         )
-    found = found + travel(run, block, values, of_base=False)
+    found = found + travel(run, block, values, of_base=False) + _bent(run, block, values, of_base=False)
     series = difference_of(run, "wire", "lvdt", values)
     return found if series is None else found + block.coefficients(series)
+
+
+def _bent(run: RockingRun, block: Block, values: Mapping[str, float], of_base: bool) -> FloatArray | float:
+    """What a wall that bends adds to the wires' mean rotation (weights z²) or to the base."""
+    found: FloatArray | float = 0.0
+    for form, size in bent_wall(run, values).items():
+        z = np.array([wire.sensor.position_m[2] for wire in run.wires])
+        shape = (z / run.survey.height_m) ** 2
+        share = (
+            float(np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0] @ shape)
+            if of_base
+            else float(z @ shape / (z @ z))
+        )
+        found = found + size * share * unit_coefficients(run, block, form, partial(bent_form, run, form))
+    return found
 
 
 def _predict_base(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
@@ -123,7 +140,7 @@ def _predict_base(run: RockingRun, block: Block, values: Mapping[str, float]) ->
     total: FloatArray = found + values.get("sliding.c", 0.0) * unit_coefficients(
         run, block, "slip", partial(slip_shape, run.grid)
     )
-    total = total + travel(run, block, values, of_base=True)
+    total = total + travel(run, block, values, of_base=True) + _bent(run, block, values, of_base=True)
     if "wire_cosine@wire.kappa" in values:
         bend = values["wire_cosine@wire.kappa"] * run.base_bend_m2
         total = total + bend * unit_coefficients(run, block, "square", lambda: run.grid.theta**2)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block, Shares
 from daq_app.gap.rocking_model.features.differences import difference_of
-from daq_app.gap.rocking_model.features.oscillations.rings import ring_columns
+from daq_app.gap.rocking_model.features.oscillations.rings import forced_column, ring_columns
 from daq_app.gap.rocking_model.features.response import delay, transfer
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 
@@ -35,8 +36,18 @@ def _ring_coefficients(
     return found
 
 
+def _forced(values: Mapping[str, float]) -> float:
+    """Share of the wall's own inertia in what makes it bend, against kicks of the impacts alone."""
+    return values.get("flexible_wall.forced", 0.0)
+
+
 def _moved(ring: Block, shares: Shares, values: Mapping[str, float]) -> float:
-    """Size of the sine in a signal of these shares, by the wall's bending or turning."""
+    """Size of the sine in a signal of these shares: inertia bends a wall against the jump of its speed."""
+    return _size(ring, shares, values) * (1.0 - 2.0 * _forced(values) if ring.kind == "bending" else 1.0)
+
+
+def _size(ring: Block, shares: Shares, values: Mapping[str, float]) -> float:
+    """Size of the ring-down in a signal of these shares, by the wall's bending or turning."""
     frequency, _, rate = ring.ring
     mean = float(np.sinc(frequency / rate))
     if ring.kind == "bending":
@@ -82,13 +93,54 @@ def _of_the_other(run: RockingRun, block: Block, values: Mapping[str, float]) ->
     return found
 
 
+def bent_wall(run: RockingRun, values: Mapping[str, float]) -> Mapping[str, float]:
+    """How much of each of its forms (`bent_form`) the bending of the wall's top has; empty for none."""
+    gain = values.get("flexible_wall.gain", 0.0)
+    if gain == 0.0 or not any(block.kind == "bending" for block in run.blocks):
+        return {}
+    forced = _forced(values)
+    return {"kicked": gain * (1.0 - 2.0 * forced), "forced": -gain * forced}
+
+
+def bent_form(run: RockingRun, name: str) -> FloatArray:
+    """One form of the bending, m at the top for a strength of one, on the grid, at the ring that is shown."""
+    frequency, zeta, rate = next(block.ring for block in run.blocks if block.kind == "bending")
+    if name == "kicked":
+        return np.asarray(np.sinc(frequency / rate) * ring_columns(run.grid, frequency, zeta)[:, 0])
+    return forced_column(run.grid, frequency, zeta, accelerations=False)
+
+
 def bending(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     """Ring-down of a cantilever mode, and what effects on the wires look like in the same columns."""
     # Bending is told against the rotation of the reference; wires as the reference show none of it.
     wires = None if run.reference == "wire" else difference_of(run, "wire", "lvdt", values)
     frequency, zeta, _ = block.ring
     own = (values.get("flexible_wall.frequency", frequency), values.get("flexible_wall.zeta", zeta))
-    return _put(run, block, values, *own) + _in_wires(block, wires)
+    return _put(run, block, values, *own) + _forced_ring(run, block, values) + _in_wires(block, wires)
+
+
+def _forced_ring(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """What the part of a bending that the wall's own inertia forces looks like as sine and cosine."""
+    found = np.zeros(len(block.names))
+    if not (forced := _forced(values)):
+        return found
+    for k, (name, shares) in enumerate(zip(block.names, block.shares, strict=False)):
+        family = name.partition(" in ")[2].removesuffix("s")
+        columns = run.cache.constant(
+            (block.family, "forced", family), partial(_forced_columns, run, block, family)
+        )
+        found[k] = -forced * _size(block, shares, values) * float(columns[k])
+    return found
+
+
+def _forced_columns(run: RockingRun, block: Block, family: str) -> FloatArray:
+    """What all coefficients make of the forced ring of unit size as a family shows it, (k,)."""
+    frequency, zeta, _ = block.ring
+    accelerations = family == "accelerometer"
+    columns: FloatArray = block.projection @ forced_column(
+        run.grid, frequency, zeta, accelerations=accelerations
+    )
+    return columns
 
 
 def turning(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal
+from daq_app.gap.rocking_model.features.response import resonator
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 
@@ -62,6 +63,20 @@ def ring_table(grid: Grid, frequencies_hz: FloatArray, zetas: FloatArray) -> Flo
     table = np.empty((grid.time_s.size, 2 * rates.size))
     table[:, 0::2], table[:, 1::2] = waves.imag.T, waves.real.T
     return table
+
+
+def forced_column(grid: Grid, frequency_hz: float, zeta: float, *, accelerations: bool) -> FloatArray:
+    """Ring of a wall whose own inertia bends it, beyond what the jumps of θ̇ do, (m,): ω q, or ω q̈.
+
+    q̈ + 2 ζ ω q̇ + ω² q = θ̈ with θ̈ as it is between impacts; its sign changes at each, from which such a wall
+    rings as well. The displacement keeps its slow part.
+    """
+    natural = 2.0 * np.pi * frequency_hz
+    place = resonator(grid.alpha, natural, zeta) / natural
+    if not accelerations:
+        return place
+    speed = np.gradient(place, 1.0 / GRID_HZ)
+    return np.asarray(natural * (grid.alpha - 2.0 * zeta * speed - natural * place))
 
 
 def cleaner(grid: Grid, pick: NDArray[np.bool_], slow: bool) -> list[tuple[NDArray[np.intp], FloatArray]]:
