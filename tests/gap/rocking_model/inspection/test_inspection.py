@@ -17,6 +17,7 @@ from daq_app.gap.rocking_model.inspection.saturation import saturated
 from daq_app.gap.rocking_model.inspection.wiring import mend
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.run_cache import RunCache
 from daq_app.gap.rocking_model.study import model_and_library, prepare
 from sim_hardware.dynamics import parameters as par
 from sim_hardware.sensors.scene import pivots
@@ -329,7 +330,7 @@ def test_a_ring_down_is_known_as_well_as_its_damping() -> None:
 
 
 def test_worn_edges_are_where_the_simulator_has_them(healthy: list[RockingRun]) -> None:
-    run = replace(healthy[0], impacts_before=120.0, cache={})
+    run = replace(healthy[0], impacts_before=120.0, cache=RunCache())
     model = RockingModel(run.survey)
     values = {p.name: p.mean for p in model.nuisance} | {"zero": 0.0, "omega0": 0.0}
     vector = np.zeros(par.N_PARAMETERS)

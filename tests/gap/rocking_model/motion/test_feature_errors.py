@@ -13,6 +13,7 @@ from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import extract
 from daq_app.gap.rocking_model.motion.release_speed import release_speed
 from daq_app.gap.rocking_model.prediction.model import RockingModel
+from daq_app.gap.rocking_model.run_cache import RunCache
 from tests.support.simulated_wall import simulate
 
 P, RATE_HZ, NOISE_RAD = 2.85, 4000.0, 2.5e-5
@@ -33,8 +34,8 @@ def test_the_error_of_a_measured_peak_is_in_every_time_that_hangs_on_it(
     values |= {p.name: p.mean for p in model.local_nuisance(run)}
     off = replace(swings, peak_rad=swings.peak_rad + np.sign(swings.peak_rad) * swings.peak_sd)
     moved = np.abs(
-        model.predict(replace(run, swings=off, cache={}), values).features
-        - model.predict(replace(run, cache={}), values).features
+        model.predict(replace(run, swings=off, cache=RunCache()), values).features
+        - model.predict(replace(run, cache=RunCache()), values).features
     )
     count = swings.levels.shape[1]
     checked = 0
