@@ -27,8 +27,10 @@ from daq_app.monitor.data.background import Background
 from daq_app.monitor.widgets.banner import keyed_button
 from daq_app.monitor.widgets.campaign_table import CampaignModel, StateDelegate, release_text
 from daq_app.monitor.widgets.labels import Tile, role_label
-from daq_app.monitor.widgets.theme import Colours, font
+from daq_app.monitor.widgets.theme import Colours
 from daq_app.runfile import RunFileError, open_run
+
+_WIDTHS_PX = (190, 70, 140)
 
 
 class CampaignPage(QWidget):
@@ -57,8 +59,6 @@ class CampaignPage(QWidget):
         self.table.setSelectionMode(QTableView.SelectionMode.SingleSelection)
         header = self.table.horizontalHeader()
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        for column, width in enumerate((190, 70, 140)):
-            self.table.setColumnWidth(column, width)
         header.setSectionResizeMode(3, QHeaderView.ResizeMode.Stretch)
         self._specimen = QComboBox()
         self._specimen.currentTextChanged.connect(lambda _text: self._show())
@@ -70,7 +70,7 @@ class CampaignPage(QWidget):
         }
         self._tiles = {state: Tile(caption, 19) for state, caption in captions.items()}
         self._next_name = QLabel("–")
-        self._next_name.setFont(font(24, bold=True))
+        self._next_name.setProperty("scale", "state")
         self._next_reason = role_label("", "muted")
         self._next_reason.setWordWrap(True)
         self.take_button = QPushButton("Take this test  F6")
@@ -132,7 +132,7 @@ class CampaignPage(QWidget):
         holder = QWidget()
         holder.setLayout(right)
         right.setContentsMargins(0, 0, 0, 0)
-        holder.setFixedWidth(400)
+        self._holder = holder
         layout = QHBoxLayout(self)
         layout.setContentsMargins(10, 8, 10, 8)
         layout.setSpacing(12)
@@ -142,6 +142,10 @@ class CampaignPage(QWidget):
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""
         self._delegate.colours = colours
+        self._holder.setFixedWidth(colours.side_px(400))
+        self.table.verticalHeader().setDefaultSectionSize(colours.px(24))
+        for column, width in enumerate(_WIDTHS_PX):
+            self.table.setColumnWidth(column, colours.px(width))
         self.table.viewport().update()
 
     def set_campaign(self, campaign: Campaign, folder: Path, specimen: str = "") -> None:

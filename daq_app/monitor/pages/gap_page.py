@@ -103,7 +103,7 @@ class GapPage(QWidget):
         holder = QWidget()
         holder.setLayout(left)
         left.setContentsMargins(0, 0, 0, 0)
-        holder.setFixedWidth(300)
+        self._holder = holder
         pictures = QGridLayout()
         pictures.setSpacing(6)
         for place, (title, widget) in enumerate(
@@ -133,13 +133,16 @@ class GapPage(QWidget):
         frame.setObjectName("card")
         layout = QVBoxLayout(frame)
         layout.setContentsMargins(12, 8, 12, 10)
-        layout.addWidget(role_label(title, "heading"))
+        heading = role_label(title, "heading")
+        heading.setWordWrap(True)
+        layout.addWidget(heading)
         layout.addWidget(content, 1)
         return frame
 
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""
         self._colours = colours
+        self._holder.setFixedWidth(colours.side_px(310))
         for view in (self.map, self.evidence, self.closure):
             view.restyle(colours)
         self._show_verdict()

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from daq_app.acquisition.checks.check_model import SensorCheck
 from daq_app.config.rig import Rig
@@ -20,7 +20,7 @@ from daq_app.monitor.widgets.check_table import SHAPES, TONES, CheckTable
 from daq_app.monitor.widgets.labels import role_label, set_role
 from daq_app.monitor.widgets.shapes import Sign
 from daq_app.monitor.widgets.test_card import TestCard
-from daq_app.monitor.widgets.theme import DARK, Colours, font
+from daq_app.monitor.widgets.theme import DARK, Colours
 from daq_app.monitor.widgets.wall_card import WallCard
 
 
@@ -55,7 +55,7 @@ class PreparePage(QWidget):
         self.wall.told.connect(self.told)
         self._sign = Sign(30)
         self._verdict = QLabel("Not checked")
-        self._verdict.setFont(font(19, bold=True))
+        self._verdict.setProperty("scale", "verdict")
         self._summary = role_label("Leave the wall alone and check the sensors.", "muted")
         self._summary.setWordWrap(True)
         self.check_button = QPushButton("Check sensors  F2")
@@ -86,8 +86,12 @@ class PreparePage(QWidget):
         left.addWidget(self.wall)
         holder = QWidget()
         holder.setLayout(left)
-        left.setContentsMargins(0, 0, 0, 0)
-        holder.setFixedWidth(400)
+        left.setContentsMargins(0, 0, 12, 0)
+        self._holder = QScrollArea()
+        self._holder.setWidget(holder)
+        self._holder.setWidgetResizable(True)
+        self._holder.setFrameShape(QFrame.Shape.NoFrame)
+        self._holder.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         banner = QHBoxLayout()
         banner.setSpacing(12)
         words = QVBoxLayout()
@@ -96,8 +100,10 @@ class PreparePage(QWidget):
         words.addWidget(self._summary)
         banner.addWidget(self._sign)
         banner.addLayout(words, 1)
-        banner.addWidget(self.check_button)
-        banner.addWidget(self.pull_button)
+        buttons = QVBoxLayout()
+        buttons.addWidget(self.check_button)
+        buttons.addWidget(self.pull_button)
+        banner.addLayout(buttons)
         right = QVBoxLayout()
         right.setSpacing(8)
         right.addWidget(role_label("3  Check the sensors", "heading"))
@@ -106,8 +112,8 @@ class PreparePage(QWidget):
         right.addWidget(self._detail)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(10, 8, 10, 8)
-        layout.setSpacing(12)
-        layout.addWidget(holder)
+        layout.setSpacing(4)
+        layout.addWidget(self._holder)
         layout.addLayout(right, 1)
 
     def _zero_row(self) -> QHBoxLayout:
@@ -131,6 +137,7 @@ class PreparePage(QWidget):
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""
         self._colours = colours
+        self._holder.setFixedWidth(colours.side_px(412))
         self.gauge.restyle(colours)
         self.table.restyle(colours)
         self._show_verdict()

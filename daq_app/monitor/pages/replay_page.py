@@ -12,6 +12,7 @@ from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
+    QHeaderView,
     QLabel,
     QListWidget,
     QListWidgetItem,
@@ -54,7 +55,7 @@ class ReplayPage(QWidget):
         self.tree = QTreeWidget()
         self.tree.setHeaderLabels(["Signal", "At the cursor"])
         self.tree.header().setStretchLastSection(True)
-        self.tree.setColumnWidth(0, 165)
+        self.tree.header().setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
         self.tree.setIndentation(14)
         self.tree.itemChanged.connect(self._on_item)
         self.events = QListWidget()

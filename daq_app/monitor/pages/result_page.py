@@ -24,7 +24,7 @@ from daq_app.monitor.data.background import Background
 from daq_app.monitor.plots.result_plots import ResultPlots
 from daq_app.monitor.widgets.banner import Banner, keyed_button, open_outside
 from daq_app.monitor.widgets.labels import DASH, Tile, number, set_role
-from daq_app.monitor.widgets.theme import DARK, Colours, font
+from daq_app.monitor.widgets.theme import DARK, Colours
 
 _LIMIT_S = 300.0
 _HEADER_PX, _ROW_PX, _VISIBLE_ROWS = 38, 23, 5
@@ -90,7 +90,6 @@ class ResultPage(QWidget):
             Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
         )
         self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
-        self.table.setFixedHeight(_HEADER_PX)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         self.buttons = {
             "page": keyed_button(self, "Page", "Ctrl+O", self._open_page),
@@ -121,6 +120,8 @@ class ResultPage(QWidget):
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""
         self._colours = colours
+        self.table.verticalHeader().setDefaultSectionSize(colours.px(_ROW_PX))
+        self._fit_table()
         self.plots.restyle(colours)
         self._show_verdict()
 
@@ -181,10 +182,15 @@ class ResultPage(QWidget):
         self._show_buttons()
         self.shown.emit()
 
+    def _fit_table(self) -> None:
+        """As high as its rows need, up to some."""
+        rows = min(self.table.rowCount(), _VISIBLE_ROWS)
+        self.table.setFixedHeight(self._colours.px(_HEADER_PX + _ROW_PX * rows))
+
     def _fill_table(self, result: Result) -> None:
         rows = repetition_rows(result.test, result.earlier)
         self.table.setRowCount(len(rows))
-        self.table.setFixedHeight(_HEADER_PX + _ROW_PX * min(len(rows), _VISIBLE_ROWS))
+        self._fit_table()
         for place, row in enumerate(rows):
             values = [DASH if row.r[name] is None else f"{row.r[name]:.4f}" for name in METHODS]
             name = f"{row.test}   (this test)" if row.this else row.test
@@ -193,7 +199,7 @@ class ResultPage(QWidget):
                 item = QTableWidgetItem(text)
                 item.setFlags(item.flags() & ~Qt.ItemFlag.ItemIsEditable)
                 if row.this:
-                    item.setFont(font(10, bold=True))
+                    item.setFont(self._colours.font(10, bold=True))
                 self.table.setItem(place, column, item)
         self.table.scrollToBottom()
 

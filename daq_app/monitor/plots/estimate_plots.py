@@ -106,7 +106,7 @@ class PhasePlane(Plot):
     def __init__(self, session: Session) -> None:
         super().__init__("Phase plane", "dθ/dt  (rad/s)", "θ  (mrad)")
         self._session = session
-        self.plot_item.getAxis("left").setWidth(56)
+        self.set_axis_width("left", 56)
         self._curve = self.curve()
         self._tip = pg.ScatterPlotItem(size=9, symbol="o")
         self.addItem(self._tip)
@@ -147,7 +147,7 @@ class PeriodPlot(Plot):
     def __init__(self, session: Session) -> None:
         super().__init__("Period against amplitude", "T  (s)", "θ/α")
         self._session = session
-        self.plot_item.getAxis("left").setWidth(48)
+        self.set_axis_width("left", 48)
         self._theory = self.curve()
         self._points = pg.ScatterPlotItem(symbol="o", size=7)
         self.addItem(self._points)

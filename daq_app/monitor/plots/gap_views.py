@@ -12,7 +12,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
 from daq_app.monitor.widgets.labels import DASH, number
-from daq_app.monitor.widgets.theme import DARK, Colours, font
+from daq_app.monitor.widgets.theme import DARK, Colours
 
 _PHASES = ("held", "release", "swing", "peak", "impact", "tail", "run", "rest")
 _FULL_GAP = 20.0
@@ -107,7 +107,7 @@ class GapMapView(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
-        painter.setFont(font(9))
+        painter.setFont(self._colours.font(9))
         channels = list(dict.fromkeys(channel for channel, _ in self._cells))
         phases = sorted(
             {phase for _, phase in self._cells},
@@ -175,7 +175,7 @@ class BarRows(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
-        painter.setFont(font(9))
+        painter.setFont(self._colours.font(9))
         if self.bars:
             metrics = painter.fontMetrics()
             left = min(

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from daq_app.acquisition.messages.published import EstimateMessage, MotionMessage
 from daq_app.monitor.data.session import RECORDING, Session
-from daq_app.monitor.plots.plot_base import Array, Plot, envelope, line_pen
+from daq_app.monitor.plots.plot_base import Array, Axis, Plot, envelope, line_pen
 from daq_app.monitor.plots.theory_overlay import current_restitution, housner_motion
 from daq_app.monitor.widgets.theme import Colours
 
@@ -32,13 +32,16 @@ class MotionPlots(QWidget):
         self.rotation = Plot("Rotation θ", "θ  (mrad)", "")
         self.velocity = Plot("Angular velocity dθ/dt", "dθ/dt  (rad/s)", "time  (s)")
         self.velocity.setXLink(self.rotation)
+        right = Axis("right")
+        right.enableAutoSIPrefix(False)
+        self.rotation.plot_item.setAxisItems({"right": right})
         self.rotation.plot_item.showAxis("right")
         self.rotation.plot_item.setLabel("right", "θ/α")
         for plot in (self.rotation, self.velocity):
-            plot.plot_item.getAxis("left").setWidth(62)
+            plot.set_axis_width("left", 62)
         self.velocity.plot_item.showAxis("right")
         for plot in (self.rotation, self.velocity):
-            plot.plot_item.getAxis("right").setWidth(52)
+            plot.set_axis_width("right", 52)
         self.velocity.plot_item.getAxis("right").setStyle(showValues=False)
         self.rotation.plot_item.getAxis("bottom").setStyle(showValues=False)
         self.rotation.plot_item.getAxis("bottom").setHeight(6)
@@ -68,7 +71,7 @@ class MotionPlots(QWidget):
         """Take over a theme."""
         self.rotation.restyle(colours)
         self.velocity.restyle(colours)
-        self.rotation.plot_item.getAxis("right").setLabel("θ/α", color=colours.muted, **{"font-size": "9pt"})
+        self.rotation.plot_item.getAxis("right").setLabel("θ/α", **colours.axis_style)
         for curve, colour in zip(self._curves, (colours.rotation, colours.velocity), strict=True):
             curve.setPen(line_pen(colour, width=2))
         for curve in self._theory:

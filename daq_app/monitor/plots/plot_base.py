@@ -10,9 +10,9 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QColor, QPaintEvent
+from PySide6.QtGui import QColor, QFontMetricsF, QPaintEvent
 
-from daq_app.monitor.widgets.theme import Colours, font
+from daq_app.monitor.widgets.theme import Colours
 
 Array = NDArray[np.float64]
 
@@ -38,12 +38,42 @@ def envelope(x: Array, y: Array, columns: int) -> tuple[Array, Array]:
     return x[index], y[index]
 
 
+class Axis(pg.AxisItem):  # type: ignore[misc]
+    """An axis that writes a true minus sign, as every other figure of the window does."""
+
+    def __init__(self, orientation: str) -> None:
+        super().__init__(orientation)
+        self.text_px = 0.0
+        """Height of the figures; 0 until they have a font."""
+
+    def tickSpacing(self, minVal: float, maxVal: float, size: float) -> list[tuple[float, float]]:
+        """Spacings of the ticks, coarse to fine: figures above each other keep a line's distance."""
+        levels: list[tuple[float, float]] = super().tickSpacing(minVal, maxVal, size)
+        if self.orientation not in ("left", "right") or not levels or size <= 0:
+            return levels
+        least = 1.3 * self.text_px / size * abs(maxVal - minVal)
+        coarse = levels[0][0]
+        while coarse < least:
+            coarse *= 2
+        return [(coarse, 0.0)] + [level for level in levels[1:] if coarse > level[0] >= least]
+
+    def tickStrings(self, values: list[float], scale: float, spacing: float) -> list[str]:
+        """The texts of the ticks."""
+        return [text.replace("-", "−") for text in super().tickStrings(values, scale, spacing)]
+
+
+def axes() -> dict[str, Axis]:
+    """New axes for a plot: left and below."""
+    return {side: Axis(side) for side in ("left", "bottom")}
+
+
 class Plot(pg.PlotWidget):  # type: ignore[misc]
     """A plot in the window's colours, without pyqtgraph's menus; call `restyle` on a new theme."""
 
     def __init__(self, title: str, left: str, bottom: str, *, mouse: bool = False) -> None:
-        super().__init__()
+        super().__init__(axisItems=axes())
         self._title = title
+        self._axis_px: dict[str, int] = {}
         self._labels = {"left": left, "bottom": bottom}
         self.plot_item = self.getPlotItem()
         self.plot_item.setMenuEnabled(False)
@@ -78,22 +108,31 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""
         self.setBackground(colours.surface)
-        small = font(8.5)
+        small = colours.font(8.5)
         for name in ("left", "bottom", "right"):
             axis = self.plot_item.getAxis(name)
             axis.setPen(pg.mkPen(colours.line))
             axis.setTextPen(pg.mkPen(colours.muted))
             axis.setTickFont(small)
+            if isinstance(axis, Axis):
+                axis.text_px = QFontMetricsF(small).height()
             axis.setStyle(tickLength=-4, hideOverlappingLabels=True)
             # Axes and grid change rarely and cost most of a frame: keep them as a picture.
             axis.setCacheMode(pg.QtWidgets.QGraphicsItem.CacheMode.DeviceCoordinateCache)
         for name, text in self._labels.items():
             if text:
-                self.plot_item.setLabel(name, text, **{"color": colours.muted, "font-size": "9pt"})
+                self.plot_item.setLabel(name, text, **colours.axis_style)
         if self._title:
-            self.plot_item.setTitle(self._title, color=colours.muted, size="9.5pt")
-            self.plot_item.titleLabel.setMaximumHeight(20)
-            self.plot_item.layout.setRowFixedHeight(0, 20)
+            self.plot_item.setTitle(self._title, color=colours.muted, size=f"{0.95 * colours.points:.1f}pt")
+            self.plot_item.titleLabel.setMaximumHeight(colours.px(20))
+            self.plot_item.layout.setRowFixedHeight(0, colours.px(20))
+        for name, pixels in self._axis_px.items():
+            self.plot_item.getAxis(name).setWidth(colours.px(pixels))
+
+    def set_axis_width(self, axis: str, pixels: int) -> None:
+        """Fix the width of an axis at the usual type size, so that plots below each other are in line."""
+        self._axis_px[axis] = pixels
+        self.plot_item.getAxis(axis).setWidth(pixels)
 
     def set_label(self, axis: str, text: str) -> None:
         """Change an axis label, which then outlives a change of theme."""

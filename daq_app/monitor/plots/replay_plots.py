@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QTimer, Signal
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QFontMetricsF
 
 from daq_app.monitor.data.replay_data import ROTATION, VELOCITY, ReplayRun
-from daq_app.monitor.plots.plot_base import line_pen
-from daq_app.monitor.widgets.theme import DARK, Colours, font
+from daq_app.monitor.plots.plot_base import axes, line_pen
+from daq_app.monitor.widgets.theme import DARK, Colours
 
 TITLES = {
     ROTATION: "θ  (mrad)",
@@ -119,7 +119,7 @@ class ReplayPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         groups = self._groups()
         start, stop = run.span_s
         for row, (key, names) in enumerate(groups.items()):
-            plot = self.addPlot(row=row, col=0)
+            plot = self.addPlot(row=row, col=0, axisItems=axes())
             self._style(plot, TITLES[key], last=row == len(groups) - 1)
             plot.setLimits(xMin=start - 0.02 * (stop - start), xMax=stop + 0.02 * (stop - start))
             plot.setMouseEnabled(x=True, y=False)
@@ -157,14 +157,15 @@ class ReplayPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             axis = plot.getAxis(name)
             axis.setPen(pg.mkPen(colours.line))
             axis.setTextPen(pg.mkPen(colours.muted))
-            axis.setTickFont(font(8.5))
+            axis.setTickFont(colours.font(8.5))
+            axis.text_px = QFontMetricsF(colours.font(8.5)).height()
             axis.enableAutoSIPrefix(False)
-        plot.getAxis("left").setWidth(64)
-        plot.setLabel("left", title, color=colours.muted, **{"font-size": "9pt"})
+        plot.getAxis("left").setWidth(colours.px(64))
+        plot.setLabel("left", title, **colours.axis_style)
         if last:
             assert self._run is not None
             zero = "release" if any(e.kind == "released" for e in self._run.events) else "first sample"
-            plot.setLabel("bottom", f"time since {zero}  (s)", color=colours.muted, **{"font-size": "9pt"})
+            plot.setLabel("bottom", f"time since {zero}  (s)", **colours.axis_style)
         else:
             plot.getAxis("bottom").setStyle(showValues=False)
             plot.getAxis("bottom").setHeight(6)

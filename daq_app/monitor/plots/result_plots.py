@@ -28,7 +28,7 @@ class ResultPlots(QWidget):
         self.legend = QLabel()
         self.legend.setContentsMargins(8, 0, 8, 0)
         for plot in (self.rotation, self.velocity):
-            plot.plot_item.getAxis("left").setWidth(60)
+            plot.set_axis_width("left", 60)
         layout = QGridLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(6)

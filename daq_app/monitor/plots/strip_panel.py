@@ -54,11 +54,14 @@ class Cell:
     box: QRectF
 
 
-def arrange(rig: Rig, width: float, height: float) -> tuple[list[Cell], list[tuple[Family, QRectF]]]:
-    """Cells of all channels and the title box of each family, for a panel of that size.
+def arrange(
+    rig: Rig, width: float, height: float, scale: float = 1.0
+) -> tuple[list[Cell], list[tuple[Family, QRectF]]]:
+    """Cells of all channels and the title box of each family, for a panel of that size and type scale.
 
     Every family gets whole columns; there are as few rows as leave a cell wide enough for its name.
     """
+    title = _TITLE_PX * scale
     families = [family for family in FAMILY_TITLES if rig.of_family(family)]
     if not families:
         return [], []
@@ -66,32 +69,43 @@ def arrange(rig: Rig, width: float, height: float) -> tuple[list[Cell], list[tup
     rows = most
     for candidate in range(1, most + 1):
         needed = sum(math.ceil(len(rig.of_family(family)) / candidate) for family in families)
-        if width / needed >= _LEAST_CELL_PX:
+        if width / needed >= _LEAST_CELL_PX * scale:
             rows = candidate
             break
-    rows = max(1, min(rows, int((height - _TITLE_PX) // _LEAST_ROW_PX)))
+    rows = max(1, min(rows, int((height - title) // (_LEAST_ROW_PX * scale))))
     columns = {family: math.ceil(len(rig.of_family(family)) / rows) for family in families}
     rows = max(math.ceil(len(rig.of_family(family)) / columns[family]) for family in families)
     total = sum(columns.values())
     cell_width = (width - _GAP_PX * 2 * (len(families) - 1)) / total
-    cell_height = (height - _TITLE_PX) / rows
+    cell_height = (height - title) / rows
     place = {channel.id: index for index, channel in enumerate(rig.channels)}
     cells: list[Cell] = []
     titles: list[tuple[Family, QRectF]] = []
     left = 0.0
     for family in families:
-        titles.append((family, QRectF(left, 0, columns[family] * cell_width, _TITLE_PX)))
+        titles.append((family, QRectF(left, 0, columns[family] * cell_width, title)))
         for order, channel in enumerate(rig.of_family(family)):
             column, row = divmod(order, rows)
             box = QRectF(
                 left + column * cell_width,
-                _TITLE_PX + row * cell_height,
+                title + row * cell_height,
                 cell_width - _GAP_PX,
                 cell_height - _GAP_PX,
             )
             cells.append(Cell(place[channel.id], channel, box))
         left += columns[family] * cell_width + 2 * _GAP_PX
     return cells, titles
+
+
+def fit(
+    rig: Rig, width: float, height: float, most: float
+) -> tuple[list[Cell], list[tuple[Family, QRectF]], float]:
+    """The arrangement with the largest type scale from 1 to `most` that leaves room for the names."""
+    for step in range(round(10 * most), 10, -1):
+        cells, titles = arrange(rig, width, height, step / 10)
+        if cells and cells[0].box.width() + _GAP_PX >= _LEAST_CELL_PX * step / 10:
+            return cells, titles, step / 10
+    return *arrange(rig, width, height), 1.0
 
 
 class StripPanel(QWidget):
@@ -106,6 +120,8 @@ class StripPanel(QWidget):
         self._cells: list[Cell] = []
         self._titles: list[tuple[Family, QRectF]] = []
         self._arranged_for: object = None
+        self._scale = 1.0
+        """Type scale of the strips: where there is too little room for large names they stay smaller."""
         self._spans: Array = np.empty((0, 2))
         self._least: Array = np.empty(0)
         self._still: QPixmap | None = None
@@ -121,6 +137,7 @@ class StripPanel(QWidget):
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""
         self._colours = colours
+        self.setMinimumHeight(colours.px(_TITLE_PX + 3 * _LEAST_ROW_PX))
         self.update()
 
     def refresh(self) -> None:
@@ -129,11 +146,15 @@ class StripPanel(QWidget):
 
     def _arrange(self) -> None:
         rig = self._session.rig
-        key = (id(rig), self.width(), self.height())
+        key = (id(rig), self.width(), self.height(), self._colours.scale)
         if key == self._arranged_for:
             return
         self._arranged_for = key
-        self._cells, self._titles = ([], []) if rig is None else arrange(rig, self.width(), self.height())
+        self._cells, self._titles = [], []
+        if rig is not None:
+            self._cells, self._titles, self._scale = fit(
+                rig, self.width(), self.height(), self._colours.scale
+            )
         channels = rig.channels if rig is not None else ()
         self._spans = np.full((len(channels), 2), np.nan)
         self._least = np.array([_SMALLEST_SPAN_SI[channel.family] for channel in channels])
@@ -163,7 +184,7 @@ class StripPanel(QWidget):
         if self._session.strips is None:
             painter.setPen(QColor(self._colours.muted))
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, "No rig is known yet")
-        bold = font(8.5, bold=True)
+        bold = font(8.5 * self._scale, bold=True)
         painter.setFont(bold)
         painter.setPen(QColor(self._colours.muted))
         for family, box in self._titles:
@@ -171,7 +192,7 @@ class StripPanel(QWidget):
                 FAMILY_TITLES[family], Qt.TextElideMode.ElideRight, int(box.width() - 4)
             )
             painter.drawText(box, _LEFT, text)
-        painter.setFont(font(8))
+        painter.setFont(font(8 * self._scale))
         for cell in self._cells:
             self._paint_still_cell(painter, cell)
         painter.end()
@@ -186,20 +207,22 @@ class StripPanel(QWidget):
             painter.setPen(QPen(QColor(colours.bad), 2))
             painter.drawRect(cell.box)
         painter.setPen(QColor(colours.bad if overloaded else colours.text))
-        painter.drawText(_head(cell), _LEFT, f"⚠ {cell.channel.id}" if overloaded else cell.channel.id)
+        painter.drawText(
+            _head(cell, self._scale), _LEFT, f"⚠ {cell.channel.id}" if overloaded else cell.channel.id
+        )
 
     def _paint_traces(self, painter: QPainter, live: bool) -> None:
         """The lines of a family as one path: a path per channel costs three times as much."""
         strips = self._session.strips
         assert strips is not None
-        width = _trace_box(self._cells[0]).width() if self._cells else 1.0
+        width = _trace_box(self._cells[0], self._scale).width() if self._cells else 1.0
         low, high = strips.columns(max(1, round(strips.n_columns / max(width, 1.0))))
         self._follow_spans(low, high)
         painter.setBrush(Qt.BrushStyle.NoBrush)
         for family, _ in self._titles:
             cells = [cell for cell in self._cells if cell.channel.family == family]
             rows = [cell.index for cell in cells]
-            boxes = np.array([_trace_box(cell).getRect() for cell in cells])
+            boxes = np.array([_trace_box(cell, self._scale).getRect() for cell in cells])
             if boxes[0, 3] <= _LEAST_TRACE_PX:
                 continue
             colour = self._colours.family(family) if live else self._colours.muted
@@ -208,12 +231,12 @@ class StripPanel(QWidget):
 
     def _paint_values(self, painter: QPainter, live: bool) -> None:
         mean = self._session.block_mean
-        painter.setFont(font(8))
+        painter.setFont(font(8 * self._scale))
         painter.setPen(QColor(self._colours.muted))
         for cell in self._cells:
             _, factor = shown_unit(cell.channel.si_unit)
             value = number(float(mean[cell.index]) * factor, 2) if live and mean is not None else DASH
-            painter.drawText(_head(cell), _RIGHT, value)
+            painter.drawText(_head(cell, self._scale), _RIGHT, value)
 
     def _follow_spans(self, low: Floats, high: Floats) -> None:
         """Vertical ranges of the strips: grow at once, shrink only when far too large."""
@@ -238,13 +261,13 @@ class StripPanel(QWidget):
                 return
 
 
-def _head(cell: Cell) -> QRectF:
+def _head(cell: Cell, scale: float) -> QRectF:
     """Where a strip's name and value stand."""
-    return QRectF(cell.box.left() + 4, cell.box.top(), cell.box.width() - 8, _LABEL_PX)
+    return QRectF(cell.box.left() + 4, cell.box.top(), cell.box.width() - 8, _LABEL_PX * scale)
 
 
-def _trace_box(cell: Cell) -> QRectF:
-    return cell.box.adjusted(2, _LABEL_PX, -2, -2)
+def _trace_box(cell: Cell, scale: float) -> QRectF:
+    return cell.box.adjusted(2, _LABEL_PX * scale, -2, -2)
 
 
 def strip_path(low: Floats, high: Floats, boxes: Array, spans: Array) -> pg.QtGui.QPainterPath:

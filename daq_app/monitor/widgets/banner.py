@@ -5,15 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl
+from PySide6.QtCore import QEvent, Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QKeySequence, QShortcut
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QFrame,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from daq_app.monitor.widgets.labels import role_label
 from daq_app.monitor.widgets.shapes import Sign
-from daq_app.monitor.widgets.theme import font
 
 _SIGN_PX = 30
+_ONE_ROW_UP_TO_PT = 12.0
+"""Type size up to which all buttons stand in one row: larger, they would leave no room for the title."""
 
 
 class Banner(QFrame):
@@ -25,7 +35,7 @@ class Banner(QFrame):
         self.setObjectName("card")
         self.sign = Sign(_SIGN_PX)
         self.title = QLabel(title)
-        self.title.setFont(font(points, bold=True))
+        self.title.setProperty("scale", "verdict")
         self.sentences = tuple(role_label(sentence, "muted") for sentence in sentences)
         words = QVBoxLayout()
         words.setSpacing(1)
@@ -38,11 +48,26 @@ class Banner(QFrame):
         self._row.setSpacing(12)
         self._row.addWidget(self.sign, 0, Qt.AlignmentFlag.AlignTop)
         self._row.addLayout(words, 1)
+        self._grid = QGridLayout()
+        self._row.addLayout(self._grid)
+        self._buttons: list[QPushButton] = []
 
     def add_buttons(self, *buttons: QPushButton) -> None:
-        """Put buttons at the right."""
-        for button in buttons:
-            self._row.addWidget(button, 0, Qt.AlignmentFlag.AlignTop)
+        """Put buttons at the right; in large type they stand in two rows."""
+        self._buttons += buttons
+        self._arrange()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Another type size needs other room."""
+        super().changeEvent(event)
+        if event.type() is QEvent.Type.FontChange:
+            self._arrange()
+
+    def _arrange(self) -> None:
+        large = QApplication.font().pointSizeF() > _ONE_ROW_UP_TO_PT and len(self._buttons) > 2
+        columns = -(-len(self._buttons) // 2) if large else max(1, len(self._buttons))
+        for place, button in enumerate(self._buttons):
+            self._grid.addWidget(button, *divmod(place, columns))
 
 
 def keyed_button(page: QWidget, text: str, key: str, act: Callable[[], object]) -> QPushButton:

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem
 from daq_app.campaign.status import CampaignStatus, Place, PlaceState, TestVerdict
 from daq_app.monitor.widgets.check_table import Index
 from daq_app.monitor.widgets.shapes import draw_shape
-from daq_app.monitor.widgets.theme import DARK, font
+from daq_app.monitor.widgets.theme import DARK
 
 HEADINGS = ("Test", "θ0/α", "State", "Releases")
 SHAPES = {PlaceState.DONE: "tick", PlaceState.TO_REPEAT: "triangle", PlaceState.MISSING: "ring"}
@@ -107,8 +107,8 @@ class StateDelegate(QStyledItemDelegate):
             painter, SHAPES[state], QRectF(rect.left() + 8, rect.center().y() - side / 2, side, side), colour
         )
         painter.setPen(colour)
-        painter.setFont(font(10, bold=True))
-        painter.drawText(rect.adjusted(30, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, state.value)
+        painter.setFont(self.colours.font(10, bold=True))
+        painter.drawText(rect.adjusted(16 + side, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, state.value)
 
     def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:
         return super().sizeHint(option, index).expandedTo(QSize(130, 24))

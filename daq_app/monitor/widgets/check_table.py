@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter
+from PySide6.QtGui import QColor, QPainter, QResizeEvent
 from PySide6.QtWidgets import QHeaderView, QStyledItemDelegate, QStyleOptionViewItem, QTableView, QWidget
 
 from daq_app.acquisition.checks.check_model import ChannelCheck, SensorCheck, Verdict
@@ -13,7 +13,7 @@ from daq_app.config.rig import Rig
 from daq_app.monitor.data.shown_units import shown_unit
 from daq_app.monitor.widgets.labels import DASH, number
 from daq_app.monitor.widgets.shapes import draw_shape
-from daq_app.monitor.widgets.theme import DARK, Colours, font
+from daq_app.monitor.widgets.theme import DARK, Colours
 
 Index = QModelIndex | QPersistentModelIndex
 HEADINGS = ("Verdict", "Channel", "What to do", "At rest", "Noise", "Hum", "Pull")
@@ -23,6 +23,11 @@ TIPS = {
     6: "measured over expected change in the pull test",
 }
 _FINDING = 2
+_FIGURES = (6, 4, 5, 3)
+"""Columns of figures, the first the last to go where there is too little room."""
+_WIDTHS_PX = {0: 96, 1: 84, 3: 108, 4: 72, 5: 64, 6: 68}
+_LEAST_FINDING_PX = 260
+"""Room for the sentence on a channel."""
 SHAPES = {Verdict.GO: "tick", Verdict.CAUTION: "triangle", Verdict.NO_GO: "cross"}
 WORDS = {Verdict.GO: "Go", Verdict.CAUTION: "Look", Verdict.NO_GO: "No-go"}
 TONES = {Verdict.GO: "good", Verdict.CAUTION: "warning", Verdict.NO_GO: "bad"}
@@ -109,7 +114,7 @@ class VerdictDelegate(QStyledItemDelegate):
         verdict = Verdict(told)
         rect = QRectF(option.rect)
         colour = QColor(str(getattr(self.colours, TONES[verdict])))
-        side = min(15.0, rect.height() - 6)
+        side = min(15.0 * self.colours.scale, rect.height() - 6)
         draw_shape(
             painter,
             SHAPES[verdict],
@@ -117,8 +122,8 @@ class VerdictDelegate(QStyledItemDelegate):
             colour,
         )
         painter.setPen(colour)
-        painter.setFont(font(10, bold=True))
-        painter.drawText(rect.adjusted(31, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, WORDS[verdict])
+        painter.setFont(self.colours.font(10, bold=True))
+        painter.drawText(rect.adjusted(16 + side, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, WORDS[verdict])
 
     def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:
         return super().sizeHint(option, index).expandedTo(QSize(86, 24))
@@ -141,10 +146,21 @@ class CheckTable(QTableView):
         self.setWordWrap(False)
         header = self.horizontalHeader()
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        for column, width in {0: 96, 1: 84, 3: 108, 4: 72, 5: 64, 6: 68}.items():
+        for column, width in _WIDTHS_PX.items():
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.Interactive)
             self.setColumnWidth(column, width)
         header.setSectionResizeMode(_FINDING, QHeaderView.ResizeMode.Stretch)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """The sentence is never squeezed: where there is too little room, figures give way to it."""
+        super().resizeEvent(event)
+        self._show_columns()
+
+    def _show_columns(self) -> None:
+        room = self.viewport().width() - _LEAST_FINDING_PX * self._delegate.colours.scale
+        for column in (0, 1, *_FIGURES):
+            room -= self.columnWidth(column) or round(_WIDTHS_PX[column] * self._delegate.colours.scale)
+            self.setColumnHidden(column, column in _FIGURES and room < 0)
 
     def show_check(self, rig: Rig | None, check: SensorCheck | None) -> None:
         """Take over a check and show its top."""
@@ -154,4 +170,8 @@ class CheckTable(QTableView):
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""
         self._delegate.colours = colours
+        self.verticalHeader().setDefaultSectionSize(colours.px(25))
+        for column, width in _WIDTHS_PX.items():
+            self.setColumnWidth(column, colours.px(width))
+        self._show_columns()
         self.viewport().update()

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QFontMetricsF, QResizeEvent
+from PySide6.QtWidgets import QApplication, QFrame, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from daq_app.monitor.widgets.theme import font
 
@@ -61,6 +62,7 @@ class Tile(QFrame):
         self._value = QLabel(DASH)
         self._value.setFont(font(points, bold=True))
         self._points = points
+        self._tenths: dict[QLabel, int] = {}
         self._detail = role_label("", "muted")
         layout = QVBoxLayout(self)
         layout.setContentsMargins(12, 6, 10, 6)
@@ -72,14 +74,44 @@ class Tile(QFrame):
 
     def set_points(self, points: float) -> None:
         """Change the size of the value."""
-        self._value.setStyleSheet(f"font-size: {points:.1f}pt;")
+        self._points = points
+        self._fit_all()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """What stands on the tile stays whole."""
+        super().resizeEvent(event)
+        self._fit_all()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """So it does at another type size."""
+        super().changeEvent(event)
+        if event.type() is QEvent.Type.FontChange:
+            self._tenths.clear()
+            self._fit_all()
+
+    def _fit_all(self) -> None:
+        base = QApplication.font().pointSizeF()
+        self._fit(self._caption, 0.95 * base, bold=True)
+        self._fit(self._value, self._points, bold=True)
+        self._fit(self._detail, base, bold=False)
+
+    def _fit(self, label: QLabel, points: float, *, bold: bool) -> None:
+        """The usual size, or less where the text would be wider than the tile."""
+        room = self.width() - 30
+        needs = QFontMetricsF(font(points, bold=bold)).horizontalAdvance(label.text())
+        tenths = round(10 * points * min(1.0, room / needs if needs > 0 and room > 0 else 1.0) - 0.5)
+        if self._tenths.get(label) != tenths:
+            self._tenths[label] = tenths
+            label.setStyleSheet(f"font-size: {tenths / 10:.1f}pt;")
 
     def show_value(self, value: str, detail: str = "", role: str = "") -> None:
         """Set the value, the line below it and the role of its colour (good, warning, bad or none)."""
         if self._value.text() != value:
             self._value.setText(value)
+            self._fit(self._value, self._points, bold=True)
         if self._detail.text() != detail:
             self._detail.setText(detail)
+            self._fit(self._detail, QApplication.font().pointSizeF(), bold=False)
         set_role(self._value, role)
 
     @property

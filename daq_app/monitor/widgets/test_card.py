@@ -69,7 +69,7 @@ class TestCard(QFrame):
         self._notes.setMaximumHeight(58)
         self._notes.setTabChangesFocus(True)
         self._operator = QLineEdit()
-        self._operator.setPlaceholderText("who takes the test")
+        self._operator.setPlaceholderText("operator")
         self._operator.setMaxLength(200)
         self._side = QComboBox()
         for text, side in (("either side", ""), ("towards +x", "+x"), ("towards −x", "-x")):

@@ -53,6 +53,19 @@ class Colours:
         """Base type size over the usual one: sizes in pixels that hold text are multiplied by it."""
         return self.points / USUAL_POINTS
 
+    def px(self, pixels: float) -> int:
+        """A size in pixels of what holds text, at this type size."""
+        return round(pixels * self.scale)
+
+    @property
+    def axis_style(self) -> dict[str, str]:
+        """How the label of an axis is written."""
+        return {"color": self.muted, "font-size": f"{0.9 * self.points:.1f}pt"}
+
+    def side_px(self, pixels: float) -> int:
+        """Width of a column of fields beside a page's main part: grows by three quarters of the type."""
+        return round(pixels * (1.0 + 0.75 * (self.scale - 1.0)))
+
     def font(self, points: float, *, bold: bool = False) -> QFont:
         """A font that is `points` large at the usual type size, and grows with it."""
         return font(points * self.scale, bold=bold)
@@ -173,7 +186,7 @@ def _stylesheet(c: Colours, base: float) -> str:
     QLabel[role="warning"] {{ color: {c.warning}; font-weight: 600; }}
     QLabel[role="bad"] {{ color: {c.bad}; font-weight: 600; }}
     QPushButton {{ background: {c.raised}; border: 1px solid {c.line}; border-radius: 5px;
-        padding: 6px 12px; min-height: 20px; }}
+        padding: 6px 12px; min-height: {max(20, round(base * 1.65))}px; }}
     QPushButton:hover {{ border-color: {c.accent}; }}
     QPushButton:focus {{ border: 2px solid {c.accent}; padding: 5px 11px; }}
     QPushButton:disabled {{ color: {c.muted}; background: {c.ground}; }}

@@ -182,7 +182,8 @@ class MainWindow(QMainWindow):
         assert isinstance(app, QApplication)
         self.colours = replace(THEMES[self.settings.theme], points=self.settings.type_size)
         apply_theme(app, self, self.colours, self.settings.type_size)
-        self.frame.set_type_size(self.settings.type_size)
+        self.frame.rail.fit()
+        self.frame.fit_footer()
         for page in (
             self.prepare,
             self.live,
@@ -301,6 +302,7 @@ class MainWindow(QMainWindow):
     def _on_slow(self) -> None:
         self.header.refresh(self.colours)
         self.health.refresh()
+        self.frame.fit_footer()
         self.display.refresh()
         may_command = self.link is not None and self.link.may_command
         self.actions_bar.refresh(

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QButtonGroup, QFrame, QPushButton, QVBoxLayout, QWidget
 
-_WIDTH_PX = 104
-
 
 class NavigationRail(QFrame):
     """Emits `page_wanted(place)`, `theme_wanted` and `size_wanted(steps)`. Every button has a key."""
@@ -20,7 +18,6 @@ class NavigationRail(QFrame):
     def __init__(self, names: Sequence[str], parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("bar")
-        self.setFixedWidth(_WIDTH_PX)
         self._group = QButtonGroup(self)
         self._rail = QVBoxLayout(self)
         self._rail.setContentsMargins(0, 10, 0, 10)
@@ -43,6 +40,13 @@ class NavigationRail(QFrame):
         button.setShortcut(key)
         self._rail.addWidget(button)
         return button
+
+    def fit(self) -> None:
+        """As wide as the longest name: called after every change of the type."""
+        buttons = self.findChildren(QPushButton)
+        for button in buttons:
+            button.ensurePolished()
+        self.setFixedWidth(max(button.sizeHint().width() for button in buttons))
 
     def mark(self, place: int) -> None:
         """Show which page is in front."""

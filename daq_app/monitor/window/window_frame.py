@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
     QBoxLayout,
     QFrame,
@@ -23,8 +23,8 @@ from daq_app.monitor.window.header import Header
 from daq_app.monitor.window.health_bar import HealthBar
 from daq_app.monitor.window.navigation import NavigationRail
 
-ONE_ROW_UP_TO: Final = 10.5
-"""Type size in points up to which orders and health figures stand in one row."""
+_FOOTER_SPARE_PX: Final = 28
+"""Margins and the gap between orders and figures."""
 
 
 class WindowFrame(QWidget):
@@ -71,10 +71,16 @@ class WindowFrame(QWidget):
             for part in (self.header, footer):
                 part.hide()  # nothing is live here, so nothing may look as if it were
 
-    def set_type_size(self, points: float) -> None:
-        """Large type: orders and figures below each other, or the window would be wider than the screen."""
-        stacked = points > ONE_ROW_UP_TO
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Orders and figures stand in one row where there is room, else below each other."""
+        super().resizeEvent(event)
+        self.fit_footer()
+
+    def fit_footer(self) -> None:
+        """Called on a change of size or type, and as figures grow: a gap is told with its samples."""
+        needs = self.actions_bar.sizeHint().width() + self.health.sizeHint().width() + _FOOTER_SPARE_PX
         directions = QBoxLayout.Direction
+        stacked = needs > self.width()
         self._footer.setDirection(directions.TopToBottom if stacked else directions.LeftToRight)
 
     def show_page(self, page: QWidget) -> None:

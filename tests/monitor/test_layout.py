@@ -1,0 +1,66 @@
+"""Nothing is cut off: on no page, at the smallest screen that is promised, in the largest type."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtWidgets import QApplication
+
+from daq_app.monitor.data.session import Published
+from daq_app.monitor.window.main_window import MainWindow
+from tests.support.clipped_text import clipped_texts
+from tests.support.quiet_link import QuietLink
+
+
+@pytest.fixture
+def rocking_window(qtbot, settings, configs, clock, stand_in):
+    """A window on a wall that rocks, with the winch of a simulated wall."""
+    window = MainWindow(QuietLink(configs / "fr1.toml"), settings)
+    qtbot.addWidget(window)
+    window._frame_timer.stop()
+    window._slow_timer.stop()
+    window.session.clock = clock
+    start = clock.now
+    for instant in stand_in.instants(stand_in.release_s + 3.0):
+        clock.now = start + instant.time_s
+        for message, readings in instant.messages:
+            window.session.feed(Published(message, clock.now, readings))
+    window.prepare.wall.set_address("grpc://127.0.0.1:1")
+    window.show()
+    return window
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+@pytest.mark.parametrize(("width", "height"), [(1366, 768), (1920, 1080)])
+@pytest.mark.parametrize("larger", [0, 4])
+def test_every_text_is_whole_on_every_page(rocking_window, theme, width, height, larger):
+    window = rocking_window
+    if window.settings.theme != theme:
+        window.toggle_theme()
+    for _ in range(larger):
+        window.change_type_size(1)
+    for name, page in window.pages.items():
+        window.show_page(page)
+        window.resize(width, height)
+        window._on_slow()
+        for _ in range(3):
+            QApplication.processEvents()
+        assert (window.width(), window.height()) == (width, height), f"{name} is larger than the screen"
+        assert clipped_texts(window) == [], name
+
+
+def test_axes_and_strips_grow_with_the_type(rocking_window):
+    window = rocking_window
+    axis = window.live.motion.rotation.plot_item.getAxis("left")
+    before = axis.style["tickFont"].pointSizeF(), axis.fixedWidth
+    for _ in range(4):
+        window.change_type_size(1)
+    assert axis.style["tickFont"].pointSizeF() == pytest.approx(1.5 * before[0])
+    assert axis.fixedWidth > 1.4 * before[1]
+    window.change_type_size(-1)
+    window.change_type_size(-10)
+    assert axis.style["tickFont"].pointSizeF() < before[0]
+
+
+def test_figures_below_zero_have_a_true_minus_sign(rocking_window):
+    axis = rocking_window.live.motion.rotation.plot_item.getAxis("left")
+    assert axis.tickStrings([-50.0, 0.0], 1.0, 50.0) == ["−50", "0"]
