@@ -17,10 +17,10 @@ from typing import Final
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.signal import bessel, bilinear, lfilter
 
 from daq_app.gap.core import CannotDiagnose, Diagnosis
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.response import bessel, first_order
 from daq_app.gap.rocking_model.motion.hold import from_hold
 from daq_app.gap.rocking_model.motion.rotation import (
     Wire,
@@ -38,6 +38,8 @@ from sim_hardware.dynamics.effects import MOTION_EFFECTS
 from sim_hardware.dynamics.motion import motion_vector, simulate_vector
 
 TRACE_HZ: Final = 200.0
+_FINE_HZ: Final = 2000.0
+"""Rate at which responses of sensors are worked out."""
 _BEFORE_S = 0.1
 _MASS_KG = 5000.0  # free in a motion that is described by α, p and R
 _MOTION: Final = frozenset(spec.name for spec in MOTION_EFFECTS)
@@ -277,16 +279,15 @@ def _seen(
     wires: Sequence[Wire],
 ) -> FloatArray:
     """A motion as the family that is shown would show it; `height_m` is where the wires look."""
-    fine = np.arange(time[0], time[-1] + 0.5e-3, 0.5e-3)
+    fine = np.arange(time[0], time[-1] + 1.0 / _FINE_HZ, 1.0 / _FINE_HZ)
     terms = {name.partition("@")[0]: values for name, values in sensor_effects.items()}
     clock = 1.0 + terms.get("clock", {}).get("error", 0.0)
     late = followed.delay_s + terms.get("lag", {}).get("tau", 0.0)
     theta = followed.motion.rotation(fine * clock - late)
-    theta = _first_order(theta, slow_s, fine)
-    theta = _first_order(theta, terms.get("slow_response", {}).get("tau", 0.0), fine)
+    theta = first_order(theta, slow_s, _FINE_HZ)
+    theta = first_order(theta, terms.get("slow_response", {}).get("tau", 0.0), _FINE_HZ)
     if delay := terms.get("filter_delay", {}).get("tau", 0.0):
-        b, a = bilinear(*bessel(2, 1.0 / delay, analog=True, norm="delay"), fs=1.0 / (fine[1] - fine[0]))
-        theta = theta[0] + lfilter(b, a, theta - theta[0])
+        theta = bessel(theta, delay, _FINE_HZ)
     theta = theta * (1.0 + terms.get("gain", {}).get("error", 0.0))
     if higher := terms.get("wire_anchor", {}).get("height", 0.0):
         theta = theta + anchors_off(wires, theta, higher)[0]
@@ -295,11 +296,3 @@ def _seen(
     for name, per in (("drift@wire", height_m), ("drift@tiltmeter", 1.0)):
         theta = theta + sensor_effects.get(name, {}).get("rate", 0.0) / per * (fine - rest_s)
     return np.asarray(np.interp(time, fine, theta))
-
-
-def _first_order(theta: FloatArray, tau_s: float, time: FloatArray) -> FloatArray:
-    """τ q̇' = q − q', at rest at the start."""
-    if tau_s <= 0.0:
-        return theta
-    share = 1.0 - math.exp(-(time[1] - time[0]) / tau_s)
-    return np.asarray(theta[0] + lfilter([share], [1.0, share - 1.0], theta - theta[0]))

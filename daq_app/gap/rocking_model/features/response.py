@@ -32,29 +32,29 @@ def slow_response(values: FloatArray, time_constants_s: FloatArray) -> FloatArra
     return np.asarray(np.mean([first_order(values, float(slow)) for slow in time_constants_s], axis=0))
 
 
-def bessel(values: FloatArray, delay_s: float) -> FloatArray:
-    """Second-order Bessel low-pass of group delay `delay_s` on the coarse grid."""
+def bessel(values: FloatArray, delay_s: float, rate_hz: float = GRID_HZ) -> FloatArray:
+    """Second-order Bessel low-pass of group delay `delay_s`."""
     if delay_s <= 1e-5:
         # As good as a delay, and not nothing: a fit that starts from none has to see where it leads.
-        return values - delay_s * GRID_HZ * np.gradient(values)
-    return resonator(values, np.sqrt(3.0) / delay_s, np.sqrt(3.0) / 2.0)
+        return values - delay_s * rate_hz * np.gradient(values)
+    return resonator(values, np.sqrt(3.0) / delay_s, np.sqrt(3.0) / 2.0, rate_hz)
 
 
-def resonator(values: FloatArray, natural: float, zeta: float) -> FloatArray:
-    """ÿ/ω² + 2ζẏ/ω + y = x on the coarse grid, for an x that is straight between samples; starts settled.
+def resonator(values: FloatArray, natural: float, zeta: float, rate_hz: float = GRID_HZ) -> FloatArray:
+    """ÿ/ω² + 2ζẏ/ω + y = x for an x that is straight between samples; starts settled.
 
     A bilinear transform would be off in delay by a fifth where the response is as quick as the grid.
     """
-    numerator, denominator = _discrete(float(natural), float(zeta))
+    numerator, denominator = _discrete(float(natural), float(zeta), rate_hz)
     found: FloatArray = lfilter(numerator, denominator, values - values[0]) + values[0]
     return found
 
 
 @lru_cache(maxsize=64)
-def _discrete(natural: float, zeta: float) -> tuple[FloatArray, FloatArray]:
+def _discrete(natural: float, zeta: float, rate_hz: float) -> tuple[FloatArray, FloatArray]:
     """Filter of the resonator; all runs and blocks of one prediction ask for the same one."""
     numerator, denominator, _ = cont2discrete(
-        ([natural**2], [1.0, 2.0 * zeta * natural, natural**2]), 1.0 / GRID_HZ, method="foh"
+        ([natural**2], [1.0, 2.0 * zeta * natural, natural**2]), 1.0 / rate_hz, method="foh"
     )
     return numerator[0], denominator
 
