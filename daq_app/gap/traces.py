@@ -230,7 +230,7 @@ def _impacts(theta: FloatArray, swings: Swings, rate_hz: float) -> FloatArray:
     places = np.round((swings.release_s + swings.peak_s) * rate_hz).astype(int)
     found = []
     for start, stop in itertools.pairwise(places):
-        # Of several passages (noise, bounce) the last leads to the next peak.
+        # The last of several passages (noise, bounce) leads to the next peak.
         passed = np.flatnonzero(np.diff(np.sign(theta[start:stop])) != 0)
         if passed.size == 0:
             raise CannotDiagnose("Two peaks lie on one side of the upright wall.")

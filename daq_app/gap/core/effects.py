@@ -38,9 +38,9 @@ class Effect:
     """A probe is a non-parametric form of its family: it can name the family, never the effect. A departure
     is the first step away from the forms of some effects, only ever tested on top of one of them."""
     of: tuple[str, ...] = ()
-    """Of a departure: the effects whose forms it departs from."""
+    """Effects whose forms a departure departs from."""
     typical: float = 0.0
-    """Of a departure: size of its coefficient where the family has another form, per unit of the first
+    """Size of a departure's coefficient where the family has another form, per unit of the first
     parameter of the effect that it departs from. Without it the departure says nothing of that."""
     instrument: bool = False
     """On a single instrument: every laboratory has a few that are a little off, so that it must explain more

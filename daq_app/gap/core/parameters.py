@@ -32,8 +32,8 @@ class Parameter:
     linear: bool = False
     """The prediction is a straight line in it whose slope no other parameter changes: one column for all."""
     smallest: float = 0.0
-    """Of an effect's strength (on a linear scale, centred on zero): what is weaker, to either side, is no
-    effect. The prior has nothing there."""
+    """Strength (on a linear scale, centred on zero) below which, to either side, there is no effect: the
+    prior has nothing there."""
 
     def __post_init__(self) -> None:
         if self.sd <= 0:

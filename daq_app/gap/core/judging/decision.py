@@ -22,7 +22,7 @@ class Evidence:
     answers: Sequence[Answer]
     """By what sensors can tell apart, most probable first, with other forms of the best hypothesis."""
     fit: Fit
-    """Of the best hypothesis of the library."""
+    """Fit of the best hypothesis of the library."""
     rest: Remainder
     detection: Sequence[Detection]
 

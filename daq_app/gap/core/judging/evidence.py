@@ -94,7 +94,7 @@ class Answer:
 
     @property
     def probability(self) -> float:
-        """Of the whole class: which of its forms it is, no recording can say."""
+        """Probability of the whole class: which of its forms it is, no recording can say."""
         return math.fsum(r.probability for r in self.alternatives)
 
 
@@ -122,8 +122,8 @@ def strength(found: Fit, effect: Effect) -> float:
 
     By the parameters that know a zero, which is none: on a linear scale about zero. One about something else
     is a form of the effect (how evenly a force falls), and its prior's centre is as much of an effect as any
-    other value. Of an effect that has logarithmic scales only, the one that is known worst counts, by how
-    many of its sd its value is: a time of 80 ± 20 ms is 4 sd.
+    other value. Where an effect has logarithmic scales only, the parameter that is known worst counts, by
+    how many of its sd its value is: a time of 80 ± 20 ms is 4 sd.
     """
     zeros = [effect.key(p) for p in effect.parameters if p.scale == "linear" and p.mean == 0.0]
     if zeros:

@@ -34,12 +34,12 @@ class FreeForm:
     gain: float
     """In log posterior."""
     p_value: float
-    """Of a gain as large by chance, where the named form is the right one."""
+    """Probability of a gain as large by chance, where the named form is the right one."""
     excess: float
     """Gain beyond what chance gives: half a nat for each coefficient that the runs determine."""
     log_bayes: float = math.nan
     """Log of how much likelier what is seen is under another form of the family than under the named one.
-    Of a departure only; NaN without."""
+    NaN for what is no departure."""
 
     @classmethod
     def of(cls, form: Effect, score: Score, strength: float = 0.0) -> FreeForm:

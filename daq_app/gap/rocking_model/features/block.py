@@ -18,18 +18,18 @@ from daq_app.gap.rocking_model.motion.rotation import Wire
 class Shares:
     """What a signal put together from several channels shows of each way in which they can move.
 
-    Of bending or turning the sensors that are left may show more than one, where they no longer stand
-    evenly on both sides of the middle.
+    Signals of bending or turning show more than one where the sensors that are left do not stand evenly on
+    both sides of the middle.
     """
 
     rotation: float = 0.0
-    """Of an error of the family's rotation, m (m/s² of the angular acceleration)."""
+    """Per error of the family's rotation, m (per angular acceleration in m/s²)."""
     bend: float = 0.0
-    """Of the bending at the top of the wall; 1/m in signals of turning."""
+    """Per bending at the top of the wall; 1/m in signals of turning."""
     yaw: float = 0.0
-    """Of the angle about the vertical, m; 1 or none in signals of turning."""
+    """Per angle about the vertical, m; 1 or none in signals of turning."""
     twist: float = 0.0
-    """Of the rotation's slope along the length, m²; m in signals of turning."""
+    """Per slope of the rotation along the length, m²; m in signals of turning."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,21 +50,21 @@ class Block:
     kind: str = ""
     """Which rule predicts it; empty where the family's name says so."""
     expected: FloatArray | None = None
-    """Of a single channel: what the others make of it, on the whole grid."""
+    """A single channel as the others predict it, on the whole grid."""
     design: FloatArray | None = None
-    """Of a single channel: the shapes of the regression at the samples of `pick`."""
+    """Shapes of a single channel's regression at the samples of `pick`."""
     noise: float = 1.0
-    """Of a single channel: rms at rest."""
+    """Rms of a single channel at rest."""
     wire: Wire | None = None
-    """Of a single wire: how its rotation was made from its length, which is what its faults act on."""
+    """Geometry of a single wire, whose faults act on its length."""
     ring: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Of a ring-down: frequency in Hz, damping ratio, rate of the grid in Hz."""
+    """Frequency of a ring-down in Hz, its damping ratio, rate of the grid in Hz."""
     levers: tuple[float, ...] = ()
-    """Of a single channel: the relative error of its prediction."""
+    """Relative error of a single channel's prediction, by coefficient."""
     shares: tuple[Shares, ...] = ()
-    """Of a ring-down: what the signal of each coefficient shows."""
+    """What the signal behind each coefficient of a ring-down shows."""
     fading: tuple[float, ...] = ()
-    """Of a ring-down: change of each coefficient of unit size per ln of the damping ratio."""
+    """d(coefficient)/d(ln ζ) of a ring-down for unit amplitude, by coefficient."""
     time_constants_s: tuple[float, ...] = ()
     """Time constants, s, of the slow sensors behind the block, as this run shows them."""
     undone_s: float = 0.0

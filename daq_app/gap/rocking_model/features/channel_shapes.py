@@ -24,9 +24,9 @@ SHAPES: dict[Family, tuple[str, ...]] = {
     "wire": (*_SHAPES, "side"),
     "accelerometer": _SHAPES,
 }
-"""Of wires also half the difference in gain between the two sides: the wall lifts on one side only, and a
-wire whose anchor is not as high as the rig file says slopes and sees it. A joint opens at one face at a time:
-LVDTs have no other side."""
+"""Wires have half the difference in gain between the two sides as well: the wall lifts on one side only, and
+a wire whose anchor is not as high as the rig file says slopes and sees it. A joint opens at one face at a
+time: LVDTs have no other side."""
 _UNITS: dict[Family, tuple[str, ...]] = {
     "lvdt": ("1", "s", "1/m", "m/s"),
     "wire": ("1", "s", "1/m", "m/s", "1"),

@@ -41,7 +41,7 @@ CROWDED: tuple[Family, ...] = ("lvdt", "accelerometer")
 STRUCTURE = 0.5
 """Excess of the logarithm of what remains over noise from which a channel is suspect for it alone."""
 _POWERS = (1, 1, 2, 0, 1)
-"""Of a wire's shapes: the power of its reading that they go with. The wall's rotation θ adds height × f(θ) to
+"""Power of its reading that each of a wire's shapes goes with. The wall's rotation θ adds height × f(θ) to
 every reading, and its base the same to all."""
 _STILL = (3.2e-3, 3e-4, 0.02, 1.2e-5, 5e-4)
 """How still a base stands, in those shapes, in m and at a reading of one: as far as a wire a metre up is
@@ -110,8 +110,8 @@ def suspects(
 def _alone(usable: Sequence[ChannelFamily], family: Family, order: Sequence[str]) -> str | None:
     """The one channel without which the others agree, if there is one."""
     bar = SUSPECT[family]
-    # A bad channel spoils the prediction of the others: right is one without which all agree. Of few
-    # sensors at few heights two may do, of which one asks for a base that moves with the wall.
+    # A bad channel spoils the prediction of the others: right is one without which all agree. Where
+    # few sensors stand at few heights two may do, of which one asks for a base that moves with the wall.
     agreed: list[tuple[float, float, str]] = []
     for name in order:
         rest = _sizes(usable, family, (name,))

@@ -43,7 +43,7 @@ class _HalfCycle:
 
     middle_s: float
     jump: float
-    """Of the angular velocity at the impact before."""
+    """Jump of the angular velocity at the impact before."""
     columns: FloatArray
     """What the accelerometers show by the floor's shape, and the ring-down's shapes, (n, 1 or 4)."""
     free: int

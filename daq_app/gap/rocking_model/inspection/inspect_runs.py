@@ -295,7 +295,7 @@ def found_channels(runs: Sequence[RockingRun]) -> dict[str, str]:
 
 
 def calibrations(runs: Sequence[RockingRun]) -> dict[str, dict[str, float]]:
-    """Of those channels: what a sound one may be off by in each shape, as the others predict it."""
+    """What each of those channels may be off by in each shape while it is sound, as the others predict it."""
     return {
         b.family: dict(zip(b.names, b.levers, strict=False))
         for run in runs

@@ -31,8 +31,8 @@ def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
     """(delay, its variance): shift of the record that fits the rotation's own acceleration best.
 
     What is compared are averages over 5 ms of z θ̈ − g sin θ with the jump of θ̇ at every impact: any
-    linear response of the accelerometers shifts its centroid by its delay. Of a long and lopsided one the
-    largest value is sooner than that, which the variance says. None without enough impacts.
+    linear response of the accelerometers shifts its centroid by its delay. The largest value of
+    a long and lopsided one comes sooner than that, which the variance says. None without enough impacts.
     """
     chosen = run.steady_accelerometers("x")
     if not chosen or grid.impact_s.size < 3:
@@ -99,7 +99,7 @@ class _Dip:
 
     @classmethod
     def of(cls, delays: FloatArray, curve: FloatArray) -> _Dip:
-        """Of a misfit in steps of 1 ms, smoothed over 5 ms."""
+        """The dip of a misfit, in steps of 1 ms, smoothed over 5 ms."""
         smooth = np.convolve(np.pad(curve, 2, mode="edge"), np.full(5, 0.2), "valid")
         k = int(np.argmin(smooth))
         out = np.flatnonzero(smooth - smooth[k] > 0.5 * (np.median(smooth) - smooth[k]))

@@ -1,6 +1,6 @@
 """Effects that a case of the contact engine can hide: what wall and floor are where they touch.
 
-Of the library are those whose table entry is a shape or a place, which the engine is given as such. Where
+They are those of the library whose table entry is a shape or a place, which the engine is given. Where
 the table has a formula for what contact does (a slip c ω, an impact on a Winkler bed that takes r), friction
 and a bed as an engine knows them are other forms: these are outside.
 """

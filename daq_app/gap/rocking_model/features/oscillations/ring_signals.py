@@ -119,7 +119,7 @@ def _of_accelerometers(seen: Accelerations, shape: FloatArray, z: FloatArray, sh
 def accelerations(run: GapRun, grid: Grid, chosen: Sequence[int]) -> Accelerations:
     """What accelerometers (their places) show beyond a rigid wall, put in step with the rotation.
 
-    Of late accelerometers the shock of an impact would lie beyond the samples that are left out for it.
+    Late accelerometers show the shock of an impact beyond the samples that are left out for it.
     """
     seen = acceleration_delay(run, grid)
     late = seen[0] - MIDDLE_OF_IMPACT_S if seen is not None else 0.0

@@ -278,7 +278,7 @@ def _fading(
 def with_repeatability(blocks: Sequence[Block]) -> list[Block]:
     """The blocks of all runs with what the ring-down itself repeats by, a share of its usual size.
 
-    Of its own size in each run it would make the small ones the sure ones. Frequency and damping come
+    A share of the size in each run would make the small ones the sure ones. Frequency and damping come
     from all runs at once: what is said in every run is known only once.
     """
     parts = {
