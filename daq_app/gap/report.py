@@ -20,7 +20,7 @@ from daq_app.gap.report_figures import ProbeMap
 from daq_app.gap.rocking_model.features.run_features import extract
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.traces import Trace, traces
+from daq_app.gap.traces import Trace, noted, traces
 from daq_app.gap.words import causes_in_words
 from daq_app.runfile.durable import write_whole
 
@@ -33,9 +33,11 @@ def write_report(result: Diagnosis, path: Path, runs: Sequence[GapRun] = ()) -> 
     """Write `path` (HTML) and the same page as PDF beside it; returns both. Raises `OSError`.
 
     `runs` are the recordings that were diagnosed: with them the page has measured against
-    simulated rotations, and the sensor map has the names of its coefficients.
+    simulated rotations, which the result's notes hold from then on, and the sensor map has the names of its
+    coefficients.
     """
     shown = traces(result, runs)
+    result.notes["traces"] = noted(shown)
     maps = draw.probe_maps(result, _meanings(runs))
     html = (
         Environment(loader=PackageLoader("daq_app.gap"), autoescape=select_autoescape(), trim_blocks=True)

@@ -72,6 +72,30 @@ class Trace:
         return tuple(float(np.sqrt(np.nanmean(part[moving] ** 2))) for part in left)  # type: ignore[return-value]
 
 
+_NOTED: Final = 2
+"""Each so manieth sample is noted in a result: 100 Hz show a half-cycle of 50 ms."""
+
+
+def noted(shown: Sequence[Trace]) -> list[dict[str, object]]:
+    """Traces as the notes of a result hold them, in mrad."""
+
+    def mrad(values: FloatArray) -> list[float]:
+        return [round(float(value), 4) for value in 1e3 * np.nan_to_num(values[::_NOTED])]
+
+    return [
+        {
+            "run": trace.run,
+            "shown": trace.shown,
+            "time_s": [round(float(value), 4) for value in trace.time_s[::_NOTED]],
+            "measured_mrad": mrad(trace.measured_rad),
+            "baseline_mrad": mrad(trace.baseline_rad),
+            "augmented_mrad": mrad(trace.augmented_rad),
+            "rms_mrad": [1e3 * value for value in trace.rms_rad],
+        }
+        for trace in shown
+    ]
+
+
 def traces(result: Diagnosis, runs: Sequence[GapRun], most: int = 2) -> list[Trace]:
     """Traces of the run with the largest and of the one with the smallest release (at most `most`).
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import textwrap
@@ -136,3 +137,19 @@ def test_the_views_read_the_documented_result():
     assert bars[0].lengths[0][1:] == ("accent", "p 0.98")
     assert [bar.name for bar in closure_bars(result)] == ["L1", "L4"]
     assert closure_bars({**result, "gap": None}) == []
+
+
+def test_the_page_shows_measured_beside_simulated_rotation(page):
+    result = made()
+    rows = {"measured": [80.0, 0.0, -70.0], "baseline": [80.0, 5.0, -60.0], "augmented": [80.0, 1.0, -69.0]}
+    trace = {f"{name}_mrad": values for name, values in rows.items()}
+    result.notes["traces"] = [
+        {"run": "FR1-L3-1", "shown": "lvdt", "time_s": [0.0, 0.5, 1.0], "rms_mrad": [7.9, 1.0], **trace}
+    ]
+    page._show(None, json.loads(result.to_json()))
+    assert "FR1-L3-1" in page.traces.legend.text() and "7.90 mrad rms" in page.traces.legend.text()
+    assert list(page.traces.curves["augmented"].getData()[1]) == rows["augmented"]
+    assert list(page.traces.rests["baseline"].getData()[1]) == [0.0, -5.0, -10.0]
+    result.notes.clear()
+    page._show(None, json.loads(result.to_json()))
+    assert "no simulated rotation" in page.traces.legend.text()

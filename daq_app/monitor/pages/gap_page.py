@@ -26,6 +26,7 @@ from daq_app.gap.files import newest_result
 from daq_app.gap.words import causes_in_words
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.gap_runner import GapRunner
+from daq_app.monitor.plots.gap_traces import GapTraces
 from daq_app.monitor.plots.gap_views import BarRows, GapMapView, closure_bars, evidence_bars, map_cells
 from daq_app.monitor.widgets.banner import Banner, keyed_button, open_outside
 from daq_app.monitor.widgets.labels import number, role_label, set_role
@@ -79,6 +80,7 @@ class GapPage(QWidget):
         }
         self.buttons["start"].setProperty("role", "primary")
         self.map = GapMapView()
+        self.traces = GapTraces()
         self.evidence = BarRows()
         self.closure = BarRows()
         self._build()
@@ -109,12 +111,12 @@ class GapPage(QWidget):
         for place, (title, widget) in enumerate(
             (
                 ("Where: largest gap before → after; 1 is noise and scatter", self.map),
+                ("Measured and simulated", self.traces),
                 ("Which: evidence, the best first", self.evidence),
                 ("How far: gap on runs not used for the fit, by level", self.closure),
             )
         ):
-            where = (0, 0, 1, 2) if place == 0 else (1, place - 1, 1, 1)
-            pictures.addWidget(self._card(title, widget), *where)
+            pictures.addWidget(self._card(title, widget), *divmod(place, 2))
         pictures.setRowStretch(0, 1)
         pictures.setRowStretch(1, 1)
         below = QHBoxLayout()
@@ -143,7 +145,7 @@ class GapPage(QWidget):
         """Take over a theme."""
         self._colours = colours
         self._holder.setFixedWidth(colours.side_px(310))
-        for view in (self.map, self.evidence, self.closure):
+        for view in (self.map, self.traces, self.evidence, self.closure):
             view.restyle(colours)
         self._show_verdict()
 
@@ -248,6 +250,7 @@ class GapPage(QWidget):
     def _show(self, path: Path, result: dict[str, Any]) -> None:
         self.result, self._result_file = result, path
         self.map.show_cells(map_cells(self.result))
+        self.traces.show_traces(self.result.get("notes", {}).get("traces", []))
         self.evidence.show_bars(evidence_bars(self.result))
         self.closure.show_bars(closure_bars(self.result))
         self._show_verdict()
