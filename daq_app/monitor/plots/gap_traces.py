@@ -24,6 +24,7 @@ class GapTraces(QWidget):
         self._colours = DARK
         self._trace: Mapping[str, Any] | None = None
         self.legend = QLabel()
+        self.legend.setWordWrap(True)
         self.rotation = Plot("", "θ  (mrad)", "")
         self.left = Plot("", "left  (mrad)", "time from release  (s)")
         self.left.setXLink(self.rotation)
