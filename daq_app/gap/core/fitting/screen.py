@@ -16,7 +16,7 @@ from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.fitting import dense
 from daq_app.gap.core.fitting.experiment import Experiment
-from daq_app.gap.core.fitting.fit import Fit, Known, starts
+from daq_app.gap.core.fitting.fit import Fit, starts
 from daq_app.gap.core.fitting.likelihood import Sizes
 from daq_app.gap.core.fitting.linear import Linear
 from daq_app.gap.core.fitting.problem import Columns, Linearised, Problem
@@ -83,26 +83,20 @@ class Base:
         nominal = Sizes.nominal(experiment).discrepancy
         self.strict = self.robust.under(Sizes(found.sizes.log_scatter, nominal))
 
-    def screened(self, effect: Effect, hint: Known | None = None) -> Screened:
-        """The best step from any start of the effect; with a `hint`, unit coordinates, from there alone."""
+    def screened(self, effect: Effect) -> Screened:
+        """The best step from any start of the effect."""
         problem = Problem(self.experiment, (*self.effects, effect))
         base = problem.start(dict(zip(_keys(self.problem), self.u.tolist(), strict=True)))
         known = set(_keys(self.problem))
-        if hint is not None:
-            own = {key: u for key, u in hint.items() if key not in known}
-            hint = {**dict(zip(_keys(self.problem), self.u.tolist(), strict=True)), **own}
-        every = starts(problem, base, dict.fromkeys(known, 0.0))
         robust: list[tuple[Step, _Attached]] = []
         strict: list[tuple[Step, _Attached]] = []
-        for u in every if hint is None else [problem.start(hint), *every]:
+        for u in starts(problem, base, dict.fromkeys(known, 0.0)):
             lines = [problem.linearise(i, u, None, self.columns, False) for i in range(len(problem.runs))]
             if not all(np.all(np.isfinite(line.residual)) for line in lines):
                 continue  # the model diverges there
             for kept, linear in ((robust, self.robust), (strict, self.strict)):
                 attached = _Attached(linear, problem, u, lines, effect.name)
                 kept.append((attached.step(), attached))
-            if hint is not None:
-                break
         first = max(robust, key=lambda entry: entry[0].gain)
         shared = [k for k, q in enumerate(first[1].unknowns) if problem.unknowns[q].run is None]
         spread = np.sqrt(np.diag(np.linalg.inv(first[1].own)))[shared]

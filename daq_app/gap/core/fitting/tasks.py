@@ -45,12 +45,10 @@ class ScreenTask:
     base: tuple[Effect, ...]
     found: Fit
     effects: tuple[Effect, ...]
-    hints: tuple[dict[tuple[str, int | None], float] | None, ...]
-    """For each effect: where to start from, or None for all of its starts."""
 
     def run(self, experiment: Experiment, frozen: Columns) -> list[Screened]:
         base = Base(experiment, self.base, self.found, {**frozen, **self.found.columns})
-        return [base.screened(e, hint) for e, hint in zip(self.effects, self.hints, strict=True)]
+        return [base.screened(effect) for effect in self.effects]
 
 
 @dataclass(frozen=True, slots=True)

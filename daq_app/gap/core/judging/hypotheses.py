@@ -61,7 +61,9 @@ class Hypotheses:
         self._keep(null)
         self._extend(NULL, "single effects", with_probes=True)
         for count in range(2, min(self.options.causes, len(self.policy.prior_count)) + 1):
-            for lead in self._leads(count - 1):
+            leads = self._leads(count - 1)
+            self._finish(leads, f"{count} effects together")
+            for lead in leads:
                 self._extend(lead, f"{count} effects together")
         self._make_consistent()
         self._polish()
@@ -111,17 +113,10 @@ class Hypotheses:
         share = max(1, -(-len(effects) // (3 * self.options.workers)))
         named = effects_of(base, self.library)
         tasks = [
-            ScreenTask(named, self.fits[base], part, tuple(self._hint(base, e) for e in part))
+            ScreenTask(named, self.fits[base], part)
             for part in (tuple(effects[k : k + share]) for k in range(0, len(effects), share))
         ]
         return {found.effect: found for part in self.workers.run(tasks, text) for found in part}
-
-    def _hint(self, base: Hypothesis, effect: Effect) -> dict[tuple[str, int | None], float] | None:
-        """Beside other effects an effect is started from where it ended alone."""
-        if base == NULL:
-            return None
-        alone = self.fits.get((effect.name,))
-        return alone.known() if alone else self.alone[effect.name].strict.known
 
     def _promises(self, screened: Screened) -> bool:
         return max(screened.robust.gain, screened.strict.gain) > self.policy.further_nats
@@ -158,12 +153,16 @@ class Hypotheses:
         ranked = [r for r in self.ranked() if r.effects in self.fits]
         top = ranked[0].log_evidence
         near = [r.effects for r in ranked[:POLISHED] if r.log_evidence > top - POLISH_REACH]
+        self._finish(near, "the best once more")
+
+    def _finish(self, hypotheses: Sequence[Hypothesis], text: str) -> None:
+        """Fit hypotheses to the end with exact Jacobians: what stands on one is judged at its end."""
         tasks = [
             FitTask(effects_of(h, self.library), self.fits[h].known(), self.fits[h].sizes)
-            for h in near
+            for h in hypotheses
             if not self.fits[h].columns
         ]
-        for result in self.workers.run(tasks, "the best once more"):
+        for result in self.workers.run(tasks, text):
             # What was worked out exactly takes the place of what was not, better or not.
             self.fits[result.effects] = result
             self.evidence[result.effects] = result.log_evidence
