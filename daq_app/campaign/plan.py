@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from daq_app.campaign.description import FieldSpec, Publication
 from daq_app.campaign.names import TestName, TestSeries
 from daq_app.config import ConfigError, Problem
 from daq_app.config.toml_file import parse_toml, read_text
@@ -57,6 +58,10 @@ class Campaign(BaseModel):
     rigs: dict[_Word, str] = Field(default_factory=dict)
     """Specimen → rig file, relative to the campaign file (absolute once loaded from a file)."""
     sequence: Annotated[tuple[Step, ...], Field(min_length=1)]
+    publication: Publication | None = None
+    """What a published folder says of the data; None for a campaign that is not published."""
+    fields: tuple[FieldSpec, ...] = ()
+    """What is noted of every test beyond its notes."""
 
     @cached_property
     def tests(self) -> tuple[PlannedTest, ...]:

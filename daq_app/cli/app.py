@@ -46,6 +46,10 @@ _COMMANDS: Final[Mapping[str, _Entry]] = {
     ),
     "keys": _Entry(("record.commands",), "Keys for viewers beyond this machine."),
     "campaign": _Entry(("campaign.commands",), "Plan and follow a campaign of tests."),
+    "publish": _Entry(
+        ("campaign.publish",),
+        "Make a folder that a repository takes: data, tables, figures, README, licence, metadata, checksums.",
+    ),
     "analyse": _Entry(
         ("analyse.commands",),
         "Analyse a recorded test: θ0, impacts, peaks, speeds, periods, r by each method, base joint.",

@@ -50,7 +50,12 @@ def _fill(file: Any, selection: Selection, guarded: GuardedFile) -> None:
         zero_ns = started_ns - round(selection.run.first_sample / selection.run.rate_hz * 1e9)
         zero = np.datetime_as_string(np.datetime64(zero_ns, "ns"), unit="us").replace("T", " ")
         time.attrs.update(
-            {"standard_name": "time", "units": f"seconds since {zero}Z", "calendar": "standard"}
+            {
+                "standard_name": "time",
+                "units": f"seconds since {zero}Z",
+                "calendar": "standard",
+                "units_metadata": "leap_seconds: utc",  # the run's own clock counts every second
+            }
         )
     else:
         time.attrs["units"] = "s"  # no wall clock is known: an axis of seconds, which CF takes for no date
