@@ -2,6 +2,10 @@
 
 The child's standard input is a pipe that only the parent holds: when the parent dies, even by kill −9,
 the pipe closes and the child ends at once. Works on every platform; nothing is left behind.
+
+A thread that waits on the pipe holds a lock of its file on Windows, and a library that looks at standard
+input while it is loaded waits for that lock for ever. So the child keeps the pipe to itself before it
+waits: standard input is the null device from then on.
 """
 
 from __future__ import annotations
@@ -13,6 +17,31 @@ import subprocess
 import sys
 import threading
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TextIO
+
+from daq_app.streams import CHILD_ENVIRONMENT, use_utf8
+
+
+def program() -> str:
+    """The interpreter for child processes.
+
+    A window that was started by pythonw.exe has children with standard streams: python.exe beside it.
+    """
+    own = Path(sys.executable)
+    console = own.with_name("python.exe")
+    return str(console) if own.name.lower() == "pythonw.exe" and console.is_file() else sys.executable
+
+
+def apart() -> dict[str, Any]:
+    """Options of `subprocess.Popen` for a child that no terminal ends, neither by Ctrl-C nor by closing.
+
+    On Windows the child gets a console of its own that is never shown: without one (DETACHED_PROCESS)
+    each of its own children would open a window.
+    """
+    if sys.platform == "win32":
+        return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP | subprocess.CREATE_NO_WINDOW}
+    return {"start_new_session": True}
 
 
 def start_guarded(
@@ -25,19 +54,16 @@ def start_guarded(
     minds the end of its standard input itself.
     """
     guard = [] if reads_input else ["daq_app.guarded"]
-    apart = (
-        {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)}
-        if sys.platform == "win32"
-        else {"start_new_session": True}
-    )
     return subprocess.Popen(
-        [sys.executable, "-u", "-m", *guard, module, *arguments],
+        [program(), "-u", "-m", *guard, module, *arguments],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL if quiet else None,
         text=True,
         encoding="utf-8",
-        **apart,
+        errors="replace",
+        env={**os.environ, **CHILD_ENVIRONMENT},
+        **apart(),
     )
 
 
@@ -55,8 +81,17 @@ def end_guarded(process: subprocess.Popen[str], grace_s: float = 2.0) -> None:
         process.stdout.close()
 
 
-def _end_with_parent() -> None:
-    while os.read(0, 4096):
+def keep_input() -> TextIO:
+    """Take the pipe from standard input, which becomes the null device. Returns the pipe as text, UTF-8."""
+    pipe = os.dup(0)
+    null = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(null, 0)
+    os.close(null)
+    return os.fdopen(pipe, encoding="utf-8")
+
+
+def _end_with_parent(pipe: TextIO) -> None:
+    while pipe.read(4096):
         pass
     os._exit(0)
 
@@ -64,7 +99,8 @@ def _end_with_parent() -> None:
 def main() -> None:
     """Watch the parent, then become the module."""
     module, *arguments = sys.argv[1:]
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    use_utf8()
+    threading.Thread(target=_end_with_parent, args=(keep_input(),), daemon=True).start()
     sys.argv = [module, *arguments]
     runpy.run_module(module, run_name="__main__", alter_sys=True)
 

@@ -16,6 +16,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from daq_app.extras import missing_extra
+from daq_app.streams import use_utf8
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +140,7 @@ def _root(
 
 def main() -> None:
     """Entry point of the console script."""
+    use_utf8()
     # The matrices here are small: threads of the linear algebra spin more than they help, and take
     # processor time from the acquisition. Read by NumPy when it is loaded, by this process and its children.
     for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):

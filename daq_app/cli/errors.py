@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Final
 
 import typer
@@ -38,6 +39,13 @@ def print_problems(problems: tuple[Problem, ...] | list[Problem]) -> None:
         print_paragraph("Error", str(problem))
     if len(problems) > 1:
         print_paragraph("Problems", f"{len(problems)} in all; nothing was started")
+
+
+def say_other_name(asked: Path, written: Path) -> None:
+    """A warning where a file could not have the name that was asked for."""
+    if written != asked:
+        text = f"{asked} is open in another program; the new one is {written.name}"
+        print_paragraph("Other name", text, style="bold yellow")
 
 
 @contextmanager

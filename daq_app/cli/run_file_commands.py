@@ -15,7 +15,7 @@ from rich.progress import Progress
 from rich.table import Table
 from rich.text import Text
 
-from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
+from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported, say_other_name
 from daq_app.config import parse_rig
 from daq_app.config.toml_file import read_text
 from daq_app.runfile import (
@@ -237,6 +237,8 @@ def export_command(
             derive=derived_of if derived else lambda run: None,
             decimal=decimal,
         )
+    if not place.is_dir():
+        say_other_name(place, path)
     typer.echo(f"{path}: written, {path.stat().st_size / 1e6:.1f} MB")
 
 

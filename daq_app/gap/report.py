@@ -51,8 +51,8 @@ def write_report(result: Diagnosis, path: Path, runs: Sequence[GapRun] = ()) -> 
         )
     )
     return [
-        write_whole(path, html.encode("utf-8")),
-        write_whole(path.with_suffix(".pdf"), _pdf(result, shown, maps)),
+        write_whole(path, html.encode("utf-8"), other_name=True),
+        write_whole(path.with_suffix(".pdf"), _pdf(result, shown, maps), other_name=True),
     ]
 
 

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import sys
+import time
 from pathlib import Path
+from typing import Final
 
 if sys.platform == "darwin":
     import fcntl
+
+_REPLACE_WAITS_S: Final = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
+"""Waits between attempts to give a file its name, 1.6 s in all; a virus scanner lets go within them
+(assumed). Longer waits keep the operator waiting where a person has the file open."""
 
 
 def create_anew(path: Path) -> int:
@@ -23,20 +30,20 @@ def create_anew(path: Path) -> int:
     return os.open(path, flags, 0o644)
 
 
-def write_whole(path: Path, content: bytes | str) -> Path:
+def write_whole(path: Path, content: bytes | str, *, other_name: bool = False) -> Path:
     """Write a file beside its name, flush it, and give it its name: no reader ever sees a part of it.
 
-    Raises `OSError`; what stood under the name is untouched then.
+    A page that is open in another program on Windows cannot be replaced: with `other_name` it is written
+    as ``NAME (2)``. Returns the file's path. Raises `OSError`; what stood under the name is untouched then.
     """
     data = content.encode() if isinstance(content, str) else content
     beside = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         with os.fdopen(create_anew(beside), "wb") as file:
             file.write(data)
-        replace_durably(beside, path)
+        return replace_durably(beside, path, other_name=other_name)
     finally:
         beside.unlink(missing_ok=True)
-    return path
 
 
 def fsync_data(fd: int) -> None:
@@ -71,8 +78,31 @@ def fsync_file(path: Path) -> None:
         os.close(fd)
 
 
-def replace_durably(temporary: Path, final: Path) -> None:
-    """Give a finished, flushed file its name in one step that survives the death of the machine."""
+def replace_durably(temporary: Path, final: Path, *, other_name: bool = False) -> Path:
+    """Give a finished, flushed file its name in one step that survives the death of the machine.
+
+    On Windows a name cannot be given while another program (a viewer, a virus scanner) has the file open
+    that bears it. That is waited for; then, with `other_name`, the file is called ``NAME (2)`` and so on.
+    Returns the name it has. Raises `OSError`, `PermissionError` where the name stays taken.
+    """
     fsync_file(temporary)
-    temporary.replace(final)
+    for wait_s in (*_REPLACE_WAITS_S, None):
+        try:
+            temporary.replace(final)
+            break
+        except PermissionError:
+            if wait_s is not None:
+                time.sleep(wait_s)
+            elif other_name and final.is_file():
+                final = _free_name(final)
+                temporary.replace(final)
+            else:
+                raise
     fsync_folder(final.parent)
+    return final
+
+
+def _free_name(path: Path) -> Path:
+    """``report (2).pdf`` for ``report.pdf``, or the first higher number that is free."""
+    numbered = (path.with_name(f"{path.stem} ({number}){path.suffix}") for number in itertools.count(2))
+    return next(name for name in numbered if not name.exists())

@@ -16,10 +16,12 @@ import sys
 import threading
 from dataclasses import asdict
 from pathlib import Path
+from typing import TextIO
 
 import psutil
 
 from daq_app.acquisition.closing.finaliser import Finished
+from daq_app.guarded import keep_input
 
 
 def finalise_job(journal: Path, out: Path) -> Finished:
@@ -95,8 +97,8 @@ def _do(job: dict[str, str]) -> Finished:
     return Finished(False, f"There is no job like {job}")
 
 
-def _listen(jobs: queue.SimpleQueue[str]) -> None:
-    for line in sys.stdin:
+def _listen(pipe: TextIO, jobs: queue.SimpleQueue[str]) -> None:
+    for line in pipe:
         jobs.put(line)
     os._exit(0)
 
@@ -109,7 +111,7 @@ def main() -> None:
     answers = sys.stdout
     sys.stdout = sys.stderr  # whatever a library prints must not be taken for an answer
     jobs: queue.SimpleQueue[str] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(jobs,), daemon=True).start()
+    threading.Thread(target=_listen, args=(keep_input(), jobs), daemon=True).start()
     import daq_app.acquisition.closing.derive  # noqa: F401  # loaded now, so that the first run need not wait
 
     while True:

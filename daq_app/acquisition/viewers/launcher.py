@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import secrets
 import subprocess
-import sys
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
 
 from daq_app.acquisition.messages.options import READY
 from daq_app.acquisition.viewers.client import AcquisitionClient
+from daq_app.guarded import apart, program
+from daq_app.streams import CHILD_ENVIRONMENT
 
 _START_LIMIT_S = 240.0
 """Loading everything and starting the simulated server, on a machine that is busy."""
@@ -35,21 +36,16 @@ class AcquisitionProcess:
     def __init__(self, options: Sequence[str], environment: Mapping[str, str] | None = None) -> None:
         """Start it and wait until it listens. Raises `AcquisitionDied`."""
         self.token = secrets.token_urlsafe(24)
-        apart = (
-            {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)}
-            if sys.platform == "win32"
-            else {"start_new_session": True}
-        )
         self.process = subprocess.Popen(
-            [sys.executable, "-u", "-m", "daq_app.acquisition", *options],
+            [program(), "-u", "-m", "daq_app.acquisition", *options],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
             encoding="utf-8",
             errors="replace",
-            env={**os.environ, **(environment or {}), "DAQ_APP_TOKEN": self.token},
-            **apart,
+            env={**os.environ, **CHILD_ENVIRONMENT, **(environment or {}), "DAQ_APP_TOKEN": self.token},
+            **apart(),
         )
         self.address = ""
         self._said: deque[str] = deque(maxlen=50)

@@ -277,7 +277,7 @@ def _write(path: Path, header: Sequence[str], rows: Sequence[Sequence[object]]) 
     writer = csv.writer(text)
     writer.writerow(header)
     writer.writerows([["" if _missing(cell) else cell for cell in row] for row in rows])
-    return write_whole(path, text.getvalue())
+    return write_whole(path, text.getvalue(), other_name=True)
 
 
 def _missing(cell: object) -> bool:

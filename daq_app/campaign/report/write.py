@@ -111,12 +111,11 @@ def write_report(
         document = pdf()
     written = tables.write_csv(folder, content.places, tests, restitution, content.repetitions)
     for picture in drawn:
-        path = folder / f"{picture.name}.svg"
-        path.write_text('<?xml version="1.0" encoding="utf-8"?>\n' + picture.svg, encoding="utf-8")
-        written.append(path)
+        svg = '<?xml version="1.0" encoding="utf-8"?>\n' + picture.svg
+        written.append(write_whole(folder / f"{picture.name}.svg", svg, other_name=True))
     written += [
-        write_whole(folder / "report.html", html.encode()),
-        write_whole(folder / "report.pdf", document),
+        write_whole(folder / "report.html", html.encode(), other_name=True),
+        write_whole(folder / "report.pdf", document, other_name=True),
     ]
     return written
 

@@ -88,8 +88,8 @@ def write_result(run: Path, test: TestSummary, earlier: Sequence[TestSummary] = 
         )
     )
     return [
-        write_whole(run.with_suffix(".result.html"), html.encode()),
-        write_whole(run.with_suffix(".result.pdf"), _pdf(test, figure, rows)),
+        write_whole(run.with_suffix(".result.html"), html.encode(), other_name=True),
+        write_whole(run.with_suffix(".result.pdf"), _pdf(test, figure, rows), other_name=True),
     ]
 
 

@@ -42,7 +42,7 @@ def write_outputs(analysis: TestAnalysis, folder: Path, stem: str) -> list[Path]
 
 
 def _write(path: Path, text: str) -> Path:
-    return write_whole(path, text)
+    return write_whole(path, text, other_name=True)
 
 
 def _cycles_csv(analysis: TestAnalysis) -> str:
@@ -124,4 +124,4 @@ def _picture(analysis: TestAnalysis, path: Path) -> Path:
 def _save(figure: Any, path: Path) -> Path:
     picture = io.StringIO()
     figure.savefig(picture, format="svg")
-    return write_whole(path, picture.getvalue())
+    return write_whole(path, picture.getvalue(), other_name=True)

@@ -16,7 +16,7 @@ from rich.table import Table
 
 from daq_app.campaign.status import CampaignStatus
 from daq_app.cli.campaign.progress import DEFAULT_PLAN, open_plan, progress_bar
-from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
+from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported, say_other_name
 from daq_app.workers import warm_up
 
 if TYPE_CHECKING:
@@ -63,9 +63,12 @@ def report(
         made = time.strftime("%Y-%m-%d %H:%M", time.localtime())
         footer = f"Made {made} from {len(found.recorded)} recorded tests in {folder.name}."
         status = CampaignStatus(campaign, found.recorded)
-        write_report(target, campaign.name, status, tests, footer, failures, at_once=workers != 1)
+        written = write_report(target, campaign.name, status, tests, footer, failures, at_once=workers != 1)
+        page = next(path for path in written if path.suffix == ".html")
+        say_other_name(target / "report.html", page)
+        say_other_name(target / "report.pdf", next(path for path in written if path.suffix == ".pdf"))
         rows = table_4_1(tests)
-        _print(rows + mean_of_specimens(rows), tests, target, as_json)
+        _print(rows + mean_of_specimens(rows), tests, page, as_json)
     if any(not failure.flagged_bad for failure in failures):
         raise typer.Exit(EXIT_FAILED)
 
@@ -75,7 +78,7 @@ def _known(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
-def _print(rows: list[RestitutionRow], tests: Sequence[TestSummary], target: Path, as_json: bool) -> None:
+def _print(rows: list[RestitutionRow], tests: Sequence[TestSummary], page: Path, as_json: bool) -> None:
     if as_json:
         document = [
             {
@@ -94,7 +97,7 @@ def _print(rows: list[RestitutionRow], tests: Sequence[TestSummary], target: Pat
             }
             for row in rows
         ]
-        typer.echo(json.dumps({"report": str(target / "report.html"), "table_4_1": document}, indent=1))
+        typer.echo(json.dumps({"report": str(page), "table_4_1": document}, indent=1))
         return
     console = Console()
     if not console.is_terminal:
@@ -113,4 +116,4 @@ def _print(rows: list[RestitutionRow], tests: Sequence[TestSummary], target: Pat
     left_out = [test.test for test in tests if not test.good]
     if left_out:
         console.print(f"Left out of the means: {', '.join(left_out)}", highlight=False, markup=False)
-    console.print(f"Report: {target / 'report.html'}", highlight=False, markup=False, soft_wrap=True)
+    console.print(f"Report: {page}", highlight=False, markup=False, soft_wrap=True)

@@ -14,7 +14,14 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
-from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED, print_paragraph, reported
+from daq_app.cli.errors import (
+    EXIT_BAD_INPUT,
+    EXIT_FAILED,
+    EXIT_INTERRUPTED,
+    print_paragraph,
+    reported,
+    say_other_name,
+)
 from daq_app.config import load_rig
 from daq_app.runfile.durable import write_whole
 from daq_app.runfile.folder import require_replaceable
@@ -103,7 +110,9 @@ def diagnose(
         if report is not None:
             from daq_app.gap.report import write_report
 
-            write_report(result, report, loaded)
+            page, document = write_report(result, report, loaded)
+            say_other_name(report, page)
+            say_other_name(report.with_suffix(".pdf"), document)
     _print(result)
     good = result.decision.verdict in ("effect", "pair", "several", "parameters", "nothing_missing")
     raise typer.Exit(0 if good else EXIT_FAILED)

@@ -13,6 +13,7 @@ import typer
 from rich.console import Console
 
 from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, reported
+from daq_app.streams import let_output_fail
 
 LEVELS: Final = {"L1": 0.15, "L2": 0.25, "L3": 0.35, "L4": 0.40}
 """Release rotation over alpha of each level of the campaign (Table 3.2)."""
@@ -91,6 +92,7 @@ def run(
         backup=backup,
         window=not headless,
     )
+    let_output_fail()
     console = Console(stderr=as_json)
     with reported():
         ended = follow_run(options, console)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ from daq_app.cli.errors import EXIT_FAILED, EXIT_HARDWARE, EXIT_INTERRUPTED
 from daq_app.cli.record.simulated_hand import SimulatedHand
 from daq_app.cli.record.view import RunView
 from daq_app.config import parse_rig
+from daq_app.guarded import program
 
 _QUIET_S = 0.25
 
@@ -108,7 +108,7 @@ def _open_window(process: AcquisitionProcess) -> subprocess.Popen[bytes]:
     """The monitor, in a process of its own: whatever happens to it costs no sample."""
     return subprocess.Popen(
         [
-            sys.executable,
+            program(),
             "-c",
             "from daq_app.cli import main; main()",
             "monitor",

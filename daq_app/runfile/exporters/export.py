@@ -44,6 +44,8 @@ def export_run(
 ) -> Path:
     """Write a run, or the times ``from_s ≤ t < to_s`` of it, in another format; returns the file's path.
 
+    Where another program holds a file of that name open, the new one is called ``NAME (2)``.
+
     `out` is the file, or a folder in which it is named after the run.  An hour of recording needs no
     more memory than a minute (MAT: one channel at a time).  Samples in gaps are NaN.  What `derive`
     computes of the run goes with it: its signals beside the channels, its results within the file and as a
@@ -69,11 +71,11 @@ def export_run(
         try:
             temporary.unlink(missing_ok=True)  # it may be a link to another file
             write(temporary, selection)
-            replace_durably(temporary, final)
+            final = replace_durably(temporary, final, other_name=True)
             if selection.results:
                 test = run.header.test or run.header.run_id
                 temporary.write_text(tidy_csv(test, selection.results, decimal), encoding="utf-8", newline="")
-                replace_durably(temporary, final.with_suffix(RESULTS_SUFFIX))
+                replace_durably(temporary, final.with_suffix(RESULTS_SUFFIX), other_name=True)
         except OSError as error:
             raise RunFileError(
                 f"{final} cannot be written ({error.strerror or error})",
