@@ -68,5 +68,5 @@ def let_output_fail() -> None:
 
     What cannot be written at the end of the process is given up in silence as well.
     """
-    sys.stdout = ForgivingStream(sys.stdout)  # type: ignore[assignment]
-    sys.stderr = ForgivingStream(sys.stderr)  # type: ignore[assignment]
+    sys.stdout = ForgivingStream(sys.stdout)
+    sys.stderr = ForgivingStream(sys.stderr)
