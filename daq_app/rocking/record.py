@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.config.rig import Family, Rig
+from daq_app.config.scaling import Scaling
 
 Floats = NDArray[np.float64]
 
@@ -67,6 +68,8 @@ class TestRecord:
     tared: bool = True
     """Whether zeros were taken with the wall upright before the test."""
     label: str = ""
+    zeros_si: Mapping[str, float] = field(default_factory=dict)
+    """What that zero took off each channel, SI: ranges hold for values with it. 0 where not listed."""
 
     @classmethod
     def from_array(
@@ -99,7 +102,6 @@ class TestRecord:
     @classmethod
     def from_run(cls, run: RunLike, rig: Rig) -> TestRecord:
         """A record on an opened run, which must stay open while it is analysed."""
-
         return cls(
             rig=rig,
             rate_hz=run.rate_hz,
@@ -110,6 +112,7 @@ class TestRecord:
             time_offsets_s={cid: run.header.time_offset_s(cid) for cid in run.channel_ids},
             tared=bool(run.header.tare),
             label=run.header.test or run.header.run_id,
+            zeros_si=_tare_si(rig, run.header.tare),
         )
 
     def family(self, family: Family, axis: str | None = None) -> tuple[str, ...]:
@@ -127,3 +130,10 @@ class TestRecord:
     def time_s(self, offset_s: float = 0.0) -> Floats:
         """(n,) absolute sample index / rate, plus an offset."""
         return np.asarray((self.first_sample + np.arange(self.n_samples)) / self.rate_hz + offset_s)
+
+
+def _tare_si(rig: Rig, tare: Mapping[str, float]) -> dict[str, float]:
+    """A tare in SI, by channel."""
+    channels = [channel for channel in rig.channels if channel.id in tare]
+    gains = Scaling.of(channels).gain[:, 0]
+    return {c.id: tare[c.id] * float(gain) for c, gain in zip(channels, gains, strict=True)}

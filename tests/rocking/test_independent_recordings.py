@@ -52,13 +52,7 @@ def record_of(folder, run, rig):
         )
 
 
-_SECOND = pytest.param(
-    "case_004",
-    marks=pytest.mark.xfail(strict=True, reason="the fitted α of one release from 0.15 α is 0.7 % off"),
-)
-
-
-@pytest.mark.parametrize("name", ["case_003", _SECOND])
+@pytest.mark.parametrize("name", ["case_003", "case_004"])
 def test_r_of_housner_walls_that_somebody_else_simulated(shared_data, configs, name):
     folder = shared_data / "independent" / name
     case = json.loads((folder / "case.json").read_text(encoding="utf-8"))

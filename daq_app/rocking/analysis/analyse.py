@@ -36,6 +36,9 @@ from daq_app.rocking.theory.block import RigidBlock
 
 Floats = NDArray[np.float64]
 
+_GEOMETRY_SHARE_P = 2e-4
+"""Relative standard uncertainty of the fitted p from sensor places that are known to a millimetre (assumed)
+and bend the rotation's scale between small and large angles."""
 _NO_ESTIMATE = RestitutionEstimate("none", ())
 
 
@@ -93,7 +96,8 @@ def _analyse(
     fit = _fit(signals, track, estimates) if options.fit else None
     if fit is not None:
         alpha_sigma = math.hypot(fit.sigma_alpha_rad, instruments.gain_sigma * fit.alpha_rad)
-        fit = replace(fit, sigma_alpha_rad=alpha_sigma)
+        p_sigma = math.hypot(fit.sigma_p_rad_s, _GEOMETRY_SHARE_P * fit.p_rad_s)
+        fit = replace(fit, sigma_alpha_rad=alpha_sigma, sigma_p_rad_s=p_sigma)
     theta0 = theta0_by_family(signals, track, instruments.gain_sigma)
     verdict, findings = verdict_of(instruments, tracks, series, estimates, levels_apart(signals, theta0))
     headline = theta0.get("tiltmeters", theta0["wires"])

@@ -8,7 +8,6 @@ What was found is said, with what was done about it. The recording itself is not
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 from daq_app.rocking.analysis.signals import Lead, Signals, TestTimes, find_phases, quiet_end, read_signals
 from daq_app.rocking.families import words
 from daq_app.rocking.families.finding import FamilyFinding
-from daq_app.rocking.families.hum import Hum, find_hum
+from daq_app.rocking.families.hum import find_hum
 from daq_app.rocking.families.noise import slow_noise
 from daq_app.rocking.families.response import Response, compare
 from daq_app.rocking.families.scales import wrong_scales
@@ -44,6 +43,11 @@ GAIN_SHARE = 0.01
 _COVERED = 0.98
 """LVDTs take the wires' place where they know at least this share of the motion."""
 _COMPARED_IMPACTS = 12
+_NOTABLE_HUM_NOISES = 1.5
+"""Hum above this many times a channel's noise is a warning; below it is taken out and remarked. Ordinary
+laboratories with noise twice the rig file's reach 1."""
+_HOLD_S = 1.0
+"""Slow noise is looked for in this last part of the hold."""
 _GEOMETRY_SHARE = 0.0005
 """Standard uncertainty of a family's gain from the places of its ends, common to all wires."""
 
@@ -111,14 +115,12 @@ def _without_hum(record: TestRecord, ids: tuple[str, ...]) -> tuple[TestRecord, 
         rows = [k for k, channel_id in enumerate(ids) if record.rig.channel(channel_id).family == family]
         rows = [k for k in rows if hum.amplitude[k]]
         if rows:
-            found.append(_hum_finding(hum, rows, ids, name, record.rig.channel(ids[rows[0]]).si_unit))
+            notable = any(abs(hum.amplitude[k]) > _NOTABLE_HUM_NOISES * noises[k] for k in rows)
+            unit = record.rig.channel(ids[rows[0]]).si_unit
+            largest = float(np.abs(hum.amplitude[rows]).max())
+            channels = tuple(ids[k] for k in rows)
+            found.append(words.hum(name, channels, largest, unit, hum.frequency_hz, notable=notable))
     return without_hum(record, ids, hum), found
-
-
-def _hum_finding(hum: Hum, rows: Sequence[int], ids: tuple[str, ...], name: str, unit: str) -> FamilyFinding:
-    largest = float(np.abs(hum.amplitude[list(rows)]).max())
-    channels = tuple(ids[k] for k in rows)
-    return words.hum(name, channels, largest, unit, hum.frequency_hz)
 
 
 def _put_to_scale(record: TestRecord) -> tuple[list[FamilyFinding], Corrections]:
@@ -285,11 +287,19 @@ def _levels(signals: Signals, times: TestTimes, response: Response) -> list[Fami
 
 
 def _with_slow_noise(signals: Signals, times: TestTimes) -> Signals:
-    """The same with half-cycles judged by the noise that long means have at rest."""
+    """The same with half-cycles judged by the noise that long means have while the wall does not move.
+
+    The stiller of hold and rest counts: a held wall may sway on its rope, and a rest may begin with the last
+    impacts.
+    """
+    assert times.release_s is not None
     rate = signals.record.rate_hz
-    still = None if times.rest is None else signals.rotation_rad[times.rest]
-    slow = math.nan if still is None else slow_noise(still, rate)
-    if not math.isfinite(slow):
+    start, stop = np.searchsorted(signals.time_s, [times.release_s - _HOLD_S, times.release_s - 0.02])
+    still = [signals.rotation_rad[start:stop]]
+    if times.rest is not None:
+        still.append(signals.rotation_rad[times.rest])
+    found = [slow for slow in (slow_noise(part, rate) for part in still) if math.isfinite(slow)]
+    if not found:
         return signals
-    settings = replace(signals.settings, slow_noise_rad=max(slow, signals.noise_rad))
+    settings = replace(signals.settings, slow_noise_rad=max(min(found), signals.noise_rad))
     return replace(signals, settings=settings)

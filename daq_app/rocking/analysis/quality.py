@@ -61,8 +61,8 @@ def _sensors(record: TestRecord, signals: Signals) -> list[QualityNote]:
         notes.append(_warn(f"{bad:.2%} of the record has no rotation (gaps); half-cycles there are left out"))
     for name, values in zip(signals.geometry.wires.ids, signals.wires_m, strict=True):
         low, high = record.rig.channel(name).range_si
-        edge = 0.002 * (high - low)
-        if np.any((values <= low + edge) | (values >= high - edge)):
+        edge, zero = 0.002 * (high - low), signals.zeros.get(name, 0.0)
+        if np.any((values <= low + edge - zero) | (values >= high - edge - zero)):
             notes.append(_warn(f"wire {name} reached the end of its range"))
     joint = signals.joint
     if joint is None:

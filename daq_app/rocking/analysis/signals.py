@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -57,6 +57,8 @@ class Signals:
     joint: JointMotion | None
     lvdt_noise_rad: float
     fused: Fused | None
+    zeros: Mapping[str, float]
+    """What was taken off each wire and LVDT as its zero, m: ranges hold for values with it."""
     zeroed_at_rest: bool = False
     """Whether the zeros were taken from the rest after the test."""
 
@@ -77,13 +79,17 @@ class Signals:
         settled = slice(
             min(rest.start + round(TILT_SETTLING_S * self.record.rate_hz), rest.stop - 1), rest.stop
         )
+        levels = [_levels(values, rest) for values in (self.wires_m, self.openings_m)]
+        ids = (*self.record.family("wire"), *self.record.family("lvdt"))
+        taken = zip(ids, np.concatenate(levels).tolist(), strict=True)
         zeroed = _combine(
             self.record,
             self.geometry,
-            _zero(self.wires_m, rest),
-            _zero(self.tilts_rad, settled),
-            _zero(self.openings_m, rest),
+            self.wires_m - levels[0][:, None],
+            self.tilts_rad - _levels(self.tilts_rad, settled)[:, None],
+            self.openings_m - levels[1][:, None],
             self.lead,
+            {name: self.zeros.get(name, 0.0) + level for name, level in taken},
         )
         return replace(zeroed, zeroed_at_rest=True)
 
@@ -127,6 +133,7 @@ def read_signals(record: TestRecord, lead: Lead = "wires") -> Signals:
         record.load(tilts) if tilts else empty,
         _aligned(record.load(lvdts), lags) if lvdts else empty,
         lead,
+        record.zeros_si,
     )
 
 
@@ -137,6 +144,7 @@ def _combine(
     tilts_rad: Floats,
     openings_m: Floats,
     lead: Lead,
+    zeros: Mapping[str, float],
 ) -> Signals:
     combined = geometry.rotation(wires_m)
     wire_rotation = combined.rotation_rad
@@ -150,7 +158,8 @@ def _combine(
     except ValueError:
         base = None  # too few LVDTs for a profile: said in the quality notes
     if base is not None:
-        joint = base.motion(openings_m)
+        taken = np.array([[zeros.get(channel_id, 0.0)] for channel_id in lvdts])
+        joint = replace(base, ranges_m=base.ranges_m - taken).motion(openings_m)
         lvdt_noise = white_noise(joint.rotation_rad)
         fused = fuse(wire_rotation, joint.rotation_rad, wire_noise, max(lvdt_noise, 1e-7))
     leads = lead == "lvdts" and joint is not None
@@ -182,6 +191,7 @@ def _combine(
         joint=joint,
         lvdt_noise_rad=lvdt_noise,
         fused=fused,
+        zeros=zeros,
     )
 
 
@@ -229,10 +239,11 @@ def quiet_end(signals: Signals) -> slice | None:
     return slice(first * size, frames.size * size) if frames.size - first >= need else None
 
 
-def _zero(values: Floats, rest: slice) -> Floats:
+def _levels(values: Floats, rest: slice) -> Floats:
+    """Median of each row (channels,) over a rest; 0 where it has none."""
     if not values.size:
-        return values
-    return np.asarray(values - np.nan_to_num(np.nanmedian(values[:, rest], axis=1))[:, None])
+        return np.zeros(values.shape[0])
+    return np.asarray(np.nan_to_num(np.nanmedian(values[:, rest], axis=1)))
 
 
 def _aligned(rows: Floats, lags: Sequence[float]) -> Floats:

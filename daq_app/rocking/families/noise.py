@@ -17,7 +17,8 @@ _FEWEST_MEANS = 12
 def slow_noise(signal: Floats, rate_hz: float) -> float:
     """rms of one sample of the white noise whose 25 ms means scatter as those of `signal` (n,) do.
 
-    The signal shows a wall at rest; slow drift falls away by second differences. NaN for less than 0.3 s.
+    The signal shows a wall at rest; slow drift falls away by second differences. The median of their sizes
+    counts, so that a wall that still rocks through a third of it does no harm. NaN for less than 0.3 s.
     """
     size = max(1, round(_MEAN_S * rate_hz))
     groups = signal.size // size
@@ -28,5 +29,5 @@ def slow_noise(signal: Floats, rate_hz: float) -> float:
     second = second[np.isfinite(second)]
     if second.size < _FEWEST_MEANS - 2:
         return math.nan
-    # A second difference of white noise has six times its variance.
-    return float(np.sqrt(np.mean(second**2) / 6.0 * size))
+    # A second difference has six times the variance; 1.4826 medians of its size are one rms of a normal one.
+    return 1.4826 * float(np.median(np.abs(second))) * math.sqrt(size / 6.0)

@@ -28,15 +28,23 @@ def families_by_name() -> dict[str, Family]:
 
 
 def hum(
-    family: str, channels: tuple[str, ...], amplitude: float, unit: str, frequency_hz: float
+    family: str,
+    channels: tuple[str, ...],
+    amplitude: float,
+    unit: str,
+    frequency_hz: float,
+    *,
+    notable: bool,
 ) -> FamilyFinding:
+    """Hum that was taken out; a warning where it is `notable`, a remark where it is little above noise."""
+    severity: Literal["info", "warning"] = "warning" if notable else "info"
     scale, shown = _IN_UNIT.get(unit, (1.0, unit))
     many = f"{len(channels)} channels" if len(channels) > 1 else channels[0]
     text = (
         f"{family}: mains hum of up to {amplitude * scale:.3g} {shown} at {frequency_hz:.2f} Hz in {many}; "
         "it was taken out. Usual causes: a missing shield, an earth loop, a cable beside mains"
     )
-    return FamilyFinding(family, channels, "hum", amplitude, unit, "removed", "warning", text)
+    return FamilyFinding(family, channels, "hum", amplitude, unit, "removed", severity, text)
 
 
 def scale(family: str, factor: float) -> FamilyFinding:

@@ -32,6 +32,8 @@ _SMALLEST_SHARE = 0.02
 
 _POOR = 1.5
 """A fit that leaves more than this many times the noise may have ended in a minimum that is not the least."""
+_CORRELATED_POINTS = 12
+"""Residuals this many points (0.1 s) apart may still be correlated: slow noise, hum, sway of the wall."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,10 +157,24 @@ def _points(
     return t[good], y[good], noise_rad / math.sqrt(size)
 
 
+def _long_run_variance(residuals: Floats) -> float:
+    """Variance that counts for slow parameters: Bartlett-weighted autocovariances (Newey and West 1987).
+
+    At least the plain variance: neighbouring residuals that alternate make nothing better known.
+    """
+    n = residuals.size
+    plain = float(residuals @ residuals) / n
+    lags = range(1, min(_CORRELATED_POINTS, n - 1) + 1)
+    together = sum(
+        (1.0 - k / (_CORRELATED_POINTS + 1.0)) * float(residuals[k:] @ residuals[:-k]) / n for k in lags
+    )
+    return max(plain + 2.0 * together, plain)
+
+
 def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: float) -> MotionFit | None:
     x = found.x
     data = found.fun[: found.fun.size - 3 - (x.size - FIXED)]
-    excess = max(1.0, float(data @ data) / max(data.size - FIXED, 1))
+    excess = max(1.0, _long_run_variance(data) * data.size / max(data.size - FIXED, 1))
     # Data rows are weakened by what the model leaves; priors keep their weight.
     scaled = found.jac.copy()
     scaled[: data.size] /= math.sqrt(excess)
