@@ -79,6 +79,8 @@ class Code(IntEnum):
     TEDS_NOT_CONFIGURABLE = -200791
     ARRAY_SIZES_DIFFER = -200672
     SHUNT_CALIBRATION = -201493
+    NUM_LINES_MISMATCH = -200463
+    WRITE_NUM_CHANS_MISMATCH = -200524
     GET_BEFORE_RESERVED = -200983
     TWO_PART_ORDER = -201194
     NOT_YET_WRITTEN = -200292
@@ -221,6 +223,14 @@ _TEXT: Final[dict[int, str]] = {
     ),
     Code.TEDS_DATA: "The electronic data sheet (TEDS) of the sensor is damaged, or is no data sheet.",
     Code.TEDS_NOT_DETECTED: "No TEDS sensor was detected on the physical channel.",
+    Code.NUM_LINES_MISMATCH: (
+        "Specified read or write operation failed, because the number of lines in the data for a channel "
+        "does not match the number of lines in the channel."
+    ),
+    Code.WRITE_NUM_CHANS_MISMATCH: (
+        "Write cannot be performed, because the number of channels in the data does not match the number "
+        "of channels in the task."
+    ),
     Code.NOT_YET_WRITTEN: "Some of the samples to generate have not been written yet.",
     Code.NO_SYNC: (
         "Devices of this task cannot be synchronized: they have no clock in common. Use devices of "

@@ -58,8 +58,13 @@ def run(folder: Path, parts: list[str]) -> list[dict[str, str]]:
             }
             command = [sys.executable, "-m", "pytest", "-q", "-p", "studies.ni_suite.plugin"]
             command += ["-p", "no:pytest-qt", "-p", "no:cacheprovider", "--timeout", "120", *parts]
-            subprocess.run(command, cwd=folder, env=environment, stdout=subprocess.DEVNULL, check=False)
-            return [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines() if line]
+            said = subprocess.run(
+                command, cwd=folder, env=environment, stdout=subprocess.PIPE, text=True, check=False
+            )
+            lines = results.read_text(encoding="utf-8").splitlines() if results.exists() else []
+            if not any(lines):
+                raise SystemExit(f"NI's suite ran no test; pytest ended with:\n{said.stdout[-2000:]}")
+            return [json.loads(line) for line in lines if line]
     finally:
         server.terminate()
         server.wait()

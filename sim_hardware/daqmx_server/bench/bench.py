@@ -66,6 +66,8 @@ class Bench:
         """Destination terminal → source, as the client has connected them."""
         self.power_up: dict[str, int] = {}
         """What lines, pulls and logic families are set to at power-up."""
+        self.analog_power_up: dict[str, tuple[float, int]] = {}
+        """Value and kind (NI's number) of analogue outputs at power-up, by physical channel."""
         self.data_sheets: dict[str, DataSheet] = {}
         """Data sheets (TEDS) of sensors, by physical channel."""
         self.calibration: dict[tuple[str, str], Any] = {}

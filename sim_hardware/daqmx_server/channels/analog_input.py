@@ -6,7 +6,7 @@ import contextlib
 from dataclasses import dataclass
 from typing import Final
 
-from nidaqmx.constants import Coupling, ExcitationSource, TerminalConfiguration, VoltageUnits
+from nidaqmx.constants import Coupling, ExcitationSource, TEDSUnits, TerminalConfiguration, VoltageUnits
 
 from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.products import Range
@@ -70,7 +70,12 @@ class AnalogInput(VirtualChannel):
     @property
     def quantity(self) -> str:
         """Electrical quantity whose ranges count; empty for a measurement that is not proportional to one."""
-        return QUANTITIES.get(self.measurement, "")
+        return "" if self.in_sensor_units else QUANTITIES.get(self.measurement, "")
+
+    @property
+    def in_sensor_units(self) -> bool:
+        """Whether the reading is in the unit of the sensor's data sheet, which its template scales to."""
+        return self.kind.teds and self.units == _FROM_TEDS
 
     @property
     def unit_per_electrical(self) -> float:
@@ -166,4 +171,5 @@ class AnalogInput(VirtualChannel):
         _ = self.input_range
 
 
+_FROM_TEDS: Final = TEDSUnits.FROM_TEDS.value
 FROM_CUSTOM_SCALE: Final = VoltageUnits.FROM_CUSTOM_SCALE.value

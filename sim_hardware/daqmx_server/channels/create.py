@@ -11,6 +11,8 @@ from sim_hardware.daqmx_server.channels.analog_input import FROM_CUSTOM_SCALE, A
 from sim_hardware.daqmx_server.channels.kinds import KINDS, ChannelKind
 from sim_hardware.daqmx_server.channels.measurements import measurements_of
 from sim_hardware.daqmx_server.channels.scale import CustomScale
+from sim_hardware.daqmx_server.channels.teds import DataSheet
+from sim_hardware.daqmx_server.channels.teds_templates import attributes_from
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory.devices import Device, Inventory, channel_list
@@ -22,6 +24,7 @@ def create_channels(
     rpc: str,
     fields: dict[str, Any],
     existing: set[str],
+    data_sheets: Mapping[str, DataSheet],
 ) -> list[VirtualChannel]:
     """Channels of one request. Raises what NI-DAQmx raises for names and types that do not fit."""
     kind = KINDS[rpc]
@@ -29,6 +32,8 @@ def create_channels(
         channels = _digital(inventory, kind, fields)
     else:
         channels = _single(inventory, scales, kind, fields)
+        if kind.teds:
+            _take_over(data_sheets, channels)
     names = set(existing)
     for channel in channels:
         if channel.name in names:
@@ -60,13 +65,21 @@ def _single(
             out.append(VirtualChannel(name, physical, device, number, kind, attributes, scale))
             continue
         _check_measurement(device, kind, physical)
-        _choose_shunt(attributes)
+        _choose_shunt(kind, attributes)
         _, number = inventory.physical_channel(physical)
         channel = AnalogInput(name, physical, device, number, kind, attributes, scale)
         if "AI_MIN" in attributes and float(attributes["AI_MIN"]) >= float(attributes["AI_MAX"]):
             raise DaqmxError(Code.MIN_NOT_BELOW_MAX, f"Channel Name: {name}")
         out.append(channel)
     return out
+
+
+def _take_over(data_sheets: Mapping[str, DataSheet], channels: list[VirtualChannel]) -> None:
+    """Let each channel have what its sensor's data sheet says; −200709 where there is none."""
+    for channel in channels:
+        if channel.physical not in data_sheets:
+            raise DaqmxError(Code.TEDS_NOT_DETECTED, f"Physical Channel Name: {channel.physical}")
+        channel.attributes |= attributes_from(data_sheets[channel.physical])
 
 
 def _plain(value: Any) -> Any:
@@ -88,10 +101,12 @@ def _check_measurement(device: Device, kind: ChannelKind, physical: str) -> None
         )
 
 
-def _choose_shunt(attributes: dict[str, Any]) -> None:
-    """ "Let the driver choose" means an external shunt where the device has none of its own."""
+def _choose_shunt(kind: ChannelKind, attributes: dict[str, Any]) -> None:
+    """ "Let the driver choose" means the shunt of a multimeter, and an external one everywhere else."""
     if attributes.get("AI_CURRENT_SHUNT_LOC") == CurrentShuntResistorLocation.LET_DRIVER_CHOOSE.value:
-        attributes["AI_CURRENT_SHUNT_LOC"] = CurrentShuntResistorLocation.EXTERNAL.value
+        own = kind.measurement == "CURRENT_ACRMS"
+        chosen = CurrentShuntResistorLocation.INTERNAL if own else CurrentShuntResistorLocation.EXTERNAL
+        attributes["AI_CURRENT_SHUNT_LOC"] = chosen.value
 
 
 def _digital(inventory: Inventory, kind: ChannelKind, fields: dict[str, Any]) -> list[VirtualChannel]:
@@ -112,14 +127,16 @@ def _digital(inventory: Inventory, kind: ChannelKind, fields: dict[str, Any]) ->
         physical = [", ".join(name for _, name, _ in groups)]
         shown = [groups[0][1] + ("..." if len(groups) > 1 else "")]
         lines_of = [tuple(line for _, _, lines in groups for line in lines)]
+        columns_of = [tuple(line for _, _, lines in groups for line in reversed(lines))]
     else:
         lines_of = [(line,) for _, _, lines in groups for line in lines]
+        columns_of = lines_of
         physical = [lines[0] for lines in lines_of]
         shown = physical
     names = _names(str(fields["name_to_assign_to_lines"]), shown)
     return [
-        VirtualChannel(name, place, device, 0, kind, lines=lines)
-        for name, place, lines in zip(names, physical, lines_of, strict=True)
+        VirtualChannel(name, place, device, 0, kind, lines=lines, columns=columns)
+        for name, place, lines, columns in zip(names, physical, lines_of, columns_of, strict=True)
     ]
 
 

@@ -51,6 +51,8 @@ class VirtualChannel:
     is_global: bool = False
     lines: tuple[str, ...] = ()
     """Lines of a digital channel, least significant first."""
+    columns: tuple[str, ...] = ()
+    """The same lines as NI's waveforms order them: single lines as given, a whole port from its highest."""
 
     @property
     def product(self) -> Product:

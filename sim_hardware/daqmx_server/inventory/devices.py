@@ -125,13 +125,15 @@ class Inventory:
     def physical_channel(self, name: str) -> tuple[Device, int]:
         """Device and number of an analogue input such as ``cDAQ1Mod1/ai3``; −200220 or −200170.
 
-        Internal channels (``Dev1/_ao0_vs_aognd``) have the number −1.
+        Internal channels (``Dev1/_ao0_vs_aognd``) and multimeters (``myDAQ1/dmm``) have the number −1.
         """
         device, terminal = self.split(name)
         known = {channel.partition("/")[2]: n for n, channel in enumerate(device.physical_channels)}
         if terminal in known:
             return device, known[terminal]
         if device.physical_channels and _INTERNAL.match(terminal):
+            return device, -1
+        if terminal == "dmm" and device.product is not None and "dmm" in device.product.measurements:
             return device, -1
         raise _no_channel(device, terminal or name)
 

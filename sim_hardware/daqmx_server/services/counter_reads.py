@@ -81,9 +81,10 @@ def _power(task: Task, channel: VirtualChannel) -> tuple[float, float]:
 
 
 def _power_codes(task: Task, channel: VirtualChannel) -> tuple[float, float]:
+    """Codes of a power channel; 0 while its output is off."""
     volts, amperes = _power(task, channel)
     if math.isnan(volts):
-        return -(2**15), -(2**15)
+        return 0, 0
     return int(volts * _VOLT_CODES), int(amperes * _AMPERE_CODES)
 
 

@@ -224,7 +224,7 @@ _TEDS: Final[dict[str, Callable[[DataSheet], Any]]] = {
     "PHYSICAL_CHAN_TEDS_SERIAL_NUM": lambda sheet: sheet.serial,
     "PHYSICAL_CHAN_TEDS_VERSION_NUM": lambda sheet: sheet.version,
     "PHYSICAL_CHAN_TEDS_VERSION_LETTER": lambda sheet: sheet.letter,
-    "PHYSICAL_CHAN_TEDS_BIT_STREAM": lambda sheet: bytes(sheet.bits),
+    "PHYSICAL_CHAN_TEDS_BIT_STREAM": lambda sheet: sheet.stream,
     "PHYSICAL_CHAN_TEDS_TEMPLATE_I_DS": lambda sheet: [sheet.template],
 }
 

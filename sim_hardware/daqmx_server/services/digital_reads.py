@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+import hightime
 import numpy as np
 from ni.protobuf.types.waveform_conversion import digital_waveform_to_protobuf
 from nidaqmx._stubs import nidaqmx_pb2 as pb
@@ -87,15 +88,22 @@ def read_waveforms(bench: Bench, request: Any) -> Any:
     mode = fields["waveform_attribute_mode"]
     for words, channel in zip(got.codes, chosen_channels(task, got), strict=True):
         states = line_states(words[None, :], len(channel.lines))[0]
-        waveform = DigitalWaveform.from_lines(states, dtype=np.uint8)
-        if mode & WaveformAttributeMode.TIMING.value and task.is_buffered:
-            interval = np.timedelta64(0, "s").astype(object)
-            interval = type(interval)(seconds=1.0 / task.timing.rate_hz)
-            waveform.timing = Timing.create_with_regular_interval(interval, bench.utc(got.first_time_s))
+        order = [channel.lines.index(line) for line in channel.columns]
+        waveform = DigitalWaveform.from_lines(np.ascontiguousarray(states[:, order]), dtype=np.uint8)
+        if mode & WaveformAttributeMode.TIMING.value:
+            waveform.timing = _timing(task, bench.utc(got.first_time_s))
         if mode & WaveformAttributeMode.EXTENDED_PROPERTIES.value:
             waveform.channel_name = channel.name
+            waveform.extended_properties["NI_LineNames"] = ", ".join(channel.columns)
         reply.waveforms.append(digital_waveform_to_protobuf(waveform))
     return reply
+
+
+def _timing(task: Task, start: hightime.datetime) -> Timing[Any, Any, Any]:
+    """Instant of the first sample, and the interval of a clocked task."""
+    if not task.is_buffered:
+        return Timing.create_with_no_interval(timestamp=start)
+    return Timing.create_with_regular_interval(hightime.timedelta(seconds=1.0 / task.timing.rate_hz), start)
 
 
 def digital_read_handlers() -> dict[str, Handler]:

@@ -13,7 +13,7 @@ from sim_hardware.daqmx_server.channels.create import create_channels
 from sim_hardware.daqmx_server.channels.kinds import KINDS
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.requests import fields_of
-from sim_hardware.daqmx_server.services.attributes import Handler, unsupported
+from sim_hardware.daqmx_server.services.attributes import Handler
 from sim_hardware.daqmx_server.tasks.task import Task, task_named
 
 _NEW, _ATTACH = 1, 2
@@ -84,7 +84,11 @@ def _create_handler(rpc: str) -> Handler:
     def create(bench: Bench, request: Any) -> Any:
         task = task_named(bench, request.task.name)
         existing = {channel.name for channel in task.channels}
-        task.add_channels(create_channels(bench.inventory, bench.scales, rpc, fields_of(request), existing))
+        task.add_channels(
+            create_channels(
+                bench.inventory, bench.scales, rpc, fields_of(request), existing, bench.data_sheets
+            )
+        )
         return reply()
 
     return create
@@ -119,9 +123,9 @@ def configure_logging(bench: Bench, request: Any) -> Any:
 
 def start_new_file(bench: Bench, request: Any) -> Any:
     task = task_named(bench, request.task.name)
-    if not task.log.enabled:
-        raise unsupported("Read_Logging_FilePath")
-    task.log.new_file(request.file_path)
+    task.reading["LOGGING_FILE_PATH"] = request.file_path
+    if task.log.enabled:
+        task.log.open()
     return pb.StartNewFileResponse()
 
 

@@ -86,7 +86,7 @@ def saved_channel(bench: Bench, name: str, shown: str, is_global: bool) -> list[
     fields = {field: values[attribute] for field, attribute in kind.attributes.items() if attribute in values}
     fields["physical_channel"] = keys["PhysicalChanName"]
     fields["name_to_assign_to_channel"] = shown
-    channels = create_channels(bench.inventory, bench.scales, rpc, fields, set())
+    channels = create_channels(bench.inventory, bench.scales, rpc, fields, set(), bench.data_sheets)
     return [replace(channel, is_global=is_global) for channel in channels]
 
 

@@ -93,7 +93,7 @@ _FIRST_LINE: Final = constants.PowerUpStates.LOW.value
 def digital_power_up(bench: Bench, request: Any) -> Any:
     device = _device(bench, request.device_name)
     states = [bench.power_up.get(name, _FIRST_LINE) for name in _lines(bench, device, request.channel_name)]
-    return pb.GetDigitalPowerUpStatesResponse(power_up_states=states, power_up_states_raw=states)
+    return pb.GetDigitalPowerUpStatesResponse(power_up_states=states)
 
 
 def set_digital_power_up(bench: Bench, request: Any) -> Any:
@@ -102,6 +102,45 @@ def set_digital_power_up(bench: Bench, request: Any) -> Any:
         for line in _lines(bench, device, [entry.channel_names]):
             bench.power_up[line] = entry.state
     return pb.SetDigitalPowerUpStatesResponse()
+
+
+_HIGH_IMPEDANCE: Final = constants.PowerUpChannelType.CHANNEL_HIGH_IMPEDANCE.value
+
+
+def analog_power_up(bench: Bench, request: Any) -> Any:
+    """Value and kind of each analogue output when the device is switched on; high impedance by default."""
+    states: list[float] = []
+    kinds: list[int] = []
+    for name in channel_list(request.channel_names):
+        _, channel = bench.inventory.named_channel(name, "AO")
+        value, kind = bench.analog_power_up.get(channel, (0.0, _HIGH_IMPEDANCE))
+        states.append(value)
+        kinds.append(kind)
+    return pb.GetAnalogPowerUpStatesWithOutputTypeResponse(
+        state_array=states, channel_type_array=kinds, channel_type_array_raw=kinds
+    )
+
+
+def set_analog_power_up(bench: Bench, request: Any) -> Any:
+    """−200077 for a value beyond the range of the output; then nothing is set."""
+    given = zip(
+        channel_list(request.channel_names), request.state_array, request.channel_type_array, strict=True
+    )
+    wanted: dict[str, tuple[float, int]] = {}
+    for name, value, kind in given:
+        device, channel = bench.inventory.named_channel(name, "AO")
+        assert device.product is not None
+        outputs = device.product.outputs
+        widest = max((high for _, high in outputs.ranges_v or outputs.ranges_a), default=0.0)
+        if abs(value) > widest:
+            raise DaqmxError(
+                Code.INVALID_VALUE,
+                f"Requested Value: {value}\nMaximum Value: {widest}",
+                f"Channel: {channel}",
+            )
+        wanted[channel] = (float(value), int(kind))
+    bench.analog_power_up |= wanted
+    return pb.SetAnalogPowerUpStatesWithOutputTypeResponse()
 
 
 def pulls(bench: Bench, request: Any) -> Any:
@@ -198,6 +237,8 @@ def system_handlers() -> dict[str, Handler]:
         "TristateOutputTerm": tristate_terminal,
         "GetDigitalPowerUpStates": digital_power_up,
         "SetDigitalPowerUpStates": set_digital_power_up,
+        "GetAnalogPowerUpStatesWithOutputType": analog_power_up,
+        "SetAnalogPowerUpStatesWithOutputType": set_analog_power_up,
         "GetDigitalPullUpPullDownStates": pulls,
         "SetDigitalPullUpPullDownStates": set_pulls,
         "GetDigitalLogicFamilyPowerUpState": logic_family,

@@ -63,8 +63,8 @@ class SettingsGroup:
     def reset(self, bench: Bench, request: Any, name: str) -> None:
         task = self._changing(bench, request, name)
         self._settings(task).pop(name, None)
-        if name in _TRIGGER_TYPES:
-            self._settings(task)[name] = triggers.NONE
+        if name in _RESET_TO:
+            self._settings(task)[name] = _RESET_TO[name]
 
     def _changing(self, bench: Bench, request: Any, name: str) -> Task:
         task = task_named(bench, request.task.name)
@@ -82,7 +82,12 @@ class SettingsGroup:
             raise unsupported(name)
 
 
-_TRIGGER_TYPES: Final = ("START_TRIG_TYPE", "REF_TRIG_TYPE")
+_RESET_TO: Final = {
+    "START_TRIG_TYPE": triggers.NONE,
+    "REF_TRIG_TYPE": triggers.NONE,
+    "SAMP_QUANT_SAMP_MODE": constants.AcquisitionType.CONTINUOUS.value,
+}
+"""Values after a reset, where they are not those of a task that nothing was set in."""
 
 
 def _samples_now(task: Task, of: str) -> int:

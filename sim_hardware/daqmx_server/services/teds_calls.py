@@ -29,7 +29,7 @@ def clear_teds(bench: Bench, request: Any) -> Any:
 
 def write_from_array(bench: Bench, request: Any) -> Any:
     """No simulated sensor has a memory: a good data sheet finds nobody to take it."""
-    DataSheet.from_bits(tuple(request.bit_stream))
+    DataSheet.from_stream(request.bit_stream)
     raise DaqmxError(Code.TEDS_NOT_DETECTED, f"Physical Channel Name: {request.physical_channel}")
 
 

@@ -74,6 +74,8 @@ class WatchdogGroup:
     def get(self, bench: Bench, request: Any, name: str) -> Any:
         task = self._task(bench, request)
         if name == "HAS_EXPIRED":
+            if not task.is_reserved:
+                raise DaqmxError(Code.GET_BEFORE_RESERVED, "Property: DAQmx_Watchdog_HasExpired")
             return has_expired(task)
         value = task.watchdog.get(self._key(request, name))
         return metadata.default_of("Watchdog", name) if value is None else value

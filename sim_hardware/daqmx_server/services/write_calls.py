@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -144,8 +145,15 @@ def write_raw(bench: Bench, request: Any) -> Any:
     return pb.WriteRawResponse(samps_per_chan_written=put_out(task, samples, request.auto_start))
 
 
+def _check_count(task: Task, waveforms: Sequence[Any]) -> None:
+    """−200524 unless there is one waveform for each channel."""
+    if len(waveforms) != len(task.channels):
+        raise DaqmxError(Code.WRITE_NUM_CHANS_MISMATCH)
+
+
 def write_analog_waveforms(bench: Bench, request: Any) -> Any:
     task = task_named(bench, request.task.name)
+    _check_count(task, request.waveforms)
     waveforms = [float64_analog_waveform_from_protobuf(waveform) for waveform in request.waveforms]
     samples = np.array([waveform.scaled_data for waveform in waveforms], dtype=np.float64)
     written = put_out(task, samples, request.auto_start)
@@ -153,9 +161,16 @@ def write_analog_waveforms(bench: Bench, request: Any) -> Any:
 
 
 def write_digital_waveforms(bench: Bench, request: Any) -> Any:
+    """States of lines, a column each, in the order of `VirtualChannel.columns`."""
     task = task_named(bench, request.task.name)
-    waveforms = [digital_waveform_from_protobuf(waveform) for waveform in request.waveforms]
-    words = [(waveform.data != 0) @ (2.0 ** np.arange(waveform.signal_count)) for waveform in waveforms]
+    _check_count(task, request.waveforms)
+    words = []
+    for channel, message in zip(task.channels, request.waveforms, strict=True):
+        waveform = digital_waveform_from_protobuf(message)
+        if waveform.signal_count != len(channel.lines):
+            raise DaqmxError(Code.NUM_LINES_MISMATCH, f"Channel Name: {channel.name}")
+        weights = [2.0 ** channel.lines.index(line) for line in channel.columns]
+        words.append((waveform.data != 0) @ np.array(weights))
     written = put_out(task, np.array(words, dtype=np.float64), request.auto_start)
     return pb.WriteDigitalWaveformsResponse(samps_per_chan_written=written)
 

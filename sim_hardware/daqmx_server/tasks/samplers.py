@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol, cast
+from typing import Any, Final, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +67,7 @@ def sampler_of(task: ChannelTask, times: SampleTimes) -> BlockSource:
 def on_demand_sampler(task: ChannelTask, now_s: float) -> BlockSource:
     """Samples taken by software, one after the other at the device's own pace."""
     times = SampleTimes(now_s, max(task.timing.max_rate_hz, 1.0))
-    if task.io == "DI":
+    if task.io in ("DI", "DO"):  # lines that are put out can be read back
         return DigitalSampler(task.channels, times, task.bench.loopback, task.taken_on_demand)
     return sampler_of(task, times)
 
@@ -85,14 +85,31 @@ def pulse_times_s(channel: VirtualChannel) -> tuple[float, float]:
     return ticks[0] / TIMEBASE_HZ, ticks[1] / TIMEBASE_HZ
 
 
+_TIMEBASES_HZ: Final = {"100mhztimebase": 100e6, "20mhztimebase": 20e6, "100khztimebase": 100e3}
+"""Clocks of a card that its counters can listen to."""
+
+
+def _on_device(channel: VirtualChannel, terminal: str) -> str:
+    """Plain name of a terminal; one without a device is on the channel's own."""
+    name = plain(terminal)
+    return name if "/" in name or not name else f"{plain(channel.device.name)}/{name}"
+
+
 def pulses_at(task: ChannelTask, channel: VirtualChannel) -> Pulses | None:
     """The train that reaches a counter input: of the counter output whose terminal it listens to."""
     group = channel.kind.group
     keys = [key for key in channel.attributes if key.startswith(group) and key.endswith("_TERM")]
-    wanted = {plain(str(channel.attributes[key])) for key in keys}
+    wanted = {_on_device(channel, str(channel.attributes[key])) for key in keys}
+    for terminal in wanted:
+        timebase_hz = _TIMEBASES_HZ.get(terminal.rpartition("/")[2])
+        if timebase_hz is not None:
+            return Pulses(0.0, 0.5 / timebase_hz, 0.5 / timebase_hz, np.inf)
     for other in cast("dict[str, ChannelTask]", task.bench.tasks).values():
         run = other.run
-        if other.io != "CO" or run is None or run.times is None:
+        if other.io != "CO" or run is None:
+            continue
+        run.look(task.bench.clock.now())
+        if run.times is None:
             continue
         if wanted & terminals_of(other, "SampleClock"):
             low_s, high_s = pulse_times_s(other.channels[0])

@@ -225,6 +225,8 @@ class Task:
 
     def verify(self) -> None:
         """Raise what is wrong with the settings."""
+        if self.watchdog:
+            return  # a timer of its device, without channels
         if not self.channels:
             raise DaqmxError(Code.NO_CHANNELS)
         self.check_devices()
@@ -324,6 +326,7 @@ class Task:
             now = self.bench.clock.now()
             for other in tasks_of(self.bench):
                 if other is not self and other.run is not None and other.timing.source_task() is self:
+                    other.run.look(now)  # what this clock has clocked so far counts, even if nobody looked
                     other.run.halt(now)
             self.run.aborted = True
             if self.io in ("AO", "DO"):
@@ -431,6 +434,7 @@ class Task:
     def log_read(self, codes: NDArray[Any], rows: list[int] | None, first: int) -> None:
         """Give a block that has been read to DAQmx's own recorder, if that is on."""
         if self.log.enabled and codes.shape[1]:
+            assert self.run is not None and self.run.times is not None
             chosen = self.channels if rows is None else [self.channels[row] for row in rows]
             self.log.write(
                 [channel.name for channel in chosen],
@@ -438,6 +442,7 @@ class Task:
                 self.scan.readings(codes, rows),
                 first,
                 self.timing.rate_hz,
+                self.bench.utc(self.run.times.first_s),
             )
 
     def trigger_readings(

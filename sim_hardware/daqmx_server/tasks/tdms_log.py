@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 from pathlib import Path
 from typing import Any, Final
 
@@ -55,15 +56,16 @@ class TdmsLog:
             self._writer = None
             raise _bad_path(path, str(error)) from error
 
-    def new_file(self, path: str) -> None:
-        """Go on in another file."""
-        self._settings["LOGGING_FILE_PATH"] = path
-        self.open()
-
     def write(
-        self, names: list[str], units: list[str], values: NDArray[np.float64], first: int, rate_hz: float
+        self,
+        names: list[str],
+        units: list[str],
+        values: NDArray[np.float64],
+        first: int,
+        rate_hz: float,
+        start: dt.datetime,
     ) -> None:
-        """Append a block (channels × samples) whose first sample has index `first`."""
+        """Append a block (channels × samples) that begins with sample `first`; sample 0 is at `start`."""
         if self._settings.get("LOGGING_PAUSE", False):
             return
         if self._writer is None:
@@ -77,6 +79,7 @@ class TdmsLog:
                 np.ascontiguousarray(row),
                 properties={
                     "unit_string": unit,
+                    "wf_start_time": np.datetime64(start.replace(tzinfo=None), "us"),
                     "wf_increment": 1.0 / rate_hz,
                     "wf_start_offset": first / rate_hz,
                 },

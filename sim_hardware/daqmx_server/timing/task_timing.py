@@ -144,7 +144,7 @@ class TaskTiming:
     @property
     def waits_for_others(self) -> bool:
         """Whether the first sample needs something that this task does not make itself."""
-        return self.source_is_foreign or self._task.trigger["START_TRIG_TYPE"] == triggers.DIGITAL
+        return self.source_is_foreign or _digital_start(self._task) is not None
 
     def verify(self) -> None:
         """Raise what NI-DAQmx raises for a clock that these channels cannot have."""
@@ -261,10 +261,18 @@ def _skews_at(scan: list[tuple[str, Product]], period_s: float) -> list[float]:
     return out
 
 
+def _digital_start(task: TimedTask) -> triggers.Which | None:
+    """Which digital edge the task waits for: the start trigger's, or a counter's arm start trigger's."""
+    if task.trigger["START_TRIG_TYPE"] == triggers.DIGITAL:
+        return "START"
+    return "ARM_START" if task.trigger.get("ARM_START_TRIG_TYPE") == triggers.DIGITAL else None
+
+
 def _start_edge(task: TimedTask, after_s: float) -> float | None:
     """The edge that a digital start trigger waits for, if it has come."""
-    source = triggers.source_of(task.trigger, "START")
-    return task.bench.first_edge(source, after_s, triggers.is_rising(task.trigger, "START"))
+    which = _digital_start(task) or "START"
+    source = triggers.source_of(task.trigger, which)
+    return task.bench.first_edge(source, after_s, triggers.is_rising(task.trigger, which))
 
 
 class _OwnClock:
@@ -301,11 +309,11 @@ class _OwnClock:
         return self._task.timing.clock_from(first, rate)
 
     def _trigger_instant(self, now_s: float) -> float | None:
+        if _digital_start(self._task) is not None:
+            return _start_edge(self._task, self._armed_s)
         if self._kind == triggers.NONE:
             return self._armed_s
         source = triggers.source_of(self._task.trigger, "START")
-        if self._kind == triggers.DIGITAL:
-            return _start_edge(self._task, self._armed_s)
         assert self._search is not None
         hit = self._search.find(
             lambda start, stop: self._task.trigger_readings(self._sampler, source, start, stop),
@@ -332,7 +340,7 @@ class _SharedClock:
         if self._task.timing.settings.get("SAMP_CLK_ACTIVE_EDGE") == Edge.FALLING.value:
             times = times.later(0.5 / times.rate_hz)
         armed = self._armed_s
-        if self._task.trigger["START_TRIG_TYPE"] == triggers.DIGITAL:
+        if _digital_start(self._task) is not None:
             edge = _start_edge(self._task, armed)
             if edge is None:
                 return None

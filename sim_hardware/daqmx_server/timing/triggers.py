@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 Readings = Callable[[int, int], NDArray[np.float64]]
 """Readings of the trigger's channel for samples start … stop−1."""
-Which = Literal["START", "REF"]
+Which = Literal["START", "REF", "ARM_START"]
 
 NONE: Final[int] = TriggerType.NONE.value
 DIGITAL: Final[int] = TriggerType.DIGITAL_EDGE.value

@@ -1,0 +1,174 @@
+"""Sensors' data sheets, digital waveforms, lines that are read back, counters that wait for an edge."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from nidaqmx.constants import (
+    AccelSensitivityUnits,
+    BridgeConfiguration,
+    Edge,
+    LineGrouping,
+    LoggingMode,
+    LoggingOperation,
+    RTDType,
+    ThermocoupleType,
+    TriggerType,
+)
+from nidaqmx.errors import DaqError
+from nidaqmx.system.physical_channel import PhysicalChannel
+from nitypes.waveform import DigitalWaveform
+from nptdms import TdmsFile
+
+from tests.support.server_support import Rig, continuous
+
+CARD = "PXI1Slot3"
+
+
+def _bits(*fields: tuple[int, int]) -> list[int]:
+    """Fields (value, width) as bits, least significant first."""
+    return [value >> place & 1 for value, width in fields for place in range(width)]
+
+
+def _single(value: float) -> tuple[int, int]:
+    return struct.unpack("<I", struct.pack("<f", value))[0], 32
+
+
+def _file(folder: Path, template: int, *fields: tuple[int, int]) -> Path:
+    """A virtual TEDS file: maker 17, model 1, version A1, number 12345, then a template."""
+    basic = ((17, 14), (1, 15), (1, 5), (1, 6), (12345, 24), (0, 2), (template, 8))
+    mark = [byte >> place & 1 for byte in b"[v03]" for place in range(8)]
+    path = folder / f"{template}.ted"
+    path.write_bytes(bytes(mark + _bits(*basic, *fields, (0, 64))))
+    return path
+
+
+def _sensor(rig: Rig, channel: str, file: Path) -> PhysicalChannel:
+    place = PhysicalChannel(channel, grpc_options=rig.options())
+    place.configure_teds(str(file))
+    return place
+
+
+def test_a_sensor_s_data_sheet_tells_who_made_it(rig: Rig, tmp_path: Path) -> None:
+    place = _sensor(rig, f"{CARD}/ai0", _file(tmp_path, 30, (0, 6)))
+
+    assert (place.teds_mfg_id, place.teds_model_num, place.teds_serial_num) == (17, 1, 12345)
+    assert (place.teds_version_letter, place.teds_version_num) == ("A", 1)
+    assert place.teds_template_ids == [30]
+    assert list(place.teds_bit_stream[:4]) == [17, 64, 0, 32]
+
+
+def test_an_accelerometer_s_sensitivity_comes_from_its_data_sheet(rig: Rig, tmp_path: Path) -> None:
+    sensitivity_v_per_m_s2 = 5e-7 * 1.0003**40000
+    _sensor(rig, "cDAQ1Mod3/ai0", _file(tmp_path, 25, (0, 1), (0, 1), (40000, 16)))
+
+    with rig.task() as task:
+        channel = task.ai_channels.add_teds_ai_accel_chan("cDAQ1Mod3/ai0", min_val=-5.0, max_val=5.0)
+        assert channel.ai_teds_is_teds
+        assert channel.ai_accel_sensitivity == pytest.approx(9.80665 * sensitivity_v_per_m_s2)
+        assert channel.ai_accel_sensitivity_units == AccelSensitivityUnits.VOLTS_PER_G
+
+
+def test_temperature_sensors_bring_their_curves(rig: Rig, tmp_path: Path) -> None:
+    couple = _file(tmp_path, 36, (0, 36), (3, 4))
+    resistor = _file(tmp_path, 37, (0, 56), (1, 3))
+    thermistor = _file(tmp_path, 38, (0, 78), _single(1.3e-3), _single(2.3e-4), _single(1e-7))
+    for number, file in enumerate((couple, resistor, thermistor)):
+        _sensor(rig, f"{CARD}/ai{number}", file)
+
+    with rig.task() as task:
+        add = task.ai_channels
+        assert add.add_teds_ai_thrmcpl_chan(f"{CARD}/ai0").ai_thrmcpl_type == ThermocoupleType.K
+        rtd = add.add_teds_ai_rtd_chan(f"{CARD}/ai1")
+        assert (rtd.ai_rtd_type, rtd.ai_rtd_a) == (RTDType.CUSTOM, 3.9083e-3)
+        ntc = add.add_teds_ai_thrmstr_chan_iex(f"{CARD}/ai2")
+        assert (ntc.ai_thrmstr_a, ntc.ai_thrmstr_c) == (pytest.approx(1.3e-3), pytest.approx(1e-7))
+
+
+def test_a_bridge_s_impedance_and_unit_come_from_its_data_sheet() -> None:
+    from sim_hardware.daqmx_server.channels.teds import DataSheet
+    from sim_hardware.daqmx_server.channels.teds_templates import attributes_from
+
+    fields = ((5, 6), (0, 64), (2, 2), (0, 64), (2, 2), (3490, 18))
+    bits = _bits((17, 14), (1, 15), (1, 5), (1, 6), (1, 24), (0, 2), (33, 8), *fields, (0, 6))
+    stream = bytes(np.packbits(bits, bitorder="little"))
+
+    read = attributes_from(DataSheet.from_stream(stream))
+
+    assert read["AI_BRIDGE_CFG"] == BridgeConfiguration.FULL_BRIDGE.value
+    assert read["AI_BRIDGE_NOM_RESISTANCE"] == pytest.approx(350.0)
+    assert read["AI_TEDS_UNITS"] == "forcelb"
+
+
+def test_a_channel_from_a_data_sheet_needs_one(rig: Rig) -> None:
+    with rig.task() as task, pytest.raises(DaqError) as error:
+        task.ai_channels.add_teds_ai_voltage_chan(f"{CARD}/ai5")
+    assert error.value.error_code == -200709
+
+
+def test_a_file_that_is_no_data_sheet_is_refused(rig: Rig, tmp_path: Path) -> None:
+    (tmp_path / "noise.ted").write_bytes(bytes(300))
+    with pytest.raises(DaqError) as error:
+        _sensor(rig, f"{CARD}/ai0", tmp_path / "noise.ted")
+    assert error.value.error_code == -200826
+
+
+def test_columns_of_a_digital_waveform_are_lines_as_given_and_ports_from_the_top(rig: Rig) -> None:
+    with rig.task() as task:
+        lines = f"{CARD}/port0/line0:2, {CARD}/port1"
+        task.di_channels.add_di_chan(lines, line_grouping=LineGrouping.CHAN_FOR_ALL_LINES)
+        task.timing.cfg_samp_clk_timing(1000.0, samps_per_chan=10)
+        waveform = task.read_waveform(10)
+
+    assert isinstance(waveform, DigitalWaveform)
+    names = waveform.extended_properties["NI_LineNames"].split(", ")
+    assert names[:4] == [f"{CARD}/port0/line{i}" for i in range(3)] + [f"{CARD}/port1/line7"]
+    assert waveform.data[1].tolist() == [1, 0, 0] + [0] * 7 + [1]  # sample 1: bit 0 of each group
+    assert waveform.signals[0].name == f"{CARD}/port1/line0"
+
+
+def test_a_digital_waveform_with_other_lines_than_the_channel_is_refused(rig: Rig) -> None:
+    with rig.task() as task:
+        task.do_channels.add_do_chan(f"{CARD}/port0/line0", line_grouping=LineGrouping.CHAN_PER_LINE)
+        with pytest.raises(DaqError, match="number of lines in the data"):
+            task.write_waveform(DigitalWaveform(5, 3))
+
+
+def test_a_pulse_train_waits_for_its_arm_start_edge(rig: Rig) -> None:
+    clock, pulses, count = rig.task("clock"), rig.task("pulses"), rig.task("count")
+    with clock, pulses, count:
+        for task, number in ((clock, 0), (pulses, 1)):
+            task.co_channels.add_co_pulse_chan_freq(f"{CARD}/ctr{number}", freq=1000.0)
+            task.timing.cfg_implicit_timing(samps_per_chan=20)
+        arm = pulses.triggers.arm_start_trigger
+        arm.trig_type, arm.dig_edge_edge = TriggerType.DIGITAL_EDGE, Edge.RISING
+        arm.dig_edge_src = f"/{CARD}/Ctr0InternalOutput"
+        channel = count.ci_channels.add_ci_count_edges_chan(f"{CARD}/ctr2")
+        channel.ci_count_edges_term = f"/{CARD}/Ctr1InternalOutput"
+        count.timing.cfg_samp_clk_timing(
+            1000.0, source=f"/{CARD}/Ctr0InternalOutput", active_edge=Edge.FALLING, samps_per_chan=20
+        )
+        count.start()
+        pulses.start()
+        rig.skip(0.005)
+        clock.start()
+        assert count.read(20) == list(range(1, 21))
+
+
+def test_a_logged_file_says_when_its_first_sample_was_taken(rig: Rig, tmp_path: Path) -> None:
+    with rig.task("wall") as task:
+        task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
+        continuous(task, 1000.0)
+        task.timing.first_samp_timestamp_enable = True
+        task.in_stream.configure_logging(
+            tmp_path / "one.tdms", LoggingMode.LOG_AND_READ, "", LoggingOperation.CREATE_OR_REPLACE
+        )
+        task.start()
+        task.read(50)
+        started = task.timing.first_samp_timestamp_val
+    with TdmsFile.open(tmp_path / "one.tdms") as file:
+        stamp = file["wall"].channels()[0].properties["wf_start_time"]
+    assert abs(stamp - np.datetime64(started.replace(tzinfo=None), "us")) < np.timedelta64(1, "ms")
