@@ -178,6 +178,10 @@ class Channel(Table):
     polarity: Literal[1, -1] = 1
     range_si: tuple[Finite, Finite]
     """Smallest and largest quantity the sensor can measure, SI."""
+    warning_si: Positive | None = None
+    """|quantity| from which the channel's view warns, SI; none where it is not given."""
+    critical_si: Positive | None = None
+    """The same, for what must not be reached."""
     input_range_v: tuple[Finite, Finite] = (-10.0, 10.0)
     """Range asked of the module, volts."""
     noise_si: Positive

@@ -182,6 +182,26 @@ def test_the_log_keeps_what_was_told_and_when_it_was_over(qtbot):
     assert notices.current == ("info", "zero taken")
 
 
+def test_the_live_page_keeps_the_record_of_the_last_test_until_the_next_arming(window, stand_in, play):
+    play(window.session, window.clock, stand_in, stand_in.release_s + 3.0)
+    say(window.session, window.clock, State.SAVED, Judgement(call=Call.LOOK))
+    window.live.draw_frame()
+    x, y = (values.copy() for values in window.live.motion._curves[0].getData())
+    assert x.size > 100 and x[0] >= -1.001
+    window.session._forget_data()  # the tasks were started anew, or the trace has gone on without the test
+    window.live.draw_frame()
+    again = window.live.motion._curves[0].getData()
+    assert (again[0] == x).all() and (again[1] == y).all()
+    say(window.session, window.clock, State.ARMED, HOLD)
+    window.live.draw_frame()
+    window.live._draw_estimate()
+    assert window.live.motion._curves[0].getData()[0] is None or not len(
+        window.live.motion._curves[0].getData()[0]
+    )
+    assert window.live.restitution.shown == {"eav": 0, "crt": 0}
+    assert all(not len(curve.getData()[0]) for curve in window.live.restitution._means.values())
+
+
 def test_a_warning_that_is_over_leaves_the_line(live_window):
     begins = EventMessage(kind="disk", sample=1, text="the disk is slow", severity="warning")
     live_window._after(begins)

@@ -38,7 +38,7 @@ def figures(session: Session) -> dict[str, TileText]:
     tiles = tile_texts(session)
     velocity = session.velocity_rad_s if session.fresh(MotionMessage) else math.nan
     return {
-        "Rotation  (mrad)": TileText(tiles["rotation"].value.removesuffix(" mrad"), tiles["rotation"].detail),
+        "Rotation  (mrad)": TileText(tiles["rotation"].value.removesuffix(" mrad")),
         "Velocity  (mrad/s)": TileText(number(1e3 * velocity, 0)),
         "r by EAV": tiles["eav"],
         "r by CRT": tiles["crt"],

@@ -89,6 +89,8 @@ class Session:
         self.events: deque[EventMessage] = deque(maxlen=200)
         self.strips: MinMaxRing | None = None
         self.trace = MotionTrace(1)
+        self.last_motion: tuple[Array, Array, Array] | None = None
+        """(samples, θ, θ̇) of the last test from a second before its release: the trace goes on without it."""
         self.block_mean: NDArray[np.float64] | None = None
         """Mean of each channel over the newest block, SI."""
         self.overloaded: frozenset[str] = frozenset()
@@ -165,7 +167,7 @@ class Session:
         before = self.state
         self.state = message
         if message.state is State.ARMED and (before is None or before.state is not State.ARMED):
-            self.estimate = None
+            self.estimate = self.last_motion = None
             for means in self._running.values():
                 means.clear()  # the lines of the last test are not this one's
             self._peak_rad = 0.0
@@ -173,8 +175,18 @@ class Session:
             self._armed_sample = message.since_sample
             self.saw_arming = True
             self.run_zeroed = self.zeroed
+        if before is not None and before.state in RECORDING and message.state not in RECORDING:
+            self._keep_motion()
         if message.state is State.AT_REST and self._rest_sample is None:
             self._rest_sample = message.since_sample
+
+    def _keep_motion(self) -> None:
+        """The run has ended: what it showed stays, however long the window stays open."""
+        if self.estimate is not None:
+            first = self.estimate.release_sample - self.rate_hz
+            samples, rotation, velocity = self.trace.window(first)
+            if samples.size:
+                self.last_motion = samples.copy(), rotation.copy(), velocity.copy()
 
     def _on_estimate(self, message: EstimateMessage) -> None:
         if self.estimate is None or self.estimate.release_sample != message.release_sample:

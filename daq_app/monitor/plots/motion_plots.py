@@ -101,25 +101,26 @@ class MotionPlots(QWidget):
         session = self._session
         rate = session.rate_hz
         now = session.sample_now
-        if rate <= 0 or not math.isfinite(now):
+        released = session.estimate.release_sample if session.estimate is not None else None
+        kept = session.last_motion if session.current_state not in RECORDING else None
+        if rate <= 0 or (kept is None and not math.isfinite(now)):
             for curve in self._curves:
                 curve.setData([], [])
             self._show_notice("No motion is measured")
             return
-        released = session.estimate.release_sample if session.estimate is not None else None
-        over = released is not None and session.current_state not in RECORDING
-        until = math.inf
         if released is not None:
-            elapsed = session.since_release_s if over else (now - released) / rate
+            elapsed = (now if kept is None else kept[0][-1]) / rate - released / rate
             start = -LEAD_S if elapsed < WINDOW_S - LEAD_S else self._paged_start(elapsed)
             self._set_frame(start, start + WINDOW_S, "time since release  (s)")
             origin = float(released)
-            if over:
-                until = origin + (start + WINDOW_S) * rate
         else:
             self._set_frame(-WINDOW_S, 0.0, "seconds ago")
             origin, start = now, -WINDOW_S
-        samples, rotation, velocity = session.trace.window(origin + start * rate, until)
+        if kept is not None:
+            shown = (kept[0] >= origin + start * rate) & (kept[0] <= origin + (start + WINDOW_S) * rate)
+            samples, rotation, velocity = (row[shown] for row in kept)
+        else:
+            samples, rotation, velocity = session.trace.window(origin + start * rate)
         time = (samples - origin) / rate
         columns = max(200, self.rotation.width() // 2)  # the pen is two pixels wide
         for curve, values in zip(self._curves, (rotation * 1e3, velocity), strict=True):
@@ -127,7 +128,7 @@ class MotionPlots(QWidget):
             curve.setData(x, y, connect="finite" if np.isnan(y).any() else "all")
         self._set_limits(rotation, velocity)
         self._draw_estimate()
-        if over:
+        if kept is not None:
             self._show_notice("The test has ended: this is its record, not the present")
         elif not session.fresh(MotionMessage):
             self._show_notice(f"Not live: the newest value is {session.age_s(MotionMessage):.1f} s old")

@@ -111,7 +111,8 @@ def fit(
 class StripPanel(QWidget):
     """The strips of a session; `refresh` asks for a repaint."""
 
-    channel_clicked = Signal(str)
+    channel_opened = Signal(str)
+    """The channel whose strip was clicked twice."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -253,11 +254,11 @@ class StripPanel(QWidget):
         self._spans[moved, 0] = centre - 0.6 * need[moved]
         self._spans[moved, 1] = centre + 0.6 * need[moved]
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        """A click on a strip names its channel."""
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """A double click on a strip opens its channel."""
         for cell in self._cells:
             if cell.box.contains(event.position()):
-                self.channel_clicked.emit(cell.channel.id)
+                self.channel_opened.emit(cell.channel.id)
                 return
 
 

@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QPushButton, QWidget
 
 from daq_app.acquisition.messages.published import (
     BlockMessage,
+    Call,
     CheckMessage,
     EventMessage,
     HealthMessage,
@@ -31,6 +32,7 @@ from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.link import Link
 from daq_app.monitor.data.session import RECORDING, Session
 from daq_app.monitor.pages.campaign_page import CampaignPage
+from daq_app.monitor.pages.channel_window import ChannelWindow
 from daq_app.monitor.pages.gap_page import GapPage
 from daq_app.monitor.pages.live_page import LivePage
 from daq_app.monitor.pages.messages_page import MessagesPage
@@ -43,15 +45,13 @@ from daq_app.monitor.widgets.settings import TYPE_SIZES, WindowSettings
 from daq_app.monitor.widgets.theme import THEMES, Colours, apply_theme
 from daq_app.monitor.window.adoption import Adoption
 from daq_app.monitor.window.orders import Orders
+from daq_app.monitor.window.placement import keep_on_screen
 from daq_app.monitor.window.test_display import TestDisplay
+from daq_app.monitor.window.what_to_tell import MAY_BE_REFUSED, is_told, numbers, trouble_of
 from daq_app.monitor.window.window_frame import WindowFrame
 
 FRAME_MS: Final = 25
 SLOW_MS: Final = 160
-_MAY_BE_REFUSED: Final = frozenset({"tare", "check", "pull", "plan"})
-"""Orders whose refusal is no error: the wall was not still, or the test is locked."""
-_QUIET_EVENTS: Final = frozenset({"impact", "marker", "tare", "saved", "check", "result", *State})
-"""Events that the pages show anyway, unless they are more than information."""
 
 
 class MainWindow(QMainWindow):
@@ -159,6 +159,7 @@ class MainWindow(QMainWindow):
         self.result.replay.connect(lambda name: self.open_run(Path(name)))
         for key, button in self.prepare.keys.items() if self.link is not None else ():
             QShortcut(QKeySequence(key), self).activated.connect(lambda b=button: self._prepare_by_key(b))
+        self.live.strips.channel_opened.connect(self.open_channel)
         QShortcut(QKeySequence("T"), self.live).activated.connect(self.live.theory_button.toggle)
         QShortcut(QKeySequence("C"), self.live).activated.connect(self.live.strips_button.toggle)
 
@@ -175,6 +176,11 @@ class MainWindow(QMainWindow):
         self.frame.show_page(page)
 
     # -- look ------------------------------------------------------------------------------------
+
+    def open_channel(self, name: str) -> None:
+        """Show one channel large, in a window of its own."""
+        self.channel = ChannelWindow(self.session, name, lambda: self.prepare.zero.readings, self.colours)
+        self.channel.show()
 
     def restyle(self) -> None:
         """Apply theme and type size to everything."""
@@ -263,10 +269,10 @@ class MainWindow(QMainWindow):
                     self.link.request("hello")
                 if message.kind == "result" and self.result.run is not None:
                     self.result.open_if_shown(Path(str(message.data.get("run", ""))))
-                trouble = _trouble(message)
+                trouble = trouble_of(message)
                 if trouble and message.severity == "info":
                     self.notices.settle(trouble)
-                if message.kind not in _QUIET_EVENTS or message.severity != "info":
+                if is_told(message):
                     self.notices.tell(message.severity, message.text, trouble)
 
     def _on_state(self, message: StateMessage) -> None:
@@ -283,7 +289,9 @@ class MainWindow(QMainWindow):
             self.show_page(self.test)
         if message.state is State.PREVIEWING and before in (State.IDLE, None) and self.link is not None:
             self.link.request("hello")
-        if message.state is State.SAVED and before is State.SAVING:
+        if before is None and message.judgement.call is Call.LOOK:  # this window came after the test
+            self._released = True
+        if message.state is State.SAVED and before in (State.SAVING, None) and message.run_path:
             self._on_saved(Path(message.run_path))
         self._on_slow()
 
@@ -356,17 +364,22 @@ class MainWindow(QMainWindow):
     def _on_reply(self, name: str, reply: Reply) -> None:
         self.orders.on_reply(name, reply)
         if not reply.ok:
-            self.notices.tell("error" if name not in _MAY_BE_REFUSED else "warning", reply.text)
+            self.notices.tell("error" if name not in MAY_BE_REFUSED else "warning", reply.text)
             return
         if name == "hello":
             self._adopt(reply.data)
         elif name == "tare":
             self.notices.tell("info", reply.text)
-            self.prepare.set_zero(Zero(_numbers(reply.data.get("tare")), {}))
+            self.prepare.set_zero(Zero(numbers(reply.data.get("tare")), {}))
             self.session.set_zeroed(True)
             self.orders.request("hello")
         elif name in ("marker", "note"):
             self.notices.tell("info", f"Written: {reply.text}.")
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """The window is whole on its screen, with the frame that it gets."""
+        super().showEvent(event)
+        keep_on_screen(self)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Remember the layout and hang up; a run under way goes on without the window."""
@@ -384,14 +397,3 @@ class MainWindow(QMainWindow):
         self._analyses.finish(0)
         self._diagnoses.finish(2000)
         super().closeEvent(event)
-
-
-def _trouble(event: EventMessage) -> str:
-    """What a warning is about, where its end is told as well; empty for others."""
-    if event.kind == "alarm":
-        return f"alarm {event.data.get('alarm', '')}"
-    return event.kind if event.kind in ("disk", "memory", "recorder") else ""
-
-
-def _numbers(value: object) -> dict[str, float]:
-    return {str(k): float(v) for k, v in value.items()} if isinstance(value, dict) else {}

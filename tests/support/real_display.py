@@ -1,0 +1,174 @@
+"""A real X server with a window manager, and the operator's window on it as a process of its own.
+
+Keys go in as key presses (xdotool), what is on the screen comes back as words and as pictures of the display.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+NEEDED = {"Xvfb": "xvfb", "openbox": "openbox", "xdotool": "xdotool"}
+"""Program → the Debian package that brings it."""
+
+LIMIT_S = 400.0
+"""Of one wait: for a hang, not for a slow machine."""
+
+_WINDOW = """
+import json, sys, threading
+from pathlib import Path
+from PySide6.QtCore import QTimer
+from daq_app.monitor.widgets.settings import WindowSettings
+from daq_app.monitor.window.app import application, campaign_beside, open_window, reach
+from tests.support.clipped_text import clipped_texts
+
+rig, out, ini, theme, token_wanted = sys.argv[1:6]
+app = application()
+settings = WindowSettings(Path(ini))
+settings.theme = theme
+address, token, mine = reach(Path(rig), Path(out), ["--speed", "2"])
+token = token if token_wanted == "yes" else ""
+window = open_window(address, token, settings, plan=campaign_beside(Path(rig)))
+window.show()
+asked, said = [], [None]
+
+def listen():
+    for line in sys.stdin:
+        asked.append(line.strip())
+
+def look():
+    while asked:
+        path = asked.pop(0)
+        window.screen().grabWindow(0).save(path)
+        print(json.dumps({"picture": path}), flush=True)
+    page = next(name for name, page in window.pages.items() if page is window.stack.currentWidget())
+    card = window.prepare.card.choice
+    words = {
+        **window.header.words, "page": page, "gauge": window.prepare.gauge.words,
+        "notice": (window.notices.current or ("", ""))[1], "chosen": card.name, "target": card.target_ratio,
+        "zeroed": bool(window.prepare.zero.readings), "check": window.prepare.verdict_text,
+        "result": window.result.result.test.test if window.result.result is not None else "",
+        "full_screen": window.display.full_screen is not None,
+        "whole": window.screen().availableGeometry().contains(window.frameGeometry()),
+    }
+    words.pop("recording_detail")
+    if words != said[0]:
+        said[0] = words
+        print(json.dumps({"words": words, "clipped": clipped_texts(window)}), flush=True)
+
+threading.Thread(target=listen, daemon=True).start()
+timer = QTimer()
+timer.timeout.connect(look)
+timer.start(50)
+app.exec()
+"""
+
+
+def missing_packages() -> list[str]:
+    """Debian packages without which there is no real display here."""
+    return [package for program, package in NEEDED.items() if shutil.which(program) is None]
+
+
+@contextlib.contextmanager
+def real_display(width: int, height: int) -> Iterator[str]:
+    """An X server of its own with a window manager; yields the name of its display."""
+    reads, writes = os.pipe()
+    size = f"{width}x{height}x24"
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(writes), "-screen", "0", size, "-nolisten", "tcp"],
+        pass_fds=[writes],
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(writes)
+    with os.fdopen(reads) as told:
+        display = f":{told.readline().strip()}"
+    manager = subprocess.Popen(
+        ["openbox"],
+        env={**os.environ, "DISPLAY": display},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        yield display
+    finally:
+        for process in (manager, server):
+            process.terminate()
+            process.wait(30)
+
+
+class RealWindow:
+    """The operator's window in a process of its own, on a display."""
+
+    def __init__(
+        self, display: str, rig: Path, out: Path, ini: Path, theme: str, *, may_command: bool = True
+    ) -> None:
+        environment = {**os.environ, "DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
+        environment["PYTHONPATH"] = str(Path(__file__).parents[2])
+        arguments = [str(rig), str(out), str(ini), theme, "yes" if may_command else "no"]
+        self._environment = environment
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", _WINDOW, *arguments],
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        self.words: dict[str, Any] = {}
+        """What the window says now."""
+        self.past: list[dict[str, Any]] = []
+        """Everything that it has said, oldest first."""
+        self.clipped: set[str] = set()
+        """Texts that were cut off at any time."""
+        self._pictures: set[str] = set()
+        self._news = threading.Condition()
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            told = json.loads(line)
+            with self._news:
+                if "picture" in told:
+                    self._pictures.add(told["picture"])
+                else:
+                    self.words = told["words"]
+                    self.past.append(self.words)
+                    self.clipped |= set(told["clipped"])
+                self._news.notify_all()
+
+    def until(self, condition: Callable[[dict[str, Any]], object], limit_s: float = LIMIT_S) -> None:
+        """Wait until the window says something."""
+        with self._news:
+            if not self._news.wait_for(lambda: bool(self.words) and condition(self.words), limit_s):
+                raise AssertionError(f"not said in time; the window says {self.words}")
+
+    def says(self, limit_s: float = LIMIT_S, **expected: object) -> None:
+        """Wait until the window says exactly this."""
+        self.until(lambda words: all(words[name] == value for name, value in expected.items()), limit_s)
+
+    def press(self, *keys: str) -> None:
+        """Press keys, as the operator does."""
+        subprocess.run(["xdotool", "key", "--delay", "120", *keys], env=self._environment, check=True)
+
+    def picture(self, path: Path) -> None:
+        """Save what the display shows."""
+        time.sleep(0.6)  # a frame has to be painted after the last word: nothing tells of it
+        assert self.process.stdin is not None
+        self.process.stdin.write(f"{path}\n")
+        self.process.stdin.flush()
+        with self._news:
+            assert self._news.wait_for(lambda: str(path) in self._pictures, 60)
+
+    def kill(self) -> None:
+        """End it as a crash does."""
+        self.process.kill()
+        self.process.wait(30)
