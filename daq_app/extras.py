@@ -11,6 +11,7 @@ EXTRA_OF: Final[Mapping[str, str]] = {
     "numba": "sim",
     "matplotlib": "report",
     "jinja2": "report",
+    "fpdf": "report",
     "pyarrow": "formats",
     "xarray": "formats",
     "h5netcdf": "formats",

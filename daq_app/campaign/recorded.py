@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from daq_app.campaign.names import TestName
-from daq_app.campaign.status import RecordedTest, TestVerdict
+from daq_app.campaign.status import RecordedTest, TestFacts, TestVerdict
 from daq_app.campaign.verdicts import OperatorVerdict, read_verdicts
 from daq_app.runfile import Event, Run, RunFileError, open_run, read_journal
 from daq_app.runfile.folder import RUN_SUFFIX, find_journals, find_runs
@@ -58,7 +58,28 @@ def test_of(run: Run, verdicts: Mapping[str, OperatorVerdict]) -> RecordedTest |
         verdict, reason = TestVerdict(given.verdict), given.reason
     else:
         verdict, reason = _judged(run)
-    return RecordedTest(name, verdict, run.header.start_utc_ns, run.path, reason)
+    return RecordedTest(name, verdict, run.header.start_utc_ns, run.path, reason, facts_of(run))
+
+
+def facts_of(run: Run) -> TestFacts:
+    """Measured figures, operator and notes of an opened run."""
+    plan, analysis = run.header.test_plan, run.results.get("analysis")
+    figures = analysis if isinstance(analysis, dict) else {}
+    estimates = figures.get("estimates")
+    r = {
+        name: float(estimate["r"])
+        for name, estimate in (estimates if isinstance(estimates, dict) else {}).items()
+        if isinstance(estimate, dict) and isinstance(estimate.get("r"), float)
+    }
+    ratio = figures.get("theta0_over_alpha")
+    written = [plan.conditions, plan.notes] if plan is not None else []
+    typed = [event.text for event in run.events if event.kind == "note"]
+    return TestFacts(
+        abs(ratio) if isinstance(ratio, float) else None,
+        {label: r[key] for label, key in (("CRT", "crt"), ("EAV", "eav")) if key in r},
+        plan.operator if plan is not None else "",
+        tuple(dict.fromkeys(text for text in (*written, run.header.notes, *typed) if text.strip())),
+    )
 
 
 def was_released(events: Sequence[Event]) -> bool:

@@ -6,10 +6,11 @@ that exist, so an armed test that is aborted burns none.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
+from typing import Final
 
 from daq_app.campaign.names import TestName, TestSeries
 from daq_app.campaign.plan import Campaign, PlannedTest
@@ -38,6 +39,24 @@ class PlaceState(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class TestFacts:
+    """What a run says of its test beside the verdict; empty where it says nothing."""
+
+    __test__ = False
+
+    theta0_over_alpha: float | None = None
+    """|θ0|/α as measured."""
+    r: Mapping[str, float] = field(default_factory=dict)
+    """By estimator, ``CRT`` and ``EAV``, as found when the run was saved."""
+    operator: str = ""
+    notes: tuple[str, ...] = ()
+    """Conditions, notes before the test, and those typed during it, in this order."""
+
+
+NO_FACTS: Final = TestFacts()
+
+
+@dataclass(frozen=True, slots=True)
 class RecordedTest:
     """One release, as a run tells it."""
 
@@ -48,6 +67,7 @@ class RecordedTest:
     path: Path | None = None
     reason: str = ""
     """Why it is bad or lost, in words."""
+    facts: TestFacts = NO_FACTS
 
 
 @dataclass(slots=True)

@@ -45,7 +45,7 @@ _COMMANDS: Final[Mapping[str, _Entry]] = {
         ("record.commands",),
         "Write the run of a simulated test without real time, through the same sensors and modules.",
     ),
-    "keys": _Entry(("record.commands",), "Keys for viewers beyond this machine."),
+    "keys": _Entry(("record.commands",), "Keys of viewers elsewhere, and of other recorders to be trusted."),
     "campaign": _Entry(("campaign.commands",), "Plan and follow a campaign of tests."),
     "publish": _Entry(
         ("campaign.publish",),

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from daq_app.cli.config_tables import plan_tables
 from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, print_problems, reported
+from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.config import ConfigError, load_rig, plan_tasks
 from daq_app.config.shipped import copy_shipped
 
@@ -79,7 +78,7 @@ def _check_json(file: Path) -> bool:
     except ConfigError as error:
         result["good"] = False
         result["problems"] = [{"key": p.key, "wrong": p.wrong, "right": p.right} for p in error.problems]
-    typer.echo(json.dumps(result, ensure_ascii=False))
+    echo_json(result)
     return bool(result["good"])
 
 
@@ -102,4 +101,4 @@ def templates(
     """Copy the rig files and campaigns that come with the program, to be edited. Overwrites nothing."""
     with reported():
         for path in copy_shipped(folder):
-            typer.echo(path)
+            echo(path)

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Final
 
 import typer
-from rich.console import Console
 from rich.text import Text
 
+from daq_app.cli.terminal import Console
 from daq_app.config import ConfigError, Problem
 from daq_app.runfile.errors import RunFileError
 from drivers.protocol import DriverError

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import contextlib
-import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
 from rich.text import Text
 
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported, say_other_name
+from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.config import parse_rig
 from daq_app.config.toml_file import read_text
 from daq_app.runfile import (
@@ -56,7 +55,7 @@ def verify_command(
         with Console(stderr=True).status("reading every sample …"):
             reports = [verify(path) for path in paths]
         if as_json:
-            typer.echo(json.dumps([_report_dict(report) for report in reports], ensure_ascii=False))
+            echo_json([_report_dict(report) for report in reports])
         else:
             _print_reports(reports)
     if not all(report.ok for report in reports):
@@ -73,6 +72,7 @@ def _report_dict(report: VerifyReport) -> dict[str, Any]:
         "n_samples": report.n_samples,
         "lost_samples": report.lost_samples,
         "duration_s": report.duration_s,
+        "proven": report.proven,
         "children": [_report_dict(child) for child in report.children],
     }
 
@@ -80,7 +80,7 @@ def _report_dict(report: VerifyReport) -> dict[str, Any]:
 def _print_reports(reports: list[VerifyReport]) -> None:
     """A table of verdicts, and under it every problem and note as a sentence of its own."""
     table = Table(box=None)
-    for column in ("file", "kind", "verdict"):
+    for column in ("file", "kind", "verdict", "proven"):
         table.add_column(column, overflow="fold")
     for column in ("samples", "missing"):
         table.add_column(column, justify="right")
@@ -88,10 +88,10 @@ def _print_reports(reports: list[VerifyReport]) -> None:
     for report in reports:
         for item in (*report.children, report):
             name = str(item.path.relative_to(report.path)) if item is not report else str(item.path)
-            verdict = "[bold red]BAD[/]" if item.problems else "[green]good[/]"
+            verdict = Text("BAD", "bold red") if item.problems else Text("good", "green")
             if item.kind != "folder":
                 numbers = (str(item.n_samples), str(item.lost_samples))
-                table.add_row(escape(name), item.kind, verdict, *numbers)
+                table.add_row(name, item.kind, verdict, item.proven or "nothing", *numbers)
             told = [("bold red", text) for text in item.problems] + [("bold", text) for text in item.notes]
             remarks += [(style, name, text.replace(str(item.path), "it")) for style, text in told]
     console = Console()
@@ -121,16 +121,16 @@ def recover_command(
             results = recover(folder, thorough=not quick, derive=_derived)
             unmade = _made_results(results)
         if as_json:
-            typer.echo(json.dumps([_recovery_dict(result) for result in results], ensure_ascii=False))
+            echo_json([_recovery_dict(result) for result in results])
         elif not results:
-            typer.echo(f"{folder}: no journals, nothing to recover")
+            echo(f"{folder}: no journals, nothing to recover")
         for text in () if as_json else (*rings, *unmade):
-            typer.echo(text)
+            echo(text)
         for result in () if as_json else results:
             if result.outcome == "failed":
                 print_paragraph("Not recovered", result.text)
             else:
-                typer.echo(f"{result.journal}: {result.outcome}: {result.text}")
+                echo(f"{result.journal}: {result.outcome}: {result.text}")
     if any(result.outcome == "failed" for result in results):
         raise typer.Exit(EXIT_FAILED)
 
@@ -224,7 +224,7 @@ def export_command(
         _file_or_folder(out) as place,
         Progress(console=Console(stderr=True), transient=True) as progress,
     ):
-        task = progress.add_task(f"{run.name} → {format_}", total=1.0)
+        task = progress.add_task(escape(f"{run.name} → {format_}"), total=1.0)
         path = export_run(
             run,
             place,
@@ -239,7 +239,7 @@ def export_command(
         )
     if not place.is_dir():
         say_other_name(place, path)
-    typer.echo(f"{path}: written, {path.stat().st_size / 1e6:.1f} MB")
+    echo(f"{path}: written, {path.stat().st_size / 1e6:.1f} MB")
 
 
 def import_command(
@@ -274,12 +274,12 @@ def import_command(
             "channels": list(report.channel_ids),
             "doubts": list(report.doubts),
         }
-        typer.echo(json.dumps(document, ensure_ascii=False))
+        echo_json(document)
         return
     for doubt in report.doubts:
         print_paragraph("Doubtful", doubt, style="bold yellow")
     size = f"{len(report.channel_ids)} channels, {report.n_samples} samples at {report.rate_hz:g} Hz"
-    typer.echo(f"{report.run}: {size}")
+    echo(f"{report.run}: {size}")
 
 
 @contextlib.contextmanager

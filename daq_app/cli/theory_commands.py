@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, reported
+from daq_app.cli.terminal import Console, echo_json
 from daq_app.config import load_rig
 
 if TYPE_CHECKING:
@@ -58,7 +57,7 @@ def theory_command(
             print_paragraph("Error", f"{error}")
             raise typer.Exit(EXIT_BAD_INPUT) from None
         if as_json:
-            typer.echo(json.dumps(result, ensure_ascii=False))
+            echo_json(result)
         else:
             _print(result)
 

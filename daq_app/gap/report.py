@@ -9,10 +9,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from jinja2 import Environment, PackageLoader, select_autoescape
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
+from daq_app.campaign.pages import page_environment
 from daq_app.campaign.report.captioned import CaptionedFigure
 from daq_app.gap import report_figures as draw
 from daq_app.gap.core import CannotDiagnose, Diagnosis
@@ -40,7 +40,7 @@ def write_report(result: Diagnosis, path: Path, runs: Sequence[GapRun] = ()) -> 
     result.notes["traces"] = noted(shown)
     maps = draw.probe_maps(result, _meanings(runs))
     html = (
-        Environment(loader=PackageLoader("daq_app.gap"), autoescape=select_autoescape(), trim_blocks=True)
+        page_environment("daq_app.gap")
         .get_template("gap.html")
         .render(
             d=result,

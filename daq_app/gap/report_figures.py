@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 
+from daq_app.config.shown_text import shortened
 from daq_app.gap.core import Diagnosis
 from daq_app.gap.core.judging.where import GapMap
 from daq_app.gap.traces import Trace
@@ -99,7 +100,7 @@ def draw_trace(upper: Axes, lower: Axes, trace: Trace, name: str) -> None:
     upper.plot(time, 1e3 * trace.measured_rad, color=MEASURED, lw=1.4, label=f"measured ({trace.shown})")
     upper.plot(time, 1e3 * trace.baseline_rad, color=BEFORE, lw=1.0, ls="--", label="simulated without")
     upper.plot(time, 1e3 * trace.augmented_rad, color=AFTER, lw=0.8, label=f"simulated with {name}")
-    upper.set_title(f"{trace.run}, {trace.level}", fontsize=8)
+    upper.set_title(shortened(f"{trace.run}, {trace.level}", 100), fontsize=8, parse_math=False)
     upper.set_ylabel("θ (mrad)", fontsize=7)
     upper.legend(fontsize=6, frameon=False, loc="upper right")
     without, with_it = (1e3 * rms for rms in trace.rms_rad)

@@ -27,12 +27,13 @@ from daq_app.runfile.model import (
     software_versions,
 )
 from daq_app.runfile.source import rig_of
-from daq_app.runfile.test_plan import CheckRecord, TestPlan
+from daq_app.runfile.test_plan import CheckFinding, CheckRecord, TestPlan
 
 __all__ = [
     "JOURNAL_SUFFIX",
     "RUN_SUFFIX",
     "BusyError",
+    "CheckFinding",
     "CheckRecord",
     "DerivedData",
     "DerivedSignal",

@@ -7,12 +7,15 @@ import itertools
 import os
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
 if sys.platform == "darwin":
     import fcntl
 
+_NUMBERS: Final = itertools.count()
+"""Two files may be written into a folder at a time."""
 _REPLACE_WAITS_S: Final = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 """Waits between attempts to give a file its name, 1.6 s in all; a virus scanner lets go within them
 (assumed). Longer waits keep the operator waiting where a person has the file open."""
@@ -37,11 +40,31 @@ def write_whole(path: Path, content: bytes | str, *, other_name: bool = False) -
     as ``NAME (2)``. Returns the file's path. Raises `OSError`; what stood under the name is untouched then.
     """
     data = content.encode() if isinstance(content, str) else content
-    beside = path.with_name(f"{path.name}.{os.getpid()}.part")
+    beside = name_beside(path)
     try:
         with os.fdopen(create_anew(beside), "wb") as file:
             file.write(data)
         return replace_durably(beside, path, other_name=other_name)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def name_beside(path: Path) -> Path:
+    """A hidden name beside `path`, of its suffix; not longer than its own, which may be as long as can be."""
+    return path.with_name(f".{os.getpid()}-{next(_NUMBERS)}.part{path.suffix}")
+
+
+@contextlib.contextmanager
+def written_whole(path: Path) -> Iterator[Path]:
+    """An empty file beside `path`, to be written by name; it gets the name when the block ends well.
+
+    Raises `OSError`; what stood under the name is untouched then, and nothing stays beside it.
+    """
+    beside = name_beside(path)
+    try:
+        os.close(create_anew(beside))
+        yield beside
+        replace_durably(beside, path)
     finally:
         beside.unlink(missing_ok=True)
 

@@ -15,6 +15,18 @@ _Text = Annotated[str, AfterValidator(clean_text)]
 _Share = Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)]
 
 
+class CheckFinding(BaseModel):
+    """What the sensor check found wrong with one channel, or with the rig."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    channel: _Text = ""
+    """Id of the channel; empty for the rig."""
+    verdict: _Text
+    """caution or no-go"""
+    text: _Text
+
+
 class CheckRecord(BaseModel):
     """What the last sensor check before the arming said."""
 
@@ -26,6 +38,8 @@ class CheckRecord(BaseModel):
     taken_utc: _Text = ""
     overruled: bool = False
     """The operator armed in spite of a no-go."""
+    findings: tuple[CheckFinding, ...] = ()
+    """What was found, the rig first, then in the order of the channels."""
 
 
 class TestPlan(BaseModel):

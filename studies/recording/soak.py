@@ -17,7 +17,7 @@ import sys
 import tempfile
 import threading
 import time
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,17 +29,14 @@ from rich.table import Table
 from daq_app.acquisition import AcquisitionClient, AcquisitionProcess
 from daq_app.acquisition.messages.published import EventMessage, HealthMessage, State, StateMessage
 from daq_app.config import load_rig
-from daq_app.runfile import Gap, open_run, verify
+from daq_app.runfile import open_run, verify
 from sim_hardware.control import SimControl
+from studies.recording.injecting import Injected, choose_fault, unexplained_gaps
 from studies.recording.marked_recording import RIG, command_line, console, marked_server, write_report
 from tests.support.marked_check import check_marked
 
-_CHASSIS: Final = "cDAQ1"
-_SLACK: Final = 8_000
-"""Samples: a fault is told to the device some time after the last health message."""
 _QUIET_S: Final = 6.0
 """After each fault, so that what is heard belongs to it."""
-_LOSING: Final = ("buffer_overwritten", "chassis_offline", "module_removed", "process stopped")
 _VIEWER: Final = """
 import sys
 from daq_app.acquisition import AcquisitionClient
@@ -47,19 +44,6 @@ with AcquisitionClient(sys.argv[1]) as client:
     while True:
         client.receive(9.0)
 """
-
-
-@dataclass(slots=True)
-class Injected:
-    """One fault and what came of it."""
-
-    kind: str
-    at_s: float
-    arguments: dict[str, float | str]
-    sample: int = 0
-    """Read when it was injected."""
-    heard: list[tuple[float, str, str]] = field(default_factory=list)
-    """Seconds after the fault, severity, text."""
 
 
 class Soak:
@@ -152,35 +136,7 @@ class Soak:
 
     def _break_something(self, control: SimControl, pid: int) -> float:
         """Choose and inject; how long it lasts in seconds of ours."""
-        rng = self._rng
-        kind = rng.choice(
-            (
-                *("read_timeout", "buffer_overwritten", "reply_cut_short", "reply_out_of_order"),
-                *("chassis_offline", "stalled", "server_frozen", "module_removed", "process stopped"),
-            )
-        )
-        bench_s = {
-            "chassis_offline": rng.choice((0.2, 0.2, 2.0, 2.0, 20.0)),
-            "stalled": rng.uniform(0.3, 3.0),
-            "module_removed": rng.uniform(1.0, 3.0),
-        }.get(kind, 0.0)
-        ours_s = {
-            "server_frozen": rng.uniform(0.3, 4.0),
-            "process stopped": rng.choice((0.5, 3.0, 3.0, 25.0)),
-        }.get(kind, bench_s / self._speed)
-        arguments: dict[str, float | str] = {}
-        if kind == "read_timeout":
-            arguments = {"samples": float(rng.randrange(0, 400)), "count": float(rng.randint(1, 3))}
-        elif kind == "buffer_overwritten":
-            arguments = {"lost_samples": float(rng.randrange(1, 20_000))}
-        elif kind == "reply_cut_short":
-            arguments = {"part": rng.choice(("array", "message"))}
-        elif kind in ("chassis_offline", "stalled"):
-            arguments = {"target": _CHASSIS, "for_s": bench_s}
-        elif kind == "module_removed":
-            arguments = {"target": f"{_CHASSIS}Mod{rng.randint(1, 4)}", "for_s": bench_s}
-        elif kind == "server_frozen":
-            arguments = {"for_s": ours_s}
+        kind, arguments, ours_s = choose_fault(self._rng, self._speed)
         at = self._health.sample if self._health is not None else 0
         fault = Injected(kind, time.monotonic(), arguments, at)
         self._faults.append(fault)
@@ -243,8 +199,8 @@ class Soak:
             "lost_samples": marks.missing,
             "unexplained_samples": marks.unexplained,
             "leaps": [asdict(leap) for leap in marks.leaps],
-            "unexplained_gaps": _unexplained_gaps(self._faults, gaps, asleep),
-            "explained": marks.ok and _unexplained_gaps(self._faults, gaps, asleep) == 0,
+            "unexplained_gaps": unexplained_gaps(self._faults, gaps, asleep),
+            "explained": marks.ok and unexplained_gaps(self._faults, gaps, asleep) == 0,
             "standstills": len(asleep),
             "verified": verified.ok,
             "problems": list(verified.problems),
@@ -261,17 +217,6 @@ class Soak:
             "memory_series_s_mb": [(round(at, 1), round(size, 1)) for at, size in self._memory],
             "gap_table": [asdict(gap) for gap in gaps],
         }
-
-
-def _unexplained_gaps(faults: list[Injected], gaps: list[Gap], asleep: list[int]) -> int:
-    """Gaps without a fault (or a standstill of the machine) that can have made them."""
-    count = 0
-    for gap in gaps:
-        before = [fault for fault in faults if fault.sample <= gap.end + _SLACK]
-        last = before[-1] if before else None
-        by_fault = last is not None and last.kind in _LOSING and gap.first_sample >= last.sample - _SLACK
-        count += not (by_fault or any(abs(sample - gap.first_sample) < 30 * _SLACK for sample in asleep))
-    return count
 
 
 def _table(report: dict[str, Any]) -> Table:

@@ -107,7 +107,7 @@ def test_zoom_steps_and_jumps_by_key(qtbot, page):
 def test_a_window_on_a_run_shows_nothing_live(page):
     window = page.window()
     assert window.header.isHidden()
-    assert list(window.pages) == ["Campaign", "Result", "Replay", "Gap"]
+    assert list(window.pages) == ["Campaign", "Result", "Replay", "Gap", "Messages"]
 
 
 def test_a_rejected_test_is_offered_again_at_once(qtbot, configs, run_file):

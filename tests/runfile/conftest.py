@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from daq_app.config import ConfigError, Rig, load_rig
 from daq_app.runfile import JournalWriter, RunFileError, RunHeader, open_run, verify
 from daq_app.runfile.importers import ImportMap, ImportReport, import_file
-from daq_app.runfile.seal.format import MAGIC, Sign, write_seal
+from daq_app.runfile.seal.format import Sign, write_seal
+from tests.support.hostile_folder import take_seal_off
 
 Readings = NDArray[np.float64]
 MakeJournal = Callable[..., Readings]
@@ -90,15 +91,7 @@ def make_journal(header: RunHeader) -> MakeJournal:
 def without_seal() -> Callable[[Path], Path]:
     """`without_seal(path)` makes a run one of format version 1, which differs by its seal only."""
 
-    def change(path: Path) -> Path:
-        with h5py.File(path, "r+") as file:
-            del file["integrity"]
-            file.attrs["format_version"] = 1
-        content = path.read_bytes()
-        path.write_bytes(content.replace(MAGIC, bytes(len(MAGIC))))
-        return path
-
-    return change
+    return take_seal_off
 
 
 @pytest.fixture(scope="session")

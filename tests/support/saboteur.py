@@ -25,7 +25,8 @@ Usage = namedtuple("Usage", "total used free")
 class Saboteur:
     """What is broken now; see `NAMES`."""
 
-    NAMES = ("full", "read_only", "flush_s", "free_bytes", "clock_s", "memory_bytes", "no_memory")
+    NAMES = (*("read_only", "refusal", "flush_s", "free_bytes", "clock_s", "memory_bytes", "no_memory"),)
+    """`read_only`: the folder whose files cannot be written; `refusal`: the error it gives, EROFS if none."""
 
     def __init__(self, orders: Connection) -> None:
         self._orders = orders
@@ -53,6 +54,10 @@ class Saboteur:
             return False
         return str(path).startswith(folder + os.sep)
 
+    def _refusal(self, *path: str) -> OSError:
+        number = int(self.get("refusal") or errno.EROFS)
+        return OSError(number, os.strerror(number), *path)
+
     def install(self) -> None:
         """Stand between Python and the system."""
         self._on_disk()
@@ -63,12 +68,12 @@ class Saboteur:
 
         def sabotaged_write(fd: int, data: Any) -> int:
             if self.is_hit(fd):
-                raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+                raise self._refusal()
             return write(fd, data)
 
         def sabotaged_open(path: Any, flags: int, *more: Any, **named: Any) -> int:
             if flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT) and self.is_hit(path):
-                raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+                raise self._refusal(str(path))
             return opened(path, flags, *more, **named)
 
         def slow(flush: Any) -> Any:

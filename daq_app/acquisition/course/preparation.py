@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +24,7 @@ from daq_app.acquisition.course.tare import NotSteady, Tare, take_tare
 from daq_app.acquisition.messages.items import Ask, RequestRefused
 from daq_app.config.rig import Rig
 from daq_app.config.scaling import Scaling
-from daq_app.runfile import CheckRecord, TestPlan
+from daq_app.runfile import CheckFinding, CheckRecord, TestPlan
 from drivers import Block, Opened
 
 Floats = NDArray[np.float64]
@@ -122,6 +122,7 @@ class Preparation:
             summary=self.check.summary,
             taken_utc=self.check.taken_utc,
             overruled=overruled,
+            findings=tuple(_findings(self.check)),
         )
 
     def _asked(self) -> list[Ask]:
@@ -238,6 +239,14 @@ class Preparation:
             ask.done.set_exception(error)
             return
         begun.add_done_callback(lambda done: _pass_on(done, ask))
+
+
+def _findings(check: SensorCheck) -> Iterator[CheckFinding]:
+    for finding in check.rig_findings:
+        yield CheckFinding(verdict=finding.verdict.value, text=finding.text)
+    for channel in check.channels:
+        if channel.findings:
+            yield CheckFinding(channel=channel.channel_id, verdict=channel.verdict.value, text=channel.text)
 
 
 def _pass_on(begun: Future[Path], ask: Ask) -> None:

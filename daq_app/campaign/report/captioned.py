@@ -5,12 +5,16 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from daq_app.campaign.report import figures
 from daq_app.campaign.report.summary import TestSummary
+
+PLAIN_TEXT: Final = {"text.parse_math": False}
+"""Setting of matplotlib under which a dollar sign that somebody typed begins no formula."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from functools import lru_cache
 from itertools import accumulate
 from typing import Final
 
+import matplotlib as mpl
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -17,10 +18,11 @@ from matplotlib.textpath import text_to_path
 from matplotlib.transforms import Bbox
 
 from daq_app.campaign.report import tables
-from daq_app.campaign.report.captioned import campaign_figures
+from daq_app.campaign.report.captioned import PLAIN_TEXT, campaign_figures
 from daq_app.campaign.report.collect import Failure
 from daq_app.campaign.report.number_words import interval, number, signed
 from daq_app.campaign.report.summary import TestSummary
+from daq_app.config.shown_text import one_line
 
 _ROWS = 40
 """Rows of a table on one page."""
@@ -44,7 +46,7 @@ def report_pdf(
 ) -> bytes:
     """A whole document."""
     buffer = io.BytesIO()
-    with PdfPages(buffer, metadata={"Title": title}) as pages:
+    with mpl.rc_context(PLAIN_TEXT), PdfPages(buffer, metadata={"Title": title}) as pages:
         for page in _tables(title, "Table 4.1: coefficient of restitution", *_restitution_rows(restitution)):
             pages.savefig(page)
         if repetitions:
@@ -127,7 +129,7 @@ def _test_rows(tests: Sequence[TestSummary]) -> tuple[list[str], list[list[str]]
 
 
 def _wrapped(text: str) -> str:
-    return "\n".join(textwrap.wrap(text, _WIDTH))
+    return "\n".join(textwrap.wrap(one_line(text), _WIDTH))
 
 
 def _tables(title: str, heading: str, header: list[str], rows: list[list[str]]) -> Iterator[Figure]:

@@ -15,6 +15,7 @@ from scipy.special import stdtrit
 from daq_app.campaign.report.statistics import GroupMean, random_effects_mean
 from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.status import CampaignStatus
+from daq_app.config.shown_text import csv_cell
 from daq_app.runfile.durable import write_whole
 
 METHODS: Final = ("CRT", "EAV", "fit")
@@ -276,7 +277,7 @@ def _write(path: Path, header: Sequence[str], rows: Sequence[Sequence[object]]) 
     text = io.StringIO()
     writer = csv.writer(text)
     writer.writerow(header)
-    writer.writerows([["" if _missing(cell) else cell for cell in row] for row in rows])
+    writer.writerows([["" if _missing(cell) else csv_cell(cell) for cell in row] for row in rows])
     return write_whole(path, text.getvalue(), other_name=True)
 
 

@@ -10,8 +10,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, select_autoescape
+from jinja2 import Environment
 
+from daq_app.campaign.pages import page_environment
 from daq_app.campaign.report import tables
 from daq_app.campaign.report.collect import Failure
 from daq_app.campaign.report.number_words import interval, number, signed
@@ -121,9 +122,7 @@ def write_report(
 
 
 def _environment() -> Environment:
-    environment = Environment(
-        loader=PackageLoader("daq_app.campaign"), autoescape=select_autoescape(), trim_blocks=True
-    )
+    environment = page_environment()
     environment.filters["number"] = number
     environment.filters["signed"] = signed
     environment.filters["interval"] = interval

@@ -43,9 +43,11 @@ def measured_periods(test: TestSummary) -> tuple[Floats, Floats]:
     return peaks, 2.0 * durations[: peaks.size]
 
 
-def result_figure(test: TestSummary, earlier: Sequence[TestSummary] = ()) -> Figure:
-    """θ(t), θ̇(t), r per impact and period against amplitude of one test."""
-    figure = Figure(figsize=(11.0, 7.2), layout="constrained")
+def result_figure(
+    test: TestSummary, earlier: Sequence[TestSummary] = (), *, size_in: tuple[float, float] = (11.0, 7.2)
+) -> Figure:
+    """θ(t), θ̇(t), r per impact and period against amplitude of one test; letters as `rcParams` says."""
+    figure = Figure(figsize=size_in, layout="constrained")
     rotation, restitution, velocity, periods = figure.subplots(
         2, 2, gridspec_kw={"width_ratios": (1.7, 1.0)}
     ).ravel()
@@ -57,7 +59,7 @@ def result_figure(test: TestSummary, earlier: Sequence[TestSummary] = ()) -> Fig
         axis.set_axisbelow(True)
         for side in ("top", "right"):
             axis.spines[side].set_visible(False)
-    figure.suptitle(test.test, fontsize=15, fontweight="bold", x=0.01, ha="left")
+    figure.suptitle(test.test, fontweight="bold", x=0.01, ha="left")
     return figure
 
 
@@ -85,7 +87,7 @@ def _draw_histories(
     second.set_ylabel("θ/α")
     velocity.set_ylabel("angular velocity dθ/dt (rad/s)")
     velocity.set_xlabel("time after release (s)")
-    rotation.legend(frameon=False, fontsize=8.5, loc="upper right")
+    rotation.legend(frameon=False, fontsize="small", loc="upper right")
 
 
 def _draw_restitution(axis: Axes, test: TestSummary) -> None:
@@ -108,7 +110,7 @@ def _draw_restitution(axis: Axes, test: TestSummary) -> None:
     axis.set_xlabel("impact")
     axis.set_ylabel("coefficient of restitution r")
     axis.set_xlim(left=0)
-    axis.legend(frameon=False, fontsize=8.5)
+    axis.legend(frameon=False, fontsize="small")
 
 
 def _draw_periods(axis: Axes, test: TestSummary, earlier: Sequence[TestSummary]) -> None:
@@ -121,4 +123,4 @@ def _draw_periods(axis: Axes, test: TestSummary, earlier: Sequence[TestSummary])
     axis.set_ylabel("period T (s)")
     axis.set_xlim(left=0)
     axis.set_ylim(bottom=0)
-    axis.legend(frameon=False, fontsize=8.5)
+    axis.legend(frameon=False, fontsize="small")

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from jinja2 import Environment, PackageLoader, select_autoescape
+import matplotlib as mpl
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
-from daq_app.campaign.report.captioned import CaptionedFigure
+from daq_app.campaign.pages import page_environment
+from daq_app.campaign.report.captioned import PLAIN_TEXT, CaptionedFigure
 from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.result.figures import measured_periods, result_figure
+from daq_app.campaign.status import NO_FACTS, TestFacts
+from daq_app.config.shown_text import one_line
 from daq_app.config.wording import plus_minus
 from daq_app.rocking import period
 from daq_app.runfile.durable import write_whole
 
 METHODS: Final = ("EAV", "CRT")
+_WIDTH: Final = 110
+"""Characters of a sentence on one line of the PDF."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +40,10 @@ class RepetitionRow:
     this: bool
 
 
-def repetition_rows(test: TestSummary, earlier: Sequence[TestSummary]) -> list[RepetitionRow]:
-    """The test and the others of its level, in the order given, the test last."""
+def repetition_rows(
+    test: TestSummary, earlier: Sequence[TestSummary], later: Sequence[TestSummary] = ()
+) -> list[RepetitionRow]:
+    """The test between the others of its level, in the order given."""
     return [
         RepetitionRow(
             test=one.test,
@@ -45,15 +53,16 @@ def repetition_rows(test: TestSummary, earlier: Sequence[TestSummary]) -> list[R
             good=one.good,
             this=one is test,
         )
-        for one in [*earlier, test]
+        for one in [*earlier, test, *later]
     ]
 
 
 def verdict_sentence(test: TestSummary) -> str:
-    """The quality verdict in words."""
+    """The quality verdict in words, on one line."""
+    reasons = one_line("; ".join(test.reasons))
     if test.good:
-        return "Good." + (f" To note: {'; '.join(test.reasons)}." if test.reasons else "")
-    return f"Not good: {'; '.join(test.reasons) or 'rejected'}. The test is offered again."
+        return "Good." + (f" To note: {reasons}." if reasons else "")
+    return f"Not good: {reasons or 'rejected'}. The test is offered again."
 
 
 def period_deviation(test: TestSummary) -> float | None:
@@ -65,17 +74,23 @@ def period_deviation(test: TestSummary) -> float | None:
     return float((measured[inside] / period(phi[inside], test.p_rad_s) - 1.0).mean())
 
 
-def write_result(run: Path, test: TestSummary, earlier: Sequence[TestSummary] = ()) -> list[Path]:
+def write_result(
+    run: Path, test: TestSummary, earlier: Sequence[TestSummary] = (), facts: TestFacts = NO_FACTS
+) -> list[Path]:
     """Write ``RUN.result.html`` and ``RUN.result.pdf`` beside the run; returns both. Raises `OSError`."""
+    with mpl.rc_context(PLAIN_TEXT):
+        return _write(run, test, earlier, facts)
+
+
+def _write(run: Path, test: TestSummary, earlier: Sequence[TestSummary], facts: TestFacts) -> list[Path]:
     figure = result_figure(test, earlier)
     rows = repetition_rows(test, earlier)
     html = (
-        Environment(
-            loader=PackageLoader("daq_app.campaign"), autoescape=select_autoescape(), trim_blocks=True
-        )
+        page_environment()
         .get_template("result.html")
         .render(
             test=test,
+            facts=facts,
             run=run.name,
             verdict=verdict_sentence(test),
             methods=[(name, test.methods.get(name)) for name in METHODS],
@@ -110,7 +125,7 @@ def _table_page(test: TestSummary, rows: Sequence[RepetitionRow]) -> Figure:
     """r by each estimator, and the tests of the level, as on the HTML page."""
     page = Figure(figsize=(11.0, 7.2))
     page.text(0.05, 0.93, test.test, fontsize=15, fontweight="bold")
-    page.text(0.05, 0.88, verdict_sentence(test), fontsize=11, wrap=True)
+    page.text(0.05, 0.9, textwrap.fill(verdict_sentence(test), _WIDTH, max_lines=3), fontsize=11, va="top")
     methods = [(name, method) for name in METHODS if (method := test.methods.get(name)) is not None]
     estimates = [
         [

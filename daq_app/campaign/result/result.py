@@ -18,7 +18,7 @@ import numpy as np
 from daq_app.campaign.names import TestName
 from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.report.summary import MethodResult, TestSummary
-from daq_app.campaign.status import RecordedTest, TestVerdict
+from daq_app.campaign.status import NO_FACTS, RecordedTest, TestFacts, TestVerdict
 from daq_app.config import ConfigError
 from daq_app.extras import missing_extra
 from daq_app.runfile import RunFileError
@@ -31,10 +31,18 @@ _ARRAYS: Final = ("time_s", "rotation_rad", "velocity_rad_s")
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """A test with the earlier ones of its level, oldest first."""
+    """A test with the other ones of its level, oldest first."""
 
     test: TestSummary
     earlier: tuple[TestSummary, ...]
+    later: tuple[TestSummary, ...] = ()
+    """Released after it, as far as they have a result."""
+    facts: TestFacts = NO_FACTS
+
+    @property
+    def in_order(self) -> tuple[TestSummary, ...]:
+        """All tests of the level in the order of their releases."""
+        return (*self.earlier, self.test, *self.later)
 
 
 class NoResult(Exception):
@@ -80,7 +88,7 @@ def judged(summary: TestSummary, test: RecordedTest) -> TestSummary:
 
 
 def level_of(run: Path) -> tuple[RecordedTest, list[RecordedTest]]:
-    """The test of a run, and the tests of its level released before it. Raises `NoResult`."""
+    """The test of a run, and the other tests of its level, oldest first. Raises `NoResult`."""
     try:
         recorded = [test for test in read_recorded(run.parent) if test.path is not None]
     except (ConfigError, RunFileError) as error:
@@ -89,25 +97,29 @@ def level_of(run: Path) -> tuple[RecordedTest, list[RecordedTest]]:
     if this is None:
         raise NoResult(f"{run.name} holds no release of a named test: there is no result to show")
     name: TestName = this.name
-    earlier = [
+    others = [
         test
         for test in recorded
         if (test.name.specimen, test.name.level) == (name.specimen, name.level)
         and test is not this
-        and test.released_ns < this.released_ns
         and test.verdict is not TestVerdict.LOST
     ]
-    return this, sorted(earlier, key=lambda test: test.released_ns)
+    return this, sorted(others, key=lambda test: test.released_ns)
 
 
 def load_result(run: Path) -> Result | None:
     """The result as saved beside the runs; None if the run itself has none yet. Raises `NoResult`."""
-    this, earlier = level_of(run)
+    this, others = level_of(run)
     summary = load_summary(run)
     if summary is None:
         return None
-    others = [(test, load_summary(test.path)) for test in earlier if test.path is not None]
-    return Result(judged(summary, this), tuple(judged(s, t) for t, s in others if s is not None))
+    earlier: list[TestSummary] = []
+    later: list[TestSummary] = []
+    for test in others:
+        saved = load_summary(test.path) if test.path is not None else None
+        if saved is not None:
+            (earlier if test.released_ns < this.released_ns else later).append(judged(saved, test))
+    return Result(judged(summary, this), tuple(earlier), tuple(later), this.facts)
 
 
 def make_result(run: Path) -> Result:
@@ -119,7 +131,8 @@ def make_result(run: Path) -> Result:
     from daq_app.campaign.report.collect import Failure, summarise_run
     from daq_app.rocking.analysis.analyse import AnalysisOptions
 
-    this, earlier = level_of(run)
+    this, others = level_of(run)
+    earlier = [test for test in others if test.released_ns < this.released_ns]
     summaries: list[TestSummary] = []
     for test in [*earlier, this]:
         assert test.path is not None
@@ -133,7 +146,7 @@ def make_result(run: Path) -> Result:
             save_summary(test.path, made)
             found = made
         summaries.append(judged(found, test))
-    result = Result(summaries[-1], tuple(summaries[:-1]))
+    result = Result(summaries[-1], tuple(summaries[:-1]), facts=this.facts)
     try:
         from daq_app.campaign.result.report import write_result
     except ModuleNotFoundError as error:
@@ -141,7 +154,7 @@ def make_result(run: Path) -> Result:
         if missing is None:
             raise
         raise NoResult(f"The figures are saved, the page is not: {missing}") from error
-    write_result(run, result.test, result.earlier)
+    write_result(run, result.test, result.earlier, result.facts)
     return result
 
 

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from daq_app.cli.analyse.bias import with_whole_chain_bias
-from daq_app.cli.analyse.files import write_outputs
+from daq_app.cli.analyse.files import output_files, write_outputs
 from daq_app.cli.analyse.tables import analysis_tables
 from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, reported
+from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.config import Rig, load_rig
+from daq_app.runfile.folder import require_replaceable
 
 
 def register(app: typer.Typer) -> None:
@@ -27,6 +27,7 @@ def analyse(
     out: Annotated[
         Path | None, typer.Option(help="Also write JSON, CSV tables and a picture into this folder.")
     ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that are there.")] = False,
     rig: Annotated[
         Path | None, typer.Option(help="Use this rig file in place of the one kept in the run.")
     ] = None,
@@ -60,6 +61,8 @@ def analyse(
     from daq_app.runfile import open_run
 
     with reported():
+        for target in output_files(out, run.stem) if out is not None else ():
+            require_replaceable(target, [run], overwrite=overwrite)
         replacement = load_rig(rig) if rig is not None else None
         options = AnalysisOptions(
             velocity_cutoff_hz=cutoff,
@@ -84,7 +87,7 @@ def analyse(
         if chain_runs and analysis.found:
             analysis = with_whole_chain_bias(analysis, used, chain_runs)
         if as_json:
-            typer.echo(json.dumps(analysis.as_dict(), ensure_ascii=False, allow_nan=False))
+            echo_json(analysis.as_dict())
         else:
             console = Console()
             if not console.is_terminal:
@@ -98,5 +101,5 @@ def analyse(
                 print_paragraph("Error", f"the results could not be written into {out}: {error}")
                 raise typer.Exit(EXIT_BAD_INPUT) from None
             if not as_json:
-                typer.echo("Written: " + ", ".join(str(path) for path in written))
+                echo("Written: " + ", ".join(str(path) for path in written))
     raise typer.Exit(0 if analysis.found else EXIT_FAILED)

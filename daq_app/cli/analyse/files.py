@@ -7,17 +7,27 @@ import io
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from daq_app.cli.analyse.joint import joint_figure, profile_csv
+from daq_app.config.shown_text import shortened
 from daq_app.runfile.durable import write_whole
 
 if TYPE_CHECKING:
     from daq_app.rocking.analysis.results import TestAnalysis
 
 _SERIES_STEP_S = 0.0025
+_SUFFIXES: Final = (
+    *(".analysis.json", ".half_cycles.csv", ".restitution.csv", ".signals.csv", ".svg"),
+    *(".joint.csv", ".joint.svg"),
+)
+
+
+def output_files(folder: Path, stem: str) -> list[Path]:
+    """Every file that `write_outputs` may write."""
+    return [folder / f"{stem}{suffix}" for suffix in _SUFFIXES]
 
 
 def write_outputs(analysis: TestAnalysis, folder: Path, stem: str) -> list[Path]:
@@ -117,7 +127,7 @@ def _picture(analysis: TestAnalysis, path: Path) -> Path:
     points.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False)
     for axes in (rotation, velocity, points):
         axes.grid(alpha=0.3)
-    rotation.set_title(analysis.label)
+    rotation.set_title(shortened(analysis.label, 80), parse_math=False)
     return _save(figure, path)
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from daq_app.campaign.names import TestName
@@ -16,9 +14,11 @@ from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.status import CampaignStatus, PlaceState
 from daq_app.campaign.verdicts import give_place, give_verdict
 from daq_app.cli.campaign.progress import DEFAULT_PLAN, open_plan
+from daq_app.cli.campaign.record import record
 from daq_app.cli.campaign.report import report
 from daq_app.cli.campaign.simulate import simulate
 from daq_app.cli.errors import reported
+from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.config import ConfigError, Problem
 from daq_app.runfile import RunFileError, open_run
 
@@ -41,6 +41,7 @@ def register(app: typer.Typer) -> None:
         epilog='Example: daq-app campaign verdict runs/FR1-L3-2.h5 bad --reason "hit a rope"',
     )(verdict)
     group.command("assign", epilog="Example: daq-app campaign assign runs/unarmed_….h5 FR1-L3-2")(assign)
+    group.command("record", epilog="Example: daq-app campaign record runs/FR1-L3-2.h5")(record)
     group.command("report", epilog="Example: daq-app campaign report runs --out report")(report)
     group.command("simulate", epilog="Example: daq-app campaign simulate runs --r FR1=0.895 --seed 3")(
         simulate
@@ -76,7 +77,7 @@ def status(
             raise ConfigError([Problem("--specimen", specimen, wrong, right)])
         found = CampaignStatus.scan(campaign, folder, read_recorded)
         if as_json:
-            typer.echo(json.dumps(_as_json(found, specimen), ensure_ascii=False))
+            echo_json(_as_json(found, specimen))
         else:
             _print_status(found, specimen)
 
@@ -148,7 +149,7 @@ def verdict(
         with open_run(run_file) as run:
             run_id, test = run.header.run_id, run.header.test
         give_verdict(run_file.parent, run_id, decision.value, reason)
-        typer.echo(f"{test or run_id}: {decision.value}" + (f" ({reason})" if reason else ""))
+        echo(f"{test or run_id}: {decision.value}" + (f" ({reason})" if reason else ""))
 
 
 def assign(
@@ -169,4 +170,4 @@ def assign(
                     advice="Only a release that nobody had armed is given a place afterwards.",
                 )
         give_place(run_file.parent, run_id, str(name))
-        typer.echo(f"{run_file.name} counts as {name}")
+        echo(f"{run_file.name} counts as {name}")

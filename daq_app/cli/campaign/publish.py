@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from daq_app.campaign.plan import Campaign
 from daq_app.cli.campaign.progress import DEFAULT_PLAN, open_plan, progress_bar
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
+from daq_app.cli.terminal import Console, echo
 from daq_app.config import ConfigError, Problem
 from daq_app.runfile import RunFileError
 from daq_app.runfile.durable import write_whole
@@ -66,7 +66,7 @@ def publish(
         for words in missing:
             print_paragraph("Missing", words)
         if check:
-            typer.echo("Nothing is missing." if not missing else f"{len(missing)} things are missing.")
+            echo("Nothing is missing." if not missing else f"{len(missing)} things are missing.")
             raise typer.Exit(EXIT_FAILED if missing else 0)
         target = out or folder.with_name(f"{folder.resolve().name}-published")
         _make(target, folder, found, left_out, campaign, values, workers)
@@ -86,7 +86,7 @@ def _write_template(folder: Path, campaign: Campaign, names: list[str], plan_fil
     if path.exists():
         raise RunFileError(f"{path} exists already", advice="Fill it in, or move it away first.")
     write_whole(path, fields_template(campaign.fields, names))
-    typer.echo(f"{path}: a row for each of {len(names)} tests")
+    echo(f"{path}: a row for each of {len(names)} tests")
 
 
 def _checked(

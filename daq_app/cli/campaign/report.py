@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import math
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
-from daq_app.campaign.status import CampaignStatus
 from daq_app.cli.campaign.progress import DEFAULT_PLAN, open_plan, progress_bar
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported, say_other_name
+from daq_app.cli.terminal import Console, echo_json
+from daq_app.runfile import RunFileError
 from daq_app.workers import warm_up
 
 if TYPE_CHECKING:
@@ -32,6 +30,10 @@ def report(
     bias_runs: Annotated[
         int, typer.Option(min=0, help="Simulated tests behind each method's bias; 0 leaves it out.")
     ] = 6,
+    overwrite: Annotated[
+        bool,
+        typer.Option("--overwrite", help="Write into an --out that holds files."),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print Table 4.1 as JSON.")] = False,
 ) -> None:
     """Analyse every run of a campaign: HTML and PDF report, figures as SVG, every number as CSV.
@@ -41,13 +43,15 @@ def report(
     """
     with reported():
         campaign = open_plan(plan_file)
+        if out is not None and not overwrite and out.is_dir() and any(out.iterdir()):
+            raise RunFileError(f"{out} holds files", advice="Choose another folder, or say --overwrite.")
         # Imported here: `--help` should not load SciPy.
         drawing = ("daq_app.campaign.report.captioned", "daq_app.campaign.report.pdf")
         # The program itself too: each worker imports it anew otherwise.
         warm_up("daq_app.campaign.report.collect", *drawing, "daq_app.cli.app")
         from daq_app.campaign.report import collect as gathering
+        from daq_app.campaign.report.job import write_collected
         from daq_app.campaign.report.tables import mean_of_specimens, table_4_1
-        from daq_app.campaign.report.write import write_report
         from daq_app.rocking.analysis.analyse import AnalysisOptions
 
         with progress_bar("analysing") as advance:
@@ -60,10 +64,7 @@ def report(
             print_paragraph("Error", f"no run in {folder} could be analysed; nothing was written")
             raise typer.Exit(EXIT_FAILED)
         target = out or folder / "report"
-        made = time.strftime("%Y-%m-%d %H:%M", time.localtime())
-        footer = f"Made {made} from {len(found.recorded)} recorded tests in {folder.name}."
-        status = CampaignStatus(campaign, found.recorded)
-        written = write_report(target, campaign.name, status, tests, footer, failures, at_once=workers != 1)
+        written = write_collected(campaign, folder, found, target, at_once=workers != 1)
         page = next(path for path in written if path.suffix == ".html")
         say_other_name(target / "report.html", page)
         say_other_name(target / "report.pdf", next(path for path in written if path.suffix == ".pdf"))
@@ -97,7 +98,7 @@ def _print(rows: list[RestitutionRow], tests: Sequence[TestSummary], page: Path,
             }
             for row in rows
         ]
-        typer.echo(json.dumps({"report": str(page), "table_4_1": document}, indent=1))
+        echo_json({"report": str(page), "table_4_1": document}, indent=1)
         return
     console = Console()
     if not console.is_terminal:

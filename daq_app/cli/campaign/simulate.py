@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from daq_app.campaign.plan import Campaign
 from daq_app.cli.campaign.progress import DEFAULT_PLAN, open_plan, progress_bar
 from daq_app.cli.errors import reported
+from daq_app.cli.terminal import Console
 from daq_app.config import ConfigError, Problem, load_rig
 
 

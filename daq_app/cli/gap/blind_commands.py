@@ -10,14 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, reported
+from daq_app.cli.terminal import Console, echo
 from daq_app.config import load_rig
 from daq_app.config.shipped import here_or_shipped
 from daq_app.runfile.durable import write_whole
+from daq_app.runfile.folder import require_replaceable
 
 if TYPE_CHECKING:
     from daq_app.gap.blind.scoring.laboratories import LaboratoryScore
@@ -116,7 +117,7 @@ def make(
             advance(before)
             for _ in make_cases(order, range(cases), _workers(workers)):
                 advance(1)
-        typer.echo(f"{cases} sealed cases in {out}; labels in {kept}: keep them away from the diagnosis")
+        echo(f"{cases} sealed cases in {out}; labels in {kept}: keep them away from the diagnosis")
 
 
 def run(
@@ -158,7 +159,7 @@ def run(
                 if outcome.failure:
                     failed += 1
                     print_paragraph(outcome.case, outcome.failure, style="bold yellow")
-        typer.echo(f"{total} cases, {todo} diagnosed now, {failed} of them without a result")
+        echo(f"{total} cases, {todo} diagnosed now, {failed} of them without a result")
         if failed:
             raise typer.Exit(EXIT_FAILED)
 
@@ -171,6 +172,7 @@ def score(
     html: Annotated[Path | None, typer.Option(help="Write a page with pictures.")] = None,
     page: Annotated[Path | None, typer.Option(help="The same as Markdown, pictures in images/.")] = None,
     json_out: Annotated[Path | None, typer.Option("--json", help="Write all numbers as JSON.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that are there.")] = False,
 ) -> None:
     """Open the labels, check the seals, say how good the diagnosis is. Exit code 1: a target is missed."""
     from daq_app.gap.blind.layout import results_without
@@ -178,6 +180,8 @@ def score(
 
     with _refusals():
         kept = results or results_without(_part(without))
+        for written in filter(None, (html, page, json_out)):
+            require_replaceable(written, overwrite=overwrite)
         found = score_folder(folder, labels or _beside(folder), kept)
         _print_score(found)
         if json_out:
@@ -274,7 +278,7 @@ def _print_confusion(found: Score, console: Console) -> None:
 @contextmanager
 def _progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
@@ -22,6 +21,7 @@ from daq_app.cli.errors import (
     reported,
     say_other_name,
 )
+from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.config import load_rig
 from daq_app.runfile.durable import write_whole
 from daq_app.runfile.folder import require_replaceable
@@ -154,7 +154,11 @@ def _options(asked: _Asked) -> Iterator[Options]:
     from daq_app.gap.core import Options
     from daq_app.gap.core.fitting.parallel import Interrupted
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"))
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("{task.completed}/{task.total}"),
+    )
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task("reading features", total=1)
 
@@ -185,14 +189,13 @@ def starter(
     from importlib.resources import files
 
     text = files("daq_app.gap.own_model").joinpath("starter.py").read_text(encoding="utf-8")
+    if out.exists():
+        raise _bad_input(f"{out} is there already. Give another name.")
     try:
-        with out.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise _bad_input(f"{out} is there already. Give another name.") from None
+        write_whole(out, text)
     except OSError as error:
         raise _bad_input(f"{out} cannot be written: {error.strerror}.") from None
-    typer.echo(f"{out} written. Try it: daq-app gap diagnose --model {out} RECORDING…")
+    echo(f"{out} written. Try it: daq-app gap diagnose --model {out} RECORDING…")
 
 
 def _print(result: Diagnosis) -> None:
@@ -242,7 +245,6 @@ def effects(
 
     Exit code 0; 2 for a family that does not exist.
     """
-    import json
 
     from daq_app.gap.rocking_model.library import rocking_library
 
@@ -274,7 +276,7 @@ def effects(
             }
             for e in chosen
         ]
-        typer.echo(json.dumps(listed, ensure_ascii=False, indent=1))
+        echo_json(listed, indent=1)
         return
     table = Table("effect", "family", "adds", "parameters", "confusable with", "source")
     for e in chosen:

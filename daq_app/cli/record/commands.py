@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,9 +9,10 @@ from pathlib import Path
 from typing import Annotated, Final
 
 import typer
-from rich.console import Console
 
 from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, reported
+from daq_app.cli.record.seal_keys import register_seal_keys
+from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.streams import let_output_fail
 
 LEVELS: Final = {"L1": 0.15, "L2": 0.25, "L3": 0.35, "L4": 0.40}
@@ -28,9 +28,13 @@ def register(app: typer.Typer) -> None:
     app.command(
         "simulate", epilog="Example: daq-app simulate configs/fr1.toml --level L3 --r 0.9 --out run.h5"
     )(simulate)
-    keys = typer.Typer(no_args_is_help=True, help="Keys for viewers beyond this machine.")
+    keys = typer.Typer(
+        no_args_is_help=True,
+        help="Keys of viewers elsewhere, and of other recorders to be trusted.",
+    )
     keys.command("recorder", epilog="Example: daq-app keys recorder keys")(recorder_keys)
     keys.command("viewer", epilog="Example: daq-app keys viewer my-keys bench-laptop")(viewer_keys)
+    register_seal_keys(keys)
     app.add_typer(keys, name="keys")
 
 
@@ -99,7 +103,7 @@ def run(
     if ended.run is not None:
         with reported():
             if as_json:
-                typer.echo(json.dumps(as_document(ended.run, ended.outcome), indent=1))
+                echo_json(as_document(ended.run, ended.outcome), indent=1)
             else:
                 console.print(results_table(ended.run))
     if ended.text:
@@ -150,7 +154,7 @@ def simulate(
             effects=effect or (),
         )
         if as_json:
-            typer.echo(json.dumps(as_document(out, "complete"), indent=1))
+            echo_json(as_document(out, "complete"), indent=1)
         else:
             Console().print(results_table(out))
 
@@ -167,8 +171,8 @@ def recorder_keys(folder: KeyFolder) -> None:
 
     with _writing(folder):
         public = create_recorder_keys(folder)
-    typer.echo(f"The recorder's public key, for viewers: {public}")
-    typer.echo(f"Viewers that may listen: put their .key files into {folder / VIEWERS}")
+    echo(f"The recorder's public key, for viewers: {public}")
+    echo(f"Viewers that may listen: put their .key files into {folder / VIEWERS}")
 
 
 def viewer_keys(
@@ -183,8 +187,8 @@ def viewer_keys(
         raise typer.Exit(EXIT_BAD_INPUT)
     with _writing(folder):
         public, secret = create_viewer_keys(folder, name)
-    typer.echo(f"For the recorder's folder of viewers: {public}")
-    typer.echo(f"Keep this one here (daq-app monitor --key): {secret}")
+    echo(f"For the recorder's folder of viewers: {public}")
+    echo(f"Keep this one here (daq-app monitor --key): {secret}")
 
 
 @contextmanager

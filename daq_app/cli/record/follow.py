@@ -11,14 +11,13 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from rich.console import Console
-
 from daq_app.acquisition.messages.published import EventMessage, State, StateMessage
 from daq_app.acquisition.viewers.client import AcquisitionClient, AcquisitionUnreachable
 from daq_app.acquisition.viewers.launcher import AcquisitionDied, AcquisitionProcess
 from daq_app.cli.errors import EXIT_FAILED, EXIT_HARDWARE, EXIT_INTERRUPTED
 from daq_app.cli.record.simulated_hand import SimulatedHand
 from daq_app.cli.record.view import RunView
+from daq_app.cli.terminal import Console
 from daq_app.config import parse_rig
 from daq_app.guarded import program
 

@@ -8,6 +8,7 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
+from daq_app.campaign.recorded import facts_of
 from daq_app.config.wording import plus_minus
 from daq_app.runfile import Run, open_run
 
@@ -20,7 +21,7 @@ def as_document(path: Path, outcome: str) -> dict[str, Any]:
 
 def _document(run: Run, outcome: str) -> dict[str, Any]:
     lost = sum(gap.n_samples for gap in run.gaps)
-    results = run.results
+    results, facts = run.results, facts_of(run)
     document: dict[str, Any] = {
         "run": str(run.path),
         "run_id": run.header.run_id,
@@ -35,6 +36,8 @@ def _document(run: Run, outcome: str) -> dict[str, Any]:
         "truth": run.header.truth,
         "results": _results(results.get("analysis"), results.get("online")),
         "quality": results.get("quality"),
+        "operator": facts.operator,
+        "notes": "\n".join(facts.notes),
     }
     return document
 
@@ -80,7 +83,8 @@ def results_table(path: Path) -> Table:
         f"{document['channels']} channels × {document['n_samples']} samples = {document['duration_s']:.3f} s "
         f"at {document['rate_hz']:g} Hz",
     )
-    table.add_row("lost", "none" if not lost else f"[bold red]{lost} samples in {document['gaps']} gap(s)[/]")
+    gaps = Text(f"{lost} samples in {document['gaps']} gap(s)", "bold red")
+    table.add_row("lost", gaps if lost else "none")
     results = document["results"]
     if results is None:
         table.add_row("r", "no release with an impact was found in this run")
@@ -91,6 +95,9 @@ def results_table(path: Path) -> Table:
         for method, formula in (("eav", "(4.4)"), ("crt", "(4.5)")):
             table.add_row(f"r {method.upper()}", _r_text(results["r"][method], results["r_max"], formula))
         table.add_row("r max", f"{results['r_max']:.4f}  (1.2)")
+    for label in ("operator", "notes"):
+        if document[label]:
+            table.add_row(label, document[label])
     quality = document["quality"]
     if quality:
         style = "bold green" if quality["verdict"] == "good" else "bold red"

@@ -6,7 +6,7 @@ import math
 from types import TracebackType
 from typing import Any, Final, Self
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.live import Live
 from rich.panel import Panel
 from rich.table import Table
@@ -22,6 +22,7 @@ from daq_app.acquisition.messages.published import (
     State,
     StateMessage,
 )
+from daq_app.cli.terminal import Console
 
 _BAR_CELLS: Final = 61
 _SHOWN_IMPACTS: Final = 12
@@ -121,7 +122,7 @@ class RunView:
             parts.append(self._impacts(self._estimate))
             if not self.zeroed:
                 parts.append(Text(UNZEROED, style="yellow"))
-        return Panel(Group(*parts), title=self._test, title_align="left")
+        return Panel(Group(*parts), title=Text(self._test), title_align="left")
 
     def _bar(self) -> Text:
         """Rotation as a mark on a scale of ± θ0 (or 100 mrad before the release)."""

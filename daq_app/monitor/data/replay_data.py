@@ -17,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.config.rig import Channel
+from daq_app.config.shown_text import csv_cell
 from daq_app.monitor.data.shown_units import shown_unit
 from daq_app.rocking import RotationGeometry, VelocityFilter
 from daq_app.runfile import Event, Gap, open_run
+from daq_app.runfile.durable import written_whole
 
 Array = NDArray[np.float64]
 
@@ -173,9 +175,10 @@ class ReplayRun:
         Columns: time from the run's zero, absolute sample, then the signals with their units.
         """
         first, last = self.column_of(start_s), self.column_of(stop_s) + 1
-        with path.open("w", newline="", encoding="utf-8") as file:
+        with written_whole(path) as beside, beside.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
-            writer.writerow(["time_s", "sample", *(f"{name} ({self.signals[name].unit})" for name in names)])
+            signals = (csv_cell(f"{name} ({self.signals[name].unit})") for name in names)
+            writer.writerow(["time_s", "sample", *signals])
             for start in range(first, last, _PART):
                 stop = min(start + _PART, last)
                 columns = [self.values(name, start, stop) for name in names]

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QHeaderView,
     QLabel,
     QLineEdit,
+    QPlainTextEdit,
     QPushButton,
     QTableView,
     QVBoxLayout,
@@ -24,13 +25,30 @@ from daq_app.campaign.status import CampaignStatus, Place, PlaceState, Proposal
 from daq_app.campaign.verdicts import give_verdict
 from daq_app.config import ConfigError
 from daq_app.monitor.data.background import Background
-from daq_app.monitor.widgets.banner import keyed_button
+from daq_app.monitor.data.child import said_by
+from daq_app.monitor.widgets.banner import keyed_button, open_outside
 from daq_app.monitor.widgets.campaign_table import CampaignModel, StateDelegate, release_text
 from daq_app.monitor.widgets.labels import Tile, role_label
 from daq_app.monitor.widgets.theme import Colours
 from daq_app.runfile import RunFileError, open_run
 
-_WIDTHS_PX = (190, 70, 140)
+_WIDTHS_PX = (160, 56, 145, 86, 64, 110, 120, 95)
+"""Of the columns before the notes, pixels."""
+_REPORT_LIMIT_S = 3600.0
+
+
+class NoReport(Exception):
+    """The report could not be made: why, in words."""
+
+
+def make_report(campaign: Campaign, folder: Path) -> Path:
+    """Make the report of a folder of runs in another process; its page. Raises `NoReport`."""
+    out = folder / "report"
+    arguments = [campaign.model_dump_json(), str(folder), str(out)]
+    ok, said = said_by("daq_app.campaign.report.job", arguments, _REPORT_LIMIT_S)
+    if not ok:
+        raise NoReport(said or "The report could not be made; it ended without a word.")
+    return out / "report.html"
 
 
 class CampaignPage(QWidget):
@@ -40,10 +58,13 @@ class CampaignPage(QWidget):
     run_chosen = Signal(str)
     told = Signal(str, str)
     scanned = Signal()
+    reported = Signal(str)
 
     def __init__(self, background: Background, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._background = background
+        self._reports = Background(self)
+        """A report takes minutes: nothing else waits for it."""
         self.campaign: Campaign | None = None
         self.folder: Path | None = None
         self.status: CampaignStatus | None = None
@@ -59,7 +80,7 @@ class CampaignPage(QWidget):
         self.table.setSelectionMode(QTableView.SelectionMode.SingleSelection)
         header = self.table.horizontalHeader()
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        header.setSectionResizeMode(3, QHeaderView.ResizeMode.Stretch)
+        header.setSectionResizeMode(len(_WIDTHS_PX), QHeaderView.ResizeMode.Stretch)
         self._specimen = QComboBox()
         self._specimen.currentTextChanged.connect(lambda _text: self._show())
         self._title = role_label("No campaign is open", "title")
@@ -75,22 +96,26 @@ class CampaignPage(QWidget):
         self._next_reason.setWordWrap(True)
         self.take_button = QPushButton("Take this test  F6")
         self.take_button.setProperty("role", "primary")
-        self._chosen = role_label("Choose a row to see its runs.", "muted")
-        self._chosen.setWordWrap(True)
+        self._chosen = QPlainTextEdit("Choose a row to see its runs.")
+        self._chosen.setReadOnly(True)
         self._reason = QLineEdit()
         self._reason.setPlaceholderText("Why (needed to reject)")
         self.accept_button = keyed_button(self, "Good", "Ctrl+G", lambda: self._judge("good"))
         self.reject_button = keyed_button(self, "Repeat it", "Ctrl+R", lambda: self._judge("bad"))
         self.open_button = QPushButton("Open its run")
+        self.report_button = QPushButton("Campaign report")
+        self.report_button.setToolTip("Analyse every run of the folder into its report/")
         self._build()
         self.take_button.clicked.connect(self.take_next)
         self.open_button.clicked.connect(self._open_chosen)
+        self.report_button.clicked.connect(self._make_report)
         self.table.selectionModel().selectionChanged.connect(lambda *_: self._show_chosen())
         self.table.activated.connect(lambda _index: self._open_chosen())
 
     def _build(self) -> None:
         top = QHBoxLayout()
         top.addWidget(self._title, 1)
+        top.addWidget(self.report_button)
         top.addWidget(role_label("Specimen", "heading"))
         top.addWidget(self._specimen)
         left = QVBoxLayout()
@@ -117,7 +142,7 @@ class CampaignPage(QWidget):
         chosen_layout = QVBoxLayout(chosen)
         chosen_layout.setContentsMargins(14, 12, 14, 12)
         chosen_layout.addWidget(role_label("Chosen test", "heading"))
-        chosen_layout.addWidget(self._chosen)
+        chosen_layout.addWidget(self._chosen, 1)
         chosen_layout.addWidget(self._reason)
         buttons = QHBoxLayout()
         for button in (self.accept_button, self.reject_button, self.open_button):
@@ -127,8 +152,7 @@ class CampaignPage(QWidget):
         right.setSpacing(8)
         right.addLayout(tiles)
         right.addWidget(following)
-        right.addWidget(chosen)
-        right.addStretch(1)
+        right.addWidget(chosen, 1)
         holder = QWidget()
         holder.setLayout(right)
         right.setContentsMargins(0, 0, 0, 0)
@@ -222,6 +246,28 @@ class CampaignPage(QWidget):
             return
         self.take.emit(str(proposal.name), proposal.theta0_over_alpha)
 
+    # -- the report ------------------------------------------------------------------------------
+
+    def _make_report(self) -> None:
+        campaign, folder = self.campaign, self.folder
+        if campaign is None or folder is None:
+            self.told.emit("info", "No campaign is open: there is nothing to report.")
+            return
+        self.report_button.setEnabled(False)
+        self.told.emit("info", "The campaign report is being made; this takes about two seconds a test.")
+        self._reports.run(lambda: make_report(campaign, folder), self._on_report, self._on_report)
+
+    def _on_report(self, made: Path | Exception) -> None:
+        self.report_button.setEnabled(True)
+        if isinstance(made, (NoReport, OSError)):
+            self.told.emit("error", str(made))
+        elif isinstance(made, Exception):
+            raise made
+        else:
+            opened = "" if open_outside(made) else "; no program on this computer opens pages"
+            self.told.emit("info", f"The campaign report is saved as {made}{opened}")
+            self.reported.emit(str(made))
+
     # -- one place -------------------------------------------------------------------------------
 
     def _chosen_place(self) -> Place | None:
@@ -234,12 +280,12 @@ class CampaignPage(QWidget):
         for widget in (self.accept_button, self.reject_button, self.open_button, self._reason):
             widget.setEnabled(bool(tests))
         if place is None:
-            self._chosen.setText("Choose a row to see its runs.")
+            self._chosen.setPlainText("Choose a row to see its runs.")
         elif not tests:
             lost = " It was lost in the original campaign." if place.planned.lost_originally else ""
-            self._chosen.setText(f"{place.planned.name}: no release yet.{lost}")
+            self._chosen.setPlainText(f"{place.planned.name}: no release yet.{lost}")
         else:
-            self._chosen.setText(release_text(place))
+            self._chosen.setPlainText(release_text(place))
 
     def _open_chosen(self) -> None:
         place = self._chosen_place()

@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
 from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.config import ConfigError
+from daq_app.config.shown_text import shortened
 from daq_app.gap.files import newest_result
 from daq_app.gap.words import causes_in_words
 from daq_app.monitor.data.background import Background
@@ -173,9 +174,13 @@ class GapPage(QWidget):
             item = QListWidgetItem(f"{test.name}   {test.verdict.value}")
             item.setData(_PATH, str(test.path))
             item.setData(_SPECIMEN, test.name.specimen)
-            item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
             good = test.verdict in (TestVerdict.GOOD, TestVerdict.UNCHECKED)
-            wanted = test.path in chosen if test.path in known else good
+            item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
+            if not good:
+                item.setFlags(item.flags() & ~Qt.ItemFlag.ItemIsEnabled)
+                item.setToolTip(shortened(test.reason, 200))
+            # A test that was rejected since it was ticked leaves the diagnosis.
+            wanted = good and (test.path in chosen if test.path in known else True)
             item.setCheckState(Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)
             self.runs.addItem(item)
         self.runs.blockSignals(False)

@@ -33,6 +33,8 @@ from daq_app.monitor.plots.strip_panel import FAMILY_TITLES
 from daq_app.monitor.widgets.labels import number, role_label
 from daq_app.monitor.widgets.theme import DARK, Colours
 from daq_app.runfile import RunFileError
+from daq_app.runfile.durable import written_whole
+from daq_app.runfile.folder import require_replaceable
 
 _NAME = Qt.ItemDataRole.UserRole
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer", "tiltmeter")
@@ -342,18 +344,21 @@ class ReplayPage(QWidget):
         if self.run is None:
             return
         try:
+            # The dialog has asked whether to replace a file; a recording never is.
+            require_replaceable(path, [self.run.path], overwrite=True)
             if kind == "csv":
                 rows = self.run.write_csv(path, self.chosen, *self.plots.view_s)
                 self.told.emit("info", f"{rows} rows of {len(self.chosen)} signals saved as {path.name}.")
                 return
-            if kind == "svg":
-                self._write_svg(path)
-            else:
-                exporter = pyqtgraph.exporters.ImageExporter(self.plots.scene())
-                exporter.parameters()["width"] = 2 * self.plots.width()
-                exporter.export(str(path))
-            if not path.is_file() or path.stat().st_size == 0:
-                raise OSError("the file was not written")
+            with written_whole(path) as beside:
+                if kind == "svg":
+                    self._write_svg(beside)
+                else:
+                    exporter = pyqtgraph.exporters.ImageExporter(self.plots.scene())
+                    exporter.parameters()["width"] = 2 * self.plots.width()
+                    exporter.export(str(beside))
+                if beside.stat().st_size == 0:
+                    raise OSError("the file was not written")
         except (OSError, RunFileError) as error:
             self.told.emit("error", f"{path} could not be saved ({error}). Choose another folder.")
             return

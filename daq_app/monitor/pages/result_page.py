@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
-import threading
+import html
+import itertools
+from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import (
-    QHBoxLayout,
-    QHeaderView,
-    QPushButton,
-    QTableWidget,
-    QTableWidgetItem,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtCore import QDateTime, Signal
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
-from daq_app.campaign.result.report import METHODS, period_deviation, repetition_rows, verdict_sentence
+from daq_app.campaign.recorded import read_recorded
+from daq_app.campaign.result.report import METHODS, period_deviation, verdict_sentence
 from daq_app.campaign.result.result import NoResult, Result, load_result
+from daq_app.campaign.status import NO_FACTS, RecordedTest, TestFacts
+from daq_app.config import ConfigError
+from daq_app.config.shown_text import shortened, visible
 from daq_app.config.wording import plus_minus
-from daq_app.guarded import end_guarded, start_guarded
 from daq_app.monitor.data.background import Background
+from daq_app.monitor.data.child import said_by
 from daq_app.monitor.plots.result_plots import ResultPlots
 from daq_app.monitor.widgets.banner import Banner, keyed_button, open_outside
 from daq_app.monitor.widgets.labels import DASH, Tile, number, set_role
+from daq_app.monitor.widgets.level_table import LevelTable
 from daq_app.monitor.widgets.theme import DARK, Colours
+from daq_app.runfile import RunFileError
+from daq_app.runfile.folder import RUN_SUFFIX
 
-_LIMIT_S = 300.0
-_HEADER_PX, _ROW_PX, _VISIBLE_ROWS = 38, 23, 5
+_NOTES_SHOWN = 240
+"""Characters of operator and notes on the page; the rest is in the tool tip."""
 
 
 def analyse(run: Path) -> Result:
@@ -35,21 +36,33 @@ def analyse(run: Path) -> Result:
     saved = load_result(run)
     if saved is not None and run.with_suffix(".result.pdf").exists():
         return saved
-    process = start_guarded("daq_app.campaign.result.result", [str(run)])
-    late = threading.Timer(_LIMIT_S, process.kill)
-    late.start()
-    try:
-        assert process.stdout is not None
-        said = process.stdout.read()  # to its end; `communicate` would close its input, which ends it
-        if process.wait():
-            raise NoResult(said.strip() or f"The analysis of {run.name} ended without a word.")
-    finally:
-        late.cancel()
-        end_guarded(process)
+    ok, said = said_by("daq_app.campaign.result.result", [str(run)])
+    if not ok:
+        raise NoResult(said or f"The analysis of {run.name} ended without a word.")
     made = load_result(run)
     if made is None:
         raise NoResult(f"The result of {run.name} could not be read back.")
     return made
+
+
+class NoRecord(Exception):
+    """The record of a run could not be made: why, in words."""
+
+
+def make_record(run: Path) -> Path:
+    """Make the test record of a run under a name that is free; a signed one is never replaced."""
+    out = free_name(run.with_suffix(".record.pdf"))
+    ok, said = said_by("daq_app.campaign.record.write", [str(run), str(out)])
+    if not ok:
+        raise NoRecord(said or f"The record of {run.name} could not be made.")
+    return out
+
+
+def free_name(path: Path) -> Path:
+    """The path, or one with a number before its suffixes that no file has."""
+    stem, _, suffixes = path.name.partition(".record")
+    candidates = (path.with_name(f"{stem}.record-{n}{suffixes}") for n in itertools.count(2))
+    return path if not path.exists() else next(one for one in candidates if not one.exists())
 
 
 class ResultPage(QWidget):
@@ -65,10 +78,12 @@ class ResultPage(QWidget):
         super().__init__(parent)
         self._background = background
         self._colours = DARK
+        self._making = False
+        """A record is being made."""
         self.run: Path | None = None
         self.result: Result | None = None
-        self.banner = Banner("No test yet", "The result appears here after a test.", points=22)
-        self._sign, self._title, (self._verdict,) = (
+        self.banner = Banner("No test yet", "The result appears here after a test.", "", points=22)
+        self._sign, self._title, (self._verdict, self.notes) = (
             self.banner.sign,
             self.banner.title,
             self.banner.sentences,
@@ -81,17 +96,14 @@ class ResultPage(QWidget):
             "periods": Tile("Periods against (4.1)", 19),
         }
         self.plots = ResultPlots()
-        self.table = QTableWidget(0, 6)
-        self.table.setHorizontalHeaderLabels(["Test", "θ0/α", "Impacts", "r EAV", "r CRT", "Verdict"])
-        self.table.verticalHeader().hide()
-        self.table.verticalHeader().setDefaultSectionSize(_ROW_PX)
-        self.table.setShowGrid(False)
-        self.table.horizontalHeader().setDefaultAlignment(
-            Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
-        )
-        self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
-        self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        self.table = LevelTable()
+        self.table.ticked.connect(self._lay_over)
+        self.table.opened.connect(self._open_sibling)
+        self.chooser = QComboBox()
+        self.chooser.setToolTip("Any test of this folder, the newest first")
+        self.chooser.activated.connect(self._open_chosen)
         self.buttons = {
+            "record": keyed_button(self, "Record", "Ctrl+J", self._make_record),
             "page": keyed_button(self, "Page", "Ctrl+O", self._open_page),
             "replay": keyed_button(self, "Replay", "Ctrl+P", lambda: self.replay.emit(str(self.run))),
             "good": keyed_button(self, "Good", "Ctrl+G", lambda: self.judge.emit(str(self.run), "good")),
@@ -112,6 +124,7 @@ class ResultPage(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(10, 8, 10, 8)
         layout.setSpacing(6)
+        layout.addWidget(self.chooser)
         layout.addWidget(self.banner)
         layout.addLayout(tiles)
         layout.addWidget(self.plots, 1)
@@ -120,8 +133,7 @@ class ResultPage(QWidget):
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""
         self._colours = colours
-        self.table.verticalHeader().setDefaultSectionSize(colours.px(_ROW_PX))
-        self._fit_table()
+        self.table.restyle(colours)
         self.plots.restyle(colours)
         self._show_verdict()
 
@@ -133,10 +145,14 @@ class ResultPage(QWidget):
         self.run, self.result = run, None
         self._title.setText(run.stem.split("_")[0])
         self._verdict.setText("The run is being analysed …")
+        self._show_notes(NO_FACTS)
         set_role(self._verdict, "muted")
         self._sign.show_shape("ring", self._colours.muted)
         self.plots.show_result(None)
-        self.table.setRowCount(0)
+        self.table.clear_rows()
+        if self.chooser.findData(str(run)) < 0:
+            self.list_tests(run.parent)
+        self._mark_chosen()
         for tile in self.tiles.values():
             tile.show_value(DASH)
         self._show_buttons()
@@ -151,7 +167,7 @@ class ResultPage(QWidget):
             self.open(self.run)
 
     def _on_trouble(self, error: Exception) -> None:
-        if not isinstance(error, (NoResult, OSError)):
+        if not isinstance(error, (NoResult, ConfigError, RunFileError, OSError)):
             raise error
         self._verdict.setText(str(error))
         set_role(self._verdict, "warning")
@@ -173,35 +189,65 @@ class ResultPage(QWidget):
                 continue
             detail = f"{plus_minus(method.standard_error)} · {method.r / test.r_max:.2f} r_max"
             self.tiles[name].show_value(f"{method.r:.3f}", detail)
+        self._show_notes(result.facts)
         deviation = period_deviation(test)
         shown = DASH if deviation is None else f"{number(100 * deviation, 1)} %"
         self.tiles["periods"].show_value(shown, "mean deviation from theory")
         self.plots.show_result(result)
-        self._fill_table(result)
+        self.table.show_result(result)
         self._show_verdict()
         self._show_buttons()
         self.shown.emit()
 
-    def _fit_table(self) -> None:
-        """As high as its rows need, up to some."""
-        rows = min(self.table.rowCount(), _VISIBLE_ROWS)
-        self.table.setFixedHeight(self._colours.px(_HEADER_PX + _ROW_PX * rows))
+    # -- past tests and repetitions ------------------------------------------------------------------
 
-    def _fill_table(self, result: Result) -> None:
-        rows = repetition_rows(result.test, result.earlier)
-        self.table.setRowCount(len(rows))
-        self._fit_table()
-        for place, row in enumerate(rows):
-            values = [DASH if row.r[name] is None else f"{row.r[name]:.4f}" for name in METHODS]
-            name = f"{row.test}   (this test)" if row.this else row.test
-            cells = [name, f"{row.phi0:.4f}", str(row.impacts), *values, "good" if row.good else "not good"]
-            for column, text in enumerate(cells):
-                item = QTableWidgetItem(text)
-                item.setFlags(item.flags() & ~Qt.ItemFlag.ItemIsEditable)
-                if row.this:
-                    item.setFont(self._colours.font(10, bold=True))
-                self.table.setItem(place, column, item)
-        self.table.scrollToBottom()
+    def list_tests(self, folder: Path) -> None:
+        """Offer every recorded test of a folder, the newest first."""
+        self._background.run(
+            lambda: read_recorded(folder) if folder.is_dir() else [], self._on_listed, self._on_trouble
+        )
+
+    def _on_listed(self, tests: Sequence[RecordedTest]) -> None:
+        self.chooser.clear()
+        for test in sorted(tests, key=lambda test: -test.released_ns):
+            if test.path is not None and test.path.suffix == RUN_SUFFIX:
+                at = QDateTime.fromMSecsSinceEpoch(test.released_ns // 10**6).toString("yyyy-MM-dd HH:mm")
+                self.chooser.addItem(f"{test.name}   {at}   {test.verdict.value}", str(test.path))
+        self._mark_chosen()
+
+    def _mark_chosen(self) -> None:
+        self.chooser.setCurrentIndex(self.chooser.findData(str(self.run)))
+
+    def _open_chosen(self, row: int) -> None:
+        self.open(Path(str(self.chooser.itemData(row))))
+
+    def _open_sibling(self, name: str) -> None:
+        if self.run is not None and name != self.run.name:
+            self.open(self.run.with_name(name))
+
+    def _lay_over(self) -> None:
+        self.plots.show_result(self.result, self.table.over)
+
+    def _make_record(self) -> None:
+        """Make the record for signature in another process, and show it."""
+        run = self.run
+        if run is None or self._making:
+            return
+        self._making = True
+        self._show_buttons()
+        self.told.emit("info", f"The record of {run.stem} is being made …")
+        self._background.run(lambda: make_record(run), self._on_record, self._on_record)
+
+    def _on_record(self, made: Path | Exception) -> None:
+        self._making = False
+        self._show_buttons()
+        if isinstance(made, (NoRecord, OSError)):
+            self.told.emit("error", str(made))
+        elif isinstance(made, Exception):
+            raise made
+        else:
+            opened = "" if open_outside(made) else "; no program on this computer opens PDF files"
+            self.told.emit("info", f"The test record is saved as {made}{opened}")
 
     def _show_verdict(self) -> None:
         if self.result is None:
@@ -214,9 +260,17 @@ class ResultPage(QWidget):
         self._verdict.setText(verdict_sentence(test))
         set_role(self._verdict, role)
 
+    def _show_notes(self, facts: TestFacts) -> None:
+        """Operator and notes: in short on the page, whole when pointed at."""
+        said = [facts.operator, *facts.notes]
+        self.notes.setText(shortened(" · ".join(filter(None, said)), _NOTES_SHOWN))
+        self.notes.setToolTip(html.escape(visible("\n".join(said).strip())).replace("\n", "<br>"))
+        self.notes.setVisible(bool(self.notes.text()))
+
     def _show_buttons(self) -> None:
         for name, button in self.buttons.items():
             button.setEnabled(name == "next" or self.result is not None)
+        self.buttons["record"].setEnabled(self.run is not None and not self._making)
 
     def _open_page(self) -> None:
         if self.run is not None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
+from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.result.figures import measured_periods, theory_motion
 from daq_app.campaign.result.result import Result
 from daq_app.monitor.plots.plot_base import Plot, line_pen
@@ -20,6 +23,8 @@ class ResultPlots(QWidget):
         super().__init__(parent)
         self._colours = DARK
         self._result: Result | None = None
+        self._over: frozenset[str] | None = None
+        """Runs of the level to lie over the test; None: every good one."""
         self.rotation = Plot("Rotation θ", "θ  (mrad)", "")
         self.velocity = Plot("Angular velocity dθ/dt", "dθ/dt  (rad/s)", "time since release  (s)")
         self.velocity.setXLink(self.rotation)
@@ -49,17 +54,26 @@ class ResultPlots(QWidget):
             plot.restyle(colours)
         self.legend.setText(
             f"<span style='color:{colours.rotation}'>━</span> this test &nbsp; "
-            f"<span style='color:{colours.bound}'>━</span> earlier tests of the level &nbsp; "
+            f"<span style='color:{colours.bound}'>━</span> ticked tests of the level &nbsp; "
             f"<span style='color:{colours.theory}'>╌</span> theory with this test's r (CRT) &nbsp; "
             f"<span style='color:{colours.eav}'>●</span> EAV (4.4) &nbsp; "
             f"<span style='color:{colours.crt}'>■</span> CRT (4.5)"
         )
         self._draw()
 
-    def show_result(self, result: Result | None) -> None:
-        """Draw a result; None clears."""
+    def show_result(self, result: Result | None, over: Iterable[str] | None = None) -> None:
+        """Draw a result, and over it the tests of its level whose run is in `over` (None: good ones).
+
+        No result: nothing is drawn.
+        """
         self._result = result
+        self._over = None if over is None else frozenset(over)
         self._draw()
+
+    def _overlaid(self, result: Result) -> Iterator[TestSummary]:
+        for other in (*result.earlier, *result.later):
+            if other.good if self._over is None else other.run in self._over:
+                yield other
 
     def _draw(self) -> None:
         for plot in (self.rotation, self.velocity, self.restitution, self.periods):
@@ -72,9 +86,16 @@ class ResultPlots(QWidget):
 
     def _draw_histories(self, result: Result) -> None:
         c, test = self._colours, result.test
-        for other in result.earlier:
-            self.rotation.plot(other.time_s, 1e3 * other.rotation_rad, pen=line_pen(c.bound))
-            self.velocity.plot(other.time_s, other.velocity_rad_s, pen=line_pen(c.bound))
+        for other in self._overlaid(result):
+            pen = line_pen(c.bound, dashed=not other.good)
+            for plot, values in (
+                (self.rotation, 1e3 * other.rotation_rad),
+                (self.velocity, other.velocity_rad_s),
+            ):
+                # A rejected test may be looked at, but the axes are those of the others.
+                plot.plot_item.addItem(
+                    pg.PlotDataItem(other.time_s, values, pen=pen), ignoreBounds=not other.good
+                )
         self.rotation.plot(test.time_s, 1e3 * test.rotation_rad, pen=line_pen(c.rotation, width=2))
         self.velocity.plot(test.time_s, test.velocity_rad_s, pen=line_pen(c.velocity, width=2))
         expected = theory_motion(test)
@@ -119,15 +140,16 @@ class ResultPlots(QWidget):
 
     def _draw_periods(self, result: Result) -> None:
         c, test = self._colours, result.test
-        for other in result.earlier:
-            self._dots(*measured_periods(other), c.bound, 5)
+        for other in self._overlaid(result):
+            self._dots(*measured_periods(other), c.bound, 5, ignore=not other.good)
         self._dots(*measured_periods(test), c.crt, 7)
         phi = np.linspace(0.002, max(0.45, 1.1 * test.phi0), 120)
         self.periods.plot(phi, theory.period(phi, test.p_rad_s), pen=line_pen(c.theory))
         self.periods.setXRange(0, float(phi[-1]), padding=0)
         self.periods.enableAutoRange(axis="y")
 
-    def _dots(self, phi: np.ndarray, periods: np.ndarray, colour: str, size: int) -> None:
-        self.periods.addItem(
-            pg.ScatterPlotItem(phi, periods, symbol="o", size=size, brush=colour, pen=colour)
-        )
+    def _dots(
+        self, phi: np.ndarray, periods: np.ndarray, colour: str, size: int, *, ignore: bool = False
+    ) -> None:
+        dots = pg.ScatterPlotItem(phi, periods, symbol="o", size=size, brush=colour, pen=colour)
+        self.periods.plot_item.addItem(dots, ignoreBounds=ignore)

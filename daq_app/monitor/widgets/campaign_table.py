@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import html
 from typing import Any
 
-from PySide6.QtCore import QAbstractTableModel, QObject, QRectF, QSize, Qt
+from PySide6.QtCore import QAbstractTableModel, QDateTime, QObject, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QPainter
 from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem
 
-from daq_app.campaign.status import CampaignStatus, Place, PlaceState, TestVerdict
+from daq_app.campaign.status import CampaignStatus, Place, PlaceState, RecordedTest, TestVerdict
+from daq_app.config.shown_text import shortened, visible
 from daq_app.monitor.widgets.check_table import Index
+from daq_app.monitor.widgets.labels import number
 from daq_app.monitor.widgets.shapes import draw_shape
 from daq_app.monitor.widgets.theme import DARK
 
-HEADINGS = ("Test", "θ0/α", "State", "Releases")
+HEADINGS = ("Test", "θ0/α", "State", "Measured", "r CRT", "Verdict", "Released", "Operator", "Notes")
 SHAPES = {PlaceState.DONE: "tick", PlaceState.TO_REPEAT: "triangle", PlaceState.MISSING: "ring"}
 TONES = {PlaceState.DONE: "good", PlaceState.TO_REPEAT: "warning", PlaceState.MISSING: "muted"}
 _STATE_ROLE = Qt.ItemDataRole.UserRole + 1
@@ -66,25 +69,57 @@ class CampaignModel(QAbstractTableModel):
             bold.setBold(True)
             return bold
         if role == Qt.ItemDataRole.ToolTipRole:
-            return "\n".join(f"{t.name}: {t.verdict.value} {t.reason}" for t in place.tests) or None
+            return html.escape(release_text(place)).replace("\n", "<br>") or None
         if role != Qt.ItemDataRole.DisplayRole:
             return None
-        return (
+        heading = (
             f"{place.planned.name}" + ("   ◀ next" if is_next else ""),
             f"{place.planned.theta0_over_alpha:.2f}",
             place.state.value,
-            release_text(place),
-        )[index.column()]
+        )
+        return (*heading, *_measured(shown_test(place)))[index.column()]
+
+
+def shown_test(place: Place) -> RecordedTest | None:
+    """The release that fills a place: the newest that counts, else the newest; None before the first."""
+    counting = [t for t in place.tests if t.verdict in (TestVerdict.GOOD, TestVerdict.UNCHECKED)]
+    return next(iter((counting or place.tests)[-1:]), None)
+
+
+def _measured(test: RecordedTest | None) -> tuple[str, ...]:
+    if test is None:
+        return ("",) * (len(HEADINGS) - 3)
+    facts = test.facts
+    return (
+        number(facts.theta0_over_alpha, 3),
+        number(facts.r.get("CRT"), 3),
+        shortened(f"{test.verdict.value}: {test.reason}" if test.reason else test.verdict.value, 60),
+        _moment(test).toString("dd MMM HH:mm"),
+        shortened(facts.operator, 40),
+        shortened(" · ".join(facts.notes), 120),
+    )
+
+
+def _moment(test: RecordedTest) -> QDateTime:
+    return QDateTime.fromMSecsSinceEpoch(test.released_ns // 10**6)
 
 
 def release_text(place: Place) -> str:
-    """The releases of a place in one line."""
-    parts = []
-    for test in place.tests:
-        word = "" if test.verdict in (TestVerdict.GOOD, TestVerdict.UNCHECKED) else f" {test.verdict.value}"
-        reason = f": {test.reason}" if test.reason and word else ""
-        parts.append(f"{test.name}{word}{reason}")
-    return " · ".join(parts)
+    """Every release of a place with what is known of it, one below the other."""
+    return "\n\n".join(map(_release, place.tests))
+
+
+def _release(test: RecordedTest) -> str:
+    facts = test.facts
+    r = ", ".join(f"r {name} {number(value, 4)}" for name, value in facts.r.items())
+    lines = [
+        f"{test.name}, {_moment(test).toString('yyyy-MM-dd HH:mm:ss')}",
+        f"{test.verdict.value}: {test.reason}" if test.reason else test.verdict.value,
+        f"θ0/α {number(facts.theta0_over_alpha, 4)}, {r or 'no r'}",
+        f"Operator: {facts.operator}" if facts.operator else "",
+        *facts.notes,
+    ]
+    return "\n".join(visible(line) for line in lines if line)
 
 
 class StateDelegate(QStyledItemDelegate):

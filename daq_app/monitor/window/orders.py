@@ -132,6 +132,7 @@ class Orders(QObject):
             )
             return
         rig = self._session.rig
+        self._result.list_tests(folder)
         self._campaign.set_campaign(campaign, folder, rig.specimen.name if rig is not None else "")
 
     def next_test(self) -> None:

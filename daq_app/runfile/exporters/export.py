@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final, Literal
 
-from daq_app.runfile.durable import replace_durably
+from daq_app.runfile.durable import name_beside, replace_durably, write_whole
 from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.exporters.results import Decimal, tidy_csv
 from daq_app.runfile.exporters.selection import Selection, Units
@@ -64,18 +64,23 @@ def export_run(
         raise RunFileError(f"{final} exists already", advice="Choose another name, or overwrite it.")
     if not final.parent.is_dir():
         raise RunFileError(f"the folder {final.parent} does not exist", advice="Make it first.")
-    temporary = final.with_name(final.name + ".part")
+    temporary = name_beside(final)
     with open_run(path) as run:
         selection = Selection.of(run, units, from_s, to_s, report, derive(run), decimal)
         write = importlib.import_module(f"daq_app.runfile.exporters.to_{format_}").write
+        beside = final.with_suffix(RESULTS_SUFFIX)
+        table = tidy_csv(run.header.test or run.header.run_id, selection.results, decimal).encode()
         try:
+            if selection.results and not overwrite and beside.exists() and beside.read_bytes() != table:
+                raise RunFileError(
+                    f"{beside} exists already and says something else",
+                    advice="Choose another name, or overwrite it.",
+                )
             temporary.unlink(missing_ok=True)  # it may be a link to another file
             write(temporary, selection)
             final = replace_durably(temporary, final, other_name=True)
             if selection.results:
-                test = run.header.test or run.header.run_id
-                temporary.write_text(tidy_csv(test, selection.results, decimal), encoding="utf-8", newline="")
-                replace_durably(temporary, final.with_suffix(RESULTS_SUFFIX), other_name=True)
+                write_whole(final.with_suffix(RESULTS_SUFFIX), table, other_name=True)
         except OSError as error:
             raise RunFileError(
                 f"{final} cannot be written ({error.strerror or error})",

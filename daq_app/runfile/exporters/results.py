@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from daq_app.config.shown_text import csv_cell
+
 Decimal = Literal["point", "comma"]
 
 COLUMNS: Final = ("test", "quantity", "source", "n", "value", "sigma", "unit")
@@ -72,7 +74,8 @@ def tidy_csv(test: str, rows: Sequence[ResultRow], decimal: Decimal) -> str:
     for row in rows:
         n = "" if row.n < 0 else row.n
         numbers = (_number(row.value, decimal), _number(row.sigma, decimal))
-        writer.writerow((test, row.quantity, row.source, n, *numbers, row.unit))
+        words = map(csv_cell, (test, row.quantity, row.source))
+        writer.writerow((*words, n, *numbers, row.unit))
     return out.getvalue()
 
 

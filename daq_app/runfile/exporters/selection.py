@@ -150,6 +150,8 @@ class Selection:
             "test": run.header.test,
             "specimen": run.header.specimen,
             "rig_name": run.header.rig_name,
+            "operator": run.header.test_plan.operator if run.header.test_plan is not None else "",
+            "notes": run.header.notes,
             "rate_hz": run.rate_hz,
             "first_sample": first,
             "n_samples": self.n_samples,

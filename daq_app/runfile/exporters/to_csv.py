@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
@@ -10,10 +13,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.config.shown_text import csv_cell, has_picture, one_line
 from daq_app.runfile.exporters.selection import Selection
 
 _ROWS: Final = 2048
 """Rows that are Python objects at a time: they take ten times the memory of the array."""
+
+_STRING: Final = re.compile(r'"(?:[^"\\]|\\.)*"')
+"""A string of JSON."""
 
 Formatter = Callable[[NDArray[np.float64]], Iterator[bytes]]
 
@@ -27,20 +34,38 @@ def write(path: Path, selection: Selection) -> None:
     between = "," if selection.decimal == "point" else ";"
     with path.open("wb") as file:
         for key, value in selection.metadata().items():
-            file.write(f"# {key}: {json.dumps(value, ensure_ascii=False)}\n".encode())
+            file.write(f"# {key}: {_one_cell(value)}\n".encode())
         for channel_id, unit in zip(selection.ids, selection.channel_units, strict=True):
-            known = json.dumps(selection.channel_metadata(channel_id), ensure_ascii=False)
-            file.write(f"# channel {channel_id} [{unit}]: {known}\n".encode())
+            known = _one_cell(selection.channel_metadata(channel_id))
+            file.write(f"# channel {one_line(channel_id)} [{one_line(unit)}]: {known}\n".encode())
         for column in selection.derived:
-            known = json.dumps({"long_name": column.long_name}, ensure_ascii=False)
-            file.write(f"# derived {column.name} [{column.unit}]: {known}\n".encode())
+            known = _one_cell({"long_name": column.long_name})
+            file.write(f"# derived {one_line(column.name)} [{one_line(column.unit)}]: {known}\n".encode())
         names = ("time_s", *selection.ids, *(column.name for column in selection.derived))
-        file.write((between.join(names) + "\n").encode())
+        file.write(_line_of_names(names, between).encode())
         at = 0
         for times, values in selection.pieces():
             derived = [column.values[at : at + times.size] for column in selection.derived]
             file.writelines(lines_of(np.vstack([times, values, *derived])))
             at += times.size
+
+
+def _one_cell(value: object) -> str:
+    """JSON whose strings neither end a cell nor a line of a spreadsheet, and show what they hold."""
+    text = json.dumps(value, ensure_ascii=False)
+    return _STRING.sub(lambda string: "".join(map(_escaped, string[0])), text)
+
+
+def _escaped(character: str) -> str:
+    if character not in ",;=" and has_picture(character):
+        return character
+    return "".join(f"\\u{unit:04x}" for unit in memoryview(character.encode("utf-16-le")).cast("H"))
+
+
+def _line_of_names(names: tuple[str, ...], between: str) -> str:
+    line = io.StringIO()
+    csv.writer(line, delimiter=between, lineterminator="\n").writerow(map(csv_cell, names))
+    return line.getvalue()
 
 
 def _formatter() -> Formatter:

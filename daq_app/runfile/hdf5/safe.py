@@ -19,7 +19,7 @@ from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.hdf5.probe import require_harmless
 from daq_app.runfile.seal.format import BrokenSealError, Seal
 from daq_app.runfile.seal.proven_file import ProvenFile, seal_of
-from daq_app.runfile.seal.signing import made_here
+from daq_app.runfile.seal.trust import is_believed
 
 _MAX_CHUNK_BYTES: Final = 2**26
 _MAX_DEFLATE_RATIO: Final = 1100
@@ -56,7 +56,7 @@ def open_hdf5(path: Path, *, just_written: bool = False, just_proven: bool = Fal
     except OSError as error:
         raise RunFileError(f"{path} cannot be read ({error.strerror})", advice="Check the name.") from error
     try:
-        if not just_written and (seal is None or not made_here(seal)):
+        if not just_written and (seal is None or not is_believed(seal)):
             require_harmless(path)
         plain = seal is None or just_proven
         source = path if plain or seal is None else ProvenFile(path, seal)

@@ -23,6 +23,7 @@ from daq_app.runfile.journal.read import read_journal
 from daq_app.runfile.seal.format import Seal
 from daq_app.runfile.seal.proven_file import ProvenFile, seal_of
 from daq_app.runfile.seal.signing import made_here, signature_is_good
+from daq_app.runfile.seal.trust import trusted_as
 from daq_app.runfile.source import RunScaling
 
 
@@ -191,7 +192,13 @@ def _seal_findings(path: Path, seal: Seal) -> tuple[list[str], list[str]]:
         return ["the signature of its seal is wrong: somebody changed the file and made a new seal"], []
     if made_here(seal):
         return [], []
-    return [], [f"it was sealed by another recorder, key {seal.public_key.hex()}"]
+    name = trusted_as(seal)
+    if name is not None:
+        return [], [f"it was sealed by the trusted recorder {name}"]
+    return [], [
+        f"it was sealed by a recorder that is not trusted here, key {seal.public_key.hex()} "
+        "(`daq-app keys trust NAME KEY`, once the key is known to be right)"
+    ]
 
 
 def _gap_note(lost: int, gaps: int) -> list[str]:

@@ -17,6 +17,7 @@ from daq_app.gap.blind.scoring.confusion import confusion
 from daq_app.gap.blind.scoring.judge import Judged
 from daq_app.gap.blind.scoring.score import Score, claims
 from daq_app.gap.blind.scoring.statistics import Value, reliability
+from daq_app.runfile.durable import write_whole
 
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Blind check</title>
@@ -56,7 +57,7 @@ def write_report(score: Score, path: Path) -> None:
         number=number,
         interval=interval,
     )
-    path.write_text(text, encoding="utf-8")
+    write_whole(path, text)
 
 
 def write_markdown(score: Score, path: Path) -> None:
@@ -79,7 +80,7 @@ def write_markdown(score: Score, path: Path) -> None:
     images.mkdir(parents=True, exist_ok=True)
     for title, note, data in _pictures(score):
         name = f"{path.stem}-{title.split()[0].lower()}.png"
-        (images / name).write_bytes(data)
+        write_whole(images / name, data)
         lines += ["", f"## {title}", "", note, "", f"![{title}](images/{name})"]
     lines += ["", "## Cases that were answered wrongly", ""]
     lines += ["| case | hidden | strength, sd | decision | named first | p |", "|---|---|---|---|---|---|"]
@@ -89,7 +90,7 @@ def write_markdown(score: Score, path: Path) -> None:
         for j in score.judged
         if not j.answered_rightly
     ]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_whole(path, "\n".join(lines) + "\n")
 
 
 def _pictures(score: Score) -> list[tuple[str, str, bytes]]:

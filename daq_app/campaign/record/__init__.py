@@ -1,0 +1,1 @@
+"""The test record: one document per test, to be printed, signed and filed."""

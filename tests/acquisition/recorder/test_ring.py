@@ -1,0 +1,53 @@
+"""The last minutes on disk, and a release that nobody armed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from daq_app.acquisition.pipeline.recent import Recent
+from daq_app.acquisition.pipeline.ring import Ring
+from tests.support.recorder_bench import Bench, Disk, contents, header
+
+
+def test_a_release_that_nobody_armed_waits_in_memory_for_a_disk(
+    bench: Callable[..., Bench], disk: Disk
+) -> None:
+    lab = bench(recent=Recent(1000))
+    disk.full = True
+    lab.blocks(0, 5)
+    lab.until(lambda: lab.recorder.status.sample == 500)
+    lab.begin("unarmed", before_samples=1000, kept=True)
+    lab.blocks(5, 5)
+    lab.until(lambda: lab.recorder.status.sample == 1000)
+    disk.full = False
+    recorded = lab.end()
+    assert recorded.journal is not None and recorded.end.outcome == "complete"
+    assert contents(recorded.journal) == {n: float(n) for n in range(1000)}
+
+
+def test_the_ring_holds_the_last_minutes_and_no_more(bench: Callable[..., Bench], tmp_path: Path) -> None:
+    ring = Ring(tmp_path, 1600, lambda run_id: header(run_id))
+    lab = bench(ring=ring)
+    lab.blocks(0, 60)
+    lab.recorder.inbox.put(None)
+    lab.recorder.join()
+    ring.close(keep=True)
+    kept = sorted(sample for path in ring.place.glob("*.journal") for sample in contents(path))
+    assert kept[-1] <= 5999 and len(kept) >= 1600
+    assert len(kept) <= 1600 * 1.25 + 400
+    assert kept == list(range(kept[0], kept[-1] + 1))
+
+
+def test_a_ring_that_cannot_be_written_is_no_trouble_for_a_run(
+    bench: Callable[..., Bench], disk: Disk, tmp_path: Path
+) -> None:
+    ring = Ring(tmp_path / "other", 1600, lambda run_id: header(run_id))
+    (tmp_path / "other").write_text("in the way")
+    lab = bench(ring=ring)
+    lab.blocks(0, 5)
+    lab.until(lambda: bool(ring.trouble))
+    journal = lab.begin()
+    lab.blocks(5, 5)
+    lab.end()
+    assert sorted(contents(journal)) == list(range(500, 1000))
