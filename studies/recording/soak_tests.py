@@ -2,10 +2,10 @@
 
 41 channels at 4000 Hz through the real nidaqmx client on a marked line: every recorded sample proves its
 place. Tests are armed and stopped one after the other; meanwhile devices fail, the network is cut, the
-recorder is frozen or killed, disks are full or give EIO, and the clock steps (all seeded). After each test its
-runs are verified and every sample compared with its mark: each is right, or in the table of gaps with a fault that
-explains it; what was acknowledged before a kill is there. Memory and handles of each recorder are taken
-between its tests. Prints a line a test, writes JSON; exit code 1 if anything is unexplained or grows.
+recorder is frozen or killed, disks are full or give EIO, and the clock steps (all seeded). After each test
+its runs are verified and every sample compared with its mark: each is right, or in the table of gaps with a
+fault that explains it; what was acknowledged before a kill is there. Memory and handles of each recorder are
+taken between its tests. Prints a line a test, writes JSON; exit code 1 if anything is unexplained or grows.
 """
 
 from __future__ import annotations
