@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
     QHeaderView,
-    QLabel,
     QLineEdit,
     QPlainTextEdit,
     QPushButton,
@@ -28,7 +27,7 @@ from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.child import said_by
 from daq_app.monitor.widgets.banner import keyed_button, open_outside
 from daq_app.monitor.widgets.campaign_table import CampaignModel, StateDelegate, release_text
-from daq_app.monitor.widgets.labels import Tile, role_label
+from daq_app.monitor.widgets.labels import PlainLabel, Tile, role_label
 from daq_app.monitor.widgets.theme import Colours
 from daq_app.runfile import RunFileError, open_run
 
@@ -90,7 +89,7 @@ class CampaignPage(QWidget):
             PlaceState.MISSING: "Missing",
         }
         self._tiles = {state: Tile(caption, 19) for state, caption in captions.items()}
-        self._next_name = QLabel("–")
+        self._next_name = PlainLabel("–")
         self._next_name.setProperty("scale", "state")
         self._next_reason = role_label("", "muted")
         self._next_reason.setWordWrap(True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from daq_app.acquisition.checks.check_model import SensorCheck
 from daq_app.config.rig import Rig
@@ -17,7 +17,7 @@ from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.session import RECORDING, Session
 from daq_app.monitor.widgets.actions import BETWEEN_TESTS
 from daq_app.monitor.widgets.check_table import SHAPES, TONES, CheckTable
-from daq_app.monitor.widgets.labels import role_label, set_role
+from daq_app.monitor.widgets.labels import PlainLabel, role_label, set_role
 from daq_app.monitor.widgets.shapes import Sign
 from daq_app.monitor.widgets.test_card import TestCard
 from daq_app.monitor.widgets.theme import DARK, Colours
@@ -54,7 +54,7 @@ class PreparePage(QWidget):
         self.wall = WallCard(background)
         self.wall.told.connect(self.told)
         self._sign = Sign(30)
-        self._verdict = QLabel("Not checked")
+        self._verdict = PlainLabel("Not checked")
         self._verdict.setProperty("scale", "verdict")
         self._summary = role_label("Leave the wall alone and check the sensors.", "muted")
         self._summary.setWordWrap(True)

@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
     QHeaderView,
-    QLabel,
     QListWidget,
     QListWidgetItem,
     QPushButton,
@@ -30,7 +29,7 @@ from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.replay_data import ROTATION, VELOCITY, ReplayRun
 from daq_app.monitor.plots.replay_plots import ReplayPlots, shade
 from daq_app.monitor.plots.strip_panel import FAMILY_TITLES
-from daq_app.monitor.widgets.labels import number, role_label
+from daq_app.monitor.widgets.labels import PlainLabel, number, role_label
 from daq_app.monitor.widgets.theme import DARK, Colours
 from daq_app.runfile import RunFileError
 from daq_app.runfile.durable import written_whole
@@ -63,7 +62,7 @@ class ReplayPage(QWidget):
         self.events = QListWidget()
         self.events.itemActivated.connect(self._to_event)
         self.events.itemClicked.connect(self._to_event)
-        self._time = QLabel("")
+        self._time = PlainLabel("")
         self.buttons = {
             "open": QPushButton("Open …  Ctrl+O"),
             "whole": QPushButton("Whole run  Home"),

@@ -9,7 +9,6 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QListWidget,
     QListWidgetItem,
@@ -22,7 +21,7 @@ from daq_app.acquisition.viewers.client import AcquisitionUnreachable
 from daq_app.acquisition.viewers.launcher import AcquisitionDied
 from daq_app.config import ConfigError, load_rig
 from daq_app.config.shipped import shipped_configs
-from daq_app.monitor.widgets.labels import role_label, set_role
+from daq_app.monitor.widgets.labels import PlainLabel, role_label, set_role
 from daq_app.monitor.widgets.settings import WindowSettings
 from daq_app.monitor.widgets.theme import font
 
@@ -48,7 +47,7 @@ class StartWindow(QWidget):
         self.setWindowTitle("Rocking-test recorder")
         self.resize(820, 560)
         self._start = start
-        title = QLabel("Which rig?")
+        title = PlainLabel("Which rig?")
         title.setFont(font(22, bold=True))
         self.rigs = QListWidget()
         self.rigs.setFont(font(12))

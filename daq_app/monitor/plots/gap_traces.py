@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
+from daq_app.config.shown_text import shortened
 from daq_app.monitor.plots.plot_base import Plot, line_pen
 from daq_app.monitor.widgets.labels import number
 from daq_app.monitor.widgets.theme import DARK, Colours
@@ -24,6 +27,7 @@ class GapTraces(QWidget):
         self._colours = DARK
         self._trace: Mapping[str, Any] | None = None
         self.legend = QLabel()
+        self.legend.setTextFormat(Qt.TextFormat.RichText)
         self.legend.setWordWrap(True)
         self.rotation = Plot("", "θ  (mrad)", "")
         self.left = Plot("", "left  (mrad)", "time from release  (s)")
@@ -66,8 +70,9 @@ class GapTraces(QWidget):
             self.legend.setText("This result holds no simulated rotation.")
             return
         colours, rms, shown = self._colours, self._trace["rms_mrad"], self._trace["shown"]
+        run = html.escape(shortened(str(self._trace["run"]), 80))
         self.legend.setText(
-            f"{self._trace['run']}: <span style='color:{colours.text}'>measured</span> ({shown}), "
+            f"{run}: <span style='color:{colours.text}'>measured</span> ({shown}), "
             f"<span style='color:{colours.warning}'>simulated</span> (leaves {number(rms[0], 2)} mrad rms), "
             f"<span style='color:{colours.good}'>with what was found</span> ({number(rms[1], 2)} mrad)"
         )

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 import pyqtgraph as pg
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from daq_app.campaign.report.summary import TestSummary
@@ -31,6 +32,7 @@ class ResultPlots(QWidget):
         self.restitution = Plot("r per impact, mean ± standard error", "r", "impact")
         self.periods = Plot("Period against amplitude", "T  (s)", "θ/α")
         self.legend = QLabel()
+        self.legend.setTextFormat(Qt.TextFormat.RichText)
         self.legend.setContentsMargins(8, 0, 8, 0)
         for plot in (self.rotation, self.velocity):
             plot.set_axis_width("left", 60)

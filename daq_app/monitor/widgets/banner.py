@@ -12,13 +12,12 @@ from PySide6.QtWidgets import (
     QFrame,
     QGridLayout,
     QHBoxLayout,
-    QLabel,
     QPushButton,
     QVBoxLayout,
     QWidget,
 )
 
-from daq_app.monitor.widgets.labels import role_label
+from daq_app.monitor.widgets.labels import PlainLabel, role_label
 from daq_app.monitor.widgets.shapes import Sign
 
 _SIGN_PX = 30
@@ -34,7 +33,7 @@ class Banner(QFrame):
         super().__init__()
         self.setObjectName("card")
         self.sign = Sign(_SIGN_PX)
-        self.title = QLabel(title)
+        self.title = PlainLabel(title)
         self.title.setProperty("scale", "verdict")
         self.sentences = tuple(role_label(sentence, "muted") for sentence in sentences)
         words = QVBoxLayout()

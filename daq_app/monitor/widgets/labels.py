@@ -8,15 +8,29 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QFontMetricsF, QResizeEvent
 from PySide6.QtWidgets import QApplication, QFrame, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
+from daq_app.config.shown_text import visible
 from daq_app.monitor.widgets.theme import font
 
 DASH = "–"
 """Stands where no true value is known."""
 
 
+class PlainLabel(QLabel):
+    """A label whose words are words: no tags, and a character without a picture shows as its code."""
+
+    def __init__(self, text: str = "", parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setText(text)
+
+    def setText(self, text: str) -> None:
+        """Show a text, whoever wrote it."""
+        super().setText(visible(text))
+
+
 def role_label(text: str, role: str, parent: QWidget | None = None) -> QLabel:
     """A label that the style sheet knows by its role."""
-    label = QLabel(text, parent)
+    label = PlainLabel(text, parent)
     label.setProperty("role", role)
     return label
 
@@ -59,7 +73,7 @@ class Tile(QFrame):
         super().__init__(parent)
         self.setObjectName("card")
         self._caption = role_label(caption, "heading")
-        self._value = QLabel(DASH)
+        self._value = PlainLabel(DASH)
         self._value.setFont(font(points, bold=True))
         self._points = points
         self._tenths: dict[QLabel, int] = {}

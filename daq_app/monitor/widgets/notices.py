@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from PySide6.QtCore import QTimer, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
-from daq_app.monitor.widgets.labels import role_label
+from daq_app.monitor.widgets.labels import PlainLabel, role_label
 from daq_app.monitor.widgets.shapes import Sign
 from daq_app.monitor.widgets.theme import Colours
 
@@ -51,7 +51,7 @@ class NoticeLine(QFrame):
         self.log: deque[Told] = deque(maxlen=LOG_MESSAGES)
         """Everything that was told, newest last."""
         self._sign = Sign(18)
-        self._text = QLabel()
+        self._text = PlainLabel()
         self._text.setWordWrap(True)
         self._text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._more = role_label("", "muted")

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLay
 from daq_app.acquisition.messages.published import State, StateMessage
 from daq_app.monitor.course.recording_light import recording_light
 from daq_app.monitor.data.session import Session
-from daq_app.monitor.widgets.labels import role_label, set_role
+from daq_app.monitor.widgets.labels import PlainLabel, role_label, set_role
 from daq_app.monitor.widgets.shapes import Sign
 from daq_app.monitor.widgets.state_look import look_of
 from daq_app.monitor.widgets.theme import Colours
@@ -21,14 +21,14 @@ class Header(QFrame):
         self.setObjectName("bar")
         self._session = session
         self._sign = Sign(34)
-        self._word = QLabel()
+        self._word = PlainLabel()
         self._word.setProperty("scale", "state")
-        self._test = QLabel()
+        self._test = PlainLabel()
         self._test.setProperty("scale", "name")
         self._sentence = role_label("", "muted")
         self._sentence.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._light = Sign(22)
-        self._light_word = QLabel()
+        self._light_word = PlainLabel()
         self._light_word.setProperty("scale", "name")
         self._light_detail = role_label("", "muted")
         self._light_detail.setMinimumWidth(170)

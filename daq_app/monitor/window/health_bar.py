@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from daq_app.acquisition.messages.published import HealthMessage
 from daq_app.monitor.data.session import Session
-from daq_app.monitor.widgets.labels import DASH, role_label, set_role, size_text
+from daq_app.monitor.widgets.labels import DASH, PlainLabel, role_label, set_role, size_text
 
 BUFFER_WARNING = 0.25
 BUFFER_BAD = 0.7
@@ -66,7 +66,7 @@ class HealthBar(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(5)
         for figure in health_texts(None, fresh=False):
-            value = QLabel(figure.value)
+            value = PlainLabel(figure.value)
             layout.addWidget(role_label(figure.caption, "muted"))
             layout.addWidget(value)
             layout.addSpacing(9)
