@@ -32,7 +32,7 @@ from daq_app.acquisition import AcquisitionClient, read_session_file
 from daq_app.acquisition.messages.published import HealthMessage, Message, State, StateMessage
 from daq_app.config import load_rig
 from daq_app.runfile import open_run, recover, verify
-from daq_app.runfile.folder import find_journals, find_runs
+from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX, find_journals, find_runs
 from sim_hardware.control import SimControl
 from studies.recording.injecting import Injected, choose_fault, unexplained_gaps
 from studies.recording.marked_recording import RIG, command_line, console, marked_server, write_report
@@ -265,11 +265,12 @@ class SoakOfTests:
         return [folder for folder in (self._runs, self._spare) if folder.is_dir()]
 
     def _journals(self, test: str) -> list[Path]:
+        """Journals of a test that no run was made of yet; one that was recovered lies beside its run."""
         return [
             journal
             for folder in self._folders()
             for journal in find_journals(folder)
-            if journal.stem.startswith(f"{test}_")
+            if journal.stem.startswith(f"{test}_") and not journal.with_suffix(RUN_SUFFIX).exists()
         ]
 
     def _judge(self, outcome: TestOutcome, faults: list[Injected], safe: int) -> None:
@@ -312,6 +313,7 @@ class SoakOfTests:
         outcome.unexplained += marks.unexplained + strange + leaps
         if not outcome.problems:
             path.unlink()
+            path.with_suffix(JOURNAL_SUFFIX).unlink(missing_ok=True)
         return ends
 
     def _tell(self, outcome: TestOutcome) -> None:
