@@ -25,6 +25,7 @@ def copy_shipped(folder: Path) -> list[Path]:
     """Copy all files into `folder`. Returns the copies.
 
     Raises `ConfigError` before anything is written where one of them exists: it may have been edited.
+    Raises `OSError`; no copy is left then.
     """
     source = shipped_configs()
     names = sorted(path.relative_to(source) for path in source.rglob("*.toml"))
@@ -32,7 +33,13 @@ def copy_shipped(folder: Path) -> list[Path]:
     if there:
         wrong = "exists and may have been edited"
         raise ConfigError([Problem(str(path), "", wrong, "Name another folder") for path in there])
-    for name in names:
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(source / name, folder / name)
-    return [folder / name for name in names]
+    copies = [folder / name for name in names]
+    try:
+        for name, copy in zip(names, copies, strict=True):
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source / name, copy)
+    except OSError:
+        for copy in copies:
+            copy.unlink(missing_ok=True)
+        raise
+    return copies

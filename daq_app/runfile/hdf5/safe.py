@@ -63,8 +63,7 @@ def open_hdf5(path: Path, *, just_written: bool = False, just_proven: bool = Fal
         locking = {"locking": "best-effort"} if plain else {}
         return OpenedHdf5(h5py.File(source, "r", **locking), seal)
     except (OSError, ValueError, RuntimeError, RunFileError) as error:
-        with path.open("rb") as file:
-            is_hdf5 = file.read(8) == b"\x89HDF\r\n\x1a\n"
+        is_hdf5 = _is_hdf5(path)
         if isinstance(error, RunFileError) and is_hdf5:
             raise
         if is_hdf5:
@@ -73,6 +72,15 @@ def open_hdf5(path: Path, *, just_written: bool = False, just_proven: bool = Fal
                 advice="If its journal is still there, `daq-app recover` makes the run anew.",
             ) from error
         raise RunFileError(f"{path} is no HDF5 file", advice="Give a run file (.h5).") from error
+
+
+def _is_hdf5(path: Path) -> bool:
+    """Whether the file begins as HDF5 does. Raises `RunFileError` where it cannot be read."""
+    try:
+        with path.open("rb") as file:
+            return file.read(8) == b"\x89HDF\r\n\x1a\n"
+    except OSError as error:
+        raise RunFileError(f"{path} cannot be read ({error.strerror})", advice="Try again.") from error
 
 
 @contextmanager
