@@ -14,10 +14,10 @@ _Name = Annotated[str, typer.Argument(help="What this lab calls the recorder.", 
 
 def register_seal_keys(keys: typer.Typer) -> None:
     """Add the commands to the group ``keys``."""
-    keys.command("seal", epilog="Example: daq-app keys seal")(seal)
+    keys.command("seal", epilog="Example: daq-app keys seal > our-recorder.txt")(seal)
     keys.command("trust", epilog="Example: daq-app keys trust hall-2 3f…c9")(trust_key)
     keys.command("distrust", epilog="Example: daq-app keys distrust hall-2")(distrust_key)
-    keys.command("trusted", epilog="Example: daq-app keys trusted")(trusted)
+    keys.command("trusted", epilog="Example: daq-app keys trusted --json")(trusted)
 
 
 def seal() -> None:
