@@ -37,6 +37,7 @@ _COMMANDS: Final[Mapping[str, _Entry]] = {
         "Look at a run: time cursor, zoom, channels, export of pictures and data.",
     ),
     "config": _Entry(("config_commands",), "Check, show and copy rig files."),
+    "rig": _Entry(("rig_commands",), "Write rig files for walls of one's own."),
     "run": _Entry(
         ("record.commands",),
         "Take one release test: zero, arm, hold, release, rest, and the table of r.",

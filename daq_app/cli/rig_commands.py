@@ -1,0 +1,88 @@
+"""`daq-app rig new`: a rig file for one's own wall, from questions or options and a list of sensors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, reported
+from daq_app.config.authoring import Block, read_sensor_table, spread_sensors, write_rig_text
+from daq_app.config.authoring.sensor_table import COLUMNS
+from daq_app.config.authoring.terminals import CHASSIS
+
+_Sensors = Annotated[
+    Path | None,
+    typer.Option(
+        "--sensors",
+        metavar="FILE.csv",
+        help=f"List of sensors, saved by a spreadsheet as CSV. Columns: {', '.join(COLUMNS)}.",
+        show_default="as many of each as asked, spread over the wall",
+    ),
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the group ``rig``."""
+    group = typer.Typer(no_args_is_help=True, help="Write rig files for walls of one's own.")
+
+    @group.callback()
+    def _rig() -> None:
+        """Write rig files for walls of one's own."""
+
+    group.command(
+        "new",
+        epilog="Example: daq-app rig new w1.toml --height 2.4 --thickness 0.5 --length 1.6 "
+        "--sensors sensors.csv --module 'NI 9205'",
+    )(new)
+    app.add_typer(group, name="rig")
+
+
+def new(
+    file: Annotated[Path, typer.Argument(help="Rig file to write.", metavar="RIG.toml")],
+    height: Annotated[float, typer.Option(prompt="Height of the wall, m", min=0.05, max=50.0, help="m.")],
+    thickness: Annotated[
+        float, typer.Option(prompt="Thickness of the wall, m", min=0.01, max=20.0, help="m.")
+    ],
+    length: Annotated[float, typer.Option(prompt="Length of the wall, m", min=0.01, max=100.0, help="m.")],
+    name: Annotated[
+        str | None, typer.Option(help="Name of the wall.", show_default="the file's name")
+    ] = None,
+    weight: Annotated[
+        float | None, typer.Option(min=1.0, help="Weight, N.", show_default="2300 kg/m³")
+    ] = None,
+    sensors: _Sensors = None,
+    lvdts: Annotated[int, typer.Option(min=0, max=500, help="Without a list: how many LVDTs.")] = 4,
+    wires: Annotated[int, typer.Option(min=0, max=500, help="Without a list: wire potentiometers.")] = 1,
+    accelerometers: Annotated[int, typer.Option(min=0, max=500, help="Without a list.")] = 2,
+    tiltmeters: Annotated[int, typer.Option(min=0, max=500, help="Without a list: tilt axes.")] = 2,
+    chassis: Annotated[str, typer.Option(help="NI's product name of the chassis.")] = CHASSIS,
+    module: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="NI's product name of a module, slot by slot; may be repeated.",
+            show_default="as many NI 9205 as needed",
+        ),
+    ] = None,
+    rate: Annotated[float, typer.Option(min=1.0, help="Sample rate, Hz.")] = 4000.0,
+) -> None:
+    """Write a commented rig file for a wall of one's own, that `config check` calls good.
+
+    Asks for what is not given. Overwrites nothing.
+    """
+    block = Block(name or file.stem, height, thickness, length, weight)
+    with reported():
+        if file.exists():
+            print_paragraph("Error", f"{file} exists and may have been edited. Name another file")
+            raise typer.Exit(EXIT_BAD_INPUT)
+        counts = {"lvdt": lvdts, "wire": wires, "accelerometer": accelerometers, "tiltmeter": tiltmeters}
+        listed = read_sensor_table(sensors) if sensors is not None else spread_sensors(block, counts)
+        text = write_rig_text(
+            block, listed, chassis=chassis, modules=module or (), rate_hz=rate, file=str(file)
+        )
+        with file.open("x", encoding="utf-8") as out:
+            out.write(text)
+    typer.echo(f"{file}: good, {len(listed)} sensors. Replace what it calls `assumed`.")
+    typer.echo(f"See it: daq-app config show {file}")
+    typer.echo(f"Try it on a simulated wall: daq-app run {file} --test {block.name}-L3-1 --headless")
