@@ -282,15 +282,15 @@ class MainWindow(QMainWindow):
         self.gap.set_recording(message.state in RECORDING | {State.SAVING})
         if message.state is State.ARMED:
             self._released = False
-        if message.state in (State.RELEASED, State.ROCKING):
+        # A window that came later than the release knows it from what the recorder asks to look at.
+        looks = message.state is State.SAVED and message.judgement.call is Call.LOOK
+        if message.state in (State.RELEASED, State.ROCKING, State.AT_REST) or looks:
             self._released = True
         # The gauge is in front from the arming to the end; an operator who chose Live keeps it.
         if message.state in (State.ARMED, State.RELEASED) and self.stack.currentWidget() is not self.live:
             self.show_page(self.test)
         if message.state is State.PREVIEWING and before in (State.IDLE, None) and self.link is not None:
             self.link.request("hello")
-        if before is None and message.judgement.call is Call.LOOK:  # this window came after the test
-            self._released = True
         if message.state is State.SAVED and before in (State.SAVING, None) and message.run_path:
             self._on_saved(Path(message.run_path))
         self._on_slow()
