@@ -173,12 +173,12 @@ class Sampler:
     def _sines(self, inputs: Sequence[Input], start: int, count: int) -> NDArray[np.float64]:
         """NI's sine between the channel's minimum and maximum, one period in `_SINE_SAMPLES` samples.
 
-        It keeps half a code away from both ends, so that no rounded reading lies beyond them.
+        It keeps one code away from both ends, so that no rounded reading lies beyond them.
         """
         phase = 2.0 * np.pi * np.arange(start, start + count) / _SINE_SAMPLES
         ends = np.array([entry.shown for entry in inputs])
         steps = np.array([entry.converter.step for entry in inputs])
-        middle, half = ends.mean(axis=1), np.maximum(0.5 * (ends[:, 1] - ends[:, 0] - steps), 0.0)
+        middle, half = ends.mean(axis=1), np.maximum(0.5 * (ends[:, 1] - ends[:, 0]) - steps, 0.0)
         sines: NDArray[np.float64] = middle[:, None] + half[:, None] * np.sin(phase)
         return sines
 

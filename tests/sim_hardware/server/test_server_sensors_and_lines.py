@@ -172,3 +172,20 @@ def test_a_logged_file_says_when_its_first_sample_was_taken(rig: Rig, tmp_path: 
     with TdmsFile.open(tmp_path / "one.tdms") as file:
         stamp = file["wall"].channels()[0].properties["wf_start_time"]
     assert abs(stamp - np.datetime64(started.replace(tzinfo=None), "us")) < np.timedelta64(1, "ms")
+
+
+def test_the_sine_of_an_open_terminal_stays_within_the_channel_s_limits() -> None:
+    from sim_hardware.daqmx_server.channels.converter import Converter
+    from sim_hardware.daqmx_server.timing.sampling import Input, Sampler, SampleTimes
+
+    class Open:
+        def volts(self, terminals: tuple[str, ...], times_s: np.ndarray) -> np.ndarray:
+            return np.full((len(terminals), len(times_s)), np.nan)
+
+        def distort(self, terminals: object, times_s: np.ndarray, volts: np.ndarray) -> np.ndarray:
+            return volts
+
+    entry = Input("Dev1/ai0", Converter(-5.0, 5.0, 16), 0.0, shown=(-2.5, 2.5))
+    codes = Sampler(Open(), Open(), [entry], SampleTimes(0.0, 1000.0)).codes(0, 200)
+    assert -16384 <= codes.min() < -16300
+    assert 16300 < codes.max() <= 16383
