@@ -324,10 +324,12 @@ class Task:
             return
         if self.run is not None:
             now = self.bench.clock.now()
+            last = self.run.last_sample()
+            ended = now if last is None else self.run.time_of_count(last)
             for other in tasks_of(self.bench):
                 if other is not self and other.run is not None and other.timing.source_task() is self:
                     other.run.look(now)  # what this clock has clocked so far counts, even if nobody looked
-                    other.run.halt(now)
+                    other.run.halt(now if ended is None else min(now, ended))
             self.run.aborted = True
             if self.io in ("AO", "DO"):
                 stop_playing(self, now)

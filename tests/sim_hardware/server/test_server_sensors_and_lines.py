@@ -158,6 +158,26 @@ def test_a_pulse_train_waits_for_its_arm_start_edge(rig: Rig) -> None:
         assert count.read(20) == list(range(1, 21))
 
 
+def test_a_finite_pulse_train_clocks_as_many_samples_as_it_has_pulses(rig: Rig) -> None:
+    clock, read = rig.task("clock"), rig.task("read")
+    with clock, read:
+        clock.co_channels.add_co_pulse_chan_freq(f"{CARD}/ctr0", freq=1000.0)
+        clock.timing.cfg_implicit_timing(samps_per_chan=100)
+        read.ai_channels.add_ai_voltage_chan(f"{CARD}/ai0", min_val=-10.0, max_val=10.0)
+        continuous(read, 1000.0)
+        read.timing.samp_clk_src = f"/{CARD}/Ctr0InternalOutput"
+        read.start()
+        clock.start()
+        rig.skip(0.5)
+        clock.wait_until_done()
+        clock.stop()
+        assert len(read.read(75)) == 75
+        with pytest.raises(DaqError) as error:
+            read.read(75, timeout=0.1)
+    assert error.value.error_code == -200284
+    assert error.value.samps_per_chan_read == 25
+
+
 def test_a_logged_file_says_when_its_first_sample_was_taken(rig: Rig, tmp_path: Path) -> None:
     with rig.task("wall") as task:
         task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
