@@ -37,6 +37,10 @@ _COMMANDS: Final[Mapping[str, _Entry]] = {
         "Look at a run: time cursor, zoom, channels, export of pictures and data.",
     ),
     "config": _Entry(("config_commands",), "Check, show and copy rig files."),
+    "demo": _Entry(
+        ("demo_commands",),
+        "Play a test day on a simulated wall: each test is zeroed, pulled, released, saved and reported.",
+    ),
     "rig": _Entry(("rig_commands",), "Write rig files for walls of one's own."),
     "run": _Entry(
         ("record.commands",),

@@ -1,0 +1,88 @@
+"""`daq-app demo`: a whole test day on a simulated wall, with nothing configured."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_HARDWARE, print_paragraph, reported
+from daq_app.guarded import program
+
+
+def register(app: typer.Typer) -> None:
+    """Add ``demo``."""
+    app.command("demo", epilog="Example: daq-app demo --headless --tests 2")(demo)
+
+
+def demo(
+    folder: Annotated[Path, typer.Argument(help="Folder of the day; made if it is not there.")] = Path(
+        "rocking-demo"
+    ),
+    tests: Annotated[int, typer.Option(min=1, max=36, help="How many tests of the campaign.")] = 4,
+    headless: Annotated[bool, typer.Option("--headless", help="No window; ends by itself.")] = False,
+    speed: Annotated[str, typer.Option(help="Time factor of the simulated wall, or max.")] = "1",
+) -> None:
+    """Play a test day on a simulated wall: each test is zeroed, pulled, released, saved and reported.
+
+    Needs no rig, no hardware and no configuration. With the window, the tests play before your eyes; at
+    the end it stays open on the last result.
+    """
+    from daq_app.acquisition.viewers.client import AcquisitionUnreachable
+    from daq_app.acquisition.viewers.launcher import AcquisitionDied, AcquisitionProcess
+    from daq_app.campaign.plan import load_campaign
+    from daq_app.cli.campaign.report import report
+    from daq_app.cli.record.test_day import DayEnded, TestDay
+    from daq_app.config import load_rig
+    from daq_app.config.shipped import shipped_configs
+
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    campaign_file = shipped_configs() / "campaigns" / "costa.toml"
+    rig_file = shipped_configs() / "fr1.toml"
+    runs = folder / "runs"
+    with reported():
+        runs.mkdir(parents=True, exist_ok=True)
+        rig = load_rig(rig_file)
+        of_rig = [t for t in load_campaign(campaign_file).tests if t.name.specimen == rig.specimen.name]
+        planned = [test for test in of_rig if not any(runs.glob(f"{test.name}*.h5"))][:tests]
+        if not planned:
+            print_paragraph("Error", f"{runs} has every test of the day already. Name another folder")
+            raise typer.Exit(EXIT_BAD_INPUT)
+        console.print("Starting the simulated wall; the first start on a machine compiles it (some seconds)")
+        try:
+            process = AcquisitionProcess(["--rig", str(rig_file), "--out", str(runs), "--speed", speed])
+            with process.client() as client:
+                window = None if headless else _open_window(process.address, process.token, campaign_file)
+                try:
+                    taken = TestDay(client, rig, console.print).take(planned)
+                    if window is not None:
+                        console.print("The day is over; close the window when you have seen it")
+                        window.wait()
+                finally:
+                    client.request("shutdown", 60.0, force=1.0)
+            process.wait(300.0)
+        except (AcquisitionDied, AcquisitionUnreachable) as error:
+            print_paragraph("Error", str(error))
+            raise typer.Exit(EXIT_HARDWARE) from None
+        except DayEnded as error:
+            print_paragraph("Incomplete", str(error))
+            raise typer.Exit(EXIT_FAILED) from None
+    report(runs, campaign_file, folder / "report", None, 0, False)
+    console.print(f"Look at the last run: daq-app view {taken[-1].run}")
+    console.print("Your own wall: daq-app rig new")
+
+
+def _open_window(address: str, token: str, campaign_file: Path) -> subprocess.Popen[bytes]:
+    """The window, in a process of its own."""
+    return subprocess.Popen(
+        [
+            *(program(), "-c", "from daq_app.cli import main; main()"),
+            *("monitor", "--connect", address, "--plan", str(campaign_file)),
+        ],
+        stdin=subprocess.DEVNULL,
+        env={**os.environ, "DAQ_APP_TOKEN": token},
+    )
