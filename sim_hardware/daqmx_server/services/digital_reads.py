@@ -67,8 +67,8 @@ def read_lines(bench: Bench, request: Any) -> Any:
 
 def line_states(words: NDArray[Any], width: int) -> NDArray[np.uint8]:
     """Words (channels, samples) → states (channels, samples, lines)."""
-    shifts = np.arange(width, dtype=np.uint32)
-    return (words.astype(np.uint32)[:, :, None] >> shifts & 1).astype(np.uint8)
+    shifts = np.arange(width, dtype=np.uint64)
+    return (words.astype(np.uint64)[:, :, None] >> shifts & 1).astype(np.uint8)
 
 
 def read_scalar(bench: Bench, request: Any) -> Any:

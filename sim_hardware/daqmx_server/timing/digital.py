@@ -1,4 +1,4 @@
-"""Samples of digital input channels: one word per sample, bit i for line i of the channel."""
+"""Samples of digital input channels: one word of 64 bits per sample, bit i for line i of the channel."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ class DigitalSampler:
         self._loopback = loopback
         self._first = first
 
-    def codes(self, start: int, stop: int) -> NDArray[np.uint32]:
+    def codes(self, start: int, stop: int) -> NDArray[np.uint64]:
         """Words of samples start … stop−1, shape (channels, samples)."""
         index = np.arange(start, stop)
-        out = np.zeros((len(self._channels), len(index)), dtype=np.uint32)
+        out = np.zeros((len(self._channels), len(index)), dtype=np.uint64)
         for row, channel in enumerate(self._channels):
             inverted = bool(channel.attributes.get("DI_INVERT_LINES", False))
             for bit, line in enumerate(channel.lines):
                 level = self._level(channel, line, index) ^ inverted
-                out[row] |= level.astype(np.uint32) << np.uint32(bit)
+                out[row] |= level.astype(np.uint64) << np.uint64(bit)
         return out
 
     def _level(self, channel: VirtualChannel, line: str, index: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -137,6 +137,16 @@ def test_a_digital_waveform_with_other_lines_than_the_channel_is_refused(rig: Ri
             task.write_waveform(DigitalWaveform(5, 3))
 
 
+def test_a_channel_of_more_than_32_lines_is_read_whole(rig: Rig) -> None:
+    with rig.task() as task:
+        lines = f"{CARD}/port0, {CARD}/port1"
+        task.di_channels.add_di_chan(lines, line_grouping=LineGrouping.CHAN_FOR_ALL_LINES)
+        task.timing.cfg_samp_clk_timing(1000.0, samps_per_chan=4)
+        data = task.read_waveform(4).data
+    # Sample 1: the lowest line of each eight. Columns: port0 from line 31 down, then port1 from line 7 down.
+    assert np.flatnonzero(data[1]).tolist() == [7, 15, 23, 31, 39]
+
+
 def test_a_pulse_train_waits_for_its_arm_start_edge(rig: Rig) -> None:
     clock, pulses, count = rig.task("clock"), rig.task("pulses"), rig.task("count")
     with clock, pulses, count:
