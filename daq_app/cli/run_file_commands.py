@@ -28,6 +28,7 @@ from daq_app.runfile import (
 )
 from daq_app.runfile.exporters import Decimal, ExportFormat, export_run
 from daq_app.runfile.importers import import_file, load_import_map
+from daq_app.runfile.source import RunSource
 
 
 def register(app: typer.Typer) -> None:
@@ -172,6 +173,12 @@ def _derived(contents: JournalContents) -> DerivedData | None:
     return derive(contents)[0]
 
 
+def _derived_of_import(run: RunSource) -> DerivedData | None:
+    from daq_app.acquisition.closing.derive import derive_imported  # loads the analysis
+
+    return derive_imported(run)
+
+
 def _recovery_dict(result: Recovery) -> dict[str, Any]:
     return {
         "journal": str(result.journal),
@@ -265,7 +272,7 @@ def import_command(
         import_map = load_import_map(map_) if map_ else None
         parsed = parse_rig(rig_text, str(rig))
         with _file_or_folder(out) as place, Console(stderr=True).status(f"importing {file.name} …"):
-            report = import_file(file, parsed, rig_text, place, import_map)
+            report = import_file(file, parsed, rig_text, place, import_map, _derived_of_import)
     if as_json:
         document = {
             "run": str(report.run),
@@ -273,6 +280,7 @@ def import_command(
             "rate_hz": report.rate_hz,
             "channels": list(report.channel_ids),
             "doubts": list(report.doubts),
+            "quality": dict(report.quality) or None,
         }
         echo_json(document)
         return
@@ -280,6 +288,8 @@ def import_command(
         print_paragraph("Doubtful", doubt, style="bold yellow")
     size = f"{len(report.channel_ids)} channels, {report.n_samples} samples at {report.rate_hz:g} Hz"
     echo(f"{report.run}: {size}")
+    if report.quality:
+        echo("Verdict: " + "; ".join([report.quality["verdict"], *report.quality["reasons"]]))
 
 
 @contextlib.contextmanager

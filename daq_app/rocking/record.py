@@ -112,7 +112,7 @@ class TestRecord:
             time_offsets_s={cid: run.header.time_offset_s(cid) for cid in run.channel_ids},
             tared=bool(run.header.tare),
             label=run.header.test or run.header.run_id,
-            zeros_si=_tare_si(rig, run.header.tare),
+            zeros_si=tare_si(rig, run.header.tare),
         )
 
     def family(self, family: Family, axis: str | None = None) -> tuple[str, ...]:
@@ -132,8 +132,8 @@ class TestRecord:
         return np.asarray((self.first_sample + np.arange(self.n_samples)) / self.rate_hz + offset_s)
 
 
-def _tare_si(rig: Rig, tare: Mapping[str, float]) -> dict[str, float]:
-    """A tare in SI, by channel."""
+def tare_si(rig: Rig, tare: Mapping[str, float]) -> dict[str, float]:
+    """A tare (unit of the readings, by channel id) in SI, for `TestRecord.zeros_si`."""
     channels = [channel for channel in rig.channels if channel.id in tare]
     gains = Scaling.of(channels).gain[:, 0]
     return {c.id: tare[c.id] * float(gain) for c, gain in zip(channels, gains, strict=True)}

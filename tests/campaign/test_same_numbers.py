@@ -11,11 +11,15 @@ import pytest
 from typer.testing import CliRunner
 
 from daq_app.acquisition.closing.derive import derive
-from daq_app.campaign.report.collect import collect
+from daq_app.campaign.recorded import recorded_test
+from daq_app.campaign.report.collect import collect, read_and_summarise
+from daq_app.campaign.report.summary import TestSummary
+from daq_app.campaign.status import TestVerdict
 from daq_app.cli.app import build_app
 from daq_app.config import load_rig, plan_tasks
-from daq_app.rocking import TestRecord, analyse_record
+from daq_app.rocking import AnalysisOptions, TestRecord, analyse_record
 from daq_app.runfile import JournalWriter, RunHeader, finalise, open_run, plan_to_dict, read_journal
+from daq_app.runfile.exporters import export_run
 from sim_hardware.direct import synthesise_test
 
 _TEST = "FR1-L3-2"
@@ -80,3 +84,52 @@ def test_the_zero_of_a_run_without_a_tare_can_be_chosen(tmp_path: Path, configs:
     run = write_run(tmp_path, configs, tared=False)
     assert command(run)["zero"] == command(run, "--zero-at-rest")["zero"] == "rest"
     assert command(run, "--keep-zero")["zero"] == "certificates"
+
+
+def imported(folder: Path, configs: Path, *, wires: bool = True) -> Path:
+    """The same test as another program would give it, imported; maybe its wires stand still."""
+    source = folder / "source"
+    source.mkdir()
+    exported = export_run(write_run(source, configs, tared=False), folder / "demo.npz", "npz")
+    if not wires:
+        with np.load(exported) as content:
+            values = dict(content)
+        rows = [k for k, name in enumerate(values["names"]) if str(name).startswith("WP")]
+        values["data"][rows] *= 0.0
+        np.savez(exported, **values)
+    (folder / "map.toml").write_text(f'[run]\ntest = "{_TEST}"\n', encoding="utf-8")
+    (folder / "runs").mkdir()
+    options = [
+        "--rig",
+        configs / "fr1.toml",
+        "--map",
+        folder / "map.toml",
+        "--out",
+        folder / "runs",
+        "--json",
+    ]
+    answer = CliRunner().invoke(build_app(), ["import", str(exported), *map(str, options)])
+    assert answer.exit_code == 0, answer.output
+    return folder / "runs" / f"{_TEST}.h5"
+
+
+def test_an_imported_run_is_judged_and_has_one_r(tmp_path: Path, configs: Path) -> None:
+    run = imported(tmp_path, configs)
+    with open_run(run) as opened:
+        stored = opened.results
+    test, summary = read_and_summarise(run, {}, AnalysisOptions(bias_runs=0, fit=False))
+    assert stored["quality"]["verdict"] == "good"
+    assert test is not None and test.verdict is TestVerdict.GOOD
+    assert isinstance(summary, TestSummary)
+    by_command = command(run, "--bias-runs", 0)
+    assert summary.trust == stored["analysis"]["verdict"]["trust"]
+    for method in ("eav", "crt"):
+        r = stored["analysis"]["estimates"][method]["r"]
+        assert r == by_command["estimates"][method]["r"] == summary.methods[method.upper()].r
+
+
+def test_an_imported_run_that_shows_no_release_is_bad(tmp_path: Path, configs: Path) -> None:
+    run = imported(tmp_path, configs, wires=False)
+    test = recorded_test(run, {})
+    assert test is not None and test.verdict is TestVerdict.BAD
+    assert "no release" in test.reason

@@ -8,15 +8,15 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.acquisition.closing.verdict import judge_run
+from daq_app.acquisition.closing.verdict import judge_imported, judge_run
 from daq_app.config.rig import Rig
 from daq_app.config.scaling import Scaling
 from daq_app.rocking.analysis.analyse import AnalysisOptions, analyse_record
 from daq_app.rocking.analysis.results import Series
 from daq_app.rocking.live import LiveAnalyser
-from daq_app.rocking.record import TestRecord
+from daq_app.rocking.record import TestRecord, tare_si
 from daq_app.runfile import DerivedData, DerivedSignal, JournalContents
-from daq_app.runfile.source import rig_of
+from daq_app.runfile.source import RunSource, rig_of
 
 Floats = NDArray[np.float64]
 
@@ -59,7 +59,26 @@ def derive(contents: JournalContents) -> tuple[DerivedData | None, str]:
     return DerivedData(contents.first_sample + start, _signals(analysis.series), results=results), remark
 
 
-def _analysed(contents: JournalContents) -> tuple[int, int]:
+def derive_imported(run: RunSource) -> DerivedData | None:
+    """Derived signals and the verdict of a recording of another program, judged as a recorded one is.
+
+    None where its rig file is not understood. A recording that cannot be analysed gets a verdict that says
+    why; a channel of the rig may be missing. Never raises.
+    """
+    rig = rig_of(run.header)
+    if run.n_samples == 0 or rig is None:
+        return None
+    start, stop = _analysed(run)
+    try:
+        analysis = analyse_record(_record(run, rig, start, stop), _OPTIONS)
+    except Exception as error:
+        quality = {"verdict": "bad", "reasons": [f"it cannot be analysed: {error}"], "doubtful_channels": []}
+        return DerivedData(run.first_sample, {}, results={"quality": quality})
+    results = {"analysis": analysis.as_dict(), "quality": judge_imported(run, analysis)}
+    return DerivedData(run.first_sample + start, _signals(analysis.series), results=results)
+
+
+def _analysed(contents: RunSource) -> tuple[int, int]:
     """First sample and end (from the run's first sample on) of what is analysed: all of a usual run.
 
     A wall may stand armed for half an hour; its readings are kept whole, but the analysis would need
@@ -77,7 +96,7 @@ def _analysed(contents: JournalContents) -> tuple[int, int]:
     return start, start + longest
 
 
-def _record(contents: JournalContents, rig: Rig, start: int, stop: int) -> TestRecord:
+def _record(contents: RunSource, rig: Rig, start: int, stop: int) -> TestRecord:
     header = contents.header
     row = {channel_id: index for index, channel_id in enumerate(header.channel_ids)}
 
@@ -100,12 +119,13 @@ def _record(contents: JournalContents, rig: Rig, start: int, stop: int) -> TestR
         rig=rig,
         rate_hz=header.rate_hz,
         n_samples=whole,
-        channel_ids=header.channel_ids,
+        channel_ids=tuple(channel_id for channel_id in header.channel_ids if channel_id in rig.channel_ids),
         load=load,
         first_sample=begin,
         time_offsets_s={channel_id: header.time_offset_s(channel_id) for channel_id in header.channel_ids},
         tared=bool(header.tare),
         label=header.test or header.run_id,
+        zeros_si=tare_si(rig, header.tare),
     )
 
 

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from daq_app.rocking.analysis.results import TestAnalysis
 from daq_app.runfile import JournalContents, TestPlan
+from daq_app.runfile.source import RunSource
 
 _SPOILS_TIME: Final = ("stood_still", "rate")
 """News of the sample clock after which times within the run are wrong."""
@@ -37,6 +38,19 @@ def judge_run(contents: JournalContents, analysis: TestAnalysis) -> dict[str, An
     channels = sorted({str(e.data["channel"]) for e in contents.events if e.kind == "channel"})
     verdict = "bad" if hard else "repeat" if missed else "good"
     return {"verdict": verdict, "reasons": hard + missed + notes, "doubtful_channels": channels}
+
+
+def judge_imported(run: RunSource, analysis: TestAnalysis) -> dict[str, Any]:
+    """The same of a recording of another program: it has neither states nor a plan that it could miss."""
+    hard = []
+    if run.gaps:
+        missing = sum(gap.n_samples for gap in run.gaps)
+        hard.append(f"{missing} samples are missing in {len(run.gaps)} gap(s)")
+    if not analysis.found:
+        hard.append("no release and impact were found")
+    notes = [note.text for note in analysis.notes if note.severity == "warning"]
+    channels = sorted({name for finding in analysis.findings for name in finding.channels})
+    return {"verdict": "bad" if hard else "good", "reasons": hard + notes, "doubtful_channels": channels}
 
 
 def _spoilt(contents: JournalContents, analysis: TestAnalysis, outcome: str) -> list[str]:

@@ -156,6 +156,7 @@ def summarise(test: RecordedTest, rig: Rig, analysis: TestAnalysis) -> TestSumma
         periods_s=_periods(analysis),
         methods=_methods(analysis),
         good=good,
+        trust=analysis.verdict.trust,
         reasons=reasons,
         **_history(analysis.series, analysis),
     )

@@ -114,7 +114,7 @@ def _place_rows(rows: Sequence[tables.PlaceRow]) -> tuple[list[str], list[list[s
 
 def _test_rows(tests: Sequence[TestSummary]) -> tuple[list[str], list[list[str]]]:
     methods = [m for m in tables.METHODS if any(m in t.methods for t in tests)]
-    header = ["Test", "θ0/α", "Impacts", *(f"r {m} ± SE" for m in methods), "In the mean"]
+    header = ["Test", "θ0/α", "Impacts", *(f"r {m} ± SE" for m in methods), "Verdict of r", "In the mean"]
     rows = []
     for test in tests:
         values = [
@@ -124,7 +124,7 @@ def _test_rows(tests: Sequence[TestSummary]) -> tuple[list[str], list[list[str]]
             for m in methods
         ]
         inside = "yes" if test.good else _wrapped("no: " + "; ".join(test.reasons))
-        rows.append([test.test, number(test.phi0, 4), str(len(test.impacts_s)), *values, inside])
+        rows.append([test.test, number(test.phi0, 4), str(len(test.impacts_s)), *values, test.trust, inside])
     return header, rows
 
 

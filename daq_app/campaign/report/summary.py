@@ -62,6 +62,8 @@ class TestSummary:
     rotation_rad: Floats
     velocity_rad_s: Floats
     good: bool
+    trust: str = ""
+    """How far r is to be believed by everything that was recorded: good, remarks or doubtful."""
     reasons: tuple[str, ...] = ()
     """Why the test is left out of the means, or what the reader should know."""
 

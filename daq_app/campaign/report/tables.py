@@ -237,14 +237,14 @@ def _group(group: GroupMean) -> tuple[object, ...]:
 
 
 def _test_table(tests: Sequence[TestSummary]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
-    header = ["test", "run", "specimen", "level", "repetition", "good", "reasons", "theta0_rad"]
-    header += ["theta0_over_alpha", "impacts", "r_max"]
+    header = ["test", "run", "specimen", "level", "repetition", "good", "trust"]
+    header += ["reasons", "theta0_rad", "theta0_over_alpha", "impacts", "r_max"]
     for method in METHODS:
         header += [f"r_{method}", f"r_{method}_standard_error", f"r_{method}_bias"]
     rows = []
     for t in tests:
-        row: list[object] = [t.test, t.run, t.specimen, t.level, t.repetition, t.good, "; ".join(t.reasons)]
-        row += [t.theta0_rad, t.phi0, len(t.impacts_s), t.r_max]
+        row: list[object] = [t.test, t.run, t.specimen, t.level, t.repetition, t.good, t.trust]
+        row += ["; ".join(t.reasons), t.theta0_rad, t.phi0, len(t.impacts_s), t.r_max]
         for method in METHODS:
             result = t.methods.get(method)
             row += [result.r, result.standard_error, result.bias] if result else ["", "", ""]

@@ -161,7 +161,7 @@ def _combine(
         taken = np.array([[zeros.get(channel_id, 0.0)] for channel_id in lvdts])
         joint = replace(base, ranges_m=base.ranges_m - taken).motion(openings_m)
         lvdt_noise = white_noise(joint.rotation_rad)
-        fused = fuse(wire_rotation, joint.rotation_rad, wire_noise, max(lvdt_noise, 1e-7))
+        fused = fuse(wire_rotation, joint.rotation_rad, max(wire_noise, 1e-7), max(lvdt_noise, 1e-7))
     leads = lead == "lvdts" and joint is not None
     rotation = joint.rotation_rad if leads and joint is not None else wire_rotation
     noise = lvdt_noise if leads else wire_noise

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,11 +18,13 @@ from daq_app.runfile.importers.mapping import MappedChannel, map_channels
 from daq_app.runfile.importers.recording import Reader, Spool
 from daq_app.runfile.importers.timing import Timing, timing_of
 from daq_app.runfile.integrity.saving import save_run
-from daq_app.runfile.model import RunHeader, host_name, software_versions
-from daq_app.runfile.source import Provenance
+from daq_app.runfile.model import DerivedData, RunHeader, host_name, software_versions
+from daq_app.runfile.source import Provenance, RunSource
 
 _HASH_BYTES: Final = 2**20
 
+Derive = Callable[[RunSource], DerivedData | None]
+"""What is computed from the samples of an imported run; must not raise."""
 _Opener = Callable[[Path, SourceMap], Reader]
 
 
@@ -36,6 +38,8 @@ class ImportReport:
     n_samples: int
     rate_hz: float
     channel_ids: tuple[str, ...]
+    quality: Mapping[str, Any]
+    """``verdict``, ``reasons`` and ``doubtful_channels``; empty where nobody judged it."""
 
 
 def _opener(suffix: str) -> _Opener:
@@ -65,14 +69,20 @@ def _opener(suffix: str) -> _Opener:
 
 
 def import_file(
-    path: Path, rig: Rig, rig_text: str, out: Path, import_map: ImportMap | None = None
+    path: Path,
+    rig: Rig,
+    rig_text: str,
+    out: Path,
+    import_map: ImportMap | None = None,
+    derive: Derive | None = None,
 ) -> ImportReport:
     """Turn a foreign recording into a run of `rig` and save it as `out` (a file, or a folder).
 
     Numbers in volts are kept as readings, bit for bit.  Numbers in engineering units become the
     readings that the rig's sensors would have given, so that every part of the program treats the run
-    like one of its own; ``RunHeader.origin`` says so for each channel.  Raises `RunFileError` (or
-    `ConfigError`) and leaves nothing behind.
+    like one of its own; ``RunHeader.origin`` says so for each channel.  With `derive` the run gets its
+    derived signals and its verdict, as a recorded one; without, nobody has judged it.  Raises
+    `RunFileError` (or `ConfigError`) and leaves nothing behind.
     """
     opener = _opener(path.suffix.lower())
     import_map = import_map or ImportMap()
@@ -84,7 +94,7 @@ def import_file(
     if not final.parent.is_dir():
         raise RunFileError(f"the folder {final.parent} does not exist", advice="Make it first.")
     try:
-        return _convert(path, opener, rig, rig_text, final, import_map)
+        return _convert(path, opener, rig, rig_text, final, import_map, derive)
     except OSError as error:
         raise RunFileError(
             f"{path} cannot be brought to {final} ({error.strerror or error})",
@@ -93,7 +103,13 @@ def import_file(
 
 
 def _convert(
-    path: Path, opener: _Opener, rig: Rig, rig_text: str, final: Path, import_map: ImportMap
+    path: Path,
+    opener: _Opener,
+    rig: Rig,
+    rig_text: str,
+    final: Path,
+    import_map: ImportMap,
+    derive: Derive | None,
 ) -> ImportReport:
     digest = _sha256(path)
     with closing(opener(path, import_map.source)) as reader:
@@ -109,8 +125,10 @@ def _convert(
             run = ImportedRun(header, spool, mapped, timing, reader.findings)
             doubts = (*reader.findings.doubts, *timing.doubts, *run.doubts(rig))
             run = run.with_origin(doubts)
-            save_run(run, final, Provenance(True, (), path.name, path.stat().st_size))
-            return ImportReport(final, doubts, run.n_samples, timing.rate_hz, header.channel_ids)
+            derived = None if derive is None else derive(run)
+            save_run(run, final, Provenance(True, (), path.name, path.stat().st_size), derived)
+            quality = {} if derived is None else derived.results.get("quality", {})
+            return ImportReport(final, doubts, run.n_samples, timing.rate_hz, header.channel_ids, quality)
 
 
 def _header(
