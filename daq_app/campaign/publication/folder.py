@@ -195,7 +195,7 @@ def _publish_test(source: Source, out: Path, derive: Derive) -> PublishedTest:
 
 def rig_file(name: str) -> str:
     """Name of a rig's file in the folder, whatever the rig is called."""
-    return re.sub(r"[^\w-]+", "_", name)[:60] + ".toml"
+    return re.sub(r"[^A-Za-z0-9_-]+", "_", name)[:60] + ".toml"
 
 
 def _write_rigs(folder: Path, found: Sequence[Source]) -> None:

@@ -11,6 +11,7 @@ from daq_app.campaign.description import FieldSpec
 from daq_app.campaign.publication.fields import Values
 from daq_app.campaign.publication.record import PublishedTest
 from daq_app.config import Rig
+from daq_app.config.shown_text import csv_cell
 from daq_app.runfile.exporters.results import COLUMNS, result_rows
 
 _TESTS: Final = (
@@ -149,5 +150,7 @@ def _csv(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
     out = io.StringIO()
     writer = csv.DictWriter(out, columns, lineterminator="\n")
     writer.writeheader()
-    writer.writerows({name: "" if row[name] is None else row[name] for name in columns} for row in rows)
+    writer.writerows(
+        {name: "" if row[name] is None else csv_cell(row[name]) for name in columns} for row in rows
+    )
     return out.getvalue()
