@@ -1,5 +1,6 @@
 """A whole test day in the real window on a real X server: keys go in, words and pictures come out.
 
+It takes minutes, so it runs only where ``DAQ_APP_REAL_DISPLAY=1`` is set.
 With ``DAQ_APP_PICTURES`` set to a folder the pictures of the manual are written there.
 """
 
@@ -22,6 +23,9 @@ _MISSING = missing_packages()
 pytestmark = [
     pytest.mark.heavy,
     pytest.mark.timeout(1500),
+    pytest.mark.skipif(
+        not os.environ.get("DAQ_APP_REAL_DISPLAY"), reason="set DAQ_APP_REAL_DISPLAY=1: minutes"
+    ),
     pytest.mark.skipif(bool(_MISSING), reason=f"a real display needs the packages {' '.join(_MISSING)}"),
 ]
 
