@@ -140,7 +140,7 @@ def test_a_whole_day(day_at, width, height, theme):
     window = day.reopen(window)
     window.says(state="Saved")
 
-    # Result, repeat, the other pages. The window that came too late shows the result all the same.
+    # Result, repeat under the next free number, the other pages. A window that came too late shows it all.
     window.says(page="Result", result="FR1-L1-1")
     run = day.run_of("FR1-L1-1_*.h5")
     report = verify(run)
@@ -150,7 +150,7 @@ def test_a_whole_day(day_at, width, height, theme):
     day.shoot(window, "result")
     window.press("ctrl+r")
     window.press("F6")
-    window.says(page="Prepare", chosen="FR1-L1-2")
+    window.says(page="Prepare", chosen="FR1-L1-6")
     for key, page in (("3", "Live"), ("4", "Campaign"), ("6", "Replay"), ("7", "Gap"), ("8", "Messages")):
         window.press(f"ctrl+{key}")
         window.says(page=page)
@@ -158,7 +158,7 @@ def test_a_whole_day(day_at, width, height, theme):
 
     # An arming that is given up, and a release that nobody armed.
     window.press("F5")
-    window.says(state="Armed", test="FR1-L1-2")
+    window.says(state="Armed", test="FR1-L1-6")
     window.press("F8", "F8")
     window.says(state="Aborted")
     assert window.words["recording"] != "On disk"

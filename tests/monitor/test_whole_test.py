@@ -108,6 +108,7 @@ def test_from_the_check_to_the_next_test(qtbot, acquisition, configs, settings):
     assert abs(prepare.check.pull_rotation_rad) == pytest.approx(0.15 * session.alpha_rad, rel=0.1)
     prepare.wall.order("release")
     until(lambda: session.estimate is not None and len(session.estimate.eav) >= 2)
+    window.show_page(window.live)
     until(lambda: window.live.restitution.shown["eav"] >= 2)
 
     # It ends by itself, the result appears, and the next test is offered.

@@ -114,7 +114,6 @@ class CampaignPage(QWidget):
     def _build(self) -> None:
         top = QHBoxLayout()
         top.addWidget(self._title, 1)
-        top.addWidget(self.report_button)
         top.addWidget(role_label("Specimen", "heading"))
         top.addWidget(self._specimen)
         left = QVBoxLayout()
@@ -152,6 +151,7 @@ class CampaignPage(QWidget):
         right.addLayout(tiles)
         right.addWidget(following)
         right.addWidget(chosen, 1)
+        right.addWidget(self.report_button)
         holder = QWidget()
         holder.setLayout(right)
         right.setContentsMargins(0, 0, 0, 0)
