@@ -20,7 +20,6 @@ SIDE: Final = 2  # ±1 while rocking on that side; the sign of θ elsewhere
 ROTATION: Final = 3  # first of 8 coefficients
 VELOCITY: Final = 11  # first of 8 coefficients
 N_COLUMNS: Final = 19
-DEGREE: Final = 7
 
 
 @part

@@ -291,11 +291,6 @@ class Session:
         return np.array(list(means), dtype=np.float64), values[:, 0], values[:, 1]
 
     @property
-    def newest_sample(self) -> int:
-        """First sample after the newest block."""
-        return self._newest_sample
-
-    @property
     def sampling(self) -> bool:
         """Samples are coming in now."""
         return self.fresh(BlockMessage)

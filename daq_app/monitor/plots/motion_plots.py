@@ -57,7 +57,6 @@ class MotionPlots(QWidget):
         self.rotation.addItem(self._notice, ignoreBounds=True)
         self._frame = (math.nan, math.nan)
         self._limits = (math.nan, math.nan)
-        self._estimate_seen: object = None
         self._theory_on = False
         self._theory_key: object = None
         self.target_rad = math.nan

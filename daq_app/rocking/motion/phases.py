@@ -98,7 +98,6 @@ class PhaseDetector:
         """Sign of the hold; 0 before the first."""
         self._first = first_sample
         self._hold_rad = math.nan
-        self._hold_tilt = math.nan
         self._crossing_side = 0
         self._fast_frames = 0
         self._lost_ticks = 0

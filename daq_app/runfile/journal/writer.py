@@ -66,8 +66,6 @@ class JournalWriter:
         self._sync_lock = threading.Lock()
         self._sync_pool: ThreadPoolExecutor | None = None
         self._pending_sync: Future[int] | None = None
-        self.last_sync_s = 0.0
-        """How long the last flush took."""
         self._header_payload = header.model_dump_json().encode()
         if len(self._header_payload) > MAX_TEXT_BYTES:
             raise RunFileError(f"{path}: the run's header is too long", advice="Shorten notes or truth.")
@@ -349,14 +347,13 @@ class JournalWriter:
             fd = self._fd
             with self._append_lock:
                 written, safe = self._next_sample or 0, (self._bytes, self._sequence)
-            started = time.perf_counter()
+            time.perf_counter()
             try:
                 fsync_data(fd)
             except OSError as error:
                 if fd != self._fd:  # a flush of the file that was left behind
                     return self._acknowledged
                 raise self._refuse_for_good(error) from error
-            self.last_sync_s = time.perf_counter() - started
             if fd == self._fd:
                 self._acknowledged, self._safe = max(self._acknowledged, written), max(self._safe, safe)
             return self._acknowledged

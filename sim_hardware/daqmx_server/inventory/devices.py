@@ -45,7 +45,6 @@ class Device:
 
     simulated: bool = True
     """What NI MAX says; a device that is not simulated shows what is wired to it, its own outputs first."""
-    pxi_slot: int = 0
 
     @property
     def physical_channels(self) -> tuple[str, ...]:

@@ -9,7 +9,6 @@ from nidaqmx.constants import RegenerationMode
 from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
-from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.timing.sampling import SampleTimes
 
 Samples = NDArray[np.float64]
@@ -48,11 +47,6 @@ class Generation:
             self._samples = np.concatenate((self._samples, samples), axis=1)
         self.written += count
         return count
-
-    def check_written(self, needed: int) -> None:
-        """−200292-style refusal of a start without samples to put out."""
-        if self._samples.shape[1] < min(needed, 1):
-            raise DaqmxError(Code.NOT_YET_WRITTEN)
 
     def at(self, row: int, times: SampleTimes, instants: Samples, total: int | None) -> Samples:
         """Value of a channel at instants: the sample last clocked out; NaN before the first."""
