@@ -22,8 +22,8 @@ from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.bench.clock import BenchClock, PacedClock, SteppedClock
 from sim_hardware.daqmx_server.inventory.devices import Inventory, device_from_text
 from sim_hardware.daqmx_server.inventory.max_export import MaxExport, load_max_export
+from sim_hardware.daqmx_server.services.devices.storage import fill
 from sim_hardware.daqmx_server.services.server import DaqmxServer, missing_calls
-from sim_hardware.daqmx_server.services.storage import fill
 from sim_hardware.faults.script import load_faults
 from sim_hardware.marked_line import MarkedLine
 from sim_hardware.signals import NothingWired, SignalSource

@@ -55,12 +55,38 @@ _COMMON: Final = {
 }
 
 
-def _ai(measurement: str, units: str, group: str = "", *, sensitivity: str = "", **own: str) -> ChannelKind:
-    fields = _COMMON | {"units": units} | own
-    if sensitivity:
-        stem = f"{sensitivity}_SENSITIVITY"
-        fields |= {"sensitivity": stem, "sensitivity_units": f"{stem}_UNITS"}
-    return ChannelKind("AI", measurement, fields, group)
+def _ai(measurement: str, units: str, group: str = "", **own: str) -> ChannelKind:
+    return ChannelKind("AI", measurement, _COMMON | {"units": units} | own, group)
+
+
+def _sensors() -> dict[str, ChannelKind]:
+    """Sensors whose sensitivity is an argument of the call."""
+    out = {}
+    for call, group, units, sensor, measurement in _SENSORS:
+        stem = f"{sensor}_SENSITIVITY"
+        own = {"sensitivity": stem, "sensitivity_units": f"{stem}_UNITS"}
+        out[call] = _ai(measurement, f"{units}_UNITS", group, **own)
+    return out
+
+
+_EDDY: Final = "AI_EDDY_CURRENT_PROX_PROBE"
+_SENSORS: Final = (
+    ("PosLVDT", "AI_LVDT", "AI_LVDT", "AI_LVDT", "POSITION_LINEAR_LVDT"),
+    ("PosRVDT", "AI_RVDT", "AI_RVDT", "AI_RVDT", "POSITION_ANGULAR_RVDT"),
+    ("PosEddyCurrProxProbe", "AI_EDDY_CURRENT", _EDDY, _EDDY, "POSITION_EDDY_CURRENT_PROX_PROBE"),
+    ("Accel", "AI_ACCEL", "AI_ACCEL", "AI_ACCEL", "ACCELERATION_ACCELEROMETER_CURRENT_INPUT"),
+    ("AccelCharge", "AI_ACCEL", "AI_ACCEL", "AI_ACCEL_CHARGE", "ACCELERATION_CHARGE"),
+    (
+        "Accel4WireDCVoltage",
+        "AI_ACCEL",
+        "AI_ACCEL",
+        "AI_ACCEL_4_WIRE_DC_VOLTAGE",
+        "ACCELERATION_4_WIRE_DC_VOLTAGE",
+    ),
+    ("VelocityIEPE", "AI_VELOCITY", "AI_VELOCITY", "AI_VELOCITY_IEPE_SENSOR", "VELOCITY_IEPE_SENSOR"),
+    ("ForceIEPE", "AI_FORCE", "AI_FORCE", "AI_FORCE_IEPE_SENSOR", "FORCE_IEPE_SENSOR"),
+)
+"""Call, and the starts of the names of its attributes, units and sensitivity; what it measures."""
 
 
 _STRAIN: Final = {
@@ -103,28 +129,7 @@ _ANALOG_IN: Final[dict[str, ChannelKind]] = {
     "TempBuiltInSensor": _ai("TEMPERATURE_BUILT_IN_SENSOR", "AI_TEMP_UNITS"),
     "StrainGage": _ai("STRAIN_STRAIN_GAGE", "AI_STRAIN_UNITS", "AI_STRAIN", **_STRAIN),
     "RosetteStrainGage": _ai("ROSETTE_STRAIN_GAGE", "AI_STRAIN_UNITS", "AI_ROSETTE", **_STRAIN),
-    "PosLVDT": _ai("POSITION_LINEAR_LVDT", "AI_LVDT_UNITS", "AI_LVDT", sensitivity="AI_LVDT"),
-    "PosRVDT": _ai("POSITION_ANGULAR_RVDT", "AI_RVDT_UNITS", "AI_RVDT", sensitivity="AI_RVDT"),
-    "PosEddyCurrProxProbe": _ai(
-        "POSITION_EDDY_CURRENT_PROX_PROBE",
-        "AI_EDDY_CURRENT_PROX_PROBE_UNITS",
-        "AI_EDDY_CURRENT",
-        sensitivity="AI_EDDY_CURRENT_PROX_PROBE",
-    ),
-    "Accel": _ai(
-        "ACCELERATION_ACCELEROMETER_CURRENT_INPUT", "AI_ACCEL_UNITS", "AI_ACCEL", sensitivity="AI_ACCEL"
-    ),
-    "AccelCharge": _ai("ACCELERATION_CHARGE", "AI_ACCEL_UNITS", "AI_ACCEL", sensitivity="AI_ACCEL_CHARGE"),
-    "Accel4WireDCVoltage": _ai(
-        "ACCELERATION_4_WIRE_DC_VOLTAGE",
-        "AI_ACCEL_UNITS",
-        "AI_ACCEL",
-        sensitivity="AI_ACCEL_4_WIRE_DC_VOLTAGE",
-    ),
-    "VelocityIEPE": _ai(
-        "VELOCITY_IEPE_SENSOR", "AI_VELOCITY_UNITS", "AI_VELOCITY", sensitivity="AI_VELOCITY_IEPE_SENSOR"
-    ),
-    "ForceIEPE": _ai("FORCE_IEPE_SENSOR", "AI_FORCE_UNITS", "AI_FORCE", sensitivity="AI_FORCE_IEPE_SENSOR"),
+    **_sensors(),
     "Microphone": _ai("SOUND_PRESSURE_MICROPHONE", "AI_SOUND_PRESSURE_UNITS", "AI_SOUND", **_MICROPHONE),
     "Power": ChannelKind(
         "AI",

@@ -13,26 +13,15 @@ from nidaqmx._stubs import nidaqmx_pb2
 
 from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.services.attributes import AttributeGroup, Handler, attribute_handlers
-from sim_hardware.daqmx_server.services.bridge_calibration import bridge_handlers
-from sim_hardware.daqmx_server.services.channel_attributes import ChannelGroup
-from sim_hardware.daqmx_server.services.control_service import control_handler
-from sim_hardware.daqmx_server.services.counter_reads import counter_read_handlers
-from sim_hardware.daqmx_server.services.device_attributes import (
+from sim_hardware.daqmx_server.services.attributes.channels import ChannelGroup
+from sim_hardware.daqmx_server.services.attributes.devices import (
     CalibrationGroup,
     DeviceGroup,
     PhysicalChannelGroup,
     SystemGroup,
 )
-from sim_hardware.daqmx_server.services.digital_reads import digital_read_handlers
-from sim_hardware.daqmx_server.services.events import STREAMS
-from sim_hardware.daqmx_server.services.gate import Gate
-from sim_hardware.daqmx_server.services.read_calls import read_handlers
-from sim_hardware.daqmx_server.services.scale_calls import ScaleGroup, scale_handlers
-from sim_hardware.daqmx_server.services.sessions import SessionError, SessionExistsError, session_handlers
-from sim_hardware.daqmx_server.services.storage import SavedGroup, storage_handlers
-from sim_hardware.daqmx_server.services.system_calls import system_handlers
-from sim_hardware.daqmx_server.services.task_attributes import (
+from sim_hardware.daqmx_server.services.attributes.groups import AttributeGroup, Handler, attribute_handlers
+from sim_hardware.daqmx_server.services.attributes.tasks import (
     EXPORT,
     READ,
     REAL_TIME,
@@ -42,9 +31,20 @@ from sim_hardware.daqmx_server.services.task_attributes import (
     BufferGroup,
     TaskGroup,
 )
-from sim_hardware.daqmx_server.services.teds_calls import teds_handlers
+from sim_hardware.daqmx_server.services.control_service import control_handler
+from sim_hardware.daqmx_server.services.devices.bridge_calibration import bridge_handlers
+from sim_hardware.daqmx_server.services.devices.scale_calls import ScaleGroup, scale_handlers
+from sim_hardware.daqmx_server.services.devices.storage import SavedGroup, storage_handlers
+from sim_hardware.daqmx_server.services.devices.system_calls import system_handlers
+from sim_hardware.daqmx_server.services.devices.teds_calls import teds_handlers
+from sim_hardware.daqmx_server.services.devices.watchdog_calls import WatchdogGroup, watchdog_handlers
+from sim_hardware.daqmx_server.services.events import STREAMS
+from sim_hardware.daqmx_server.services.gate import Gate
+from sim_hardware.daqmx_server.services.reads.analog_reads import read_handlers
+from sim_hardware.daqmx_server.services.reads.counter_reads import counter_read_handlers
+from sim_hardware.daqmx_server.services.reads.digital_reads import digital_read_handlers
+from sim_hardware.daqmx_server.services.sessions import SessionError, SessionExistsError, session_handlers
 from sim_hardware.daqmx_server.services.timing_calls import timing_handlers
-from sim_hardware.daqmx_server.services.watchdog_calls import WatchdogGroup, watchdog_handlers
 from sim_hardware.daqmx_server.services.write_calls import write_handlers
 
 _THREADS: Final = 64

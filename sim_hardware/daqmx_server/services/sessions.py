@@ -13,7 +13,7 @@ from sim_hardware.daqmx_server.channels.create import create_channels
 from sim_hardware.daqmx_server.channels.kinds import KINDS
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.requests import fields_of
-from sim_hardware.daqmx_server.services.attributes import Handler
+from sim_hardware.daqmx_server.services.attributes.groups import Handler
 from sim_hardware.daqmx_server.tasks.task import Task, task_named
 
 _NEW, _ATTACH = 1, 2

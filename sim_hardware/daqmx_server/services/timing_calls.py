@@ -11,8 +11,8 @@ from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory.devices import channel_list
 from sim_hardware.daqmx_server.requests import fields_of
-from sim_hardware.daqmx_server.services.attributes import Handler
-from sim_hardware.daqmx_server.services.timestamps import timestamp
+from sim_hardware.daqmx_server.services.attributes.groups import Handler
+from sim_hardware.daqmx_server.services.attributes.timestamps import timestamp
 from sim_hardware.daqmx_server.tasks.task import task_named
 from sim_hardware.daqmx_server.timing import triggers
 

@@ -18,8 +18,8 @@ from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.requests import fields_of
-from sim_hardware.daqmx_server.services.attributes import Handler
-from sim_hardware.daqmx_server.services.task_attributes import line_bytes
+from sim_hardware.daqmx_server.services.attributes.groups import Handler
+from sim_hardware.daqmx_server.services.attributes.tasks import line_bytes
 from sim_hardware.daqmx_server.tasks.generation import line_levels
 from sim_hardware.daqmx_server.tasks.task import State, Task, task_named
 

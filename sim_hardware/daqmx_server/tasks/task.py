@@ -6,15 +6,17 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from nidaqmx.constants import AcquisitionType, OverwriteMode, SampleTimingType, TaskMode
+from nidaqmx.constants import SampleTimingType, TaskMode
 from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory.devices import Device, channel_list
-from sim_hardware.daqmx_server.inventory.terminals import full_name
+from sim_hardware.daqmx_server.tasks.checks import check_configuration
 from sim_hardware.daqmx_server.tasks.generation import Generation
+from sim_hardware.daqmx_server.tasks.needs import buffer_size, resources_of
+from sim_hardware.daqmx_server.tasks.runs import make_run, trigger_readings
 from sim_hardware.daqmx_server.tasks.samplers import (
     on_demand_sampler,
     play,
@@ -24,7 +26,7 @@ from sim_hardware.daqmx_server.tasks.samplers import (
 )
 from sim_hardware.daqmx_server.tasks.tdms_log import TdmsLog
 from sim_hardware.daqmx_server.timing import triggers
-from sim_hardware.daqmx_server.timing.acquisition import ReferenceSearch, Run, RunPlan
+from sim_hardware.daqmx_server.timing.acquisition import Run
 from sim_hardware.daqmx_server.timing.routing import edges_of
 from sim_hardware.daqmx_server.timing.sampling import BlockSource, SampleTimes
 from sim_hardware.daqmx_server.timing.scan import Scan
@@ -118,20 +120,6 @@ class Task:
         return list(dict.fromkeys(channel.device.name for channel in self.channels))
 
     @property
-    def resources(self) -> list[str]:
-        """Parts of devices that this task needs for itself; inputs that only look need none."""
-        out: list[str] = []
-        for channel in self.channels:
-            if channel.io == "AI":
-                out.append(f"{channel.device.name}/ai")
-            elif channel.io == "DI":
-                reads_back = channel.attributes.get("DI_TRISTATE") is False
-                out += [] if reads_back else list(channel.lines)
-            else:
-                out += channel.lines or (channel.physical,)
-        return list(dict.fromkeys(out))
-
-    @property
     def hosts(self) -> list[str]:
         """Owners of the clocks and triggers of this task's devices, the first one first."""
         return list(dict.fromkeys(self.bench.inventory.host_of(channel.device) for channel in self.channels))
@@ -144,6 +132,12 @@ class Task:
     def is_reserved(self) -> bool:
         """Whether the task holds its devices, and so may drive their lines."""
         return self.state >= State.RESERVED
+
+    @property
+    def host(self) -> Device | None:
+        """The device that owns the task's clocks and triggers."""
+        hosts = self.hosts
+        return self.bench.inventory.devices.get(hosts[0]) if hosts else None
 
     @property
     def io(self) -> str:
@@ -172,21 +166,8 @@ class Task:
 
     @property
     def buffer_size(self) -> int:
-        """Samples per channel of the circular buffer: as set, or NI's default for the rate."""
-        if self.input_buffer is not None and not self.is_output:
-            return self.input_buffer
-        if self.is_output:
-            return max(int(self.generation.samples.shape[1]), self.output_buffer or 0)
-        samples = self.timing.samples_per_channel
-        if self.timing.mode == AcquisitionType.FINITE.value:
-            return samples
-        rate = self.timing.rate_hz
-        default = next(
-            size
-            for limit, size in ((100, 1_000), (10_000, 10_000), (1e6, 100_000), (np.inf, 1_000_000))
-            if rate <= limit
-        )
-        return max(default, samples)
+        """Samples per channel of the circular buffer."""
+        return buffer_size(self)
 
     # --- states -------------------------------------------------------------------------------
 
@@ -213,73 +194,15 @@ class Task:
     def advance(self, target: State) -> None:
         """Go through the states up to the target, none left out."""
         if target >= State.VERIFIED and (self._stale or self.state < State.VERIFIED):
-            self.verify()
+            check_configuration(self)
             self._stale = False
             self.state = max(self.state, State.VERIFIED)
         if target >= State.RESERVED and self.state < State.RESERVED:
             self.check_devices()
-            self.bench.reserve(self.resources, self.name, self.io == "AI" and self.is_buffered)
+            self.bench.reserve(resources_of(self.channels), self.name, self.io == "AI" and self.is_buffered)
             self.state = State.RESERVED
         if target >= State.COMMITTED and self.state < State.COMMITTED:
             self.state = State.COMMITTED
-
-    def verify(self) -> None:
-        """Raise what is wrong with the settings."""
-        if self.watchdog:
-            return  # a timer of its device, without channels
-        if not self.channels:
-            raise DaqmxError(Code.NO_CHANNELS)
-        self.check_devices()
-        for channel in self.channels:
-            channel.verify()
-        if "every_n" in self.events and not self.is_buffered:
-            raise DaqmxError(Code.EVERY_N_UNBUFFERED)
-        self._check_mix()
-        self._check_terminals()
-        self.timing.verify()
-        self.log.check()
-        if (
-            self.trigger["REF_TRIG_TYPE"] != triggers.NONE
-            and self.timing.mode != AcquisitionType.FINITE.value
-        ):
-            raise DaqmxError(Code.REF_TRIGGER_WHEN_CONTINUOUS)
-        for which in ("START", "REF"):
-            if self.trigger[f"{which}_TRIG_TYPE"] in (triggers.ANALOG, triggers.WINDOW):
-                self._trigger_channel(triggers.source_of(self.trigger, which))
-
-    def _check_mix(self) -> None:
-        """Devices of several chassis need a common clock: a network, or the PXI backplane; −201426."""
-        devices = {channel.device.name: channel.device for channel in self.channels}.values()
-        hosts = {host: self.bench.inventory.devices.get(host) for host in self.hosts}
-        on_network = all(host is not None and host.is_chassis and host.networked for host in hosts.values())
-        on_backplane = len({device.category for device in devices}) == 1 and not any(
-            d.chassis for d in devices
-        )
-        if len(hosts) > 1 and not (on_network or on_backplane):
-            raise DaqmxError(Code.NO_SYNC, f"Device Names: {', '.join(self.devices)}")
-
-    def _check_terminals(self) -> None:
-        """−89120 or −89121 for clock sources, triggers and exports that no device has."""
-        host = self.host
-        if host is None:
-            return
-        inventory = self.bench.inventory
-        if self.timing.source_is_foreign:
-            full_name(inventory, host, self.timing.source, Code.SOURCE_TERMINAL_UNKNOWN)
-        for which in ("START", "REF"):
-            if self.trigger[f"{which}_TRIG_TYPE"] == triggers.DIGITAL:
-                source = triggers.source_of(self.trigger, which)
-                full_name(inventory, host, source, Code.SOURCE_TERMINAL_UNKNOWN)
-        for name, terminals in self.exported.items():
-            if name.endswith("_OUTPUT_TERM"):
-                for terminal in channel_list(str(terminals)):
-                    full_name(inventory, host, terminal, Code.DESTINATION_TERMINAL_UNKNOWN)
-
-    @property
-    def host(self) -> Device | None:
-        """The device that owns the task's clocks and triggers."""
-        hosts = self.hosts
-        return self.bench.inventory.devices.get(hosts[0]) if hosts else None
 
     def check_devices(self) -> None:
         """Raise if a device of the task has gone; a run that loses one has failed for good."""
@@ -313,7 +236,7 @@ class Task:
         # A task that waits for another one's clock or edge does not set the world going by itself.
         clock = self.bench.clock
         self.armed_s = clock.now() if self.timing.waits_for_others else clock.power_on()
-        self.run = self._make_run(self.armed_s)
+        self.run = make_run(self, self.armed_s)
         self.run.look(clock.now())
         if self.io in ("AO", "DO"):
             play(self, self.run)
@@ -383,36 +306,9 @@ class Task:
 
     # --- the run ------------------------------------------------------------------------------
 
-    def _make_run(self, now_s: float) -> Run:
-        finite = self.timing.mode == AcquisitionType.FINITE.value
-        ref = self.trigger["REF_TRIG_TYPE"] != triggers.NONE
-        plan = RunPlan(
-            rate_hz=self.timing.rate_hz,
-            total=self._total() if finite else None,
-            pretrigger=int(self.trigger["REF_TRIG_PRETRIG_SAMPLES"]) if ref else None,
-            buffer=self.buffer_size,
-            overwrite=self.reading.get("OVERWRITE") == OverwriteMode.OVERWRITE_UNREAD_SAMPLES.value,
-            instant=finite and self.bench.finite == "instant",
-        )
-        search = self._reference_search(plan) if ref else None
-        hosts = self.hosts
-        return Run(
-            plan,
-            self.timing.start_rule(now_s),
-            self.make_sampler,
-            search,
-            arrived=lambda now: self.bench.arrived_s(hosts, now),
-        )
-
     def edges_at(self, terminal: str) -> list[float]:
         """Instants of the task's edges at a (plain) terminal, as far as they have happened."""
         return edges_of(self, terminal)
-
-    def _total(self) -> int:
-        """Samples per channel of a finite run; a counter output without timing makes one pulse."""
-        if self.timing.timing_type == SampleTimingType.ON_DEMAND.value:
-            return 1
-        return self.timing.samples_per_channel
 
     def disturbed(self) -> None:
         """The world or its faults have changed: samples ahead of now are made afresh."""
@@ -433,6 +329,12 @@ class Task:
         """Samples of the task's channels, whatever they measure, by that clock."""
         return sampler_of(self, times)
 
+    def trigger_readings(
+        self, sampler: BlockSource, source: str, start: int, stop: int
+    ) -> NDArray[np.float64]:
+        """Readings of the channel an analogue trigger listens to."""
+        return trigger_readings(self, sampler, source, start, stop)
+
     def log_read(self, codes: NDArray[Any], rows: list[int] | None, first: int) -> None:
         """Give a block that has been read to DAQmx's own recorder, if that is on."""
         if self.log.enabled and codes.shape[1]:
@@ -446,37 +348,6 @@ class Task:
                 self.timing.rate_hz,
                 self.bench.utc(self.run.times.first_s),
             )
-
-    def trigger_readings(
-        self, sampler: BlockSource, source: str, start: int, stop: int
-    ) -> NDArray[np.float64]:
-        """Readings of the channel an analogue trigger listens to."""
-        row = self.channels.index(self._trigger_channel(source))
-        return self.scan.readings(sampler.codes(start, stop)[[row]], [row]).ravel()
-
-    def _trigger_channel(self, source: str) -> VirtualChannel:
-        try:
-            return self.channel(source)
-        except DaqmxError:
-            raise DaqmxError(Code.TRIGGER_SOURCE_INVALID, f"Source: {source}") from None
-
-    def _reference_search(self, plan: RunPlan) -> ReferenceSearch:
-        source = triggers.source_of(self.trigger, "REF")
-        assert plan.pretrigger is not None
-        if self.trigger["REF_TRIG_TYPE"] == triggers.DIGITAL:
-            rising = triggers.is_rising(self.trigger, "REF")
-            return ReferenceSearch(
-                plan.pretrigger, edge=lambda after: self.bench.first_edge(source, after, rising)
-            )
-        condition = triggers.Condition.of(self.trigger, "REF")
-
-        def readings(run: Run, start: int, stop: int) -> NDArray[np.float64]:
-            assert run.sampler is not None
-            return self.trigger_readings(run.sampler, source, start, stop)
-
-        return ReferenceSearch(
-            plan.pretrigger, crossing=triggers.CrossingSearch(condition, plan.pretrigger), readings=readings
-        )
 
 
 def tasks_of(bench: Bench) -> list[Task]:

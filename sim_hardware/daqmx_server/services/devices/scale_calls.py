@@ -12,7 +12,7 @@ from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.channels.scale import LINEAR, MAP, POLYNOMIAL, TABLE, CustomScale
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.requests import fields_of
-from sim_hardware.daqmx_server.services.attributes import Handler, unsupported
+from sim_hardware.daqmx_server.services.attributes.groups import Handler, unsupported
 
 _CREATE: Final[dict[str, tuple[int, dict[str, str]]]] = {
     "CreateLinScale": (LINEAR, {"slope": "LIN_SLOPE", "y_intercept": "LIN_Y_INTERCEPT"}),

@@ -12,7 +12,7 @@ from sim_hardware.daqmx_server.errors import Code, DaqmxError, error_text
 from sim_hardware.daqmx_server.inventory.devices import Device, channel_list
 from sim_hardware.daqmx_server.inventory.terminals import full_name
 from sim_hardware.daqmx_server.requests import fields_of
-from sim_hardware.daqmx_server.services.attributes import Handler, unsupported
+from sim_hardware.daqmx_server.services.attributes.groups import Handler, unsupported
 from sim_hardware.daqmx_server.tasks.task import tasks_of
 
 _CALIBRATED: Final = {"year": 2020, "month": 1, "day": 2, "hour": 3, "minute": 4}

@@ -14,7 +14,7 @@ from sim_hardware.daqmx_server.channels import metadata
 from sim_hardware.daqmx_server.channels.analog_input import AnalogInput
 from sim_hardware.daqmx_server.channels.virtual import CHANNEL_TYPES, USAGES, VirtualChannel
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.services.attributes import unsupported
+from sim_hardware.daqmx_server.services.attributes.groups import unsupported
 from sim_hardware.daqmx_server.tasks.task import Task, task_named
 
 _GROUP: Final = "Chan"

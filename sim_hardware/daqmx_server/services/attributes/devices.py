@@ -19,7 +19,7 @@ from sim_hardware.daqmx_server.channels.virtual import USAGES
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory.devices import Device
 from sim_hardware.daqmx_server.inventory.terminals import terminals_on
-from sim_hardware.daqmx_server.services.attributes import unsupported
+from sim_hardware.daqmx_server.services.attributes.groups import unsupported
 
 DRIVER_VERSION: Final = (26, 0, 0)
 """What the simulated driver says it is; the client uses newer calls from 24.5 on."""

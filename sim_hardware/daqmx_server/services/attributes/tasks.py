@@ -14,8 +14,8 @@ from sim_hardware.daqmx_server.channels import metadata
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory.devices import channel_list
 from sim_hardware.daqmx_server.inventory.terminals import full_name
-from sim_hardware.daqmx_server.services.attributes import unsupported
-from sim_hardware.daqmx_server.services.timestamps import timestamp
+from sim_hardware.daqmx_server.services.attributes.groups import unsupported
+from sim_hardware.daqmx_server.services.attributes.timestamps import timestamp
 from sim_hardware.daqmx_server.tasks.reading import default_count
 from sim_hardware.daqmx_server.tasks.task import Task, task_named
 from sim_hardware.daqmx_server.timing import triggers

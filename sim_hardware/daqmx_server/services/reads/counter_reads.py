@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.requests import fields_of
-from sim_hardware.daqmx_server.services.attributes import Handler
-from sim_hardware.daqmx_server.services.digital_reads import chosen_channels
+from sim_hardware.daqmx_server.services.attributes.groups import Handler
+from sim_hardware.daqmx_server.services.reads.digital_reads import chosen_channels
 from sim_hardware.daqmx_server.tasks.reading import read
 from sim_hardware.daqmx_server.tasks.samplers import pulses_at
 from sim_hardware.daqmx_server.tasks.task import Task, task_named

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.requests import fields_of
-from sim_hardware.daqmx_server.services.attributes import Handler
+from sim_hardware.daqmx_server.services.attributes.groups import Handler
 from sim_hardware.daqmx_server.tasks.reading import Reading, read
 from sim_hardware.daqmx_server.tasks.task import Task, task_named
 

@@ -18,7 +18,7 @@ from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory.devices import channel_list
 from sim_hardware.daqmx_server.inventory.max_export import MaxExport
-from sim_hardware.daqmx_server.services.attributes import Handler, unsupported
+from sim_hardware.daqmx_server.services.attributes.groups import Handler, unsupported
 from sim_hardware.daqmx_server.services.sessions import SessionExistsError
 from sim_hardware.daqmx_server.tasks.task import Task, task_named
 

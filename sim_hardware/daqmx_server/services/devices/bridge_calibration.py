@@ -7,7 +7,7 @@ from typing import Any, Final
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 
 from sim_hardware.daqmx_server.bench.bench import Bench
-from sim_hardware.daqmx_server.services.attributes import Handler, unsupported
+from sim_hardware.daqmx_server.services.attributes.groups import Handler, unsupported
 from sim_hardware.daqmx_server.tasks.task import task_named
 
 _BRIDGES: Final = ("BRIDGE", "STRAIN")

@@ -12,7 +12,7 @@ from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.channels import metadata
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.requests import fields_of
-from sim_hardware.daqmx_server.services.attributes import Handler, unsupported
+from sim_hardware.daqmx_server.services.attributes.groups import Handler, unsupported
 from sim_hardware.daqmx_server.services.sessions import new_task
 from sim_hardware.daqmx_server.tasks.task import State, Task, task_named
 

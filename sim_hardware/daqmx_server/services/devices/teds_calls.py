@@ -9,7 +9,7 @@ from nidaqmx._stubs import nidaqmx_pb2 as pb
 from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.channels.teds import DataSheet, read_data_sheet
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.services.attributes import Handler
+from sim_hardware.daqmx_server.services.attributes.groups import Handler
 
 
 def configure_teds(bench: Bench, request: Any) -> Any:

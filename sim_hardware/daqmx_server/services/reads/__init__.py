@@ -1,0 +1,1 @@
+"""Calls that hand out samples: analogue, digital and counted."""

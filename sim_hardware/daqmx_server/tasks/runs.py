@@ -1,0 +1,96 @@
+"""The run that a started task begins: its plan, its clock, its reference trigger."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from nidaqmx.constants import AcquisitionType, OverwriteMode, SampleTimingType
+from numpy.typing import NDArray
+
+from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
+from sim_hardware.daqmx_server.tasks.checks import trigger_channel
+from sim_hardware.daqmx_server.timing import triggers
+from sim_hardware.daqmx_server.timing.acquisition import ReferenceSearch, Run, RunPlan
+from sim_hardware.daqmx_server.timing.sampling import BlockSource, SampleTimes
+from sim_hardware.daqmx_server.timing.scan import Scan
+from sim_hardware.daqmx_server.timing.task_timing import TaskTiming
+
+
+class StartedTask(Protocol):
+    """A task as far as its run is concerned."""
+
+    bench: Bench
+    channels: list[VirtualChannel]
+    reading: dict[str, Any]
+    timing: TaskTiming
+    trigger: dict[str, Any]
+
+    @property
+    def buffer_size(self) -> int: ...
+
+    @property
+    def hosts(self) -> list[str]: ...
+
+    @property
+    def scan(self) -> Scan: ...
+
+    def channel(self, name: str) -> VirtualChannel: ...
+
+    def make_sampler(self, times: SampleTimes) -> BlockSource: ...
+
+
+def make_run(task: StartedTask, now_s: float) -> Run:
+    """The run of a task that is armed at an instant of the bench, s."""
+    plan = _plan(task)
+    hosts = task.hosts
+    return Run(
+        plan,
+        task.timing.start_rule(now_s),
+        task.make_sampler,
+        None if plan.pretrigger is None else _reference_search(task, plan.pretrigger),
+        arrived=lambda now: task.bench.arrived_s(hosts, now),
+    )
+
+
+def _plan(task: StartedTask) -> RunPlan:
+    finite = task.timing.mode == AcquisitionType.FINITE.value
+    ref = task.trigger["REF_TRIG_TYPE"] != triggers.NONE
+    return RunPlan(
+        rate_hz=task.timing.rate_hz,
+        total=_total(task.timing) if finite else None,
+        pretrigger=int(task.trigger["REF_TRIG_PRETRIG_SAMPLES"]) if ref else None,
+        buffer=task.buffer_size,
+        overwrite=task.reading.get("OVERWRITE") == OverwriteMode.OVERWRITE_UNREAD_SAMPLES.value,
+        instant=finite and task.bench.finite == "instant",
+    )
+
+
+def _total(timing: TaskTiming) -> int:
+    """Samples per channel of a finite run; a counter output without timing makes one pulse."""
+    return 1 if timing.timing_type == SampleTimingType.ON_DEMAND.value else timing.samples_per_channel
+
+
+def trigger_readings(
+    task: StartedTask, sampler: BlockSource, source: str, start: int, stop: int
+) -> NDArray[np.float64]:
+    """Readings start … stop−1 of the channel an analogue trigger listens to, in its unit."""
+    row = task.channels.index(trigger_channel(task, source))
+    return task.scan.readings(sampler.codes(start, stop)[[row]], [row]).ravel()
+
+
+def _reference_search(task: StartedTask, pretrigger: int) -> ReferenceSearch:
+    source = triggers.source_of(task.trigger, "REF")
+    if task.trigger["REF_TRIG_TYPE"] == triggers.DIGITAL:
+        rising = triggers.is_rising(task.trigger, "REF")
+        return ReferenceSearch(pretrigger, edge=lambda after: task.bench.first_edge(source, after, rising))
+    condition = triggers.Condition.of(task.trigger, "REF")
+
+    def readings(run: Run, start: int, stop: int) -> NDArray[np.float64]:
+        assert run.sampler is not None
+        return trigger_readings(task, run.sampler, source, start, stop)
+
+    return ReferenceSearch(
+        pretrigger, crossing=triggers.CrossingSearch(condition, pretrigger), readings=readings
+    )
