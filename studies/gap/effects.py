@@ -18,7 +18,7 @@ from daq_app.gap.core import Options
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.study import diagnose_runs
 from studies.gap.rows import Found, cpu_s, mark_of, run_study, state_now, states_in_words
-from tests.support.simulated_campaign import Effects, simulate
+from tests.support.gap.simulated_campaign import Effects, simulate
 
 CASES: dict[str, Effects] = {
     "nothing": {},

@@ -28,7 +28,7 @@ from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.study import prepare
 from studies.gap.effects import CASES, diagnosed
 from studies.gap.rows import Found, mark_of, run_study, states_in_words
-from tests.support.simulated_campaign import RIG, quick_rig, simulate
+from tests.support.gap.simulated_campaign import RIG, quick_rig, simulate
 
 LOOPS = (
     "pivot_shift",

@@ -16,7 +16,7 @@ from matplotlib.patches import FancyBboxPatch
 
 from daq_app.gap.rocking_model.motion.swings import FRACTIONS
 from sim_hardware.dynamics import Body, Release, Restitution, simulate_motion
-from tests.support.simulated_campaign import RIG, quick_rig
+from tests.support.gap.simulated_campaign import RIG, quick_rig
 
 STAGES = (
     ("runs", "41 channels\nof each release"),

@@ -28,7 +28,7 @@ MATTERS = (
     "daq_app/config",
     "sim_hardware",
     "configs/fr1.toml",
-    "tests/support/simulated_campaign.py",
+    "tests/support/gap/simulated_campaign.py",
 )
 """What the figures of these studies depend on."""
 

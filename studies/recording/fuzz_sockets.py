@@ -31,7 +31,7 @@ from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.acquisition.viewers.client import decode
 from daq_app.config import load_rig
 from daq_app.runfile import open_run, verify
-from tests.support.marked_check import check_marked
+from tests.support.recorder.marked_check import check_marked
 
 RIG = Path(__file__).parents[2] / "configs" / "fr1.toml"
 GREETING = b"\xff\x00\x00\x00\x00\x00\x00\x00\x01\x7f\x03\x00NULL" + b"\x00" * 48

@@ -27,8 +27,8 @@ from daq_app.acquisition.process.process import run_and_exit
 from daq_app.config import load_rig
 from daq_app.runfile import open_run, verify
 from studies.recording.marked_recording import RIG, command_line, console, marked_server, write_report
-from tests.support.marked_check import check_marked
-from tests.support.processes import free_the_hardware, quick_context
+from tests.support.recorder.marked_check import check_marked
+from tests.support.recorder.processes import free_the_hardware, quick_context
 
 MOMENTS: Final = ("arming", "rocking", "rocking", "finalising", "recovering")
 _LIMIT_S: Final = 240.0

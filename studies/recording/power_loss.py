@@ -1,7 +1,7 @@
 """``python -m studies.recording.power_loss --trials 100``: power is lost while a journal is written.
 
-Prints how much was lost at most and whether anything was wrong silently; `tests.support.power_loss` says
-what is modelled. The exit code is 0 without silent damage and with at most 0.2 s lost.
+Prints how much was lost at most and whether anything was wrong silently.
+`tests.support.recorder.power_loss` says what is modelled. The exit code is 0 without silent damage and with at most 0.2 s lost.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.support.power_loss import one_trial
+from tests.support.recorder.power_loss import one_trial
 
 
 def main() -> int:

@@ -33,7 +33,7 @@ from daq_app.runfile import open_run, verify
 from sim_hardware.control import SimControl
 from studies.recording.injecting import Injected, choose_fault, unexplained_gaps
 from studies.recording.marked_recording import RIG, command_line, console, marked_server, write_report
-from tests.support.marked_check import check_marked
+from tests.support.recorder.marked_check import check_marked
 
 _QUIET_S: Final = 6.0
 """After each fault, so that what is heard belongs to it."""

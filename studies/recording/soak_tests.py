@@ -36,10 +36,10 @@ from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX, find_journals, fi
 from sim_hardware.control import SimControl
 from studies.recording.injecting import Injected, choose_fault, unexplained_gaps
 from studies.recording.marked_recording import RIG, command_line, console, marked_server, write_report
-from tests.support.marked_check import check_marked
-from tests.support.processes import free_the_hardware, quick_context
-from tests.support.relay import Relay
-from tests.support.saboteur import run_sabotaged
+from tests.support.recorder.marked_check import check_marked
+from tests.support.recorder.processes import free_the_hardware, quick_context
+from tests.support.recorder.relay import Relay
+from tests.support.recorder.saboteur import run_sabotaged
 
 _LIMIT_S: Final = 300.0
 _QUIET_S: Final = 5.0

@@ -25,8 +25,8 @@ from daq_app.config import Rig, Scaling, TaskPlan, load_rig, plan_tasks
 from daq_app.rocking import RotationGeometry, free_rocking
 from drivers import Block, DriverError, Opened
 from sim_hardware.control import SimControl
-from tests.support.process_bench import SPEED, Running, quick_rig
-from tests.support.processes import free_the_hardware
+from tests.support.recorder.process_bench import SPEED, Running, quick_rig
+from tests.support.recorder.processes import free_the_hardware
 
 RATE_HZ = 4000.0
 UPRIGHT_S, PULL_S, HOLD_S = 4.0, 1.0, 6.0

@@ -14,7 +14,7 @@ from daq_app.acquisition.messages.published import State
 from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.result.result import make_result
 from daq_app.runfile import JournalWriter, RunHeader, finalise, open_run, recover, verify
-from tests.support.hostile_folder import take_seal_off, write_hostile_files
+from tests.support.files.hostile_folder import take_seal_off, write_hostile_files
 
 HEALTHY = ("FR1-L1-1", "FR1-L1-2", "FR1-L1-3")
 

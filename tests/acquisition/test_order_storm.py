@@ -1,4 +1,4 @@
-"""Random orders and faults, a few sequences of them; `python -m tests.support.order_storm 200` runs more."""
+"""A few random sequences of orders and faults; `python -m tests.support.recorder.order_storm 200` runs more."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.order_storm import storm_once
+from tests.support.recorder.order_storm import storm_once
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -13,7 +13,7 @@ from daq_app.campaign.record.write import write_record
 from daq_app.campaign.verdicts import give_verdict
 from daq_app.cli.app import build_app
 from daq_app.runfile import CheckFinding, CheckRecord, Event, RunFileError, TestPlan, open_run
-from tests.support.rewritten_run import rewrite_run
+from tests.support.files.rewritten_run import rewrite_run
 
 A4_PT = (595.3, 841.9)
 LONG = "Ωμέγα-" + "sehr-lange-Bezeichnung-ohne-Leerzeichen-" * 7

@@ -23,7 +23,7 @@ from daq_app.cli.app import build_app
 from daq_app.config.shown_text import csv_cell, one_line, shortened, visible
 from daq_app.runfile import JournalWriter, RunHeader, finalise, verify
 from daq_app.runfile.exporters import export_run
-from tests.support.hostile_words import ALL_KNOWN, hidden_characters, hostile
+from tests.support.files.hostile_words import ALL_KNOWN, hidden_characters, hostile
 
 few = settings(max_examples=25, deadline=None)
 

@@ -19,7 +19,7 @@ import pytest
 import trustme
 
 from drivers import DriverError, open_driver
-from tests.support.relay import Relay
+from tests.support.recorder.relay import Relay
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the stand-in for NI's tool is a script")
 

@@ -13,7 +13,7 @@ from nidaqmx import errors as ni_errors
 
 from drivers import Driver, DriverError, open_driver
 from drivers.stream import TaskStream
-from tests.support.relay import Relay
+from tests.support.recorder.relay import Relay
 
 SLOW_S = 0.4
 """Names, TCP and TLS over a distance, or a computer with too much to do."""

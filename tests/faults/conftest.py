@@ -13,8 +13,8 @@ import pytest
 from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.config import Rig, load_rig
 from sim_hardware.control import SimControl
-from tests.support.fault_bench import SPEED, Acquisition, Row, RunFacts, Start, Told
-from tests.support.processes import free_the_hardware
+from tests.support.recorder.fault_bench import SPEED, Acquisition, Row, RunFacts, Start, Told
+from tests.support.recorder.processes import free_the_hardware
 
 _KEY = "fault row"
 

@@ -9,8 +9,8 @@ from daq_app.acquisition.messages.published import State
 from daq_app.config import Rig
 from daq_app.runfile import open_run
 from sim_hardware.control import SimControl
-from tests.support.fault_bench import Acquisition, Row, another_process, look_at
-from tests.support.saboteur import view_for_ever
+from tests.support.recorder.fault_bench import Acquisition, Row, another_process, look_at
+from tests.support.recorder.saboteur import view_for_ever
 
 WALL = "commanded"
 

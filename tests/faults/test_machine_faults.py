@@ -16,8 +16,8 @@ from daq_app.acquisition.messages.published import State
 from daq_app.config import Rig
 from daq_app.runfile import open_run
 from sim_hardware.control import SimControl
-from tests.support.fault_bench import SPEED, Acquisition, Row, Start, look_at
-from tests.support.processes import free_the_hardware
+from tests.support.recorder.fault_bench import SPEED, Acquisition, Row, Start, look_at
+from tests.support.recorder.processes import free_the_hardware
 
 pytestmark = pytest.mark.heavy
 

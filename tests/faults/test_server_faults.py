@@ -16,7 +16,7 @@ from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.config import Rig
 from daq_app.runfile import open_run
 from sim_hardware.control import SimControl
-from tests.support.fault_bench import RATE_HZ, SPEED, Acquisition, Row, Start, look_at
+from tests.support.recorder.fault_bench import RATE_HZ, SPEED, Acquisition, Row, Start, look_at
 
 pytestmark = pytest.mark.heavy
 

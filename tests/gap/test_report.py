@@ -12,7 +12,7 @@ from daq_app.gap.core.findings import Finding
 from daq_app.gap.report import write_report
 from daq_app.gap.report_figures import ProbeMap, map_table
 from daq_app.gap.traces import traces
-from tests.support.made_diagnosis import diagnosis
+from tests.support.gap.made_diagnosis import diagnosis
 from tests.support.simulated_wall import simulate
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.support.stand_in import StandIn, write_run
+from tests.support.window.stand_in import StandIn, write_run
 
 FOLDER = Path(__file__).parent
 try:

@@ -11,7 +11,7 @@ from daq_app.monitor.course.sounds import PATTERNS_MS, Sounds
 from daq_app.monitor.data.session import Published
 from daq_app.monitor.pages.messages_page import MessagesPage
 from daq_app.monitor.widgets.notices import NoticeLine
-from tests.support.quiet_link import QuietLink
+from tests.support.window.quiet_link import QuietLink
 
 HOLD = Judgement(
     call=Call.HOLD,

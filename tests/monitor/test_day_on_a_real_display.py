@@ -17,7 +17,7 @@ from daq_app.acquisition.viewers.client import AcquisitionClient, AcquisitionUnr
 from daq_app.acquisition.viewers.session_file import read_session_file
 from daq_app.runfile import open_run, verify
 from sim_hardware.control import SimControl
-from tests.support.real_display import RealWindow, missing_packages, real_display
+from tests.support.window.real_display import RealWindow, missing_packages, real_display
 
 _MISSING = missing_packages()
 pytestmark = [

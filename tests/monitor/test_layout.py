@@ -7,8 +7,8 @@ from PySide6.QtWidgets import QApplication
 
 from daq_app.monitor.data.session import Published
 from daq_app.monitor.window.main_window import MainWindow
-from tests.support.clipped_text import clipped_texts
-from tests.support.quiet_link import QuietLink
+from tests.support.window.clipped_text import clipped_texts
+from tests.support.window.quiet_link import QuietLink
 
 
 @pytest.fixture

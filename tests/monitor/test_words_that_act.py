@@ -15,7 +15,7 @@ from daq_app.monitor.pages.campaign_page import CampaignPage
 from daq_app.monitor.pages.result_page import ResultPage
 from daq_app.monitor.widgets.campaign_table import HEADINGS, CampaignModel
 from daq_app.monitor.widgets.labels import Tile, role_label
-from tests.support.hostile_words import hidden_characters, hostile
+from tests.support.files.hostile_words import hidden_characters, hostile
 
 PLAN = Campaign(name="c", levels={"L1": 0.15}, sequence=(Step(specimen="FR1", level="L1", tests=2),))
 

@@ -16,7 +16,7 @@ from daq_app.config import ConfigError, Rig, load_rig
 from daq_app.runfile import JournalWriter, RunFileError, RunHeader, open_run, verify
 from daq_app.runfile.importers import ImportMap, ImportReport, import_file
 from daq_app.runfile.seal.format import Sign, write_seal
-from tests.support.hostile_folder import take_seal_off
+from tests.support.files.hostile_folder import take_seal_off
 
 Readings = NDArray[np.float64]
 MakeJournal = Callable[..., Readings]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from daq_app.runfile import JournalWriter, RunHeader, open_run, recover, verify
-from tests.support.power_loss import one_trial
+from tests.support.recorder.power_loss import one_trial
 
 BLOCK = 40
 CHANNELS = 8

@@ -12,7 +12,7 @@ from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.status import TestVerdict
 from daq_app.runfile import finalise, open_run, recover, verify
 from daq_app.runfile.hdf5 import probe
-from tests.support.hostile_folder import write_hostile_files
+from tests.support.files.hostile_folder import write_hostile_files
 
 
 @pytest.fixture

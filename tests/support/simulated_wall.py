@@ -8,7 +8,7 @@ from pathlib import Path
 from daq_app.config import load_rig
 from daq_app.config.rig import Rig
 from daq_app.gap.rocking_model.records import GapRun
-from tests.support.simulated_campaign import LEVELS, campaign
+from tests.support.gap.simulated_campaign import LEVELS, campaign
 
 RIG = Path(__file__).parents[2] / "configs" / "fr1.toml"
 

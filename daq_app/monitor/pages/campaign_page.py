@@ -32,7 +32,7 @@ from daq_app.monitor.widgets.theme import Colours
 from daq_app.runfile import RunFileError, open_run
 
 _WIDTHS_PX = (160, 56, 145, 86, 64, 110, 120, 95)
-"""Of the columns before the notes, pixels."""
+"""Widths of the columns before the notes, pixels."""
 _REPORT_LIMIT_S = 3600.0
 
 

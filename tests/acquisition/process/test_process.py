@@ -16,7 +16,7 @@ from daq_app.acquisition.messages.published import State
 from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.runfile import open_run, verify
 from sim_hardware.control import SimControl
-from tests.support.process_bench import RESTITUTION, SPEED, Running, whole_test
+from tests.support.recorder.process_bench import RESTITUTION, SPEED, Running, whole_test
 
 
 @pytest.mark.heavy

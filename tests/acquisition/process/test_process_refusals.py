@@ -15,7 +15,7 @@ from daq_app.acquisition.process.process import main
 from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.runfile import FolderLock
 from sim_hardware.control import SimControl
-from tests.support.process_bench import Running
+from tests.support.recorder.process_bench import Running
 
 
 def test_two_recorders_never_share_a_folder(

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.support.recorder_bench import Bench, Disk
+from tests.support.recorder.recorder_bench import Bench, Disk
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ import pytest
 from daq_app.acquisition.messages.items import Lost, Noted
 from daq_app.acquisition.messages.published import EventMessage
 from daq_app.runfile import JournalWriter, read_journal
-from tests.support.recorder_bench import N_CHANNELS, Bench, Disk, contents
+from tests.support.recorder.recorder_bench import N_CHANNELS, Bench, Disk, contents
 
 
 def test_a_full_disk_costs_nothing_once_there_is_room_again(bench: Callable[..., Bench], disk: Disk) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from daq_app.acquisition.pipeline.unwritten import Unwritten
 from daq_app.runfile import read_journal
-from tests.support.recorder_bench import N_CHANNELS, Bench, Disk, contents
+from tests.support.recorder.recorder_bench import N_CHANNELS, Bench, Disk, contents
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows does not delete a file that is open")

@@ -11,7 +11,7 @@ import pytest
 from daq_app.acquisition.messages.items import Arrived, End, Item, RequestRefused
 from daq_app.acquisition.pipeline.recent import Recent
 from daq_app.runfile import read_journal
-from tests.support.recorder_bench import N_CHANNELS, Bench, Disk, contents
+from tests.support.recorder.recorder_bench import N_CHANNELS, Bench, Disk, contents
 
 
 def test_blocks_are_in_the_journal_before_anybody_else_sees_them(bench: Callable[..., Bench]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from daq_app.acquisition.pipeline.recent import Recent
 from daq_app.acquisition.pipeline.ring import Ring
-from tests.support.recorder_bench import Bench, Disk, contents, header
+from tests.support.recorder.recorder_bench import Bench, Disk, contents, header
 
 
 def test_a_release_that_nobody_armed_waits_in_memory_for_a_disk(

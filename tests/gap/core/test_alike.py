@@ -8,7 +8,7 @@ from daq_app.gap.core import Alike, Confusion, Effect, Library, Options, diagnos
 from daq_app.gap.core.judging.evidence import Ranked, answers, credible_set
 from daq_app.gap.core.parameters import signed
 from daq_app.gap.rocking_model.library import rocking_library
-from tests.support.toy_wave import LIBRARY, DecayModel, make_runs
+from tests.support.gap.toy_wave import LIBRARY, DecayModel, make_runs
 
 SLOPE = Effect(
     "slope",

@@ -9,7 +9,7 @@ from daq_app.gap.core.fitting.experiment import Experiment
 from daq_app.gap.core.fitting.screen import Base, Score
 from daq_app.gap.core.judging.other_forms import FreeForm
 from daq_app.gap.core.parameters import signed
-from tests.support.toy_wave import AGAIN, BEND, LIBRARY, BendingModel, DecayModel, make_runs
+from tests.support.gap.toy_wave import AGAIN, BEND, LIBRARY, BendingModel, DecayModel, make_runs
 
 
 def test_a_departure_from_the_form_of_the_named_effect_is_another_form_of_its_family() -> None:

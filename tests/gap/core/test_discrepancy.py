@@ -9,7 +9,7 @@ import pytest
 
 from daq_app.gap.core import Options, diagnose, fit
 from daq_app.gap.core.features import PlainRun
-from tests.support.toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
+from tests.support.gap.toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
 
 
 def spoilt(runs: list[PlainRun], sd_s: float, seed: int = 1) -> list[PlainRun]:

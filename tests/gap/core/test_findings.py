@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from daq_app.gap.core import Finding, Library, Options, diagnose
-from tests.support.toy_wave import LIBRARY, DecayModel, make_runs
+from tests.support.gap.toy_wave import LIBRARY, DecayModel, make_runs
 
 HUM = Finding(
     name="hum@wire",

@@ -16,7 +16,7 @@ from daq_app.gap.core import Parameter, Prediction, Run, fit
 from daq_app.gap.core.features import independent_fraction
 from daq_app.gap.core.fitting.likelihood import Covariance, log_density
 from daq_app.gap.core.parameters import between, positive
-from tests.support.toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
+from tests.support.gap.toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
 
 
 @settings(max_examples=25)

@@ -14,7 +14,7 @@ from daq_app.gap.core.fitting.screen import Score
 from daq_app.gap.core.judging.evidence import Ranked
 from daq_app.gap.core.judging.other_forms import FreeForm, with_other_forms
 from daq_app.gap.core.policy import POLICY
-from tests.support.toy_wave import BEND, LIBRARY, BendingModel, make_runs
+from tests.support.gap.toy_wave import BEND, LIBRARY, BendingModel, make_runs
 
 SIZED = replace(BEND, typical=1.5)
 """A bend of 1.5 k (a − ½)² turns the slope over by half of it from one end to the other."""

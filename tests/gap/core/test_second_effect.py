@@ -13,7 +13,7 @@ from scipy.stats import norm
 from daq_app.gap.core import Effect, Library, Options, Parameter, Prediction, Run, diagnose, fit
 from daq_app.gap.core.judging.evidence import strength
 from daq_app.gap.core.parameters import between, positive, signed
-from tests.support.toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
+from tests.support.gap.toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
 
 
 class Line:

@@ -10,7 +10,7 @@ import pytest
 
 from daq_app.gap.core import CannotDiagnose, Confusion, Library, Options, diagnose, fit
 from daq_app.gap.core.fitting.parallel import Interrupted
-from tests.support.toy_wave import LIBRARY, DecayModel, make_runs
+from tests.support.gap.toy_wave import LIBRARY, DecayModel, make_runs
 
 FAST = Options()
 

@@ -9,7 +9,7 @@ import pytest
 from daq_app.gap.core import Diagnosis, Options, fit
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare
-from tests.support.foreign_cases import FOLDER, load_case
+from tests.support.gap.foreign_cases import FOLDER, load_case
 
 pytestmark = pytest.mark.skipif(
     not FOLDER.is_dir(), reason="the folder shared/data/independent is not beside the repository"

@@ -15,7 +15,7 @@ from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.gap_runner import GapRunner
 from daq_app.monitor.pages.gap_page import GapPage
 from daq_app.monitor.plots.gap_views import closure_bars, evidence_bars, map_cells
-from tests.support.made_diagnosis import diagnosis
+from tests.support.gap.made_diagnosis import diagnosis
 
 LONG_WORK = """
 import threading

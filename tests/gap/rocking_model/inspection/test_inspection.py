@@ -21,7 +21,7 @@ from daq_app.gap.rocking_model.run_cache import RunCache
 from daq_app.gap.rocking_model.study import model_and_library, prepare
 from sim_hardware.dynamics import parameters as par
 from sim_hardware.sensors.scene import pivots
-from tests.support.simulated_campaign import simulate as longer_held
+from tests.support.gap.simulated_campaign import simulate as longer_held
 from tests.support.simulated_wall import simulate
 
 LEVELS = (0.25, -0.35)

@@ -11,7 +11,7 @@ from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare
-from tests.support.simulated_campaign import simulate
+from tests.support.gap.simulated_campaign import simulate
 from tests.support.simulated_wall import short_rig
 from tests.support.simulated_wall import simulate as held_briefly
 

@@ -1,6 +1,6 @@
 """The independently simulated recordings as runs of the diagnosis.
 
-``python -m tests.support.foreign_cases case_001 …`` prints what is said about them (all effects), and with
+``python -m tests.support.gap.foreign_cases case_001 …`` prints what is said about them (all effects), with
 ``--only EFFECT,EFFECT`` what is said when only these are considered.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 
 from daq_app.gap.rocking_model.records import GapRun, Sensor, Survey
 
-FOLDER = Path(__file__).parents[2].parent / "shared" / "data" / "independent"
+FOLDER = Path(__file__).parents[3].parent / "shared" / "data" / "independent"
 _KINDS: dict[str, tuple[Any, float]] = {
     "LVDT": ("lvdt", 1e-3),
     "WIREPOT": ("wire", 1e-3),

@@ -11,7 +11,7 @@ from daq_app.acquisition import AcquisitionClient, AcquisitionUnreachable, read_
 from daq_app.acquisition.messages.published import EventMessage, HealthMessage, Message, State, StateMessage
 from daq_app.acquisition.process.process import run_and_exit
 from sim_hardware.control import SimControl, SimControlError
-from tests.support.processes import quick_context
+from tests.support.recorder.processes import quick_context
 
 SPEED = 5
 """Slow enough that a busy machine keeps up: at this speed the buffer of 20 s lasts 4 s."""

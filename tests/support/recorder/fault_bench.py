@@ -13,9 +13,9 @@ from daq_app.acquisition import AcquisitionClient, read_session_file
 from daq_app.acquisition.messages.published import EventMessage, HealthMessage, Message, State, StateMessage
 from daq_app.config import Rig
 from daq_app.runfile import open_run, verify
-from tests.support.marked_check import check_marked
-from tests.support.processes import quick_context
-from tests.support.saboteur import run_sabotaged
+from tests.support.recorder.marked_check import check_marked
+from tests.support.recorder.processes import quick_context
+from tests.support.recorder.saboteur import run_sabotaged
 
 SPEED = 2
 """Speed of the simulated devices' clock: a buffer of 20 s lasts 10 s then, also on a busy machine."""

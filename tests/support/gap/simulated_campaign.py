@@ -14,7 +14,7 @@ from daq_app.config.scaling import Scaling
 from daq_app.gap.rocking_model.records import GapRun, Sensor, Survey
 from sim_hardware.direct import synthesise_test
 
-RIG = Path(__file__).parents[2] / "configs" / "fr1.toml"
+RIG = Path(__file__).parents[3] / "configs" / "fr1.toml"
 LEVELS = (0.15, -0.25, 0.35, 0.40, -0.15, 0.25)
 CALIBRATION = 0.002
 SCATTER_OF_R = 0.004

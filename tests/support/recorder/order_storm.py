@@ -1,4 +1,6 @@
-"""Random orders and faults against a model of what must hold: ``python -m tests.support.order_storm 200``.
+"""Random orders and faults against a model of what must hold.
+
+``python -m tests.support.recorder.order_storm 200`` runs as many sequences.
 
 Each sequence is a wall that is pulled, held, released or lowered at random, a session that samples it, orders
 in any order at any time, disks that fill up or fail for a while, and moments at which the folder is copied as

@@ -21,7 +21,7 @@ NEEDED = {"Xvfb": "xvfb", "openbox": "openbox", "xdotool": "xdotool"}
 """Program → the Debian package that brings it."""
 
 LIMIT_S = 400.0
-"""Of one wait: for a hang, not for a slow machine."""
+"""The longest wait for one thing: it ends a hang, not a slow machine."""
 
 _WINDOW = """
 import json, sys, threading
@@ -29,7 +29,7 @@ from pathlib import Path
 from PySide6.QtCore import QTimer
 from daq_app.monitor.widgets.settings import WindowSettings
 from daq_app.monitor.window.app import application, campaign_beside, open_window, reach
-from tests.support.clipped_text import clipped_texts
+from tests.support.window.clipped_text import clipped_texts
 
 rig, out, ini, theme, token_wanted = sys.argv[1:6]
 app = application()
@@ -112,7 +112,7 @@ class RealWindow:
         self, display: str, rig: Path, out: Path, ini: Path, theme: str, *, may_command: bool = True
     ) -> None:
         environment = {**os.environ, "DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
-        environment["PYTHONPATH"] = str(Path(__file__).parents[2])
+        environment["PYTHONPATH"] = str(Path(__file__).parents[3])
         arguments = [str(rig), str(out), str(ini), theme, "yes" if may_command else "no"]
         self._environment = environment
         self.process = subprocess.Popen(

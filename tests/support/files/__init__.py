@@ -1,0 +1,1 @@
+"""Files that tests damage or fill with hostile words."""
