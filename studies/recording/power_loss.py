@@ -1,7 +1,8 @@
 """``python -m studies.recording.power_loss --trials 100``: power is lost while a journal is written.
 
 Prints how much was lost at most and whether anything was wrong silently.
-`tests.support.recorder.power_loss` says what is modelled. The exit code is 0 without silent damage and with at most 0.2 s lost.
+`tests.support.recorder.power_loss` says what is modelled. The exit code is 0 without silent damage and with
+at most 0.2 s lost.
 """
 
 from __future__ import annotations

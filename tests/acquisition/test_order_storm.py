@@ -1,4 +1,4 @@
-"""A few random sequences of orders and faults; `python -m tests.support.recorder.order_storm 200` runs more."""
+"""Some random sequences of orders, faults; `python -m tests.support.recorder.order_storm 200` runs more."""
 
 from __future__ import annotations
 
