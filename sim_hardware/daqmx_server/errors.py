@@ -54,6 +54,7 @@ class Code(IntEnum):
     DUPLICATE_TASK = -200089
     TASK_NOT_IN_MAX = -200485
     SCALAR_OF_MANY = -200523
+    READ_TYPE_MISMATCH = -200525
     EVERY_N_NOT_FOR_INPUT = -200980
     SIGNAL_EVENT_UNSUPPORTED = -200987
     UNITS_NOT_CUSTOM = -200447
@@ -88,6 +89,9 @@ class Code(IntEnum):
     OUTPUT_UNDERFLOW = -200290
     NO_OUTPUT_CHANNELS = -200459
     NO_LIMITS = -200695
+    TEE_ROSETTE_GAUGES = -201446
+    DELTA_ROSETTE_GAUGES = -201447
+    ROSETTE_WITHOUT_QUANTITY = -201448
     NETWORK_NOT_RESERVED = -201388
     NETWORK_RESERVED_BY_OTHER = -201420
 
@@ -213,6 +217,15 @@ _TEXT: Final[dict[int, str]] = {
     Code.SCALE_PRE_SCALED_EQUAL: "Minimum and maximum of the pre-scaled values cannot be equal.",
     Code.SCALE_SCALED_EQUAL: "Minimum and maximum of the scaled values cannot be equal.",
     Code.SCALE_NO_COEFFICIENTS: "Coefficients of the polynomial scale are not specified.",
+    Code.SCALE_ATTRIBUTE: "Specified property is not supported by custom scales of this type.",
+    Code.READ_TYPE_MISMATCH: (
+        "Read cannot be performed, because this read is for channels of another kind than some of the task."
+    ),
+    Code.TEE_ROSETTE_GAUGES: "A tee rosette has two strain gauges: give two physical channels.",
+    Code.DELTA_ROSETTE_GAUGES: (
+        "A rectangular or delta rosette has three strain gauges: give three physical channels."
+    ),
+    Code.ROSETTE_WITHOUT_QUANTITY: "No quantity is asked for that the rosette is to measure.",
     Code.SCALE_TABLE_LENGTHS: "Table scale has different numbers of pre-scaled and scaled values.",
     Code.ATTRIBUTE_NOT_SUPPORTED: "Specified property is not supported by this device.",
     Code.GLOBAL_CHANNEL_UNKNOWN: "There is no global channel of that name in NI MAX.",

@@ -10,6 +10,7 @@ from nidaqmx.constants import CurrentShuntResistorLocation, LineGrouping
 from sim_hardware.daqmx_server.channels.analog_input import FROM_CUSTOM_SCALE, AnalogInput
 from sim_hardware.daqmx_server.channels.kinds import KINDS, ChannelKind
 from sim_hardware.daqmx_server.channels.measurements import measurements_of
+from sim_hardware.daqmx_server.channels.rosette import rosette_channels
 from sim_hardware.daqmx_server.channels.scale import CustomScale
 from sim_hardware.daqmx_server.channels.teds import DataSheet
 from sim_hardware.daqmx_server.channels.teds_templates import attributes_from
@@ -32,6 +33,9 @@ def create_channels(
         channels = _digital(inventory, kind, fields)
     else:
         channels = _single(inventory, scales, kind, fields)
+        if kind.measurement == "ROSETTE_STRAIN_GAGE":
+            gauges = [channel for channel in channels if isinstance(channel, AnalogInput)]
+            channels = [*rosette_channels(gauges, fields, existing)]
         if kind.teds:
             _take_over(data_sheets, channels)
     names = set(existing)

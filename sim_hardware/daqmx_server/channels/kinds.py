@@ -95,6 +95,10 @@ _STRAIN: Final = {
     "poisson_ratio": "AI_STRAIN_GAGE_POISSON_RATIO",
     "nominal_gage_resistance": "AI_BRIDGE_NOM_RESISTANCE",
 }
+_ROSETTE: Final = _STRAIN | {
+    "rosette_type": "AI_ROSETTE_STRAIN_GAGE_ROSETTE_TYPE",
+    "gage_orientation": "AI_ROSETTE_STRAIN_GAGE_ORIENTATION",
+}
 _THERMISTOR: Final = {"a": "AI_THRMSTR_A", "b": "AI_THRMSTR_B", "c": "AI_THRMSTR_C", "r1": "AI_THRMSTR_R1"}
 _THERMOCOUPLE: Final = {
     "thermocouple_type": "AI_THRMCPL_TYPE",
@@ -128,7 +132,7 @@ _ANALOG_IN: Final[dict[str, ChannelKind]] = {
     "ThrmstrVex": _ai("TEMPERATURE_THERMISTOR", "AI_TEMP_UNITS", "AI_THRMSTR", **_THERMISTOR),
     "TempBuiltInSensor": _ai("TEMPERATURE_BUILT_IN_SENSOR", "AI_TEMP_UNITS"),
     "StrainGage": _ai("STRAIN_STRAIN_GAGE", "AI_STRAIN_UNITS", "AI_STRAIN", **_STRAIN),
-    "RosetteStrainGage": _ai("ROSETTE_STRAIN_GAGE", "AI_STRAIN_UNITS", "AI_ROSETTE", **_STRAIN),
+    "RosetteStrainGage": _ai("ROSETTE_STRAIN_GAGE", "AI_STRAIN_UNITS", "AI_ROSETTE", **_ROSETTE),
     **_sensors(),
     "Microphone": _ai("SOUND_PRESSURE_MICROPHONE", "AI_SOUND_PRESSURE_UNITS", "AI_SOUND", **_MICROPHONE),
     "Power": ChannelKind(

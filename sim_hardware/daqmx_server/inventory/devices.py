@@ -10,7 +10,7 @@ from nidaqmx.utils import unflatten_channel_string
 
 from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.product_files import NO_PRODUCTS, ProductSet
-from daq_app.config.hardware.products import ChassisProduct, Product
+from daq_app.config.hardware.products import ChassisProduct, Counters, Product
 from daq_app.config.rig import Rig
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 
@@ -24,7 +24,7 @@ _TERMINAL = re.compile(r"^/?(?P<device>[^/]+)/(?P<rest>.+)$")
 class Device:
     """One name in NI MAX: a chassis, a module in it, or a stand-alone board.
 
-    `product` is None for a chassis and for a product without simulated inputs.
+    `product` is what is simulated of it: of a chassis its counters; None where no product file knows it.
     """
 
     name: str
@@ -74,7 +74,9 @@ class Device:
 
     @property
     def counters(self) -> tuple[str, ...]:
-        return tuple(f"{self.name}/ctr{i}" for i in range(self.product.counters.n)) if self.product else ()
+        """Counters; those of a chassis are internal channels (``cDAQ1/_ctr0``)."""
+        stem = "_ctr" if self.is_chassis else "ctr"
+        return tuple(f"{self.name}/{stem}{i}" for i in range(self.product.counters.n)) if self.product else ()
 
 
 @dataclass(slots=True)
@@ -179,6 +181,26 @@ def _no_channel(device: Device, terminal: str) -> DaqmxError:
     )
 
 
+_CHASSIS_COUNTERS = Counters(4, 32, 80e6)
+"""NI CompactDAQ user manual: four counters of 32 bits in a chassis, with a timebase of 80 MHz."""
+
+
+def _counters_of_chassis(product_name: str) -> Product:
+    return Product(
+        product_name,
+        bus="cdaq",
+        task_family="counters",
+        n_ai=0,
+        converter="simultaneous",
+        bits=_CHASSIS_COUNTERS.bits,
+        terminals={},
+        ranges_v=(),
+        max_rate_hz=0.0,
+        timebase_hz=_CHASSIS_COUNTERS.max_rate_hz,
+        counters=_CHASSIS_COUNTERS,
+    )
+
+
 def cdaq_chassis(name: str, product: ChassisProduct | str, serial: int = 0, number: int = 0) -> Device:
     """The device of a cDAQ chassis; one that the catalogue lacks has three timing engines."""
     known = product if isinstance(product, ChassisProduct) else known_chassis(product)
@@ -188,6 +210,7 @@ def cdaq_chassis(name: str, product: ChassisProduct | str, serial: int = 0, numb
     return Device(
         name,
         product_name,
+        None if test_scale else _counters_of_chassis(product_name),
         serial=serial,
         product_number=number,
         is_chassis=True,

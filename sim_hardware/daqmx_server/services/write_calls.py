@@ -135,11 +135,12 @@ def _scalar_handler(rpc: str) -> Handler:
 
 
 def write_raw(bench: Bench, request: Any) -> Any:
-    """Bytes as the device takes them: scan by scan, 16 bits for each analogue output."""
+    """Bytes as the device takes them: scan by scan, 16 bits an analogue output; part of a scan is left."""
     task = task_named(bench, request.task.name)
     wide = "<i2" if task.io == "AO" else {1: "u1", 2: "<u2"}.get((line_bytes(task) + 7) // 8, "<u4")
     values = np.frombuffer(request.write_array, wide).astype(np.float64)
-    samples = np.ascontiguousarray(values.reshape(-1, len(task.channels)).T)
+    whole = values.size // max(len(task.channels), 1) * len(task.channels)
+    samples = np.ascontiguousarray(values[:whole].reshape(-1, len(task.channels)).T)
     if task.io == "AO":
         samples = samples * np.array([[_volts_per_code(channel)] for channel in task.channels])
     return pb.WriteRawResponse(samps_per_chan_written=put_out(task, samples, request.auto_start))

@@ -160,7 +160,9 @@ class Task:
         """Value of an attribute that the running hardware decides; None for the others."""
         if name == "CO_PULSE_DONE":
             return self.run is None or self.run.is_done(self.bench.clock.glance())
-        if name == "CI_COUNT" and self.run is None and self.state is State.RUNNING:
+        if name == "CI_COUNT" and self.state is not State.RUNNING:
+            return int(channel.attributes.get("CI_COUNT_EDGES_INITIAL_CNT", 0))
+        if name == "CI_COUNT" and self.run is None:
             return int(on_demand_sampler(self, self.bench.clock.glance()).codes(0, 1)[0, 0])
         return None
 

@@ -15,14 +15,18 @@ from nidaqmx.constants import (
     LoggingMode,
     LoggingOperation,
     RTDType,
+    StrainGageRosetteType,
     ThermocoupleType,
     TriggerType,
 )
+from nidaqmx.constants import StrainGageRosetteMeasurementType as Quantity
 from nidaqmx.errors import DaqError
 from nidaqmx.system.physical_channel import PhysicalChannel
+from nidaqmx.system.watchdog import WatchdogTask
 from nitypes.waveform import DigitalWaveform
 from nptdms import TdmsFile
 
+from sim_hardware.daqmx_server.inventory.devices import module_device
 from tests.support.server_support import Rig, continuous
 
 CARD = "PXI1Slot3"
@@ -219,3 +223,43 @@ def test_the_sine_of_an_open_terminal_stays_within_the_channel_s_limits() -> Non
     codes = Sampler(Open(), Open(), [entry], SampleTimes(0.0, 1000.0)).codes(0, 200)
     assert -16384 <= codes.min() < -16300
     assert 16300 < codes.max() <= 16383
+
+
+def test_a_rosette_has_a_channel_for_each_quantity_it_is_asked_for(rig: Rig) -> None:
+    rig.bench.inventory.add(module_device("Bridges", "PXIe-4331", "", 4))
+    with rig.task() as task:
+        task.ai_channels.add_ai_rosette_strain_gage_chan(
+            "Bridges/ai0:2",
+            StrainGageRosetteType.DELTA,
+            0.0,
+            [Quantity.PRINCIPAL_STRAIN_1, Quantity.MAX_SHEAR_STRAIN],
+        )
+        assert task.channel_names == ["rosette0_principalStrain1", "rosette0_maxShearStrain"]
+        assert task.ai_channels[0].ai_rosette_strain_gage_rosette_type == StrainGageRosetteType.DELTA
+        task.timing.cfg_samp_clk_timing(1000.0, samps_per_chan=10)
+        assert np.shape(task.read(10)) == (2, 10)
+
+
+def test_a_rosette_of_the_wrong_number_of_gauges_is_refused(rig: Rig) -> None:
+    rig.bench.inventory.add(module_device("Bridges", "PXIe-4331", "", 4))
+    with rig.task() as task, pytest.raises(DaqError, match="two strain gauges"):
+        task.ai_channels.add_ai_rosette_strain_gage_chan(
+            "Bridges/ai0:2", StrainGageRosetteType.TEE, 0.0, [Quantity.PRINCIPAL_STRAIN_1]
+        )
+
+
+def test_a_watchdog_s_time_runs_from_its_start(rig: Rig) -> None:
+    rig.skip(100.0)
+    with WatchdogTask(CARD, timeout=0.8, grpc_options=rig.options()) as task:
+        task.start()
+        assert not task.expired
+        rig.skip(1.0)
+        assert task.expired
+
+
+def test_a_chassis_counts_with_counters_of_its_own(rig: Rig) -> None:
+    with rig.task() as task:
+        channel = task.ci_channels.add_ci_count_edges_chan("cDAQ1/_ctr0", initial_count=10)
+        assert channel.ci_count == 10
+        task.start()
+        assert task.read() == 10

@@ -83,6 +83,11 @@ _DEFAULTS: Final[dict[str, Any]] = {
     "CI_CTR_TIMEBASE_SRC": "100MHzTimebase",
     "CO_CTR_TIMEBASE_SRC": "100MHzTimebase",
     "CO_COUNT": 0,
+    **{
+        name: "100MHzTimebase"
+        for name in metadata.attributes_of(_GROUP)
+        if name.endswith("_DIG_FLTR_TIMEBASE_SRC")
+    },
 }
 """Defaults that are not the zero of their type (RTD: the coefficients of the Pt 3750 curve)."""
 _SETTABLE_DERIVED: Final = frozenset(

@@ -245,6 +245,12 @@ def _first_sample(task: Task) -> Any:
     return timestamp(task.bench.utc(run.times.first_s))
 
 
+def is_first_sample_stamped(task: Task) -> bool:
+    """Whether the instant of the first sample is kept: as set, else on chassis that share their time."""
+    default = task.host is not None and task.host.networked
+    return bool(task.timing.settings.get("FIRST_SAMP_TIMESTAMP_ENABLE", default))
+
+
 def _lines(name: str) -> Callable[[Task], str]:
     return lambda task: ", ".join(channel_list(str(task.timing.settings.get(name, ""))))
 
@@ -274,6 +280,7 @@ TIMING: Final = SettingsGroup(
         "AI_CONV_MAX_RATE": lambda task: max(
             (c.product.aggregate_rate_hz or c.product.max_rate_hz for c in task.timing.inputs), default=0.0
         ),
+        "FIRST_SAMP_TIMESTAMP_ENABLE": is_first_sample_stamped,
         "FIRST_SAMP_TIMESTAMP_VAL": _first_sample,
         "CHANGE_DETECT_DI_RISING_EDGE_PHYSICAL_CHANS": _lines("CHANGE_DETECT_DI_RISING_EDGE_PHYSICAL_CHANS"),
         "CHANGE_DETECT_DI_FALLING_EDGE_PHYSICAL_CHANS": _lines(

@@ -84,7 +84,7 @@ class ScaleGroup:
     def get(self, bench: Bench, request: Any, name: str) -> Any:
         attributes = find_scale(bench, request.scale_name).attributes
         if name not in attributes:
-            raise unsupported(f"Scale_{name}")
+            raise DaqmxError(Code.SCALE_ATTRIBUTE, f"Property: DAQmx_Scale_{name}")
         return attributes[name]
 
     def set(self, bench: Bench, request: Any, name: str, value: Any) -> None:

@@ -32,7 +32,8 @@ def has_expired(task: Task) -> bool:
     """Whether the timer has run out since it was started or reset last."""
     timeout = float(task.watchdog["TIMEOUT"])
     if task.state is State.RUNNING and timeout >= 0:
-        elapsed = task.bench.clock.glance() - task.watchdog["reset_s"]
+        since = max(task.watchdog["reset_s"], task.armed_s)
+        elapsed = task.bench.clock.glance() - since
         task.watchdog["expired"] = bool(task.watchdog["expired"]) or elapsed > timeout
     return bool(task.watchdog["expired"])
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
+from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.requests import fields_of
 from sim_hardware.daqmx_server.services.attributes.groups import Handler
 from sim_hardware.daqmx_server.services.reads.digital_reads import chosen_channels
@@ -105,6 +106,8 @@ def _pair_handler(rpc: str) -> Handler:
     def handler(bench: Bench, request: Any) -> Any:
         fields = fields_of(request)
         task = task_named(bench, request.task.name)
+        if rpc.startswith("ReadPower") and any(c.measurement != "POWER" for c in task.channels):
+            raise DaqmxError(Code.READ_TYPE_MISMATCH, samples_read=0)
         got = read(task, fields["num_samps_per_chan"], fields["timeout"], fields["array_size_in_samps"])
         both = np.array([pair(task, channel) for channel in chosen_channels(task, got)])
         by_scan = fields.get("fill_mode") == FillMode.GROUP_BY_SCAN_NUMBER.value

@@ -1,0 +1,1 @@
+"""NI's examples of its Python client, run as they are against the simulated device server."""

@@ -1,0 +1,71 @@
+"""Runs one program of a stranger as it is: its tasks come from a simulated server, nothing else changes.
+
+``python -m studies.ni_examples.stranger ADDRESS SECONDS PROGRAM``. After SECONDS somebody presses Enter where
+the program asks for it, and Ctrl-C where it runs without end; plots are drawn to nowhere.
+"""
+
+from __future__ import annotations
+
+import _thread
+import builtins
+import os
+import runpy
+import sys
+import threading
+from typing import Any
+
+import grpc
+import nidaqmx
+from nidaqmx.system import System
+
+from sim_hardware.control import SimControl, SimControlError
+
+EDGES = ("/Dev1/PFI0", "/Dev1/PFI8")
+"""Terminals at which somebody gives pulses while the program runs."""
+_EDGE_PERIOD_S = 0.2
+
+
+def _bring_tasks(address: str) -> None:
+    """Every task and the local system of the program come from the server at the address."""
+    channel = grpc.insecure_channel(address, options=[("grpc.max_receive_message_length", -1)])
+    make = nidaqmx.Task.__init__
+
+    def make_remote(self: Any, new_task_name: str = "", **given: Any) -> None:
+        given.setdefault("grpc_options", nidaqmx.GrpcSessionOptions(channel, new_task_name))
+        make(self, new_task_name, **given)
+
+    nidaqmx.Task.__init__ = make_remote
+    remote = System.remote(nidaqmx.GrpcSessionOptions(channel, ""))
+    System.local = staticmethod(lambda: remote)
+
+
+def _give_edges(address: str, over: threading.Event) -> None:
+    with SimControl(address) as control:
+        while not over.wait(_EDGE_PERIOD_S):
+            for terminal in EDGES:
+                try:
+                    control.command("digital_edge", terminal=terminal, edge="rising")
+                except SimControlError:
+                    return
+
+
+def main(address: str, seconds: float, program: str) -> None:
+    os.environ["MPLBACKEND"] = "agg"
+    _bring_tasks(address)
+    over = threading.Event()
+    enter = threading.Event()
+    builtins.input = lambda *_: str(enter.wait(seconds) or "")
+    threading.Thread(target=_give_edges, args=(address, over), daemon=True).start()
+    ctrl_c = threading.Timer(2.0 * seconds, _thread.interrupt_main)
+    ctrl_c.daemon = True
+    ctrl_c.start()
+    try:
+        runpy.run_path(program, run_name="__main__")
+    except KeyboardInterrupt:
+        raise SystemExit("still waiting when Ctrl-C came, which it does not catch") from None
+    finally:
+        over.set()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], float(sys.argv[2]), sys.argv[3])
