@@ -18,9 +18,7 @@ from tests.support.recorder.recorder_bench import N_CHANNELS, Bench, Disk, conte
 
 def test_a_full_disk_costs_nothing_once_there_is_room_again(bench: Callable[..., Bench], disk: Disk) -> None:
     lab = bench()
-    journal = lab.begin()
-    lab.blocks(0, 5)
-    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    journal = lab.begin_and_keep(5)
     disk.full = True
     lab.blocks(5, 20)
     lab.until(lambda: lab.heard("error", "full"))
@@ -51,9 +49,7 @@ def test_a_broken_disk_moves_the_recording_to_the_spare_folder(
     bench: Callable[..., Bench], disk: Disk, tmp_path: Path
 ) -> None:
     lab = bench(tmp_path / "spare")
-    journal = lab.begin()
-    lab.blocks(0, 5)
-    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    journal = lab.begin_and_keep(5)
     disk.broken = journal
     lab.blocks(5, 10)
     lab.until(lambda: lab.heard("error", "Recording goes on in"))
@@ -72,9 +68,7 @@ def test_what_was_not_acknowledged_is_written_once_more_when_the_disk_breaks(
 ) -> None:
     """Gaps and events in the unsafe part: nothing twice, nothing missing, and the counts stay right."""
     lab = bench(tmp_path / "spare")
-    journal = lab.begin()
-    lab.blocks(0, 5)
-    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    journal = lab.begin_and_keep(5)
     disk.flush_takes.clear()
     lab.recorder.inbox.put(Lost(500, 100, "overwritten"))
     lab.recorder.inbox.put(Noted(EventMessage(kind="marker", sample=550, text="between")))
@@ -99,9 +93,7 @@ def test_an_old_file_that_cannot_be_read_any_more_is_continued_in_a_run_of_its_o
     bench: Callable[..., Bench], disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lab = bench(tmp_path / "spare")
-    journal = lab.begin()
-    lab.blocks(0, 5)
-    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    journal = lab.begin_and_keep(5)
 
     def unreadable(fd: int, size: int) -> bytes:
         raise OSError(errno.EIO, "Input/output error")
@@ -122,9 +114,7 @@ def test_the_recorder_outlives_errors_that_no_disk_has(
     bench: Callable[..., Bench], error: Exception, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lab = bench()
-    journal = lab.begin()
-    lab.blocks(0, 5)
-    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    journal = lab.begin_and_keep(5)
     real = JournalWriter.append_block
     broken = threading.Event()
     broken.set()

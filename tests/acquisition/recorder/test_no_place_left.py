@@ -20,9 +20,7 @@ def test_a_folder_deleted_under_the_run_costs_nothing(bench: Callable[..., Bench
     lab = bench(tmp_path / "spare")
     lab.folder = tmp_path / "runs"
     lab.folder.mkdir()
-    journal = lab.begin()
-    lab.blocks(0, 5)
-    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    journal = lab.begin_and_keep(5)
     shutil.rmtree(lab.folder)
     following = 5
     while not lab.heard("error", "was deleted or moved"):
@@ -39,9 +37,7 @@ def test_disks_that_all_fail_for_a_moment_cost_nothing(
 ) -> None:
     """The run waits in memory, its file held open, until one of the places takes it again."""
     lab = bench(tmp_path / "spare")
-    lab.begin()
-    lab.blocks(0, 5)
-    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    lab.begin_and_keep(5)
     disk.broken = True
     lab.blocks(5, 3)
     lab.until(lambda: lab.heard("error", "No other place takes the run"))
@@ -61,9 +57,7 @@ def test_a_folder_deleted_while_no_other_place_takes_the_run_costs_nothing(
     lab = bench()
     lab.folder = tmp_path / "runs"
     lab.folder.mkdir()
-    lab.begin()
-    lab.blocks(0, 5)
-    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    lab.begin_and_keep(5)
     shutil.rmtree(lab.folder)
     (tmp_path / "runs").write_text("in the way")  # the folder cannot be made again either
     following = 5
@@ -82,9 +76,7 @@ def test_when_no_disk_ever_takes_it_what_was_lost_is_counted_truly(
 ) -> None:
     monkeypatch.setattr("daq_app.acquisition.pipeline.recorder._SHUT_S", 0.3)
     lab = bench()
-    journal = lab.begin()
-    lab.blocks(0, 5)
-    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    journal = lab.begin_and_keep(5)
     disk.broken = True
     lab.blocks(5, 3)
     lab.recorder.inbox.put(None)
@@ -105,9 +97,7 @@ def test_of_a_run_whose_file_is_gone_for_good_nothing_is_promised(
     lab = bench()
     lab.folder = tmp_path / "runs"
     lab.folder.mkdir()
-    lab.begin()
-    lab.blocks(0, 5)
-    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    lab.begin_and_keep(5)
     shutil.rmtree(lab.folder)
     disk.broken = True
     lab.blocks(5, 3)
@@ -125,9 +115,7 @@ def test_memory_that_is_full_makes_a_gap_that_is_counted(
         "daq_app.acquisition.pipeline.run_recording.Unwritten", partial(Unwritten, limit_bytes=limit)
     )
     lab = bench()
-    lab.begin()
-    lab.blocks(0, 5)
-    lab.until(lambda: lab.recorder.status.acknowledged_sample == 500)
+    lab.begin_and_keep(5)
     disk.broken = True
     lab.blocks(5, 10)
     lab.until(lambda: lab.heard("error", "Samples are being lost"))

@@ -110,6 +110,13 @@ class Bench:
         self.recorder.inbox.put(Begin(path, header(name), done, before_samples, kept))
         return done.result(10.0)
 
+    def begin_and_keep(self, blocks: int) -> Path:
+        """The journal of a new run whose first blocks the disk has confirmed."""
+        journal = self.begin()
+        self.blocks(0, blocks)
+        self.until(lambda: self.recorder.status.acknowledged_sample == 100 * blocks)
+        return journal
+
     def blocks(self, first: int, count: int) -> None:
         for n in range(first, first + count):
             self.recorder.inbox.put(Arrived(Block(n * 100, readings(n * 100), 0, 0), time.perf_counter()))
