@@ -92,6 +92,9 @@ class Code(IntEnum):
     TEE_ROSETTE_GAUGES = -201446
     DELTA_ROSETTE_GAUGES = -201447
     ROSETTE_WITHOUT_QUANTITY = -201448
+    RETRIGGER_INVALID = -201320
+    LOG_UNBUFFERED = -201299
+    READ_WHILE_LOGGING = -201301
     NETWORK_NOT_RESERVED = -201388
     NETWORK_RESERVED_BY_OTHER = -201420
 
@@ -220,6 +223,11 @@ _TEXT: Final[dict[int, str]] = {
     Code.SCALE_ATTRIBUTE: "Specified property is not supported by custom scales of this type.",
     Code.READ_TYPE_MISMATCH: (
         "Read cannot be performed, because this read is for channels of another kind than some of the task."
+    ),
+    Code.RETRIGGER_INVALID: "Retriggering needs a finite number of samples.",
+    Code.LOG_UNBUFFERED: "Logging needs a task with a sample clock.",
+    Code.READ_WHILE_LOGGING: (
+        "Samples cannot be read in the logging mode Log: they go to the file alone. Use Log and Read."
     ),
     Code.TEE_ROSETTE_GAUGES: "A tee rosette has two strain gauges: give two physical channels.",
     Code.DELTA_ROSETTE_GAUGES: (

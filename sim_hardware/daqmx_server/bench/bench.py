@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import datetime as dt
+import itertools
 from concurrent.futures import ThreadPoolExecutor
 from threading import Condition, RLock
 from typing import Any, Literal, Protocol
 
 import hightime
 import numpy as np
+from google.protobuf.timestamp_pb2 import Timestamp
 
 from sim_hardware.daqmx_server.bench.clock import BenchClock, SteppedClock
 from sim_hardware.daqmx_server.bench.loopback import Loopback, WiredBench
@@ -93,6 +95,14 @@ class Bench:
         if self._epoch is None:
             self._epoch = hightime.datetime.now(dt.UTC) - hightime.timedelta(seconds=self.clock.now())
         return self._epoch + hightime.timedelta(seconds=time_s)
+
+    def instant_of(self, when: Timestamp) -> float:
+        """Instant of the bench at which the wall clock shows a time, s."""
+        since_1970 = hightime.timedelta(seconds=when.seconds) + hightime.timedelta(
+            microseconds=when.nanos / 1e3
+        )
+        wall = hightime.datetime(1970, 1, 1, tzinfo=dt.UTC) + since_1970
+        return float((wall - self.utc(0.0)).total_seconds())
 
     # --- devices --------------------------------------------------------------------------------
 
@@ -200,7 +210,17 @@ class Bench:
     def digital_edge(self, terminal: str, time_s: float, rising: bool = True) -> None:
         """An edge at a terminal such as ``/cDAQ1/PFI0``."""
         self._edges.setdefault(plain(terminal), []).append((time_s, rising))
-        self.changed.notify_all()
+        self.world_changed()
+
+    def level_spans(self, terminal: str, high: bool) -> list[tuple[float, float]]:
+        """When a terminal has a level, as far as it is known: low before its first edge, s."""
+        edges = sorted(self._edges.get(plain(terminal), ()))
+        bounds = [(-np.inf, False), *edges, (np.inf, not high)]
+        return [
+            (start_s, end_s)
+            for (start_s, level), (end_s, _) in itertools.pairwise(bounds)
+            if level is high and end_s > start_s
+        ]
 
     def first_edge(self, terminal: str, after_s: float, rising: bool = True) -> float | None:
         """First edge at the terminal at or after the instant: commanded, or a pulse of another task."""

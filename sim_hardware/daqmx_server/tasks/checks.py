@@ -43,6 +43,9 @@ class ConfiguredTask(Protocol):
     def host(self) -> Device | None: ...
 
     @property
+    def io(self) -> str: ...
+
+    @property
     def is_buffered(self) -> bool: ...
 
     def channel(self, name: str) -> VirtualChannel: ...
@@ -64,7 +67,7 @@ def check_configuration(task: ConfiguredTask) -> None:
     _check_mix(task)
     _check_terminals(task)
     task.timing.verify()
-    task.log.check()
+    task.log.check(task.is_buffered)
     _check_triggers(task)
 
 
@@ -101,6 +104,8 @@ def _check_triggers(task: ConfiguredTask) -> None:
     endless = task.timing.mode != AcquisitionType.FINITE.value
     if task.trigger["REF_TRIG_TYPE"] != triggers.NONE and endless:
         raise DaqmxError(Code.REF_TRIGGER_WHEN_CONTINUOUS)
+    if task.trigger.get("START_TRIG_RETRIGGERABLE") and endless and task.io in ("AI", "DI"):
+        raise DaqmxError(Code.RETRIGGER_INVALID)
     for which in _TRIGGERS:
         if task.trigger[f"{which}_TRIG_TYPE"] in (triggers.ANALOG, triggers.WINDOW):
             trigger_channel(task, triggers.source_of(task.trigger, which))

@@ -49,7 +49,7 @@ def buffer_size(task: BufferedTask) -> int:
     if task.input_buffer is not None:
         return task.input_buffer
     samples = task.timing.samples_per_channel
-    if task.timing.mode == AcquisitionType.FINITE.value:
+    if task.timing.mode == AcquisitionType.FINITE.value and not task.timing.retriggers:
         return samples
     rate = task.timing.rate_hz
     return max(next(size for limit, size in _DEFAULT_BUFFERS if rate <= limit), samples)

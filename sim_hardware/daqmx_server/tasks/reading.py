@@ -41,7 +41,7 @@ def default_count(task: Task) -> int:
     if task.timing.mode == AcquisitionType.FINITE.value and not task.reading.get(
         "READ_ALL_AVAIL_SAMP", False
     ):
-        taken = 0 if task.run is None else task.run.read_position
+        taken = 0 if task.run is None or task.timing.retriggers else task.run.read_position
         return max(task.timing.samples_per_channel - taken, 0)
     if task.run is None:
         return 0
@@ -51,7 +51,8 @@ def default_count(task: Task) -> int:
 
 def _within_run(task: Task, asked: int) -> int:
     """What is left of a finite acquisition, where more is asked for; all that is asked where none is left."""
-    if not task.is_buffered or task.timing.mode != AcquisitionType.FINITE.value:
+    endless = task.timing.mode != AcquisitionType.FINITE.value or task.timing.retriggers
+    if not task.is_buffered or endless:
         return asked
     taken = 0 if task.run is None else task.run.read_position
     following = task.reading.get("RELATIVE_TO", _CURRENT) == _CURRENT and not task.reading.get("OFFSET", 0)
@@ -64,6 +65,8 @@ def read(task: Task, asked: int, timeout_s: float, room: int | None = None) -> R
 
     `room` is the client's array in samples of all channels together.
     """
+    if task.log.takes_samples:
+        raise DaqmxError(Code.READ_WHILE_LOGGING, samples_read=0)
     _ready(task)
     rows = task.read_rows()
     count = default_count(task) if asked == ALL_AVAILABLE else _within_run(task, asked)

@@ -8,37 +8,28 @@ import numpy as np
 from nidaqmx.constants import AcquisitionType, OverwriteMode, SampleTimingType
 from numpy.typing import NDArray
 
-from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.tasks.checks import trigger_channel
 from sim_hardware.daqmx_server.timing import triggers
 from sim_hardware.daqmx_server.timing.acquisition import ReferenceSearch, Run, RunPlan
-from sim_hardware.daqmx_server.timing.sampling import BlockSource, SampleTimes
+from sim_hardware.daqmx_server.timing.sampling import BlockSource
 from sim_hardware.daqmx_server.timing.scan import Scan
-from sim_hardware.daqmx_server.timing.task_timing import TaskTiming
+from sim_hardware.daqmx_server.timing.start_rules import start_rule
+from sim_hardware.daqmx_server.timing.task_timing import TaskTiming, TimedTask
 
 
-class StartedTask(Protocol):
+class StartedTask(TimedTask, Protocol):
     """A task as far as its run is concerned."""
 
-    bench: Bench
-    channels: list[VirtualChannel]
     reading: dict[str, Any]
-    timing: TaskTiming
-    trigger: dict[str, Any]
 
     @property
     def buffer_size(self) -> int: ...
 
     @property
-    def hosts(self) -> list[str]: ...
-
-    @property
     def scan(self) -> Scan: ...
 
     def channel(self, name: str) -> VirtualChannel: ...
-
-    def make_sampler(self, times: SampleTimes) -> BlockSource: ...
 
 
 def make_run(task: StartedTask, now_s: float) -> Run:
@@ -47,7 +38,7 @@ def make_run(task: StartedTask, now_s: float) -> Run:
     hosts = task.hosts
     return Run(
         plan,
-        task.timing.start_rule(now_s),
+        start_rule(task, now_s),
         task.make_sampler,
         None if plan.pretrigger is None else _reference_search(task, plan.pretrigger),
         arrived=lambda now: task.bench.arrived_s(hosts, now),
@@ -55,7 +46,7 @@ def make_run(task: StartedTask, now_s: float) -> Run:
 
 
 def _plan(task: StartedTask) -> RunPlan:
-    finite = task.timing.mode == AcquisitionType.FINITE.value
+    finite = task.timing.mode == AcquisitionType.FINITE.value and not task.timing.retriggers
     ref = task.trigger["REF_TRIG_TYPE"] != triggers.NONE
     return RunPlan(
         rate_hz=task.timing.rate_hz,

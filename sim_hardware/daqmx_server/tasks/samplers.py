@@ -15,7 +15,8 @@ from sim_hardware.daqmx_server.timing.acquisition import Run
 from sim_hardware.daqmx_server.timing.counting import TIMEBASE_HZ, CounterSampler, Pulses
 from sim_hardware.daqmx_server.timing.digital import DigitalSampler
 from sim_hardware.daqmx_server.timing.routing import terminals_of
-from sim_hardware.daqmx_server.timing.sampling import BlockSource, Sampler, SampleTimes
+from sim_hardware.daqmx_server.timing.sample_times import SampleTimes
+from sim_hardware.daqmx_server.timing.sampling import BlockSource, Sampler
 from sim_hardware.daqmx_server.timing.scan import Scan
 from sim_hardware.daqmx_server.timing.task_timing import TaskTiming
 

@@ -28,7 +28,8 @@ from sim_hardware.daqmx_server.tasks.tdms_log import TdmsLog
 from sim_hardware.daqmx_server.timing import triggers
 from sim_hardware.daqmx_server.timing.acquisition import Run
 from sim_hardware.daqmx_server.timing.routing import edges_of
-from sim_hardware.daqmx_server.timing.sampling import BlockSource, SampleTimes
+from sim_hardware.daqmx_server.timing.sample_times import SampleTimes
+from sim_hardware.daqmx_server.timing.sampling import BlockSource
 from sim_hardware.daqmx_server.timing.scan import Scan
 from sim_hardware.daqmx_server.timing.task_timing import TaskTiming
 
@@ -248,6 +249,7 @@ class Task:
         if self.state is not State.RUNNING:
             return
         if self.run is not None:
+            self.look()
             now = self.bench.clock.now()
             last = self.run.last_sample()
             ended = now if last is None else self.run.time_of_count(last)
@@ -290,6 +292,7 @@ class Task:
         if self.state is not State.RUNNING or self.run is None:
             return True
         now = self.bench.clock.glance()
+        self.look()
         self.run.check(now)
         return self.run.is_done(now)
 
@@ -318,7 +321,7 @@ class Task:
             return
         self.run.start_rule.disturbed()
         if self.run.times is not None:
-            self.run.retime(self.timing.clock_from(self.run.times.first_s, self.run.times.rate_hz))
+            self.run.retime(self.timing.retimed(self.run.times))
 
     @property
     def scan(self) -> Scan:
@@ -336,6 +339,20 @@ class Task:
     ) -> NDArray[np.float64]:
         """Readings of the channel an analogue trigger listens to."""
         return trigger_readings(self, sampler, source, start, stop)
+
+    def look(self) -> None:
+        """Find out what has happened by now; a recorder in the mode Log takes what has come."""
+        run = self.run
+        if run is None:
+            return
+        now = self.bench.clock.now()
+        run.look(now)
+        if not self.log.takes_samples or run.aborted or run.failure is not None:
+            return
+        count = run.available(now)
+        if count:
+            self.log_read(run.block(run.read_position, count), None, run.read_position)
+            run.read_position += count
 
     def log_read(self, codes: NDArray[Any], rows: list[int] | None, first: int) -> None:
         """Give a block that has been read to DAQmx's own recorder, if that is on."""

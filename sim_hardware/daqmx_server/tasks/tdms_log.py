@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import sys
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,24 +26,31 @@ class TdmsLog:
     def __init__(self, settings: dict[str, Any]) -> None:
         self._settings = settings
         self._writer: TdmsWriter | None = None
+        self._part = 0
+        self._written = 0
 
     @property
     def enabled(self) -> bool:
         return bool(self._settings.get("LOGGING_MODE", LoggingMode.OFF.value) != LoggingMode.OFF.value)
 
-    def check(self) -> None:
-        """Refuse what the simulation does not do: logging without reading."""
-        if self._settings.get("LOGGING_MODE") == LoggingMode.LOG.value:
-            raise DaqmxError(
-                Code.INVALID_VALUE,
-                "Property: DAQmx_Logging_Mode\nRequested Value: DAQmx_Val_Log\n"
-                "Possible Values: DAQmx_Val_Off, DAQmx_Val_LogAndRead",
-            )
+    @property
+    def takes_samples(self) -> bool:
+        """Mode Log: the samples go to the file as they come, and cannot be read."""
+        return bool(self._settings.get("LOGGING_MODE") == LoggingMode.LOG.value)
+
+    def check(self, buffered: bool) -> None:
+        """−201299 for a task without a sample clock."""
+        if self.enabled and not buffered:
+            raise DaqmxError(Code.LOG_UNBUFFERED)
 
     def open(self) -> None:
         """Open the file of the settings, by the operation of the settings."""
+        self._part = 0
+        self._open(Path(str(self._settings["LOGGING_FILE_PATH"])))
+
+    def _open(self, path: Path) -> None:
         self.close()
-        path = Path(str(self._settings["LOGGING_FILE_PATH"]))
+        self._written = 0
         operation = self._settings.get("LOGGING_TDMS_OPERATION", LoggingOperation.OPEN_OR_CREATE.value)
         if operation == LoggingOperation.CREATE.value and path.exists():
             raise _bad_path(path, "the file exists already")
@@ -70,6 +78,33 @@ class TdmsLog:
             return
         if self._writer is None:
             self.open()
+        begin = 0
+        while begin < values.shape[1]:
+            end = min(begin + self._room(), values.shape[1])
+            self._append(names, units, values[:, begin:end], first + begin, rate_hz, start)
+            self._written += end - begin
+            begin = end
+
+    def _room(self) -> int:
+        """Samples per channel that go into this file; a full one is followed by ``…_0001.tdms``."""
+        limit = int(self._settings.get("LOGGING_SAMPS_PER_FILE", 0))
+        if not limit:
+            return sys.maxsize
+        if self._written >= limit:
+            path = Path(str(self._settings["LOGGING_FILE_PATH"]))
+            self._part += 1
+            self._open(path.with_stem(f"{path.stem}_{self._part:04d}"))
+        return limit - self._written
+
+    def _append(
+        self,
+        names: list[str],
+        units: list[str],
+        values: NDArray[np.float64],
+        first: int,
+        rate_hz: float,
+        start: dt.datetime,
+    ) -> None:
         assert self._writer is not None
         group = str(self._settings.get("LOGGING_TDMS_GROUP_NAME") or "Task")
         channels = [

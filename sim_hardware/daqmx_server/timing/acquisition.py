@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.timing.sampling import BlockSource, SampleTimes
+from sim_hardware.daqmx_server.timing.sample_times import SampleTimes
+from sim_hardware.daqmx_server.timing.sampling import BlockSource
 from sim_hardware.daqmx_server.timing.triggers import CrossingSearch
 
 
@@ -33,6 +34,10 @@ class StartRule(Protocol):
     """Answers, once it is known, when the first sample is taken."""
 
     def __call__(self, now_s: float) -> SampleTimes | None: ...
+
+    def again(self, times: SampleTimes, now_s: float) -> SampleTimes | None:
+        """The clock with the samples of a further trigger, if one has come."""
+        ...
 
     def disturbed(self) -> None:
         """What has been made ahead of now is no longer right."""
@@ -72,6 +77,9 @@ class Run:
             self.times = self.start_rule(now_s)
             if self.times is not None:
                 self.sampler = self._make_sampler(self.times)
+        else:
+            while (times := self.start_rule.again(self.times, now_s)) is not None:
+                self.retime(times)
         if self.times is not None and self._ref_sample is None and self._ref_search is not None:
             self._ref_sample = self._ref_search(self, now_s)
 

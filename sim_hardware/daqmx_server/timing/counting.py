@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
-from sim_hardware.daqmx_server.timing.sampling import SampleTimes
+from sim_hardware.daqmx_server.timing.sample_times import SampleTimes
 
 TIMEBASE_HZ: Final = 100e6
 """Clock that pulse widths are counted in, where the client asks for ticks."""

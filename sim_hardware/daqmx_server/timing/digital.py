@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.bench.loopback import Loopback
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
-from sim_hardware.daqmx_server.timing.sampling import SampleTimes
+from sim_hardware.daqmx_server.timing.sample_times import SampleTimes
 
 
 class DigitalSampler:

@@ -16,60 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.channels.converter import Converter
-from sim_hardware.faults.model import ClockChange
+from sim_hardware.daqmx_server.timing.sample_times import SampleTimes
 
 _SINE_SAMPLES: Final = 100
-
-
-class SampleTimes:
-    """Sample index ↔ simulated time: straight pieces between changes of the clock."""
-
-    def __init__(self, first_s: float, rate_hz: float, changes: Sequence[ClockChange] = ()) -> None:
-        self.first_s = first_s
-        self.rate_hz = rate_hz
-        self._changes = tuple(changes)
-        edges = {first_s}
-        for change in changes:
-            edges.update(t for t in (change.start_s, change.end_s) if first_s < t < np.inf)
-        times = np.array(sorted(edges))
-        rates = np.full(len(times), rate_hz)
-        for change in changes:
-            inside = (times >= change.start_s) & (times < change.end_s)
-            rates[inside] *= change.factor
-        self._times = times
-        self._rates = rates
-        counts = np.concatenate(([0.0], np.cumsum(np.diff(times) * rates[:-1])))
-        self._counts = counts
-        self._moving = rates > 0
-
-    def at(self, index: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Instant of each sample; inf where the clock has stopped for good."""
-        if len(self._times) == 1 and self._moving[0]:
-            return self.first_s + index / float(self._rates[0])
-        piece = np.clip(np.searchsorted(self._counts, index, side="right") - 1, 0, None)
-        rates = self._rates[piece]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            out = self._times[piece] + np.where(rates > 0, (index - self._counts[piece]) / rates, np.inf)
-        return np.where(index == self._counts[piece], self._times[piece], out)
-
-    def later(self, delay_s: float) -> SampleTimes:
-        """The same clock, each sample later by a delay."""
-        return SampleTimes(self.first_s + delay_s, self.rate_hz, self._changes)
-
-    def from_sample(self, index: int) -> SampleTimes:
-        """The same clock, counted from a later sample."""
-        return SampleTimes(self.time_of(index), self.rate_hz, self._changes)
-
-    def time_of(self, index: int) -> float:
-        return float(self.at(np.array([index]))[0])
-
-    def count(self, now_s: float) -> int:
-        """Samples taken up to and including `now_s`."""
-        if now_s < self.first_s:
-            return 0
-        piece = int(np.searchsorted(self._times, now_s, side="right")) - 1
-        position = self._counts[piece] + (now_s - self._times[piece]) * self._rates[piece]
-        return int(np.floor(position + 1e-6)) + 1
 
 
 @dataclass(frozen=True, slots=True)

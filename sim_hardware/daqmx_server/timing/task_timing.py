@@ -7,7 +7,7 @@ from collections import Counter
 from typing import Any, Protocol, cast
 
 import numpy as np
-from nidaqmx.constants import AcquisitionType, DigitalWidthUnits, Edge, SampleTimingType
+from nidaqmx.constants import AcquisitionType, Level, SampleTimingType
 from numpy.typing import NDArray
 
 from daq_app.config.hardware import catalogue
@@ -18,10 +18,10 @@ from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory.terminals import plain
 from sim_hardware.daqmx_server.timing import triggers
-from sim_hardware.daqmx_server.timing.acquisition import StartRule
 from sim_hardware.daqmx_server.timing.routing import SignalTask, terminals_of
-from sim_hardware.daqmx_server.timing.sampling import BlockSource, SampleTimes
-from sim_hardware.daqmx_server.timing.triggers import CrossingSearch
+from sim_hardware.daqmx_server.timing.sample_times import BurstTimes, SampleTimes
+from sim_hardware.daqmx_server.timing.sampling import BlockSource
+from sim_hardware.faults.model import ClockChange
 
 _RATE_OF_SLOW_MODULES_HZ = 100e3
 _FEWEST_SAMPLES = 2
@@ -144,7 +144,7 @@ class TaskTiming:
     @property
     def waits_for_others(self) -> bool:
         """Whether the first sample needs something that this task does not make itself."""
-        return self.source_is_foreign or _digital_start(self._task) is not None
+        return self.source_is_foreign or triggers.digital_start(self._task.trigger) is not None
 
     def verify(self) -> None:
         """Raise what NI-DAQmx raises for a clock that these channels cannot have."""
@@ -220,10 +220,41 @@ class TaskTiming:
         ]
 
     def clock_from(self, first_s: float, rate_hz: float) -> SampleTimes:
-        """A sample clock from an instant on, with what faults do to it."""
+        """A sample clock from an instant on, with what faults and pauses do to it."""
         owner = self.source_task() or self._task
         places = [*owner.hosts, *owner.devices]
-        return SampleTimes(first_s, rate_hz, self._task.bench.faults.clock_changes(places))
+        return SampleTimes(
+            first_s, rate_hz, [*self._task.bench.faults.clock_changes(places), *owner.timing.pauses()]
+        )
+
+    def retimed(self, times: SampleTimes) -> SampleTimes:
+        """A clock that runs already, with what faults and pauses do to it by now."""
+        if isinstance(times, BurstTimes):
+            bursts = [self.clock_from(burst.first_s, burst.rate_hz) for burst in times.bursts]
+            return BurstTimes(bursts, times.samples)
+        return self.clock_from(times.first_s, times.rate_hz)
+
+    def pauses(self) -> tuple[ClockChange, ...]:
+        """When a digital level holds the sample clock, as far as that is known."""
+        trigger = self._task.trigger
+        if trigger.get("PAUSE_TRIG_TYPE") != triggers.LEVEL:
+            return ()
+        source = str(trigger.get("DIG_LVL_PAUSE_TRIG_SRC", ""))
+        high = trigger.get("DIG_LVL_PAUSE_TRIG_WHEN", Level.HIGH.value) == Level.HIGH.value
+        return tuple(
+            ClockChange(start_s, end_s, 0.0) for start_s, end_s in self._task.bench.level_spans(source, high)
+        )
+
+    @property
+    def retriggers(self) -> bool:
+        """Whether a finite acquisition takes its samples anew at each start trigger."""
+        trigger = self._task.trigger
+        return bool(
+            trigger.get("START_TRIG_RETRIGGERABLE", False)
+            and self.mode == AcquisitionType.FINITE.value
+            and trigger["START_TRIG_TYPE"] != triggers.NONE
+            and self._task.io in ("AI", "DI")
+        )
 
     def source_task(self) -> TimedTask | None:
         """The task whose sample clock this one uses: one that runs before one that only holds its devices.
@@ -244,12 +275,6 @@ class TaskTiming:
         running = [other for other in drivers if other.run is not None]
         return next(iter(running or drivers), None)
 
-    def start_rule(self, armed_s: float) -> StartRule:
-        """How the instant of the first sample is found, once and for all at the start of the task."""
-        if self.source_is_foreign:
-            return _SharedClock(self._task, armed_s)
-        return _OwnClock(self._task, armed_s)
-
 
 def _skews_at(scan: list[tuple[str, Product]], period_s: float) -> list[float]:
     """Skews where the client has set the convert clock itself."""
@@ -259,92 +284,3 @@ def _skews_at(scan: list[tuple[str, Product]], period_s: float) -> list[float]:
         out.append(seen[device] * period_s if product.converter == "multiplexed" else 0.0)
         seen[device] += 1
     return out
-
-
-def _digital_start(task: TimedTask) -> triggers.Which | None:
-    """Which digital edge the task waits for: the start trigger's, or a counter's arm start trigger's."""
-    if task.trigger["START_TRIG_TYPE"] == triggers.DIGITAL:
-        return "START"
-    return "ARM_START" if task.trigger.get("ARM_START_TRIG_TYPE") == triggers.DIGITAL else None
-
-
-def _start_edge(task: TimedTask, after_s: float) -> float | None:
-    """The edge that a digital start trigger waits for, if it has come."""
-    which = _digital_start(task) or "START"
-    source = triggers.source_of(task.trigger, which)
-    return task.bench.first_edge(source, after_s, triggers.is_rising(task.trigger, which))
-
-
-class _OwnClock:
-    """The clock starts at the start trigger, or at once."""
-
-    def __init__(self, task: TimedTask, armed_s: float) -> None:
-        self._task = task
-        self._armed_s = armed_s
-        self._kind = int(task.trigger["START_TRIG_TYPE"])
-        self._search: CrossingSearch | None = None
-        if self._kind in (triggers.ANALOG, triggers.WINDOW):
-            self._search = CrossingSearch(triggers.Condition.of(task.trigger, "START"), 0)
-            self._listen()
-
-    def disturbed(self) -> None:
-        if self._search is not None:
-            self._listen()
-
-    def _listen(self) -> None:
-        """An analogue trigger looks at its channel at the rate of the acquisition to come."""
-        self._times = self._task.timing.clock_from(self._armed_s, self._task.timing.rate_hz)
-        self._sampler = self._task.make_sampler(self._times)
-
-    def __call__(self, now_s: float) -> SampleTimes | None:
-        instant = self._trigger_instant(now_s)
-        if instant is None:
-            return None
-        delay = float(self._task.trigger.get("START_TRIG_DELAY", 0.0))
-        if self._task.trigger.get("START_TRIG_DELAY_UNITS") == DigitalWidthUnits.SAMPLE_CLOCK_PERIODS.value:
-            delay /= self._task.timing.rate_hz
-        first = instant + delay
-        rate = self._task.timing.rate_hz
-        self._task.bench.faults.acquisition_started(first, rate)
-        return self._task.timing.clock_from(first, rate)
-
-    def _trigger_instant(self, now_s: float) -> float | None:
-        if _digital_start(self._task) is not None:
-            return _start_edge(self._task, self._armed_s)
-        if self._kind == triggers.NONE:
-            return self._armed_s
-        source = triggers.source_of(self._task.trigger, "START")
-        assert self._search is not None
-        hit = self._search.find(
-            lambda start, stop: self._task.trigger_readings(self._sampler, source, start, stop),
-            self._times.count(now_s),
-        )
-        return None if hit is None else self._times.time_of(hit)
-
-
-class _SharedClock:
-    """Samples are taken at the clock of another task, from its first edge after this one is armed."""
-
-    def __init__(self, task: TimedTask, armed_s: float) -> None:
-        self._task = task
-        self._armed_s = armed_s
-
-    def disturbed(self) -> None:
-        """The master's clock is disturbed by itself."""
-
-    def __call__(self, now_s: float) -> SampleTimes | None:
-        master = self._task.timing.source_task()
-        if master is None or master.run is None or master.run.times is None:
-            return None
-        times = master.run.times
-        if self._task.timing.settings.get("SAMP_CLK_ACTIVE_EDGE") == Edge.FALLING.value:
-            times = times.later(0.5 / times.rate_hz)
-        armed = self._armed_s
-        if _digital_start(self._task) is not None:
-            edge = _start_edge(self._task, armed)
-            if edge is None:
-                return None
-            armed = edge
-        if armed <= times.first_s:
-            return times
-        return times.from_sample(times.count(armed - 1e-12))

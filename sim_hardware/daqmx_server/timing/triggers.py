@@ -18,6 +18,8 @@ NONE: Final[int] = TriggerType.NONE.value
 DIGITAL: Final[int] = TriggerType.DIGITAL_EDGE.value
 ANALOG: Final[int] = TriggerType.ANALOG_EDGE.value
 WINDOW: Final[int] = TriggerType.ANALOG_WINDOW.value
+LEVEL: Final[int] = TriggerType.DIGITAL_LEVEL.value
+TIME: Final[int] = TriggerType.TIME.value
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +85,13 @@ class CrossingSearch:
 def is_rising(settings: Mapping[str, Any], which: Which) -> bool:
     """Which edge of a digital trigger counts."""
     return bool(settings.get(f"DIG_EDGE_{which}_TRIG_EDGE", Edge.RISING.value) == Edge.RISING.value)
+
+
+def digital_start(settings: Mapping[str, Any]) -> Which | None:
+    """Which digital edge a task waits for: the start trigger's, or a counter's arm start trigger's."""
+    if settings["START_TRIG_TYPE"] == DIGITAL:
+        return "START"
+    return "ARM_START" if settings.get("ARM_START_TRIG_TYPE") == DIGITAL else None
 
 
 def source_of(settings: Mapping[str, Any], which: str) -> str:

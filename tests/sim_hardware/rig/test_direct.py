@@ -9,7 +9,8 @@ import pytest
 
 from daq_app.config import load_rig, plan_tasks
 from daq_app.config.scaling import Scaling
-from sim_hardware.daqmx_server.timing.sampling import Input, Sampler, SampleTimes
+from sim_hardware.daqmx_server.timing.sample_times import SampleTimes
+from sim_hardware.daqmx_server.timing.sampling import Input, Sampler
 from sim_hardware.direct import converter_of, electrical_per_reading, synthesise_test
 from sim_hardware.virtual_rig import VirtualRig
 

@@ -14,7 +14,8 @@ from nidaqmx._stubs import nidaqmx_pb2 as pb
 
 from sim_hardware.daqmx_server.channels.converter import Converter
 from sim_hardware.daqmx_server.services.reads.analog_reads import encode_f64
-from sim_hardware.daqmx_server.timing.sampling import Input, Sampler, SampleTimes
+from sim_hardware.daqmx_server.timing.sample_times import SampleTimes
+from sim_hardware.daqmx_server.timing.sampling import Input, Sampler
 from sim_hardware.daqmx_server.timing.triggers import Condition, CrossingSearch
 from sim_hardware.faults.model import ClockChange, fault_from
 from tests.support.server_support import Rig

@@ -80,7 +80,7 @@ def test_scale_attributes_and_mistakes(rig: Rig) -> None:
     assert (scale.lin_slope, scale.lin_y_intercept, scale.scaled_units) == (2.0, 1.0, "mm")
     scale.lin_slope = 3.0
     assert scale.lin_slope == 3.0
-    assert code_of(lambda: scale.poly_forward_coeff) == -200452
+    assert code_of(lambda: scale.poly_forward_coeff) == -200601
     assert code_of(lambda: setattr(scale, "lin_slope", 0.0)) == -200409
     assert code_of(lambda: Scale.create_map_scale("m", 1, 1, 0, 5, grpc_options=options)) == -200602
     assert code_of(lambda: Scale.create_map_scale("m", 0, 1, 5, 5, grpc_options=options)) == -200603

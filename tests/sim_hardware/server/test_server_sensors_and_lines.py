@@ -210,7 +210,8 @@ def test_a_logged_file_says_when_its_first_sample_was_taken(rig: Rig, tmp_path: 
 
 def test_the_sine_of_an_open_terminal_stays_within_the_channel_s_limits() -> None:
     from sim_hardware.daqmx_server.channels.converter import Converter
-    from sim_hardware.daqmx_server.timing.sampling import Input, Sampler, SampleTimes
+    from sim_hardware.daqmx_server.timing.sample_times import SampleTimes
+    from sim_hardware.daqmx_server.timing.sampling import Input, Sampler
 
     class Open:
         def volts(self, terminals: tuple[str, ...], times_s: np.ndarray) -> np.ndarray:

@@ -94,6 +94,7 @@ def _samples_now(task: Task, of: str) -> int:
     if task.run is None:
         return 0
     now = task.bench.clock.glance()
+    task.look()
     task.run.check(now)
     return task.run.available(now) if of == "available" else task.run.acquired(now)
 
