@@ -62,6 +62,8 @@ class CampaignPage(QWidget):
     def __init__(self, background: Background, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._background = background
+        self._scans_under_way = 0
+        self._take_after_scan = False
         self._reports = Background(self)
         """A report takes minutes: nothing else waits for it."""
         self.campaign: Campaign | None = None
@@ -81,6 +83,7 @@ class CampaignPage(QWidget):
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         header.setSectionResizeMode(len(_WIDTHS_PX), QHeaderView.ResizeMode.Stretch)
         self._specimen = QComboBox()
+        self._specimen.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
         self._specimen.currentTextChanged.connect(lambda _text: self._show())
         self._title = role_label("No campaign is open", "title")
         captions = {
@@ -204,14 +207,23 @@ class CampaignPage(QWidget):
             recorded = read_recorded(folder) if folder.is_dir() else []
             return CampaignStatus(campaign, recorded)
 
+        self._scans_under_way += 1
         self._background.run(read, self._on_status, self._on_trouble)
 
     def _on_status(self, status: CampaignStatus) -> None:
         self.status = status
         self._show()
         self.scanned.emit()
+        self._on_scan_over()
+
+    def _on_scan_over(self) -> None:
+        self._scans_under_way -= 1
+        if self._take_after_scan and not self._scans_under_way:
+            self._take_after_scan = False
+            self.take_next()
 
     def _on_trouble(self, error: Exception) -> None:
+        self._on_scan_over()
         if not isinstance(error, (ConfigError, RunFileError, OSError)):
             raise error
         self.told.emit("error", f"The runs cannot be read: {error}")
@@ -238,7 +250,10 @@ class CampaignPage(QWidget):
         self._show_chosen()
 
     def take_next(self) -> None:
-        """Fill in the proposed test."""
+        """Fill in the proposed test; a verdict just given, or a run just saved, is read first."""
+        if self._scans_under_way:
+            self._take_after_scan = True
+            return
         proposal = self.proposal
         if proposal is None:
             self.told.emit("info", "Every planned test is done; type a name for a further one.")

@@ -39,7 +39,7 @@ address, token, mine = reach(Path(rig), Path(out), ["--speed", "2"])
 token = token if token_wanted == "yes" else ""
 window = open_window(address, token, settings, plan=campaign_beside(Path(rig)))
 window.show()
-asked, said = [], [None]
+asked, said, cut_before, cut_told = [], [None], [set()], [set()]
 
 def listen():
     for line in sys.stdin:
@@ -61,9 +61,12 @@ def look():
         "whole": window.screen().availableGeometry().contains(window.frameGeometry()),
     }
     words.pop("recording_detail")
-    if words != said[0]:
-        said[0] = words
-        print(json.dumps({"words": words, "clipped": clipped_texts(window)}), flush=True)
+    cut = {f"{page}: {text}" for text in clipped_texts(window)}
+    lasting = cut & cut_before[0]  # a text that has just changed gets its room with the next layout
+    cut_before[0] = cut
+    if words != said[0] or not lasting <= cut_told[0]:
+        said[0], cut_told[0] = words, cut_told[0] | lasting
+        print(json.dumps({"words": words, "clipped": sorted(lasting)}), flush=True)
 
 threading.Thread(target=listen, daemon=True).start()
 timer = QTimer()
