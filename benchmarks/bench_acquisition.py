@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import psutil
@@ -60,14 +60,21 @@ def fastest(folder: Path) -> list[Throughput]:
 
 
 def sustained(
-    connection: str, folder: Path, seconds: float = _THROUGHPUT_S, *, hurry: bool = False
+    connection: str,
+    folder: Path,
+    seconds: float = _THROUGHPUT_S,
+    *,
+    hurry: bool = False,
+    read_samples: int | None = None,
 ) -> Throughput:
     """Reader and recorder (no analysis, no viewer) as fast as the server can deliver.
 
-    `hurry`: in the short pieces that are read while the wall rocks.
+    `hurry`: in the short pieces that are read while the wall rocks. `read_samples`: size of the reads, by
+    default the rig's.
     """
     rig = load_rig(RIG)
     plan = plan_tasks(rig)
+    plan = replace(plan, read_samples=read_samples or plan.read_samples)
     begun, ended = threading.Event(), threading.Event()
     lost: list[int] = []
 

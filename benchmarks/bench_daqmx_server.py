@@ -44,7 +44,7 @@ def figures() -> list[Figure]:
             raise RuntimeError("the simulated device server did not start")
         out = []
         for samples in (400, 4000):
-            runs = [_run(match[1], samples, psutil.Process(server.pid)) for _ in range(_RUNS)]
+            runs = [bare_loop(match[1], samples, psutil.Process(server.pid)) for _ in range(_RUNS)]
             multiple, client, served = (float(np.median(column)) for column in zip(*runs, strict=True))
             name = f"41 channels through nidaqmx, {samples} samples a read"
             out.append(Figure(name, multiple, "x 4000 Hz", _RUNS, 40.0, "high"))
@@ -56,8 +56,8 @@ def figures() -> list[Figure]:
         server.wait()
 
 
-def _run(port: str, samples: int, server: psutil.Process) -> tuple[float, float, float]:
-    """(multiple of real time, CPU s of the client, CPU s of the server per s of record)."""
+def bare_loop(port: str, samples: int, server: psutil.Process) -> tuple[float, float, float]:
+    """A bare loop of reads: (multiple of real time, CPU s of the client, of the server per s of record)."""
     rig = load_rig(_RIG)
     options = [("grpc.max_receive_message_length", -1)]
     with (
