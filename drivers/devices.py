@@ -1,11 +1,16 @@
-"""Before any task is made: is every device of the plan there, and the right one?"""
+"""Devices before any task is made: which there are, and whether those of the plan are among them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+import nidaqmx.system
+from nidaqmx.constants import BusType, ProductCategory
+
+from daq_app.config.hardware.max_file import ListedDevice
 from daq_app.config.planning.plan import TaskPlan
 from drivers.connection import Connection
+from drivers.error_advice import translate
 from drivers.protocol import DeviceInfo, DriverError
 
 Inspection = Callable[[tuple[DeviceInfo, ...]], list[str]]
@@ -47,3 +52,34 @@ def check_devices(
             advice="Nothing was started",
         )
     return devices
+
+
+def list_devices(connection: str) -> list[ListedDevice]:
+    """Every device that NI-DAQmx knows at a connection. Raises `DriverError`."""
+    way = Connection(connection)
+    way.limit_calls_to()
+    try:
+        return [_listed(device) for device in way.system().devices]
+    except Exception as error:
+        raise translate(error, doing="listing the devices") from error
+    finally:
+        way.close()
+
+
+def _listed(device: nidaqmx.system.Device) -> ListedDevice:
+    category = device.product_category
+    chassis, slot = "", 0
+    if category is ProductCategory.C_SERIES_MODULE:
+        chassis, slot = str(device.compact_daq_chassis_device.name), int(device.compact_daq_slot_num)
+    elif device.bus_type in (BusType.PXI, BusType.PXIE):
+        chassis, slot = f"PXI{int(device.pxi_chassis_num)}", int(device.pxi_slot_num)
+    serial = int(device.serial_num)
+    return ListedDevice(
+        name=str(device.name),
+        product=str(device.product_type),
+        serial=f"{serial:08X}" if serial else "",
+        chassis=chassis,
+        slot=slot,
+        is_chassis=category is ProductCategory.COMPACT_DAQ_CHASSIS,
+        simulated=bool(device.is_simulated),
+    )

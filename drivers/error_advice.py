@@ -12,6 +12,7 @@ from typing import Final
 
 from nidaqmx import errors as ni_errors
 
+from drivers.local_library import not_installed
 from drivers.protocol import Block, DriverError
 
 
@@ -250,11 +251,7 @@ def translate(error: Exception, *, doing: str, partial: Block | None = None) -> 
     if isinstance(error, ni_errors.RpcError):
         return _from_rpc(error, doing, partial)
     if isinstance(error, (ni_errors.DaqNotFoundError, ni_errors.DaqNotSupportedError)):
-        return DriverError(
-            "NI-DAQmx is not installed on this computer",
-            advice="Install the NI-DAQmx driver from ni.com, or use --connection simulated or grpc://HOST:PORT",
-            partial=partial,
-        )
+        return not_installed(partial)
     if isinstance(error, ni_errors.DaqFunctionNotSupportedError):
         return DriverError(
             f"The installed NI-DAQmx driver lacks a function that {doing} needs",

@@ -8,9 +8,12 @@ from typing import Annotated
 import typer
 
 from daq_app.cli.config_tables import plan_tables
+from daq_app.cli.devices import devices_of
 from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, print_problems, reported
 from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.config import ConfigError, load_rig, plan_tasks
+from daq_app.config.hardware.comparison import differences
+from daq_app.config.hardware.max_file import ListedDevice
 from daq_app.config.shipped import copy_shipped
 
 
@@ -25,21 +28,28 @@ def register(app: typer.Typer) -> None:
 
 def check(
     files: Annotated[list[Path], typer.Argument(help="Rig files (TOML).", metavar="FILE…")],
+    against: Annotated[
+        str | None,
+        typer.Option(metavar="EXPORT.ini|CONNECTION", help="Compare with the devices that are there."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object per file.")] = False,
 ) -> None:
     """Say of each rig file whether it can be used, with every problem in it and every note.
 
+    With --against also what differs from an export of NI MAX, or from the devices at local,
+    grpc://HOST:PORT or grpcs://HOST:PORT.
     Exit code 0 if all files are good, 2 if one is not.
     """
     bad = 0
-    for file in files:
-        with reported():
-            good = _check_json(file) if as_json else _check_text(file)
-        bad += not good
+    with reported():
+        there = devices_of(against) if against is not None else None
+        for file in files:
+            good = _check_json(file, there) if as_json else _check_text(file, there)
+            bad += not good
     raise typer.Exit(EXIT_BAD_INPUT if bad else 0)
 
 
-def _check_text(file: Path) -> bool:
+def _check_text(file: Path, there: list[ListedDevice] | None) -> bool:
     try:
         rig = load_rig(file)
         plan = plan_tasks(rig, str(file))
@@ -55,10 +65,15 @@ def _check_text(file: Path) -> bool:
     for note in plan.notes:
         if note.severity == "warning":
             print_paragraph("Warning", f"{file}: {note.where}: {note.text}", style="bold yellow")
-    return True
+    wrong = [] if there is None else differences(rig.hardware, there)
+    for sentence in wrong:
+        print_paragraph("Error", f"{file}: {sentence}")
+    if there is not None and not wrong:
+        echo(f"{file}: its hardware is there")
+    return not wrong
 
 
-def _check_json(file: Path) -> bool:
+def _check_json(file: Path, there: list[ListedDevice] | None) -> bool:
     result: dict[str, object] = {"file": str(file), "good": True, "problems": [], "notes": []}
     try:
         rig = load_rig(file)
@@ -75,6 +90,9 @@ def _check_json(file: Path) -> bool:
                 {"severity": note.severity, "where": note.where, "text": note.text} for note in plan.notes
             ],
         }
+        if there is not None:
+            wrong = differences(rig.hardware, there)
+            result |= {"good": not wrong, "differences": wrong}
     except ConfigError as error:
         result["good"] = False
         result["problems"] = [{"key": p.key, "wrong": p.wrong, "right": p.right} for p in error.problems]

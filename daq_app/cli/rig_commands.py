@@ -1,4 +1,4 @@
-"""`daq-app rig new`: a rig file for one's own wall, from questions or options and a list of sensors."""
+"""`daq-app rig`: a rig file for one's own wall and hardware."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ from typing import Annotated
 
 import typer
 
+from daq_app.cli.devices import devices_at
 from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, reported
+from daq_app.cli.terminal import echo
 from daq_app.config.authoring import Block, read_sensor_table, spread_sensors, write_rig_text
+from daq_app.config.authoring.hardware_text import hardware_text
 from daq_app.config.authoring.sensor_table import COLUMNS
 from daq_app.config.authoring.terminals import CHASSIS
+from daq_app.config.hardware.max_file import listed_in_export
 
 _Sensors = Annotated[
     Path | None,
@@ -36,6 +40,10 @@ def register(app: typer.Typer) -> None:
         epilog="Example: daq-app rig new w1.toml --height 2.4 --thickness 0.5 --length 1.6 "
         "--sensors sensors.csv --module 'NI 9205'",
     )(new)
+    group.command("from-max", epilog="Example: daq-app rig from-max lab.ini > hardware.toml")(from_max)
+    group.command("from-device", epilog="Example: daq-app rig from-device grpc://127.0.0.1:31763")(
+        from_device
+    )
     app.add_typer(group, name="rig")
 
 
@@ -86,3 +94,27 @@ def new(
     typer.echo(f"{file}: good, {len(listed)} sensors. Replace what it calls `assumed`.")
     typer.echo(f"See it: daq-app config show {file}")
     typer.echo(f"Try it on a simulated wall: daq-app run {file} --test {block.name}-L3-1 --headless")
+
+
+def from_max(
+    export: Annotated[Path, typer.Argument(help="Export of NI MAX.", metavar="EXPORT.ini")],
+) -> None:
+    """Print the hardware part of a rig file from what NI MAX has exported (File, Export, .ini)."""
+    with reported():
+        _print(hardware_text(listed_in_export(export), export.name))
+
+
+def from_device(
+    connection: Annotated[
+        str, typer.Argument(help="local, grpc://HOST:PORT or grpcs://HOST:PORT.", metavar="CONNECTION")
+    ] = "local",
+) -> None:
+    """Print the hardware part of a rig file from the devices that NI-DAQmx finds."""
+    with reported():
+        devices = devices_at(connection)
+        _print(hardware_text(devices, f"NI-DAQmx at {connection}", connection))
+
+
+def _print(text: str) -> None:
+    for line in text.splitlines():
+        echo(line)

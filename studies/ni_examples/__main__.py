@@ -29,7 +29,7 @@ DEVICES = (
 )
 """What the examples name; the other devices do not matter to them."""
 _PRESS_S = 2.5
-"""Seconds after which somebody presses Enter; Ctrl-C comes after twice that. Callbacks come once a second."""
+"""Seconds after which somebody presses Enter; Ctrl-C comes after four times that."""
 _NEED_SIGNAL = {
     "counter_in/cnt_dig_event.py": "counts edges at PFI8",
     "counter_in/cont_cnt_buff_event_ext_clk.py": "is clocked by a signal at PFI9",

@@ -12,6 +12,7 @@ import os
 import runpy
 import sys
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import grpc
@@ -23,14 +24,17 @@ from sim_hardware.control import SimControl, SimControlError
 EDGES = ("/Dev1/PFI0", "/Dev1/PFI8")
 """Terminals at which somebody gives pulses while the program runs."""
 _EDGE_PERIOD_S = 0.2
+_PATIENCE = 4.0
+"""Ctrl-C comes after so many times the wait before Enter, from the program's first task on."""
 
 
-def _bring_tasks(address: str) -> None:
+def _bring_tasks(address: str, on_first_task: Callable[[], None]) -> None:
     """Every task and the local system of the program come from the server at the address."""
     channel = grpc.insecure_channel(address, options=[("grpc.max_receive_message_length", -1)])
     make = nidaqmx.Task.__init__
 
     def make_remote(self: Any, new_task_name: str = "", **given: Any) -> None:
+        on_first_task()
         given.setdefault("grpc_options", nidaqmx.GrpcSessionOptions(channel, new_task_name))
         make(self, new_task_name, **given)
 
@@ -51,14 +55,19 @@ def _give_edges(address: str, over: threading.Event) -> None:
 
 def main(address: str, seconds: float, program: str) -> None:
     os.environ["MPLBACKEND"] = "agg"
-    _bring_tasks(address)
     over = threading.Event()
     enter = threading.Event()
     builtins.input = lambda *_: str(enter.wait(seconds) or "")
     threading.Thread(target=_give_edges, args=(address, over), daemon=True).start()
-    ctrl_c = threading.Timer(2.0 * seconds, _thread.interrupt_main)
+    ctrl_c = threading.Timer(_PATIENCE * seconds, _thread.interrupt_main)
     ctrl_c.daemon = True
-    ctrl_c.start()
+    first = threading.Lock()
+
+    def begin() -> None:
+        if first.acquire(blocking=False):
+            ctrl_c.start()
+
+    _bring_tasks(address, begin)
     try:
         runpy.run_path(program, run_name="__main__")
     except KeyboardInterrupt:

@@ -10,6 +10,7 @@ from typing import Final
 
 from daq_app.acquisition.messages.items import RequestRefused
 from daq_app.config.hardware import catalogue
+from daq_app.config.hardware.comparison import wrong_module
 from daq_app.config.rig import Rig
 from drivers import DeviceInfo
 
@@ -64,19 +65,6 @@ def check_modules(rig: Rig, devices: Sequence[DeviceInfo]) -> list[str]:
             device = found.get(name)
             if device is None:
                 continue  # no channel uses it, so it was not opened
-            if _product(device.product) != _product(module.product):
-                wrong.append(
-                    f"{name} is a {device.product} where the rig file has {module.product}: put the right "
-                    f"module into slot {module.slot}, or correct the rig file"
-                )
-            elif module.serial and device.serial and module.serial.lstrip("0") != device.serial.lstrip("0"):
-                wrong.append(
-                    f"{name} has serial number {device.serial} where the rig file has {module.serial}: "
-                    "was the module exchanged?"
-                )
+            if sentence := wrong_module(name, module, device):
+                wrong.append(sentence)
     return wrong
-
-
-def _product(name: str) -> str:
-    """``NI 9205`` and ``NI-9205 (DSUB)`` are the same for us."""
-    return re.sub(r"[\s-]|\(.*\)", "", name).upper()

@@ -15,6 +15,7 @@ from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.config.rig import Rig
 from daq_app.runfile import RunFileError, open_run
 from drivers import Driver, DriverError, ReplayDriver, open_driver
+from drivers.local_library import require_ni_daqmx
 
 _REPLAY = "replay:"
 
@@ -42,6 +43,8 @@ def driver_maker(
         return (lambda: open_it(server.connection)), (lambda: server.connection)
     if connection.startswith(_REPLAY):
         return _replay(Path(connection.removeprefix(_REPLAY)), options, stack), (lambda: connection)
+    if connection == "local":
+        require_ni_daqmx()
     # Checks the address now rather than in the reader's thread.
     open_it(connection).close()
     return (lambda: open_it(connection)), (lambda: connection)

@@ -20,6 +20,8 @@ from daq_app.cli.record.view import RunView
 from daq_app.cli.terminal import Console
 from daq_app.config import parse_rig
 from daq_app.guarded import program
+from drivers import DriverError
+from drivers.local_library import require_ni_daqmx
 
 _QUIET_S = 0.25
 
@@ -87,7 +89,11 @@ class _Interrupts:
 def follow_run(options: RunOptions, console: Console) -> RunEnd:
     """Take the test. Failures are told in the answer, not raised."""
     try:
+        if options.connection == "local":
+            require_ni_daqmx()  # a process would need seconds to say the same
         process = AcquisitionProcess(options.command_line())
+    except DriverError as error:
+        return RunEnd(EXIT_HARDWARE, str(error), None, "")
     except AcquisitionDied as died:
         return RunEnd(died.exit_code or EXIT_HARDWARE, died.said, None, "")
     try:

@@ -7,6 +7,7 @@ say the same.  Rates in Hz, times in seconds, ranges in volts.
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -50,7 +51,7 @@ _Entry = TypeVar("_Entry")
 
 
 def find(name: str, *tables: Mapping[str, _Entry]) -> _Entry | None:
-    """The entry of that name in the first table that has it; ``NI-9205`` and ``ni 9205`` are ``NI 9205``."""
+    """The entry of that name in the first table that has it; ``ni-9205 (DSUB)`` is ``NI 9205``."""
     for table in tables:
         if name in table:
             return table[name]
@@ -61,7 +62,7 @@ def find(name: str, *tables: Mapping[str, _Entry]) -> _Entry | None:
 
 
 def _spelling(name: str) -> str:
-    return name.casefold().replace("-", " ").replace("_", " ").strip()
+    return re.sub(r"\(.*\)", "", name).casefold().replace("-", " ").replace("_", " ").strip()
 
 
 def module(name: str, own: Mapping[str, Product] = _NONE) -> Product:

@@ -116,8 +116,8 @@ class Inventory:
         ]
 
     def device(self, name: str) -> Device:
-        """Case-insensitive, as in NI-DAQmx; −200220 if there is none."""
-        wanted = name.strip().strip("/").lower()
+        """Case-insensitive, as in NI-DAQmx; a channel names its device, too. −200220 if there is none."""
+        wanted = name.strip().strip("/").partition("/")[0].lower()
         for known, device in self.devices.items():
             if known.lower() == wanted:
                 return device

@@ -1,0 +1,56 @@
+"""The hardware part of a rig file, from the devices that are there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import tomli_w
+
+from daq_app.config.errors import ConfigError, Problem
+from daq_app.config.hardware import catalogue
+from daq_app.config.hardware.max_file import ListedDevice
+
+_PXI: Final = "the product of the PXI chassis"
+_HEAD: Final = "# The hardware of {source}: put it in the place of [hardware] in a rig file.\n"
+
+
+def hardware_text(devices: Sequence[ListedDevice], source: str, connection: str = "local") -> str:
+    """TOML of ``[hardware]``: every chassis with its modules, by name and slot.
+
+    Modules that the catalogue lacks stand as comments, and so does what no list of devices tells: the product
+    of a PXI chassis. Raises `ConfigError` where there is no module in a chassis.
+    """
+    modules = [device for device in devices if device.chassis and device.slot]
+    owners = list(dict.fromkeys(device.chassis for device in modules))
+    if not owners:
+        right = "A rig file needs a chassis with modules: cDAQ, or PXI cards"
+        raise ConfigError([Problem(source, "", "no module sits in a chassis", right)])
+    products = {device.name: device.product for device in devices if device.is_chassis}
+    remarks: list[str] = []
+    tables: list[dict[str, Any]] = []
+    for owner in owners:
+        mine = sorted((d for d in modules if d.chassis == owner), key=lambda device: device.slot)
+        tables.append(_chassis(owner, products.get(owner, _PXI), mine, remarks))
+        if owner not in products:
+            remarks.append(f"{owner}: NI-DAQmx does not name the product of a PXI chassis; write it")
+    text = tomli_w.dumps({"hardware": {"connection": connection, "chassis": tables}})
+    return _HEAD.format(source=source) + "".join(f"# {remark}.\n" for remark in remarks) + text
+
+
+def _chassis(name: str, product: str, modules: Sequence[ListedDevice], remarks: list[str]) -> dict[str, Any]:
+    bus = "pxie" if product == _PXI else "cdaq"
+    entries: list[dict[str, Any]] = []
+    for device in modules:
+        known = catalogue.find(device.product, catalogue.MODULES, catalogue.BUILT_IN.products)
+        if known is None:
+            place = f"{device.name} in slot {device.slot} of {name}"
+            remarks.append(f"{place} is a {device.product}, which the catalogue lacks")
+            continue
+        entry: dict[str, Any] = {"slot": device.slot, "product": known.name}
+        if device.name != catalogue.device_name(name, bus, device.slot):
+            entry["name"] = device.name
+        if device.serial:
+            entry["serial"] = device.serial
+        entries.append(entry)
+    return {"name": name, "product": product, "modules": entries}

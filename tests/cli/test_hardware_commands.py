@@ -1,0 +1,158 @@
+"""The hardware of a rig file from NI MAX or NI-DAQmx, and the comparison of both with the file."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from daq_app.config.authoring.hardware_text import hardware_text
+from daq_app.config.errors import ConfigError
+from daq_app.config.hardware.comparison import differences
+from daq_app.config.hardware.max_file import ListedDevice, listed_in_export
+from daq_app.config.loader import load_rig
+from daq_app.config.rig import Hardware
+from sim_hardware.daqmx_server.program import build_bench, parser
+from sim_hardware.daqmx_server.services.server import DaqmxServer
+from tests.cli.test_config_commands import daq_app
+
+EXPORT = """
+[DAQmxCDAQChassis cDAQ1]
+ProductType = cDAQ-9178
+DevSerialNum = 0x1A2B3C
+DevIsSimulated = 0
+[DAQmxCDAQModule cDAQ1Mod1]
+ProductType = NI 9205
+DevSerialNum = 0x11
+DevIsSimulated = 0
+CompactDAQ.ChassisDevName = cDAQ1
+CompactDAQ.SlotNum = 1
+[DAQmxCDAQModule Bridges]
+ProductType = NI 9237 (DSUB)
+CompactDAQ.ChassisDevName = cDAQ1
+CompactDAQ.SlotNum = 4
+[DAQmxCDAQModule cDAQ1Mod5]
+ProductType = NI 9999
+CompactDAQ.ChassisDevName = cDAQ1
+CompactDAQ.SlotNum = 5
+"""
+
+
+@pytest.fixture
+def export(tmp_path: Path) -> Path:
+    path = tmp_path / "lab.ini"
+    path.write_text(EXPORT, encoding="utf-8-sig")
+    return path
+
+
+@pytest.fixture
+def connection(configs: Path) -> Iterator[str]:
+    """NI-DAQmx with the devices of FR1."""
+    server = DaqmxServer(build_bench(parser().parse_args(["--config", str(configs / "fr1.toml")])))
+    server.start()
+    yield f"grpc://{server.address}"
+    server.stop()
+
+
+def test_an_export_of_ni_max_becomes_the_hardware_of_a_rig_file(export: Path) -> None:
+    done = daq_app("rig", "from-max", export)
+
+    assert done.returncode == 0, done.stderr
+    hardware = Hardware.model_validate(tomllib.loads(done.stdout)["hardware"])
+    assert hardware.connection == "local"
+    (chassis,) = hardware.chassis
+    assert (chassis.name, chassis.product) == ("cDAQ1", "cDAQ-9178")
+    assert [(m.slot, m.product, m.name, m.serial) for m in chassis.modules] == [
+        (1, "NI 9205", "", "00000011"),
+        (4, "NI 9237", "Bridges", ""),
+    ]
+    assert "# cDAQ1Mod5 in slot 5 of cDAQ1 is a NI 9999, which the catalogue lacks." in done.stdout
+
+
+def test_what_ni_daqmx_finds_is_the_hardware_of_the_rig_that_it_serves(
+    connection: str, configs: Path
+) -> None:
+    done = daq_app("rig", "from-device", connection)
+
+    assert done.returncode == 0, done.stderr
+    found = Hardware.model_validate(tomllib.loads(done.stdout)["hardware"])
+    wanted = load_rig(configs / "fr1.toml").hardware
+    assert found.connection == connection
+    assert [[(m.slot, m.product) for m in c.modules] for c in found.chassis] == [
+        [(m.slot, m.product) for m in c.modules] for c in wanted.chassis
+    ]
+
+
+def test_a_rig_file_is_checked_against_the_devices_that_are_there(connection: str, configs: Path) -> None:
+    done = daq_app("config", "check", configs / "fr1.toml", "--against", connection)
+
+    assert done.returncode == 0, done.stderr
+    assert "its hardware is there" in done.stdout
+
+
+def test_a_rig_file_is_checked_against_an_export(export: Path, configs: Path) -> None:
+    done = daq_app("config", "check", configs / "fr1.toml", "--against", export)
+
+    assert done.returncode == 2
+    assert "cDAQ1Mod2 (NI 9205) is missing" in done.stderr
+    assert "Bridges (NI 9237 (DSUB), slot 4 of cDAQ1) is not in the rig file" in " ".join(done.stderr.split())
+
+
+def _hardware() -> Hardware:
+    modules = [{"slot": 1, "product": "NI 9205", "serial": "00000011"}, {"slot": 2, "product": "NI 9234"}]
+    return Hardware.model_validate({"chassis": [{"name": "c", "product": "cDAQ-9178", "modules": modules}]})
+
+
+CHASSIS = ListedDevice("c", "cDAQ-9178", is_chassis=True)
+FIRST = ListedDevice("cMod1", "NI-9205", "00000011", "c", 1)
+SECOND = ListedDevice("cMod2", "NI 9234", "", "c", 2)
+
+
+@pytest.mark.parametrize(
+    ("devices", "sentence"),
+    [
+        ([FIRST, SECOND], "the chassis c (cDAQ-9178) is missing"),
+        ([ListedDevice("c", "cDAQ-9185"), FIRST, SECOND], "the chassis c is a cDAQ-9185"),
+        ([CHASSIS, SECOND], "cMod1 (NI 9205) is missing"),
+        ([CHASSIS, ListedDevice("cMod1", "NI 9239", "", "c", 1), SECOND], "cMod1 is a NI 9239"),
+        ([CHASSIS, ListedDevice("cMod1", "NI 9205", "00000012", "c", 1), SECOND], "serial number 00000012"),
+        ([CHASSIS, ListedDevice("cMod1", "NI 9205", "", "c", 3), SECOND], "cMod1 sits in slot 3"),
+    ],
+)
+def test_each_difference_is_one_sentence(devices: list[ListedDevice], sentence: str) -> None:
+    (said,) = differences(_hardware(), devices)
+    assert sentence in said
+
+
+def test_the_same_hardware_under_other_spellings_is_no_difference() -> None:
+    assert differences(_hardware(), [CHASSIS, FIRST, SECOND, ListedDevice("Dev1", "PCIe-6363")]) == []
+
+
+def test_the_product_of_a_pxi_chassis_is_asked_for() -> None:
+    text = hardware_text([ListedDevice("PXI1Slot2", "PXIe-4340", "", "PXI1", 2)], "lab.ini")
+    assert "# PXI1: NI-DAQmx does not name the product of a PXI chassis; write it." in text
+    assert tomllib.loads(text)["hardware"]["chassis"][0]["modules"] == [{"slot": 2, "product": "PXIe-4340"}]
+
+
+def test_devices_without_a_chassis_make_no_rig() -> None:
+    with pytest.raises(ConfigError, match="no module sits in a chassis"):
+        hardware_text([ListedDevice("Dev1", "PCIe-6363")], "lab.ini")
+
+
+def test_a_file_that_is_no_export_is_told_in_words(tmp_path: Path) -> None:
+    (tmp_path / "a.ini").write_text("hello", encoding="utf-8")
+    with pytest.raises(ConfigError, match="the export cannot be read"):
+        listed_in_export(tmp_path / "a.ini")
+
+
+def test_a_computer_without_ni_daqmx_says_so_before_anything_is_started(
+    tmp_path: Path, configs: Path
+) -> None:
+    rig, out = configs / "fr1.toml", tmp_path / "runs"
+    done = daq_app("run", rig, "--test", "FR1-L3-1", "--connection", "local", "--headless", "--out", out)
+
+    assert done.returncode == 3
+    assert "NI-DAQmx is not installed on this computer" in " ".join(done.stderr.split())
+    assert not out.exists()
