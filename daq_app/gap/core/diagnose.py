@@ -57,8 +57,7 @@ def diagnose(
         study = _Study(experiment, library, options, workers)
         study.fit_all()
         result = study.conclude(stated)
-        findings = (*findings, *study.ordinary_instruments())
-    return replace(with_findings(result, findings), seconds=time.perf_counter() - began)
+    return replace(with_findings(result, findings, options.policy), seconds=time.perf_counter() - began)
 
 
 def _refuse_without_features(runs: Sequence[Run]) -> None:
@@ -120,30 +119,6 @@ class _Study(Hypotheses):
             next_measurement=following,
             limits=tuple(limits),
         )
-
-    def ordinary_instruments(self) -> list[Finding]:
-        """Single instruments that are a little off, as findings."""
-        found = []
-        for name, probability, fit in self.of_instruments():
-            effect = self.library[name]
-            estimates = [e for e in self._estimates(fit, nuisance=False) if e.name.startswith(name + ".")]
-            size = estimates[0]
-            found.append(
-                Finding(
-                    name,
-                    _in_words(effect.signature or name, estimates),
-                    effect.family,
-                    probability,
-                    size.value,
-                    size.low,
-                    size.high,
-                    size.unit,
-                    "all runs",
-                    material=False,
-                    parameter=size.name.rpartition(".")[2],
-                )
-            )
-        return found
 
     def _finished(self, hypothesis: Hypothesis) -> Fit:
         """The fit of a hypothesis with exact Jacobians."""

@@ -42,9 +42,6 @@ class Effect:
     typical: float = 0.0
     """Size of a departure's coefficient where the family has another form, per unit of the first
     parameter of the effect that it departs from. Without it the departure says nothing of that."""
-    instrument: bool = False
-    """On a single instrument: every laboratory has a few that are a little off, so that it must explain more
-    than chance and forms do before it is a cause; below it is listed as a finding."""
     null_value: Mapping[str, float] = field(default_factory=dict)
     """Parameter values at which the effect vanishes; 0 for each that is not listed."""
 

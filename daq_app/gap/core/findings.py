@@ -38,6 +38,9 @@ class Finding:
     closes: float = math.nan
     """Share of the gap that it alone closes; NaN where it is not known."""
 
+    unknown: float = 0.0
+    """Probability that it is something that matters and that no effect of the library does."""
+
     @property
     def explained(self) -> bool:
         """Whether the library has an effect that does the same."""
@@ -49,6 +52,6 @@ def material(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     return tuple(f for f in findings if f.material and f.explained)
 
 
-def unexplained(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Material findings that no effect of the library explains."""
-    return tuple(f for f in findings if f.material and not f.explained)
+def unknown(findings: Sequence[Finding]) -> float:
+    """Probability that any finding is something that matters and that no effect of the library does."""
+    return 1.0 - math.prod(1.0 - finding.unknown for finding in findings)

@@ -14,7 +14,14 @@ from daq_app.gap.rocking_model.features.marks import EFFECT_SIZES, Mark
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 
 _IN_NOISE = ("hum", "quantisation")
-"""Conditions that every laboratory has a little of: material by their size over the noise."""
+"""Conditions whose size counts over the noise."""
+_LEAST = {
+    "hum": POLICY.finding_in_noise,
+    "quantisation": POLICY.finding_in_noise,
+    "shaking": POLICY.finding_shaking,
+    "crossed": POLICY.finding_crossed,
+}
+"""Size from which a condition that every laboratory has a little of is material; any other always is."""
 _FAMILY_WORDS = {
     "lvdt": "the LVDTs",
     "wire": "the wires",
@@ -42,6 +49,9 @@ def _finding(key: str, marks: Sequence[Mark], runs: int) -> Finding:
         # The mark is the inverse of the limit, so that no limit is 0 ± sd.
         size, sd, unit = 1.0 / size, sd / size**2, "m"
     in_noise = size / marks[0].noise if kind in _IN_NOISE and marks[0].noise > 0.0 else math.nan
+    limit = _LEAST.get(kind, 0.0)
+    parameter = EFFECT_SIZES.get(kind, "")
+    matters = POLICY.chance(in_noise if kind in _IN_NOISE else size, limit)
     where = f"{len(marks)} of {runs} runs"
     return Finding(
         name=key,
@@ -53,17 +63,11 @@ def _finding(key: str, marks: Sequence[Mark], runs: int) -> Finding:
         high=size + 1.96 * sd,
         unit=unit,
         where=where,
-        material=_is_material(kind, size, in_noise),
-        parameter=EFFECT_SIZES.get(kind, ""),
+        material=matters >= POLICY.refused,
+        parameter=parameter,
         in_noise=in_noise,
+        unknown=0.0 if parameter else (1.0 - chance) * matters,
     )
-
-
-def _is_material(kind: str, size: float, in_noise: float) -> bool:
-    if kind in _IN_NOISE:
-        return in_noise > POLICY.finding_in_noise
-    least = {"shaking": POLICY.finding_shaking, "crossed": POLICY.finding_crossed}
-    return size > least.get(kind, 0.0)
 
 
 def _median_with_sd(marks: Sequence[Mark]) -> tuple[float, float]:

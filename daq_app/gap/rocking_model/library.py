@@ -223,7 +223,7 @@ def rocking_library(channels: Mapping[str, str] | None = None) -> Library:
     specs = [spec for spec in MOTION_EFFECTS if spec.name in _MOTION]
     known = {spec.name for spec in specs}
     single = [
-        replace(_sensor_effect(name, channel, family, known), instrument=True)
+        _sensor_effect(name, channel, family, known)
         for channel, family in (channels or {}).items()
         for name in _ONE_CHANNEL[family]
     ]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from daq_app.gap.core import Finding, Library, Options, diagnose
+import pytest
+
+from daq_app.gap.core import Finding, Options, diagnose
 from tests.support.gap.toy_wave import LIBRARY, DecayModel, make_runs
 
 HUM = Finding(
@@ -22,7 +24,9 @@ HUM = Finding(
     in_noise=4.0,
 )
 ORDINARY = replace(HUM, name="hum@lvdt", material=False, in_noise=0.2)
-STRANGE = replace(HUM, name="crossed@TL-1Y", words="TL-1Y shows 8 % of the rotation", parameter="")
+STRANGE = replace(
+    HUM, name="crossed@TL-1Y", words="TL-1Y shows 8 % of the rotation", parameter="", unknown=0.999
+)
 
 
 def test_findings_take_no_place_from_causes() -> None:
@@ -60,18 +64,13 @@ def test_what_no_effect_explains_is_none_of_these() -> None:
     assert STRANGE.words in result.decision.sentence
 
 
-def test_a_single_instrument_that_is_a_little_off_is_listed_and_takes_no_place() -> None:
-    """The same shift once as a cause and once as an effect on one instrument: 9 nats are a finding there."""
-    runs = make_runs(4, slope_k=0.05, shift_s=0.004)
-    as_cause = diagnose(DecayModel(), runs, LIBRARY, Options())
-    assert as_cause.decision.effects == ("shift", "slope")
-    one = replace(LIBRARY["shift"], instrument=True)
-    others = [effect for effect in LIBRARY.values() if effect.name != "shift"]
-    result = diagnose(DecayModel(), runs, Library([*others, one]), Options())
-    assert result.decision.effects == ("slope",)
-    (finding,) = result.findings
-    assert (finding.name, finding.material) == ("shift", False)
-    assert finding.low < 0.004 < finding.high
-    large = make_runs(4, slope_k=0.05, shift_s=0.05)
-    named = diagnose(DecayModel(), large, Library([*others, one]), Options())
-    assert named.decision.effects == ("shift", "slope")
+def test_what_no_effect_explains_counts_by_degrees() -> None:
+    """A chance of a quarter to matter: the causes stand, less probable by that, and the unknown is ranked."""
+    runs = make_runs(4, slope_k=0.05, shift_s=0.05)
+    alone = diagnose(DecayModel(), runs, LIBRARY, Options())
+    small = replace(STRANGE, material=False, unknown=0.25)
+    result = diagnose(DecayModel(), runs, LIBRARY, Options(), findings=(small,))
+    assert result.decision.effects == alone.decision.effects
+    assert result.which[0].probability == pytest.approx(0.75 * alone.which[0].probability)
+    assert result.decision.confidence == pytest.approx(0.75 * alone.decision.confidence)
+    assert result.rest.unknown == pytest.approx(1.0 - 0.75 * (1.0 - alone.rest.unknown))

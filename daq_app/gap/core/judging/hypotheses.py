@@ -13,7 +13,7 @@ from daq_app.gap.core.fitting.likelihood import Sizes
 from daq_app.gap.core.fitting.parallel import Workers
 from daq_app.gap.core.fitting.screen import Screened, Step
 from daq_app.gap.core.fitting.tasks import FitTask, FormsTask, ScreenTask
-from daq_app.gap.core.judging.evidence import NULL, Hypothesis, Ranked, inclusion, rank
+from daq_app.gap.core.judging.evidence import NULL, Hypothesis, Ranked, rank
 from daq_app.gap.core.judging.other_forms import FreeForm
 from daq_app.gap.core.judging.remainder import misfit_nats
 from daq_app.gap.core.policy import POLICY, Policy
@@ -172,31 +172,15 @@ class Hypotheses:
         kept = {h: e for h, e in self.evidence.items() if self._worth_it(h)}
         return rank(kept, self.library, self.policy)
 
-    def of_instruments(self) -> list[tuple[str, float, Fit]]:
-        """Effects on single instruments that are there and explain too little to be causes.
-
-        Each with its probability among all hypotheses, and the best fit that has it.
-        """
-        best = self.ranked()[0].effects
-        found = []
-        for name, probability in inclusion(rank(self.evidence, self.library, self.policy)).items():
-            fits = [fit for h, fit in self.fits.items() if name in h]
-            if self.library[name].instrument and name not in best and fits and probability > 0.5:
-                found.append((name, probability, max(fits, key=lambda fit: fit.log_evidence)))
-        return found
-
     def _worth_it(self, hypothesis: Hypothesis) -> bool:
-        """Whether each single instrument gains enough, and the last of several causes explains enough."""
+        """Whether the last of several causes explains enough."""
+        if len(hypothesis) < 2:
+            return True
         evidence = self.evidence[hypothesis]
         without = {
             left: self.evidence.get(tuple(name for name in hypothesis if name != left), -math.inf)
             for left in hypothesis
         }
-        for name, value in without.items():
-            if self.library[name].instrument and evidence - value < self.policy.instrument_nats:
-                return False
-        if len(hypothesis) < 2:
-            return True
         explained = evidence - self.evidence[NULL]
         last = max(without, key=lambda name: without[name])
         gained = evidence - without[last]

@@ -5,17 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from daq_app.gap.core.findings import Finding, material, unexplained
+from daq_app.gap.core.findings import Finding, material, unknown
 from daq_app.gap.core.judging.evidence import Ranked
+from daq_app.gap.core.policy import POLICY, Policy
 from daq_app.gap.core.result import NAMING, Decision, Diagnosis, Estimate, Verdict, verdict_of
 
 _NO_CAUSE: tuple[Verdict, ...] = ("nothing_missing", "parameters", "below_detection")
 
 
-def with_findings(result: Diagnosis, findings: Sequence[Finding]) -> Diagnosis:
-    """The diagnosis with findings about instruments: material ones join each hypothesis and the decision."""
+def with_findings(result: Diagnosis, findings: Sequence[Finding], policy: Policy = POLICY) -> Diagnosis:
+    """The diagnosis with findings about instruments: material ones join each hypothesis and the decision.
+
+    What no effect does adds to the probability of something unknown, and every hypothesis gives way.
+    """
     if not findings:
         return result
+    known = 1.0 - unknown(findings)
     joining = material(findings)
     names = tuple(finding.name for finding in joining)
     sizes = tuple(
@@ -23,15 +28,17 @@ def with_findings(result: Diagnosis, findings: Sequence[Finding]) -> Diagnosis:
     )
     return replace(
         result,
-        which=tuple(_joined(entry, names) for entry in result.which),
+        which=tuple(_joined(entry, names, known) for entry in result.which),
         set95=tuple(_joined(entry, names) for entry in result.set95),
-        decision=_decision(result.decision, findings),
+        decision=_decision(result.decision, findings, policy),
+        rest=replace(result.rest, unknown=1.0 - known * (1.0 - result.rest.unknown)),
         effect_parameters=(*result.effect_parameters, *sizes),
         findings=tuple(findings),
     )
 
 
-def _joined(entry: Ranked, names: tuple[str, ...]) -> Ranked:
+def _joined(entry: Ranked, names: tuple[str, ...], known: float = 1.0) -> Ranked:
+    entry = replace(entry, probability=known * entry.probability)
     if not names:
         return entry
     families = [family for family in entry.family.split(" + ") if family != "none"]
@@ -39,12 +46,14 @@ def _joined(entry: Ranked, names: tuple[str, ...]) -> Ranked:
     return replace(entry, effects=tuple(sorted((*entry.effects, *names))), family=family)
 
 
-def _decision(decision: Decision, findings: Sequence[Finding]) -> Decision:
-    strange = unexplained(findings)
-    if strange and decision.verdict != "none_of_these":
-        words = "; ".join(f.words for f in strange)
+def _decision(decision: Decision, findings: Sequence[Finding], policy: Policy) -> Decision:
+    strange = unknown(findings)
+    if strange >= policy.refused and decision.verdict != "none_of_these":
+        worst = max(findings, key=lambda finding: finding.unknown)
+        words = "; ".join(f.words for f in findings if f.material and not f.explained)
         sentence = f"None of these explains what was measured directly: {words}. {decision.sentence}"
-        return Decision("none_of_these", (), strange[0].family, sentence, strange[0].probability)
+        return Decision("none_of_these", (), worst.family, sentence, strange)
+    decision = replace(decision, confidence=(1.0 - strange) * decision.confidence)
     joining = material(findings)
     if not joining or decision.verdict == "none_of_these":
         return decision

@@ -92,7 +92,7 @@ def remainder(
     gain = max((f.excess for f in forms), default=0.0)
     if gain > 0.0 and best.effects:
         bar = max(policy.form_nats, policy.form_share * explained)
-        other = _logistic(math.log(gain / bar), policy)
+        other = policy.chance(gain, bar)
         rest = 1.0 - (1.0 - rest) * (1.0 - other)
         form = max(forms, key=lambda f: f.excess).family if other > policy.refused else ""
     return Remainder(nominal, before, after, nats, share, groups, rest, form)
@@ -103,14 +103,10 @@ def _unknown(share: float, nats: float, largest: float, policy: Policy) -> float
 
     A share that matters, or one group whose discrepancy (`largest`) is more than any model is wrong by.
     """
-    counts = _logistic(math.log(max(share, 1e-6) / policy.unknown_share), policy)
-    matters = _logistic(math.log(max(nats, 1e-6) / policy.unknown_nats), policy)
-    gross = _logistic(math.log(max(largest, 1e-6) / policy.unknown_misfit), policy)
+    counts = policy.chance(share, policy.unknown_share)
+    matters = policy.chance(nats, policy.unknown_nats)
+    gross = policy.chance(largest, policy.unknown_misfit)
     return 1.0 - (1.0 - counts * matters) * (1.0 - gross)
-
-
-def _logistic(distance: float, policy: Policy) -> float:
-    return 1.0 / (1.0 + math.exp(-policy.unknown_steepness * min(max(distance, -50.0), 50.0)))
 
 
 def _white(

@@ -42,6 +42,8 @@ SPIKE_SIZE = 9.0
 """A sample this many noise sd off its neighbours is a spike."""
 SPIKY_PER_S = 0.3
 """Lone samples a second, on the mean of all runs, that no ordinary channel has (assumed: 0.2 at most)."""
+STANDS_OUT = 1.5
+"""Times what any other channel of its family has of a condition, 1, from which one stands for itself."""
 RANGE_MARGIN = 0.03
 """Share of the range next to its end where a reading may stand still: the sensor is at its stop."""
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer")
@@ -244,11 +246,11 @@ def marks_of(runs: Sequence[GapRun], conditions: Sequence[dict[str, Condition]])
         for name, cells in table.items():
             if family == "accelerometer" and name != "hum":
                 continue
-            key, chosen = _who(family, ids, [[cell[2] for cell in row] for row in cells])
-            for run_marks, row in zip(marks, cells, strict=True):
-                value, sd = _amount(name, [row[k] for k in chosen] if chosen else row)
-                rms = noise if name in ("hum", "quantisation") else math.nan
-                run_marks.append(Mark(f"{name}@{key}", *_WORDS[name][family], value, sd, family, rms))
+            rms = noise if name in ("hum", "quantisation") else math.nan
+            for key, chosen in _who(family, ids, cells):
+                for run_marks, row in zip(marks, cells, strict=True):
+                    value, sd = _amount(name, [row[k] for k in chosen] if chosen else row)
+                    run_marks.append(Mark(f"{name}@{key}", *_WORDS[name][family], value, sd, family, rms))
     return marks
 
 
@@ -264,13 +266,23 @@ _WORDS: dict[str, dict[str, tuple[str, str]]] = {
 }
 
 
-def _who(family: str, ids: Sequence[str], seen: Sequence[Sequence[bool]]) -> tuple[str, list[int]]:
-    """(name, places): the one channel that has it, or the family when several or none have it."""
-    share = np.mean(np.asarray(seen, dtype=float), axis=0)
-    having = np.flatnonzero(share >= 0.5)
-    if having.size == 1:
-        return ids[int(having[0])], [int(having[0])]
-    return family, [int(k) for k in having]
+def _who(
+    family: str, ids: Sequence[str], cells: Sequence[Sequence[tuple[float, float, bool]]]
+) -> list[tuple[str, list[int]]]:
+    """(name, places) of who has a condition: one channel, or the family when several or none have it.
+
+    A channel that has far more of it than the others of the family stands for itself beside them.
+    """
+    share = np.mean([[seen for _, _, seen in row] for row in cells], axis=0)
+    size = np.median([[value for value, _, _ in row] for row in cells], axis=0)
+    having = [int(k) for k in np.flatnonzero(share >= 0.5)]
+    if len(having) == 1:
+        return [(ids[having[0]], having)]
+    most = max(having, key=lambda k: float(size[k]), default=0)
+    others = [k for k in having if k != most]
+    if len(others) > 1 and size[most] > STANDS_OUT * max(float(size[k]) for k in others):
+        return [(family, others), (ids[most], [most])]
+    return [(family, having)]
 
 
 def _amount(name: str, cells: Iterable[tuple[float, float, bool]]) -> tuple[float, float]:
