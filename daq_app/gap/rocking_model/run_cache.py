@@ -42,17 +42,24 @@ class _Part(Generic[T]):
         self._known: list[tuple[tuple[str, ...], tuple[float | None, ...], tuple[str, ...] | None, T]] = []
 
     def of(self, values: Mapping[str, float], make: Callable[[Mapping[str, float]], T]) -> T:
-        get = values.get
+        # A part within another one looks at the plain values; the other one depends on what decided.
+        outer = values if isinstance(values, _Watched) else None
+        plain = values if outer is None else outer.plain
+        get = plain.get
         for keys, given, names, result in reversed(self._known):
-            if tuple(map(get, keys)) == given and (names is None or names == tuple(values)):
-                return result
-        watched = _Watched(values)
-        result = make(watched)
-        keys = tuple(watched.asked)
-        if len(self._known) >= _KEPT:
-            del self._known[0]
-        names = tuple(values) if watched.listed else None
-        self._known.append((keys, tuple(map(get, keys)), names, result))
+            if tuple(map(get, keys)) == given and (names is None or names == tuple(plain)):
+                break
+        else:
+            watched = _Watched(plain)
+            result = make(watched)
+            keys = tuple(watched.asked)
+            if len(self._known) >= _KEPT:
+                del self._known[0]
+            names = tuple(plain) if watched.listed else None
+            self._known.append((keys, tuple(map(get, keys)), names, result))
+        if outer is not None:
+            outer.asked.update(dict.fromkeys(keys))
+            outer.listed = outer.listed or names is not None
         return result
 
 
@@ -60,28 +67,28 @@ class _Watched(Mapping[str, float]):
     """Values that note which of them were asked for."""
 
     def __init__(self, values: Mapping[str, float]) -> None:
-        self._values = values
+        self.plain = values
         self.asked: dict[str, None] = {}
         self.listed = False
         """Whether the names themselves were asked for."""
 
     def __getitem__(self, key: str) -> float:
         self.asked[key] = None
-        return self._values[key]
+        return self.plain[key]
 
     def get(self, key: str, default: Any = None) -> Any:
         """As a dict's; the mapping's own would raise and catch an error for every effect that is absent."""
         self.asked[key] = None
-        return self._values.get(key, default)
+        return self.plain.get(key, default)
 
     def __contains__(self, key: object) -> bool:
         self.asked[str(key)] = None
-        return key in self._values
+        return key in self.plain
 
     def __iter__(self) -> Iterator[str]:
         self.listed = True
-        return iter(self._values)
+        return iter(self.plain)
 
     def __len__(self) -> int:
         self.listed = True
-        return len(self._values)
+        return len(self.plain)

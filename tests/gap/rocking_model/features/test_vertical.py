@@ -22,15 +22,16 @@ def _scaled(factors: dict[str, float], effects: dict[str, dict[str, float]] | No
     return runs
 
 
-def test_a_gain_of_one_accelerometer_along_z_is_a_finding_about_it_and_no_cause() -> None:
+def test_a_gain_of_one_accelerometer_along_z_is_likeliest_on_two_runs() -> None:
+    """It shows once in each run, so that two runs leave a chance to the model's own discrepancy there."""
     result = diagnose_runs(
-        _scaled({"AC-7": 1.1}), only=("gain@AC-7", "drift@AC-7", "gain@accelerometer", "pivot_shift")
+        _scaled({"AC-7": 1.06}), only=("gain@AC-7", "drift@AC-7", "gain@accelerometer", "pivot_shift")
     )
-    assert result.decision.effects == ()
-    (found,) = (finding for finding in result.findings if finding.name == "gain@AC-7")
-    assert found.probability > 0.7
-    assert found.low < 0.1 < found.high
-    assert found.high - found.low < 0.06
+    assert result.best == ("gain@AC-7",)
+    assert result.which[0].probability > 0.7
+    (size,) = (e for e in result.effect_parameters if e.name == "gain@AC-7.error")
+    assert size.low < 0.06 < size.high
+    assert size.high - size.low < 0.06
 
 
 @pytest.mark.parametrize(
