@@ -46,7 +46,8 @@ class _Part(Generic[T]):
         outer = values if isinstance(values, _Watched) else None
         plain = values if outer is None else outer.plain
         get = plain.get
-        for keys, given, names, result in reversed(self._known):
+        for entry in reversed(self._known):
+            keys, given, names, result = entry
             if tuple(map(get, keys)) == given and (names is None or names == tuple(plain)):
                 break
         else:
