@@ -43,8 +43,9 @@ SPIKE_SIZE = 9.0
 SPIKY_PER_S = 0.3
 """Lone samples a second, on the mean of all runs, that no ordinary channel has (assumed: 0.2 at most)."""
 STANDS_OUT = 2.0
-"""Times what any other channel of its family has of a condition, 1, from which one stands for itself. Pick-up
-of sound channels of one family differs by less (development laboratories); raising it hides one among many."""
+"""Times what any other channel of its family has of a condition, 1, from which one stands for itself.
+
+Pick-up of sound channels differs by less (development laboratories); raising it hides one among many."""
 RANGE_MARGIN = 0.03
 """Share of the range next to its end where a reading may stand still: the sensor is at its stop."""
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer")
