@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QAbstractButton, QComboBox, QLabel, QLineEdit, QWidget
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QComboBox,
+    QLabel,
+    QLineEdit,
+    QStyle,
+    QStyleOptionComboBox,
+    QWidget,
+)
 
 _FIELD_PX = 12
 """Frame and padding of a field."""
-_ARROW_PX = 20
 
 
 def clipped_texts(root: QWidget) -> list[str]:
@@ -23,9 +30,9 @@ def _of(widget: QWidget) -> list[str]:
             fits = hint.width() <= widget.width() + 1 and hint.height() <= widget.height() + 1
             return [] if fits else [f"button {widget.text()!r}: {widget.size()} for {hint}"]
         case QLineEdit():
-            return _of_field(widget, widget.text() or widget.placeholderText(), 0)
+            return _of_field(widget, widget.text() or widget.placeholderText(), widget.width() - _FIELD_PX)
         case QComboBox():
-            return _of_field(widget, widget.currentText(), _ARROW_PX)
+            return _of_field(widget, widget.currentText(), _room_of(widget))
     return []
 
 
@@ -42,7 +49,14 @@ def _of_label(label: QLabel) -> list[str]:
     return told + ([] if metrics.height() <= label.height() + 2 else [f"height of {label.text()!r}"])
 
 
-def _of_field(field: QWidget, text: str, beside_px: int) -> list[str]:
-    room = field.width() - _FIELD_PX - beside_px
+def _room_of(choice: QComboBox) -> int:
+    """Width between the frame and the arrow, as the style draws them."""
+    option = QStyleOptionComboBox()
+    choice.initStyleOption(option)
+    field = QStyle.SubControl.SC_ComboBoxEditField
+    return choice.style().subControlRect(QStyle.ComplexControl.CC_ComboBox, option, field, choice).width()
+
+
+def _of_field(field: QWidget, text: str, room: int) -> list[str]:
     wide = field.fontMetrics().horizontalAdvance(text)
     return [] if wide <= room else [f"field {text!r}: {room} < {wide}"]
