@@ -25,6 +25,7 @@ from daq_app.rocking.families.single_wires import CALIBRATION_SHARE, SingleWires
 from daq_app.rocking.families.treated import Corrections, held_in_memory, without_hum
 from daq_app.rocking.geometry.joint import BaseJoint
 from daq_app.rocking.geometry.kinematics import RotationGeometry
+from daq_app.rocking.motion.swings import REST_ZERO_SIGMA_RAD
 from daq_app.rocking.record import TestRecord
 
 Floats = NDArray[np.float64]
@@ -203,7 +204,7 @@ def _in_step(
     if wires is not None:
         sigma = wires.family_gain_sigma(signals.geometry.weights()[0])
     return Instruments(
-        record, _with_slow_noise(signals, times), times, tuple(findings), response, shocks,
+        record, _with_errors(signals, times), times, tuple(findings), response, shocks,
         math.hypot(sigma, _GEOMETRY_SHARE),
     )  # fmt: skip
 
@@ -286,8 +287,8 @@ def _levels(signals: Signals, times: TestTimes, response: Response) -> list[Fami
     return [words.gain(family, apart)]
 
 
-def _with_slow_noise(signals: Signals, times: TestTimes) -> Signals:
-    """The same with half-cycles judged by the noise that long means have while the wall does not move.
+def _with_errors(signals: Signals, times: TestTimes) -> Signals:
+    """The same with half-cycles judged by what the zero and long means may be wrong by.
 
     The stiller of hold and rest counts: a held wall may sway on its rope, and a rest may begin with the last
     impacts.
@@ -299,7 +300,9 @@ def _with_slow_noise(signals: Signals, times: TestTimes) -> Signals:
     if times.rest is not None:
         still.append(signals.rotation_rad[times.rest])
     found = [slow for slow in (slow_noise(part, rate) for part in still) if math.isfinite(slow)]
-    if not found:
-        return signals
-    settings = replace(signals.settings, slow_noise_rad=max(min(found), signals.noise_rad))
+    settings = signals.settings
+    if signals.zeroed_at_rest:
+        settings = replace(settings, zero_sigma_rad=REST_ZERO_SIGMA_RAD)
+    if found:
+        settings = replace(settings, slow_noise_rad=max(min(found), signals.noise_rad))
     return replace(signals, settings=settings)

@@ -17,6 +17,9 @@ Floats = NDArray[np.float64]
 
 ZERO_SIGMA_RAD = 2e-5
 """What the tared zero of the rotation may be wrong by."""
+REST_ZERO_SIGMA_RAD = 1e-5
+"""What a zero from the rest after the test may be wrong by: it is seconds old, where a tare is minutes old.
+Raising it widens the stated errors of impact times, peaks and speeds."""
 _HOLD_S = 0.3
 _HOLD_POINT_S = 0.02
 
