@@ -24,7 +24,7 @@ from daq_app.gap.rocking_model.features.response import bessel, first_order
 from daq_app.gap.rocking_model.motion.hold import from_hold
 from daq_app.gap.rocking_model.motion.rotation import (
     Wire,
-    anchors_off,
+    anchors_turn,
     sample_noise,
     wall_rotation,
     wires_of,
@@ -314,7 +314,7 @@ def _seen(
         theta = bessel(theta, delay, _FINE_HZ)
     theta = theta * (1.0 + terms.get("gain", {}).get("error", 0.0))
     if higher := terms.get("wire_anchor", {}).get("height", 0.0):
-        theta = theta + anchors_off(wires, theta, higher)[0]
+        theta = theta + anchors_turn(wires, theta, higher)
     theta = theta + terms.get("wire_cosine", {}).get("kappa", 0.0) * height_m * theta**2
     # A drift of all LVDTs lifts the joint and turns nothing; one of the wires looks like a rotation.
     for name, per in (("drift@wire", height_m), ("drift@tiltmeter", 1.0)):

@@ -13,7 +13,7 @@ from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE
 from daq_app.gap.rocking_model.features.response import bessel, first_order, resonator, slow_response
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape
-from daq_app.gap.rocking_model.motion.rotation import anchors_off
+from daq_app.gap.rocking_model.motion.rotation import anchors_turn
 
 _FAMILY_EFFECTS = (
     ("gain", "error"),
@@ -77,7 +77,7 @@ def _added(run: RockingRun, family: str, values: Mapping[str, float], theta: Flo
                 scale = {"wire": run.wire_height_m, "lvdt": np.inf}.get(family, 1.0)
                 parts.append(value / scale * (time_s - (run.swings.rest_s - run.swings.release_s)))
             case "wire_anchor":
-                parts.append(anchors_off(run.wires, theta, value)[0])
+                parts.append(anchors_turn(run.wires, theta, value))
             case "wire_cosine":
                 parts.append(run.wire_bend_m * value * theta**2)
     total: FloatArray = np.sum(parts, axis=0)

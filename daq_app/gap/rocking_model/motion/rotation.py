@@ -177,9 +177,14 @@ def wires_of(run: GapRun) -> tuple[Wire, ...]:
     return tuple(Wire(s, run.survey.half_base_m) for s in chosen if s.anchor_m is not None)
 
 
-def anchors_off(wires: Sequence[Wire], theta: FloatArray, higher: float) -> tuple[FloatArray, FloatArray]:
-    """(rad, m): what higher anchors add to the wires' mean rotation (weights z²) and to the base."""
-    return _seen_as(wires, theta, [wire.shortening(theta, higher) for wire in wires])
+def anchors_turn(wires: Sequence[Wire], theta: FloatArray, higher: float) -> FloatArray:
+    """What anchors higher by so much, m, add to the wires' mean rotation (weights z²), rad."""
+    return _turned(wires, theta, [wire.shortening(theta, higher) for wire in wires])
+
+
+def anchors_move(wires: Sequence[Wire], theta: FloatArray, higher: float) -> FloatArray:
+    """What anchors higher by so much, m, add to what the wires show of the base, m."""
+    return _moved(wires, theta, [wire.shortening(theta, higher) for wire in wires])
 
 
 _FURTHER_M = 1e-3
@@ -191,20 +196,24 @@ def pivots_off(wires: Sequence[Wire], theta: FloatArray) -> tuple[FloatArray, Fl
     To first order: the wall moves along x by 1 − cos θ and rises by sin|θ| for each metre.
     """
     seen = [wire.shortening(theta, pivot_further=_FURTHER_M) for wire in wires]
-    turned, moved = _seen_as(wires, theta, seen)
-    return turned / _FURTHER_M, moved / _FURTHER_M
+    return _turned(wires, theta, seen) / _FURTHER_M, _moved(wires, theta, seen) / _FURTHER_M
 
 
-def _seen_as(
-    wires: Sequence[Wire], theta: FloatArray, shortenings: Sequence[FloatArray]
-) -> tuple[FloatArray, FloatArray]:
-    """(rad, m): what wires shorter by `shortenings` show beyond `theta`: mean rotation (weights z²), base."""
+def _turned(wires: Sequence[Wire], theta: FloatArray, shortenings: Sequence[FloatArray]) -> FloatArray:
+    """Mean rotation (weights z²), rad, that wires shorter by `shortenings` show beyond `theta`."""
+    weights = np.array([wire.sensor.position_m[2] for wire in wires]) ** 2
+    turned = np.array([wire.rotation(s) - theta for wire, s in zip(wires, shortenings, strict=True)])
+    found: FloatArray = np.tensordot(weights / np.sum(weights), turned, 1)
+    return found
+
+
+def _moved(wires: Sequence[Wire], theta: FloatArray, shortenings: Sequence[FloatArray]) -> FloatArray:
+    """Motion of the base, m, that wires shorter by `shortenings` show beyond `theta`."""
     z = np.array([wire.sensor.position_m[2] for wire in wires])
-    pairs = list(zip(wires, shortenings, strict=True))
-    turned = np.array([wire.rotation(s) - theta for wire, s in pairs])
-    moved = np.array([s - wire.shortening(theta) for wire, s in pairs])
+    moved = np.array([s - wire.shortening(theta) for wire, s in zip(wires, shortenings, strict=True)])
     at_base = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
-    return np.tensordot(z**2 / np.sum(z**2), turned, 1), np.tensordot(at_base, moved, 1)
+    found: FloatArray = np.tensordot(at_base, moved, 1)
+    return found
 
 
 def wall_rotation(run: GapRun) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:

@@ -9,7 +9,7 @@ import numpy as np
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.differences import face_gain
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.motion.rotation import anchors_off
+from daq_app.gap.rocking_model.motion.rotation import anchors_turn
 
 
 def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
@@ -43,7 +43,7 @@ def _bent(run: RockingRun, values: Mapping[str, float], theta: FloatArray) -> Fl
     if bend := values.get(f"wire_cosine@{run.reference}.kappa", 0.0):
         found = bend * run.wire_bend_m * theta**2
     if higher := values.get(f"wire_anchor@{run.reference}.height", 0.0):
-        found = found + anchors_off(run.wires, theta, higher)[0]
+        found = found + anchors_turn(run.wires, theta, higher)
     return found
 
 

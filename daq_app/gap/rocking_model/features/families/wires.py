@@ -26,7 +26,7 @@ from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import (
     Wire,
-    anchors_off,
+    anchors_move,
     coarse,
     gridded,
     wall_rotation,
@@ -145,7 +145,7 @@ def _predict_base(run: RockingRun, block: Block, values: Mapping[str, float]) ->
         bend = values["wire_cosine@wire.kappa"] * run.base_bend_m2
         total = total + bend * unit_coefficients(run, block, "square", lambda: run.grid.theta**2)
     if higher := values.get("wire_anchor@wire.height", 0.0):
-        total = total + block.coefficients(anchors_off(run.wires, run.grid.theta, higher)[1])
+        total = total + block.coefficients(anchors_move(run.wires, run.grid.theta, higher))
     return total
 
 
