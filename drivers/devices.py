@@ -66,6 +66,21 @@ def list_devices(connection: str) -> list[ListedDevice]:
         way.close()
 
 
+def reserve_chassis(connection: str, name: str, *, override: bool) -> None:
+    """Reserve a network chassis for this computer; with `override` also from another computer.
+
+    Raises `DriverError`, with the code −201420 where another computer has it and `override` is false.
+    """
+    way = Connection(connection)
+    way.limit_calls_to()
+    try:
+        way.system().devices[name].reserve_network_device(override_reservation=override)
+    except Exception as error:
+        raise translate(error, doing=f"reserving {name}") from error
+    finally:
+        way.close()
+
+
 def _listed(device: nidaqmx.system.Device) -> ListedDevice:
     category = device.product_category
     chassis, slot = "", 0

@@ -129,11 +129,11 @@ BY_CODE: Final[dict[int, Advice]] = {
     -201401: _LOST,
     -201420: Advice(
         "The chassis is reserved by another computer on the network",
-        "Release it there (NI MAX, Unreserve), then reserve it from this computer",
+        "Release it there (NI MAX, Unreserve), or take it over: daq-app rig reserve CHASSIS CONNECTION",
     ),
     -201388: Advice(
         "The chassis is not reserved by this computer",
-        "Reserve it in NI MAX (Reserve Chassis), then try again",
+        "Reserve it (daq-app rig reserve CHASSIS CONNECTION, or NI MAX, Reserve Chassis), then try again",
     ),
     -201271: Advice(
         "Another product sits where the rig file expects this device",

@@ -9,13 +9,26 @@ from daq_app.config.hardware.max_file import ListedDevice, listed_in_export
 
 def devices_at(connection: str) -> list[ListedDevice]:
     """The devices that NI-DAQmx finds at a connection. Raises `DriverError`."""
+    _require(connection)
+    from drivers.devices import list_devices
+
+    return list_devices(connection)
+
+
+def reserve_at(connection: str, chassis: str, *, override: bool) -> None:
+    """Reserve a network chassis for the computer of NI-DAQmx. Raises `DriverError`."""
+    _require(connection)
+    from drivers.devices import reserve_chassis
+
+    reserve_chassis(connection, chassis, override=override)
+
+
+def _require(connection: str) -> None:
+    """NI-DAQmx must be there before its client is loaded, which takes a second."""
     from drivers.local_library import require_ni_daqmx
 
     if connection == "local":
         require_ni_daqmx()
-    from drivers.devices import list_devices
-
-    return list_devices(connection)
 
 
 def devices_of(source: str) -> list[ListedDevice]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from daq_app.cli.devices import devices_at
+from daq_app.cli.devices import devices_at, reserve_at
 from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, reported
 from daq_app.cli.terminal import echo
 from daq_app.config.authoring import Block, read_sensor_table, spread_sensors, write_rig_text
@@ -25,6 +25,8 @@ _Sensors = Annotated[
         show_default="as many of each as asked, spread over the wall",
     ),
 ]
+
+_RESERVED_BY_OTHER = -201420
 
 
 def register(app: typer.Typer) -> None:
@@ -44,6 +46,7 @@ def register(app: typer.Typer) -> None:
     group.command("from-device", epilog="Example: daq-app rig from-device grpc://127.0.0.1:31763")(
         from_device
     )
+    group.command("reserve", epilog="Example: daq-app rig reserve cDAQ9188-1A2B3C4 local")(reserve)
     app.add_typer(group, name="rig")
 
 
@@ -113,6 +116,42 @@ def from_device(
     with reported():
         devices = devices_at(connection)
         _print(hardware_text(devices, f"NI-DAQmx at {connection}", connection))
+
+
+def reserve(
+    chassis: Annotated[str, typer.Argument(help="Name of the network chassis in NI MAX.")],
+    connection: Annotated[
+        str, typer.Argument(help="local, grpc://HOST:PORT or grpcs://HOST:PORT.", metavar="CONNECTION")
+    ] = "local",
+    override: Annotated[
+        bool, typer.Option("--override", help="Take it from another computer without asking.")
+    ] = False,
+) -> None:
+    """Reserve a network chassis for the computer of NI-DAQmx; one of another computer only when told to.
+
+    What that computer measures with the chassis ends.
+    """
+    with reported():
+        if not _reserved(chassis, connection, override):
+            typer.confirm(
+                f"Another computer has reserved {chassis}; its measurement would end. Take it over?",
+                abort=True,
+            )
+            _reserved(chassis, connection, override=True)
+    echo(f"{chassis} is reserved")
+
+
+def _reserved(chassis: str, connection: str, override: bool) -> bool:
+    """Whether the reservation was given; False where another computer has the chassis."""
+    from drivers import DriverError
+
+    try:
+        reserve_at(connection, chassis, override=override)
+    except DriverError as error:
+        if error.code != _RESERVED_BY_OTHER:
+            raise
+        return False
+    return True
 
 
 def _print(text: str) -> None:

@@ -95,6 +95,7 @@ class Code(IntEnum):
     RETRIGGER_INVALID = -201320
     LOG_UNBUFFERED = -201299
     READ_WHILE_LOGGING = -201301
+    FIFO_OVERFLOW = -200361
     NETWORK_NOT_RESERVED = -201388
     NETWORK_RESERVED_BY_OTHER = -201420
 
@@ -223,6 +224,14 @@ _TEXT: Final[dict[int, str]] = {
     Code.SCALE_ATTRIBUTE: "Specified property is not supported by custom scales of this type.",
     Code.READ_TYPE_MISMATCH: (
         "Read cannot be performed, because this read is for channels of another kind than some of the task."
+    ),
+    Code.FIFO_OVERFLOW: (
+        "Onboard device memory overflow. Because of limits of the system or of its bus, the driver could not "
+        "take the samples as fast as the device made them."
+    ),
+    Code.NETWORK_NOT_RESERVED: "The network device is not reserved by this host: reserve it first.",
+    Code.NETWORK_RESERVED_BY_OTHER: (
+        "The network device is reserved by another host: unreserve it there, or override the reservation."
     ),
     Code.RETRIGGER_INVALID: "Retriggering needs a finite number of samples.",
     Code.LOG_UNBUFFERED: "Logging needs a task with a sample clock.",

@@ -7,13 +7,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from daq_app.cli.app import build_app
 from daq_app.config.authoring.hardware_text import hardware_text
 from daq_app.config.errors import ConfigError
 from daq_app.config.hardware.comparison import differences
 from daq_app.config.hardware.max_file import ListedDevice, listed_in_export
 from daq_app.config.loader import load_rig
 from daq_app.config.rig import Hardware
+from sim_hardware.control import SimControl
 from sim_hardware.daqmx_server.program import build_bench, parser
 from sim_hardware.daqmx_server.services.server import DaqmxServer
 from tests.cli.test_config_commands import daq_app
@@ -98,6 +101,31 @@ def test_a_rig_file_is_checked_against_an_export(export: Path, configs: Path) ->
     assert done.returncode == 2
     assert "cDAQ1Mod2 (NI 9205) is missing" in done.stderr
     assert "Bridges (NI 9237 (DSUB), slot 4 of cDAQ1) is not in the rig file" in " ".join(done.stderr.split())
+
+
+@pytest.fixture
+def network() -> Iterator[DaqmxServer]:
+    """One chassis on the network, that another computer has reserved."""
+    server = DaqmxServer(build_bench(parser().parse_args(["--device", "N1=cDAQ-9188"])))
+    server.start()
+    with SimControl(server.address) as control:
+        control.command("fault", kind="network_reserved", target="N1")
+    yield server
+    server.stop()
+
+
+def test_a_chassis_of_another_computer_is_taken_over_only_when_told_to(network: DaqmxServer) -> None:
+    runner, app, way = CliRunner(), build_app(), f"grpc://{network.address}"
+
+    declined = runner.invoke(app, ["rig", "reserve", "N1", way], input="n\n")
+    held = network.bench.faults.active("network_reserved", "N1")
+    taken = runner.invoke(app, ["rig", "reserve", "N1", way, "--override"])
+
+    assert "Another computer has reserved N1" in declined.output
+    assert declined.exit_code != 0
+    assert held is not None
+    assert (taken.exit_code, taken.output) == (0, "N1 is reserved\n")
+    assert network.bench.faults.active("network_reserved", "N1") is None
 
 
 def _hardware() -> Hardware:

@@ -272,6 +272,41 @@ def test_a_server_that_forgot_the_tasks_gets_them_again_and_the_gap_has_its_leng
     assert lab.open_tasks == 0
 
 
+def test_after_an_onboard_overflow_the_tasks_are_started_again_and_the_gap_is_told(
+    laboratory: Laboratories,
+) -> None:
+    lab = laboratory()
+    driver = started(lab)
+    for _ in range(30):
+        last = driver.read(1.0)
+    lab.break_something("onboard_overflow", "cDAQ1", for_s=0.05)
+    with pytest.raises(DriverError, match="its own memory ran over") as caught:
+        driver.read(1.0)
+    assert (caught.value.code, caught.value.recoverable) == (-200361, True)
+    with lab.bench.changed:
+        lab.bench.clock.skip(0.1)
+
+    assert "length of the gap" in driver.recover()
+    after = driver.read(1.0)
+    assert after.first_sample >= last.first_sample + last.n_samples
+    assert driver.read(1.0).first_sample == after.first_sample + after.n_samples
+    driver.close()
+
+
+@pytest.mark.parametrize(("fault", "code"), [("network_unreserved", -201388), ("network_reserved", -201420)])
+def test_a_chassis_that_is_not_reserved_for_us_is_told_with_the_command_that_reserves_it(
+    laboratory: Laboratories, fault: str, code: int
+) -> None:
+    lab = laboratory()
+    lab.break_something(fault, "cDAQ1")
+    driver = open_driver(lab.connection)
+    with pytest.raises(DriverError) as caught:
+        driver.open(lab.plan)
+    assert caught.value.code == code
+    assert "daq-app rig reserve" in caught.value.advice
+    driver.close()
+
+
 def test_a_device_that_comes_back_at_another_rate_is_no_continuation(laboratory: Laboratories) -> None:
     lab = laboratory()
     driver = started(lab)

@@ -6,7 +6,7 @@ import datetime as dt
 import itertools
 from concurrent.futures import ThreadPoolExecutor
 from threading import Condition, RLock
-from typing import Any, Literal, Protocol
+from typing import Any, Final, Literal, Protocol
 
 import hightime
 import numpy as np
@@ -25,6 +25,11 @@ from sim_hardware.signals import SignalSource
 
 _SKEW_MARGIN_S = 1e-3
 """Multiplexers look at their last channel this long after the sample clock at most."""
+_RESERVATIONS: Final = {
+    "network_unreserved": Code.NETWORK_NOT_RESERVED,
+    "network_reserved": Code.NETWORK_RESERVED_BY_OTHER,
+}
+"""Fault → what the driver says of a chassis that has it."""
 FiniteClock = Literal["real", "instant"]
 
 
@@ -74,8 +79,6 @@ class Bench:
         """Data sheets (TEDS) of sensors, by physical channel."""
         self.calibration: dict[tuple[str, str], Any] = {}
         """(device, attribute) → value that a client has set."""
-        self.network_reserved: set[str] = set()
-        """Network chassis that this computer has reserved."""
         self.saved_scales: dict[str, dict[str, str]] = {}
         self.saved_channels: dict[str, dict[str, str]] = {}
         self.saved_tasks: dict[str, dict[str, str]] = {}
@@ -116,11 +119,25 @@ class Bench:
         ]
 
     def check_access(self, device: Device) -> None:
-        """Raise what the driver says of a device that has gone: −201003, or −201390 over a dead network."""
+        """Raise what the driver says of a device that it cannot use.
+
+        −201003 for one that has gone, −201390 over a dead network, −201388 for a network chassis that nobody
+        has reserved, −201420 for one that another computer has.
+        """
         if self.faults.active("module_removed", device.name):
             raise DaqmxError(Code.DEVICE_LOST, f"Device Specified: {device.name}")
         if self._offline(device):
             raise DaqmxError(Code.NETWORK_LOST, f"Device Specified: {device.name}")
+        host = self.inventory.host_of(device)
+        for kind, code in _RESERVATIONS.items():
+            if self.faults.active(kind, host):
+                raise DaqmxError(code, f"Device Specified: {host}")
+
+    def take_over(self, chassis: str) -> None:
+        """This computer has reserved a network chassis; who had it before has it no more."""
+        for entry in self.faults.listing():
+            if entry["kind"] in _RESERVATIONS and entry["target"] == chassis:
+                self.clear_faults(int(str(entry["number"])))
 
     def _offline(self, device: Device) -> bool:
         outage = self.faults.outage([device.name, self.inventory.host_of(device)])

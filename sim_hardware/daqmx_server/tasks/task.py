@@ -209,13 +209,15 @@ class Task:
 
     def check_devices(self) -> None:
         """Raise if a device of the task has gone; a run that loses one has failed for good."""
-        for device in {channel.device.name: channel.device for channel in self.channels}.values():
-            try:
+        try:
+            for device in {channel.device.name: channel.device for channel in self.channels}.values():
                 self.bench.check_access(device)
-            except DaqmxError as error:
-                if self.run is not None and self.run.failure is None:
-                    self.run.failure = error
-                raise
+            if self.run is not None and self.bench.faults.active("onboard_overflow", *self.hosts):
+                raise DaqmxError(Code.FIFO_OVERFLOW)
+        except DaqmxError as error:
+            if self.run is not None and self.run.failure is None:
+                self.run.failure = error
+            raise
 
     def start(self) -> None:
         if self.state is State.RUNNING:

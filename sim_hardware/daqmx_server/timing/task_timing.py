@@ -103,7 +103,9 @@ class TaskTiming:
         if not self._task.channels or self.source_is_foreign or asked <= 0:
             return asked
         if not inputs:
-            return self.timebase_hz / max(1, math.floor(self.timebase_hz / asked * (1 + 1e-12)))
+            rate = self.timebase_hz / max(1, math.floor(self.timebase_hz / asked * (1 + 1e-12)))
+            fastest = self.max_rate_hz
+            return fastest if asked <= fastest < rate else rate
         products = {channel.product.name: channel.product for channel in inputs}
         try:
             return catalogue.coerce_rate(list(products.values()), asked)

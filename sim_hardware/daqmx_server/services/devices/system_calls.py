@@ -184,15 +184,12 @@ def reserve_network(bench: Bench, request: Any) -> Any:
     device = _network_chassis(bench, request.device_name)
     if bench.faults.active("network_reserved", device.name) and not request.override_reservation:
         raise DaqmxError(Code.NETWORK_RESERVED_BY_OTHER, f"Device Specified: {device.name}")
-    for entry in bench.faults.listing():
-        if entry["kind"] == "network_reserved" and entry["target"] == device.name:
-            bench.clear_faults(int(str(entry["number"])))
-    bench.network_reserved.add(device.name)
+    bench.take_over(device.name)
     return pb.ReserveNetworkDeviceResponse()
 
 
 def unreserve_network(bench: Bench, request: Any) -> Any:
-    bench.network_reserved.discard(_network_chassis(bench, request.device_name).name)
+    _network_chassis(bench, request.device_name)  # a simulated chassis can be used without a reservation
     return pb.UnreserveNetworkDeviceResponse()
 
 
