@@ -31,6 +31,7 @@ _CATCH_UP_READS = 10
 """Most read periods fetched in one call when samples have piled up."""
 _CLOSE_LIMIT_S = 2.0
 _MOST_DOUBLINGS = 4
+_OVERWRITTEN = -200279
 
 
 class _OutOfStepError(DriverError):
@@ -265,6 +266,8 @@ class NidaqmxDriver:
             self._garbled, garbled_before = is_garbled(error), self._garbled
             if has_ended(error) and (garbled_before or not self._garbled):
                 return False
+            if isinstance(error, ni_errors.DaqError) and int(error.error_code) == _OVERWRITTEN:
+                return False  # a task that must not overwrite has stopped before its full buffer
             raise
         self._garbled = False
         return bool(self._streams)
@@ -276,14 +279,16 @@ class NidaqmxDriver:
         margin = max(2 * plan.read_samples, self._buffer_samples // 20) << self._in_vain
         margin = min(margin, self._buffer_samples // 2)
         oldest = max(stream.total_acquired() for stream in self._streams) - self._buffer_samples + margin
-        position = max(self._next_sample - self._origin, oldest)
-        for stream in self._streams:
-            stream.seek(position)
+        position = asked = max(self._next_sample - self._origin, oldest)
+        for _ in self._streams:  # one that cannot go back takes the others along
+            position = max(stream.seek(position, _REPLY_MARGIN_S) for stream in self._streams)
         overwritten = self._origin + position > self._next_sample
         self._next_sample = self._origin + position
         self._last_housekeeping = time.monotonic()
         if not overwritten:
             return ""
+        if position > asked:
+            return "What the lost reply held cannot be asked for again while NI-DAQmx writes its own files"
         self._in_vain = min(self._in_vain + 1, _MOST_DOUBLINGS)
         kept_s = self._buffer_samples / self._rate_hz
         return f"The device's buffer holds {kept_s:.0f} s: older samples had been overwritten"

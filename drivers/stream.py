@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from daq_app.config.planning.plan import PlannedTask
 from drivers.protocol import DriverError
-from drivers.tasks import virtual_name
+from drivers.tasks import NOT_WHILE_LOGGING, virtual_name
 
 _SURE_SAMPLES = 200
 """Counters that moved by more than this while they were asked for prove nothing."""
@@ -136,14 +136,32 @@ class TaskStream:
             return ()
         return tuple(self._ids[name] for name in names if name in self._ids)
 
-    def seek(self, position: int) -> None:
-        """Read from that absolute sample on; what waits here is dropped."""
+    def seek(self, position: int, timeout_s: float) -> int:
+        """Read from that absolute sample on, or from a later one where the device cannot go back.
+
+        What waits here is dropped. The sample that the next read begins with.
+        """
         self._pending.clear()
         self.n_pending = 0
-        self.task.in_stream.relative_to = ReadRelativeTo.FIRST_SAMPLE
-        self.task.in_stream.offset = position
-        self.position = position
-        self._sought = True
+        try:
+            self.task.in_stream.relative_to = ReadRelativeTo.FIRST_SAMPLE
+            self.task.in_stream.offset = position
+        except ni_errors.DaqError as error:
+            if int(error.error_code) != NOT_WHILE_LOGGING:
+                raise
+            self._pass_over(position, timeout_s)
+        else:
+            self.position = position
+            self._sought = True
+        return self.position
+
+    def _pass_over(self, position: int, timeout_s: float) -> None:
+        """Go on where the device stands, and read what lies before `position` for nothing."""
+        self.position = int(self.task.in_stream.curr_read_pos)
+        missing = position - self.position
+        if missing > 0:
+            self._reader.read_many_sample(np.empty((len(self.rows), missing)), missing, timeout_s)
+            self.position = position
 
     def begin(self) -> None:
         """The task is about to start: its samples count from 0."""

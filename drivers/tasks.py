@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from pathlib import PurePath
+from typing import Final
 
 import nidaqmx
+from nidaqmx import errors as ni_errors
 from nidaqmx.constants import (
     AccelSensitivityUnits,
     AccelUnits,
@@ -27,6 +29,8 @@ from daq_app.config.rig import Channel
 from daq_app.config.units import G_M_S2
 from drivers.connection import Connection
 
+NOT_WHILE_LOGGING: Final = -201300
+"""NI-DAQmx's code for an attribute that excludes its own logging (`nidaqmx.error_codes`)."""
 _DEFAULT_LVDT_EXCITATION_V = 3.0
 _DEFAULT_LVDT_FREQUENCY_HZ = 2500.0
 _DEFAULT_IEPE_CURRENT_A = 0.002
@@ -62,7 +66,21 @@ def create_task(connection: Connection, planned: PlannedTask) -> nidaqmx.Task:
 
 
 def commit(task: nidaqmx.Task) -> None:
-    """Verify, reserve and program the hardware, so that starting takes no time and cannot fail late."""
+    """Verify, reserve and program the hardware, so that starting takes no time and cannot fail late.
+
+    A driver that refuses to overwrite samples while it logs (−201300) must stop when its buffer is full; the
+    tasks are then started again, with a gap.
+    """
+    try:
+        _commit(task)
+    except ni_errors.DaqError as error:
+        if int(error.error_code) != NOT_WHILE_LOGGING:
+            raise
+        del task.in_stream.overwrite
+        _commit(task)
+
+
+def _commit(task: nidaqmx.Task) -> None:
     task.control(TaskMode.TASK_VERIFY)
     task.control(TaskMode.TASK_RESERVE)
     task.control(TaskMode.TASK_COMMIT)

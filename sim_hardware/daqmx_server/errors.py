@@ -94,6 +94,7 @@ class Code(IntEnum):
     ROSETTE_WITHOUT_QUANTITY = -201448
     RETRIGGER_INVALID = -201320
     LOG_UNBUFFERED = -201299
+    NOT_WHILE_LOGGING = -201300
     READ_WHILE_LOGGING = -201301
     FIFO_OVERFLOW = -200361
     NETWORK_NOT_RESERVED = -201388
@@ -235,6 +236,7 @@ _TEXT: Final[dict[int, str]] = {
     ),
     Code.RETRIGGER_INVALID: "Retriggering needs a finite number of samples.",
     Code.LOG_UNBUFFERED: "Logging needs a task with a sample clock.",
+    Code.NOT_WHILE_LOGGING: "Specified property is not supported while logging is enabled.",
     Code.READ_WHILE_LOGGING: (
         "Samples cannot be read in the logging mode Log: they go to the file alone. Use Log and Read."
     ),

@@ -45,6 +45,7 @@ KINDS: Final[dict[str, Kind]] = {
     "onboard_overflow": Kind("host", "its memory ran over before the network took the samples", {}),
     "network_unreserved": Kind("host", "no computer has reserved the chassis", {}),
     "network_reserved": Kind("host", "another computer has reserved the chassis", {}),
+    "strict_logging": Kind("host", "the driver refuses overwriting and seeking while it logs", {}),
     "wrong_device": Kind("device", "another product is in the slot", {"product": None}),
     "reserved": Kind("device", "another program holds the device", {}),
     "buffer_overwritten": Kind("task", "the computer was deaf too long", {"lost_samples": 1000.0}),

@@ -421,6 +421,48 @@ def test_the_native_second_recorder_writes_only_while_asked(laboratory: Laborato
     assert np.allclose(kept, expected, atol=1e-9)
 
 
+def logging_driver(lab: Any, folder: Path) -> Driver:
+    """A driver with the second recorder, over an NI-DAQmx that is strict about attributes while it logs."""
+    lab.break_something("strict_logging", "cDAQ1")
+    driver = open_driver(lab.connection, backup_folder=folder)
+    driver.open(lab.plan)
+    driver.start()
+    return driver
+
+
+@pytest.mark.parametrize("rig", ["fr1", "fr1-pxie"])
+def test_where_logging_excludes_seeking_a_reply_cut_short_is_a_gap(
+    laboratory: Laboratories, rig: str, tmp_path: Path
+) -> None:
+    lab = laboratory(rig)
+    driver = logging_driver(lab, tmp_path)
+    lab.break_something("reply_cut_short")
+
+    blocks, errors = read_through(driver, lab, 8000)
+
+    assert len(errors) == 1
+    assert lost(blocks) == lab.plan.read_samples
+    driver.close()
+
+
+def test_where_logging_excludes_overwriting_a_full_buffer_means_a_new_start(
+    laboratory: Laboratories, tmp_path: Path
+) -> None:
+    lab = laboratory()
+    driver = logging_driver(lab, tmp_path)
+    for _ in range(30):
+        last = driver.read(1.0)
+    with lab.bench.changed:
+        lab.bench.clock.skip(60.0)
+    with pytest.raises(DriverError) as caught:
+        driver.read(1.0)
+    assert (caught.value.code, caught.value.recoverable) == (-200279, True)
+
+    assert "started again" in driver.recover()
+    assert driver.read(1.0).first_sample > last.first_sample + last.n_samples
+    driver.close()
+
+
 def test_every_error_the_operator_will_meet_has_its_sentence() -> None:
     listed = [-200279, -200284, -200220, -50103, -200170, -200431, -200077, -201003]
     for code in listed:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Any, Final, Protocol
 
-from nidaqmx.constants import AcquisitionType
+from nidaqmx.constants import AcquisitionType, OverwriteMode
 
 from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
@@ -27,6 +27,7 @@ class ConfiguredTask(Protocol):
     timing: TaskTiming
     trigger: dict[str, Any]
     exported: dict[str, Any]
+    reading: dict[str, Any]
     watchdog: dict[str, Any]
     log: TdmsLog
 
@@ -68,7 +69,24 @@ def check_configuration(task: ConfiguredTask) -> None:
     _check_terminals(task)
     task.timing.verify()
     task.log.check(task.is_buffered)
+    overwrites = task.reading.get("OVERWRITE") == OverwriteMode.OVERWRITE_UNREAD_SAMPLES.value
+    if overwrites:
+        refuse_while_logging(task, "OverWrite")
     _check_triggers(task)
+
+
+class _LoggingTask(Protocol):
+    bench: Bench
+    log: TdmsLog
+
+    @property
+    def hosts(self) -> list[str]: ...
+
+
+def refuse_while_logging(task: _LoggingTask, name: str) -> None:
+    """−201300 where the driver is strict about attributes while it logs."""
+    if task.log.enabled and task.bench.faults.active("strict_logging", *task.hosts):
+        raise DaqmxError(Code.NOT_WHILE_LOGGING, f"Property: DAQmx_Read_{name}")
 
 
 def _check_mix(task: ConfiguredTask) -> None:

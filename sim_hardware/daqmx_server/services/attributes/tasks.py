@@ -16,6 +16,7 @@ from sim_hardware.daqmx_server.inventory.devices import channel_list
 from sim_hardware.daqmx_server.inventory.terminals import full_name
 from sim_hardware.daqmx_server.services.attributes.groups import unsupported
 from sim_hardware.daqmx_server.services.attributes.timestamps import timestamp
+from sim_hardware.daqmx_server.tasks.checks import refuse_while_logging
 from sim_hardware.daqmx_server.tasks.reading import default_count
 from sim_hardware.daqmx_server.tasks.task import Task, task_named
 from sim_hardware.daqmx_server.timing import triggers
@@ -128,7 +129,16 @@ def line_bytes(task: Task) -> int:
     return max((len(channel.lines) for channel in task.channels), default=0)
 
 
-READ: Final = SettingsGroup(
+class _ReadGroup(SettingsGroup):
+    """Attributes of reading; a strict driver refuses some while it logs."""
+
+    def set(self, bench: Bench, request: Any, name: str, value: Any) -> None:
+        if name in ("OVERWRITE", "RELATIVE_TO", "OFFSET"):
+            refuse_while_logging(task_named(bench, request.task.name), name)
+        super().set(bench, request, name, value)
+
+
+READ: Final = _ReadGroup(
     "Read",
     lambda task: task.reading,
     defaults={
