@@ -430,11 +430,10 @@ def logging_driver(lab: Any, folder: Path) -> Driver:
     return driver
 
 
-@pytest.mark.parametrize("rig", ["fr1", "fr1-pxie"])
 def test_where_logging_excludes_seeking_a_reply_cut_short_is_a_gap(
-    laboratory: Laboratories, rig: str, tmp_path: Path
+    laboratory: Laboratories, tmp_path: Path
 ) -> None:
-    lab = laboratory(rig)
+    lab = laboratory()
     driver = logging_driver(lab, tmp_path)
     lab.break_something("reply_cut_short")
 
@@ -459,7 +458,7 @@ def test_where_logging_excludes_overwriting_a_full_buffer_means_a_new_start(
     assert (caught.value.code, caught.value.recoverable) == (-200279, True)
 
     assert "started again" in driver.recover()
-    assert driver.read(1.0).first_sample > last.first_sample + last.n_samples
+    assert driver.read(1.0).first_sample >= last.first_sample + last.n_samples
     driver.close()
 
 
