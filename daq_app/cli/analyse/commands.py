@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,9 @@ from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, rep
 from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.config import Rig, load_rig
 from daq_app.runfile.folder import require_replaceable
+
+if TYPE_CHECKING:
+    from daq_app.rocking import AnalysisOptions, TestAnalysis
 
 
 def register(app: typer.Typer) -> None:
@@ -56,9 +59,7 @@ def analyse(
 
     Exit code 0; 1 where the run shows no release test; 2 for a file that cannot be used.
     """
-    # Imported here: `daq-app --help` should not load SciPy.
-    from daq_app.rocking import AnalysisOptions, TestRecord, analyse_record
-    from daq_app.runfile import open_run
+    from daq_app.rocking import AnalysisOptions  # here: `daq-app --help` should not load SciPy
 
     with reported():
         for target in output_files(out, run.stem) if out is not None else ():
@@ -70,36 +71,51 @@ def analyse(
             bias_runs=bias_runs,
             keep_series=out is not None,
         )
-        with open_run(run) as opened:
-            used: Rig | None = replacement or opened.rig
-            if used is None:
-                print_paragraph(
-                    "Error",
-                    f"{run}: the rig file kept in this run is not understood by this version. "
-                    "Give one with --rig",
-                )
-                raise typer.Exit(EXIT_BAD_INPUT)
-            try:
-                analysis = analyse_record(TestRecord.from_run(opened, used), options)
-            except (ValueError, KeyError) as error:
-                print_paragraph("Error", f"{run}: {error}")
-                raise typer.Exit(EXIT_BAD_INPUT) from None
+        analysis, used = _analysis(run, replacement, options)
         if chain_runs and analysis.found:
             analysis = with_whole_chain_bias(analysis, used, chain_runs)
-        if as_json:
-            echo_json(analysis.as_dict())
-        else:
-            console = Console()
-            if not console.is_terminal:
-                console = Console(width=130)  # a file or pipe has no width of its own
-            for part in analysis_tables(analysis):
-                console.print(part)
+        _show(analysis, as_json=as_json)
         if out is not None:
-            try:
-                written = write_outputs(analysis, out, run.stem)
-            except OSError as error:
-                print_paragraph("Error", f"the results could not be written into {out}: {error}")
-                raise typer.Exit(EXIT_BAD_INPUT) from None
+            written = _written(analysis, out, run.stem)
             if not as_json:
                 echo("Written: " + ", ".join(str(path) for path in written))
     raise typer.Exit(0 if analysis.found else EXIT_FAILED)
+
+
+def _analysis(run: Path, replacement: Rig | None, options: AnalysisOptions) -> tuple[TestAnalysis, Rig]:
+    """The analysis of a run file, and the rig that it was made with."""
+    from daq_app.rocking import TestRecord, analyse_record
+    from daq_app.runfile import open_run
+
+    with open_run(run) as opened:
+        used = replacement or opened.rig
+        if used is None:
+            print_paragraph(
+                "Error",
+                f"{run}: this version does not understand the rig file kept in this run. Give one with --rig",
+            )
+            raise typer.Exit(EXIT_BAD_INPUT)
+        try:
+            return analyse_record(TestRecord.from_run(opened, used), options), used
+        except (ValueError, KeyError) as error:
+            print_paragraph("Error", f"{run}: {error}")
+            raise typer.Exit(EXIT_BAD_INPUT) from None
+
+
+def _show(analysis: TestAnalysis, *, as_json: bool) -> None:
+    if as_json:
+        echo_json(analysis.as_dict())
+        return
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=130)  # a file or pipe has no width of its own
+    for part in analysis_tables(analysis):
+        console.print(part)
+
+
+def _written(analysis: TestAnalysis, out: Path, stem: str) -> list[Path]:
+    try:
+        return write_outputs(analysis, out, stem)
+    except OSError as error:
+        print_paragraph("Error", f"the results could not be written into {out}: {error}")
+        raise typer.Exit(EXIT_BAD_INPUT) from None

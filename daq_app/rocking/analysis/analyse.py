@@ -93,30 +93,11 @@ def _analyse(
     series = decay_series(signals, tracks, peaks, velocity_filter)
     estimates = estimates_of(series)
     onsets = _onsets(instruments.record, signals, track)
-    fit = _fit(signals, track, estimates) if options.fit else None
-    if fit is not None:
-        alpha_sigma = math.hypot(fit.sigma_alpha_rad, instruments.gain_sigma * fit.alpha_rad)
-        p_sigma = math.hypot(fit.sigma_p_rad_s, _GEOMETRY_SHARE_P * fit.p_rad_s)
-        fit = replace(fit, sigma_alpha_rad=alpha_sigma, sigma_p_rad_s=p_sigma)
+    fit = _fit(signals, track, estimates, instruments.gain_sigma) if options.fit else None
     theta0 = theta0_by_family(signals, track, instruments.gain_sigma)
     verdict, findings = verdict_of(instruments, tracks, series, estimates, levels_apart(signals, theta0))
     headline = theta0.get("tiltmeters", theta0["wires"])
-    bias: Mapping[str, Bias] = {}
-    if options.bias_runs > 0:
-        bias = method_bias(
-            BiasSettings(
-                settings=signals.settings,
-                velocity_filter=velocity_filter,
-                theta0_rad=track.theta0_rad,
-                sigma_theta0_rad=track.sigma_theta0_rad,
-                r=_typical_r(estimates),
-                impacts=len(times.impacts_s),
-                noise_rad=signals.noise_rad,
-                with_fit=options.fit,
-                runs=options.bias_runs,
-                seed=zlib.crc32(record.label.encode()) if options.seed is None else options.seed,
-            )
-        )
+    bias = _bias(record, signals, track, estimates, velocity_filter, options)
     joint = summarise_joint(instruments.record, signals, track) if signals.joint is not None else None
     residuals = residuals_after(signals, times.rest)
     analysis = TestAnalysis(
@@ -165,9 +146,10 @@ def _typical_r(estimates: Mapping[str, RestitutionEstimate]) -> float:
 
 
 def _fit(
-    signals: Signals, track: MotionTrack, estimates: Mapping[str, RestitutionEstimate]
+    signals: Signals, track: MotionTrack, estimates: Mapping[str, RestitutionEstimate], gain_sigma: float
 ) -> MotionFit | None:
-    return fit_motion(
+    """Housner's motion laid through the half-cycles; its errors hold gain and geometry of the family."""
+    fit = fit_motion(
         signals.time_s,
         signals.rotation_rad,
         release_s=track.release.time_s,
@@ -180,6 +162,40 @@ def _fit(
         noise_rad=max(signals.noise_rad, signals.settings.slow_noise_rad),
         p_rad_s=signals.settings.p_rad_s,
         alpha_rad=signals.settings.alpha_rad,
+    )
+    if fit is None:
+        return None
+    return replace(
+        fit,
+        sigma_alpha_rad=math.hypot(fit.sigma_alpha_rad, gain_sigma * fit.alpha_rad),
+        sigma_p_rad_s=math.hypot(fit.sigma_p_rad_s, _GEOMETRY_SHARE_P * fit.p_rad_s),
+    )
+
+
+def _bias(
+    record: TestRecord,
+    signals: Signals,
+    track: MotionTrack,
+    estimates: Mapping[str, RestitutionEstimate],
+    velocity_filter: VelocityFilter,
+    options: AnalysisOptions,
+) -> Mapping[str, Bias]:
+    """Bias of each method on simulated tests like this one; empty where none is asked for."""
+    if options.bias_runs <= 0:
+        return {}
+    return method_bias(
+        BiasSettings(
+            settings=signals.settings,
+            velocity_filter=velocity_filter,
+            theta0_rad=track.theta0_rad,
+            sigma_theta0_rad=track.sigma_theta0_rad,
+            r=_typical_r(estimates),
+            impacts=len(track.impacts_s),
+            noise_rad=signals.noise_rad,
+            with_fit=options.fit,
+            runs=options.bias_runs,
+            seed=zlib.crc32(record.label.encode()) if options.seed is None else options.seed,
+        )
     )
 
 
