@@ -77,6 +77,26 @@ class MainWindow(QMainWindow):
         self._released = False
         """Whether the wall was let go since the last arming: an aborted arming has no result."""
 
+        self._make_pages()
+        self._lay_out()
+        ordered = (self.prepare, self.campaign, self.result)
+        self.orders = Orders(link, self.session, ordered, self.notices, self.show_page, self)
+        self.restyle()
+        self._connect()
+        self.resize(1366, 768)
+        settings.restore_layout(self, self.splitters)
+        if link is not None:
+            self._meet(link)
+        self._frame_timer = QTimer(self)
+        self._frame_timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._frame_timer.timeout.connect(self._on_frame)
+        self._frame_timer.start(FRAME_MS)
+        self._slow_timer = QTimer(self)
+        self._slow_timer.timeout.connect(self._on_slow)
+        self._slow_timer.start(SLOW_MS)
+
+    def _make_pages(self) -> None:
+        """Every page, and those that a window has with and without an acquisition."""
         self.live = LivePage(self.session)
         self.prepare = PreparePage(self.session, self.background)
         self.campaign = CampaignPage(self.background)
@@ -89,19 +109,23 @@ class MainWindow(QMainWindow):
         self.messages = MessagesPage(self.notices)
         live_pages: dict[str, QWidget] = {"Prepare": self.prepare, "Test": self.test, "Live": self.live}
         self.pages: dict[str, QWidget] = {
-            **(live_pages if link is not None else {}),
+            **(live_pages if self.link is not None else {}),
             "Campaign": self.campaign,
             "Result": self.result,
             "Replay": self.replay,
             "Gap": self.gap,
             "Messages": self.messages,
         }
+
+    def _lay_out(self) -> None:
+        """Header, rail, pages and order bar in one frame; the full screen beside it."""
+        link = self.link
         self.frame = WindowFrame(self.session, self.pages, self.notices, live=link is not None)
         self.header, self.note_entry = self.frame.header, self.frame.note_entry
         self.actions_bar, self.health = self.frame.actions_bar, self.frame.health
         self.stack, self.rail = self.frame.stack, self.frame.rail
         self.setCentralWidget(self.frame)
-        self.display = TestDisplay(self.session, self.test, self.frame, settings, self)
+        self.display = TestDisplay(self.session, self.test, self.frame, self.settings, self)
         may_command = link is not None and link.may_command
         self.adoption = Adoption(self.session, self.prepare, self.gap, self.notices, may_command=may_command)
         self.splitters = {
@@ -110,33 +134,14 @@ class MainWindow(QMainWindow):
             "replay": self.replay.splitter,
         }
         self.show_page(self.prepare if link is not None else self.replay)
-        self.orders = Orders(
-            link,
-            self.session,
-            (self.prepare, self.campaign, self.result),
-            self.notices,
-            self.show_page,
-            self,
-        )
-        self.restyle()
-        self._connect()
-        self.resize(1366, 768)
-        settings.restore_layout(self, self.splitters)
-        if link is not None:
-            link.replied.connect(self._on_reply)
-            link.urgent.connect(self._on_urgent)
-            self._adopt(link.about)
-            if not link.may_command:
-                self.notices.tell(
-                    "info", "This window may watch, not command: it was opened without the token."
-                )
-        self._frame_timer = QTimer(self)
-        self._frame_timer.setTimerType(Qt.TimerType.PreciseTimer)
-        self._frame_timer.timeout.connect(self._on_frame)
-        self._frame_timer.start(FRAME_MS)
-        self._slow_timer = QTimer(self)
-        self._slow_timer.timeout.connect(self._on_slow)
-        self._slow_timer.start(SLOW_MS)
+
+    def _meet(self, link: Link) -> None:
+        """Hear what the acquisition says, and take over what it knows already."""
+        link.replied.connect(self._on_reply)
+        link.urgent.connect(self._on_urgent)
+        self._adopt(link.about)
+        if not link.may_command:
+            self.notices.tell("info", "This window may watch, not command: it was opened without the token.")
 
     def _connect(self) -> None:
         self.actions_bar.ordered.connect(self._on_order)
@@ -190,15 +195,8 @@ class MainWindow(QMainWindow):
         apply_theme(app, self, self.colours, self.settings.type_size)
         self.frame.rail.fit()
         self.frame.fit_footer()
-        for page in (
-            self.prepare,
-            self.live,
-            self.campaign,
-            self.result,
-            self.replay,
-            self.gap,
-            self.messages,
-        ):
+        pages = (self.prepare, self.live, self.campaign, self.result, self.replay, self.gap, self.messages)
+        for page in pages:
             page.restyle(self.colours)
         self.display.restyle(self.colours)
         self.notices.restyle(self.colours)
