@@ -15,8 +15,8 @@ from daq_app.guarded import end_guarded, start_guarded
 _CHILD = (
     "import os, stat, sys\n"
     "print('pipe' if stat.S_ISFIFO(os.fstat(0).st_mode) else 'null', sys.stdout.encoding, flush=True)\n"
-    "import time\n"
-    "while True: time.sleep(60)\n"
+    "import threading\n"
+    "threading.Event().wait()\n"
 )
 
 

@@ -15,8 +15,8 @@ from pathlib import Path
 CHILD = (
     "import os, stat, sys, ssl, sqlite3, asyncio, decimal\n"
     "print(stat.S_ISFIFO(os.fstat(0).st_mode), sys.stdout.encoding, 'θ', flush=True)\n"
-    "import time\n"
-    "while True: time.sleep(1)\n"
+    "import threading\n"
+    "threading.Event().wait()\n"
 )
 
 

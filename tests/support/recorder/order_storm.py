@@ -16,6 +16,7 @@ import re
 import shutil
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
@@ -92,8 +93,15 @@ class WallDriver:
     def __init__(self, wall: Wall) -> None:
         self._wall = wall
         self.allowed = 0
+        self._more = threading.Condition()
         self._next = 0
         self._read_samples = 400
+
+    def allow(self, sample: int) -> None:
+        """Let the wall be read up to this sample."""
+        with self._more:
+            self.allowed = sample
+            self._more.notify_all()
 
     def open(self, plan: Any) -> Opened:
         self._read_samples = plan.read_samples
@@ -104,8 +112,9 @@ class WallDriver:
 
     def read(self, timeout_s: float, n_samples: int | None = None) -> Block:
         stop = self._next + (n_samples or self._read_samples)
-        if stop > self.allowed:
-            time.sleep(0.002)
+        with self._more:
+            there = self._more.wait_for(lambda: stop <= self.allowed, timeout_s)
+        if not there:
             raise DriverError("No samples", advice="Wait", retryable=True)
         block = Block(self._next, np.ascontiguousarray(self._wall.readings[:, self._next : stop]), 0, 0)
         self._next = stop
@@ -127,6 +136,7 @@ class Listener:
     def __init__(self) -> None:
         self.states: list[StateMessage] = []
         self.health: HealthMessage | None = None
+        self._said = threading.Condition()
 
     def send(self, topic: str, message: Any, readings: bytes | None = None) -> None:
         del topic, readings
@@ -134,6 +144,15 @@ class Listener:
             self.states.append(message)
         elif isinstance(message, HealthMessage):
             self.health = message
+        with self._said:
+            self._said.notify_all()
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        """Wait until something holds, looking again whenever something is said; at most a minute."""
+        deadline = time.monotonic() + 60.0
+        with self._said:
+            while not condition() and time.monotonic() < deadline:
+                self._said.wait(0.02)
 
 
 class QuickFinaliser:
@@ -205,13 +224,13 @@ class Storm:
             while driver.allowed < end:
                 self._order(session)
                 self._break(disk)
-                driver.allowed = min(end, driver.allowed + int(self.rng.integers(1, 10)) * 400)
-                self._catch_up(session, driver.allowed)
+                driver.allow(min(end, driver.allowed + int(self.rng.integers(1, 10)) * 400))
+                listener.until(lambda: session.analyst.voice.sample >= driver.allowed - 400)
                 session.tick()
                 if self.rng.random() < 0.03 and not disk.trouble:
                     kills.append(self._kill(session, listener, driver.allowed, len(kills)))
             disk.trouble = 0
-            self._end(session)
+            self._end(session, listener)
         self._check_runs(wall, find_runs(self.folder))
         self._check_words(listener.states)
         for copy, safe, sample in kills:
@@ -254,12 +273,6 @@ class Storm:
             disk.trouble = 0
             self.log.append("disk: well")
 
-    @staticmethod
-    def _catch_up(session: Session, sample: int) -> None:
-        deadline = time.monotonic() + 60.0
-        while session.analyst.voice.sample < sample - 400 and time.monotonic() < deadline:
-            time.sleep(0.002)
-
     def _kill(self, session: Session, listener: Listener, sample: int, number: int) -> tuple[Path, int, int]:
         """The folder as kill −9 would leave it now, what had been called safe, and the newest sample."""
         status = session.recorder.status
@@ -269,13 +282,16 @@ class Storm:
         self.log.append(f"{sample}: killed (copy {number}), safe up to {safe}")
         return copy, safe, sample
 
-    def _end(self, session: Session) -> None:
-        deadline = time.monotonic() + 60.0
-        while session.recording and session.analyst.state is not State.ARMED and time.monotonic() < deadline:
+    @staticmethod
+    def _end(session: Session, listener: Listener) -> None:
+        """Stop what is recorded, but let a run that is just begun know its wall first."""
+        moved = (State.HOLDING, State.RELEASED, State.ROCKING, State.AT_REST)
+
+        def settled() -> bool:
             session.tick()
-            time.sleep(0.01)
-            if session.analyst.state in (State.HOLDING, State.RELEASED, State.ROCKING, State.AT_REST):
-                break
+            return not session.recording or session.analyst.state in (State.ARMED, *moved)
+
+        listener.until(settled)
         if session.recording:
             session.ask("stop", {})
         session.close()
