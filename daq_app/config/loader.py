@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from daq_app.config.checks import rig_problems
 from daq_app.config.errors import ConfigError, Problem
+from daq_app.config.hardware.product_files import read_product_files
 from daq_app.config.planning.grouping import OwnKeys, grouped
 from daq_app.config.planning.planner import channel_problems
 from daq_app.config.rig import Channel, Family, Rig
@@ -21,12 +22,26 @@ DEFAULTS_KEY = "channel_defaults"
 
 
 def load_rig(path: Path | str) -> Rig:
-    """The rig of a file. Raises `ConfigError` with all problems of the file."""
-    return parse_rig(read_text(path), str(path))
+    """The rig of a file. Raises `ConfigError` with all problems of the file and of its product files."""
+    text = read_text(path)
+    return parse_rig(text, str(path), _product_texts(text, Path(path)))
 
 
-def parse_rig(text: str, file: str = "rig") -> Rig:
+def _product_texts(text: str, path: Path) -> tuple[str, ...]:
+    """Contents of the product files that a rig file names, each of which is good. Raises `ConfigError`."""
+    hardware = parse_toml(text, str(path)).get("hardware")
+    names = hardware.get("products") if isinstance(hardware, dict) else None
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        return ()  # nothing, or what the rig's own check refuses
+    files = [path.parent / name for name in names]
+    read_product_files(files)
+    return tuple(read_text(file) for file in files)
+
+
+def parse_rig(text: str, file: str = "rig", product_texts: tuple[str, ...] = ()) -> Rig:
     """The rig of a TOML text (of a file, or kept in a run). Raises `ConfigError` with all problems.
+
+    `product_texts` are the contents of the product files that it names.
 
     Rules of the hardware are checked by `plan_tasks`: a rig that can no longer be planned can still
     be read for analysis. But a rig that is refused here has its hardware problems listed too.
@@ -35,19 +50,25 @@ def parse_rig(text: str, file: str = "rig") -> Rig:
     own_keys = _own_keys(data)
     problems = merge_channel_defaults(data, file)
     try:
-        rig = Rig.model_validate(data)
+        rig = _with_products(Rig.model_validate(data), product_texts)
         channels = dict(enumerate(rig.channels))
     except ValidationError as error:
         problems += problems_of(error, Rig, file, lambda location: _channel_label(data, location))
         salvaged = _salvage(data, error)
         if salvaged is None:
             raise ConfigError(grouped(problems, own_keys)) from None
-        rig, channels = salvaged
+        rig, channels = _with_products(salvaged[0], product_texts), salvaged[1]
     problems += rig_problems(rig, channels, _families(data), file)
     if problems:
         problems += channel_problems(rig, channels, file)[1]
         raise ConfigError(grouped(problems, own_keys))
     return rig
+
+
+def _with_products(rig: Rig, texts: tuple[str, ...]) -> Rig:
+    if not texts:
+        return rig
+    return rig.model_copy(update={"hardware": rig.hardware.with_product_texts(texts)})
 
 
 def _salvage(data: dict[str, Any], error: ValidationError) -> tuple[Rig, dict[int, Channel]] | None:

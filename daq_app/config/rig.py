@@ -15,7 +15,7 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 from daq_app.config.units import FAMILY_SI_UNIT, G_M_S2, SENSITIVITY_TO_SI
 
@@ -98,6 +98,20 @@ class Hardware(Table):
     connection: str = "simulated"
     """``local``, ``grpc://HOST:PORT`` or ``simulated``."""
     chassis: tuple[Chassis, ...] = Field(min_length=1)
+    products: tuple[str, ...] = ()
+    """Product files in the folder of the rig file, for products that the catalogue lacks."""
+    _product_texts: tuple[str, ...] = PrivateAttr(())
+
+    @property
+    def product_texts(self) -> tuple[str, ...]:
+        """Contents of `products`, where the rig was read from its file."""
+        return self._product_texts
+
+    def with_product_texts(self, texts: tuple[str, ...]) -> Hardware:
+        """The same hardware with what its product files say."""
+        copy = self.model_copy()
+        copy._product_texts = texts
+        return copy
 
 
 class Acquisition(Table):

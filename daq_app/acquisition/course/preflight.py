@@ -11,6 +11,7 @@ from typing import Final
 from daq_app.acquisition.messages.items import RequestRefused
 from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.comparison import wrong_module
+from daq_app.config.hardware.own_products import own_products
 from daq_app.config.rig import Rig
 from drivers import DeviceInfo
 
@@ -59,7 +60,7 @@ def check_modules(rig: Rig, devices: Sequence[DeviceInfo]) -> list[str]:
     found = {device.name: device for device in devices}
     wrong = []
     for chassis in rig.hardware.chassis:
-        bus = catalogue.chassis(chassis.product).bus
+        bus = catalogue.chassis(chassis.product, own_products(rig.hardware).chassis).bus
         for module in chassis.modules:
             name = module.name or catalogue.device_name(chassis.name, bus, module.slot)
             device = found.get(name)

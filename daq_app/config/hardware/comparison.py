@@ -8,6 +8,7 @@ from typing import Protocol
 
 from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.max_file import ListedDevice
+from daq_app.config.hardware.own_products import own_products
 from daq_app.config.rig import Hardware, Module
 
 
@@ -48,8 +49,9 @@ def differences(hardware: Hardware, listed: Iterable[ListedDevice]) -> list[str]
     wrong: list[str] = []
     named: set[str] = set()
     owners: set[str] = set()
+    own = own_products(hardware)
     for entry in hardware.chassis:
-        chassis = catalogue.find(entry.product, catalogue.CHASSIS)
+        chassis = catalogue.find(entry.product, own.chassis, catalogue.CHASSIS)
         on_backplane = chassis is not None and chassis.bus == "pxie"
         owners.add(entry.name)
         if not on_backplane:

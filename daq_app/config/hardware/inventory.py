@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from daq_app.config.errors import Problem
 from daq_app.config.hardware import catalogue
+from daq_app.config.hardware.own_products import own_products
 from daq_app.config.hardware.products import ChassisProduct, Product
 from daq_app.config.rig import Chassis, Hardware, Module
 
@@ -30,6 +32,7 @@ def devices_of(hardware: Hardware, file: str = "") -> tuple[dict[str, Device | N
     """Device name → device, and the problems; None is a module whose product is not known."""
     problems: list[Problem] = []
     devices: dict[str, Device | None] = {}
+    own = own_products(hardware)
     chassis_keys: dict[str, str] = {}
     for index, entry in enumerate(hardware.chassis):
         key = f"hardware.chassis[{index}] ({entry.name})"
@@ -41,11 +44,11 @@ def devices_of(hardware: Hardware, file: str = "") -> tuple[dict[str, Device | N
                 Problem(file, f"{key}.name", wrong, "Give each chassis its own name, as in NI MAX")
             )
         try:
-            product = catalogue.chassis(entry.product)
+            product = catalogue.chassis(entry.product, own.chassis)
         except catalogue.UnknownProduct as error:
             problems.append(_unknown(error, f"{key}.product", "chassis", file))
             product = None
-        for name, where, device in _modules(entry, product, key, file, problems):
+        for name, where, device in _modules(entry, product, own.products, key, file, problems):
             if name in devices:
                 wrong = f"two modules have the device name `{name}`"
                 right = "Give each module its own slot and name, as in NI MAX"
@@ -56,7 +59,12 @@ def devices_of(hardware: Hardware, file: str = "") -> tuple[dict[str, Device | N
 
 
 def _modules(
-    entry: Chassis, chassis: ChassisProduct | None, key: str, file: str, problems: list[Problem]
+    entry: Chassis,
+    chassis: ChassisProduct | None,
+    own: Mapping[str, Product],
+    key: str,
+    file: str,
+    problems: list[Problem],
 ) -> list[tuple[str, str, Device | None]]:
     """(device name, key path, device) of each module; None where its product is not known."""
     slots: dict[int, str] = {}
@@ -72,7 +80,7 @@ def _modules(
         if item.name:
             problems += _name_problems(item.name, f"{where}.name", file)
         try:
-            product = catalogue.module(item.product)
+            product = catalogue.module(item.product, own)
         except catalogue.UnknownProduct as error:
             problems.append(_unknown(error, f"{where}.product", "modules", file))
             devices.append((name, where, None))
@@ -112,4 +120,5 @@ def _unknown(error: catalogue.UnknownProduct, key: str, what: str, file: str) ->
     known = sorted(catalogue.CHASSIS if what == "chassis" else catalogue.MODULES)
     hint = f"Did you mean {' or '.join(error.near)}? " if error.near else ""
     wrong = f"`{error.name}` is not in the hardware catalogue"
-    return Problem(file, key, wrong, f"{hint}Known {what}: {', '.join(known)}")
+    own = "Describe others in a product file beside the rig file and name it in hardware.products"
+    return Problem(file, key, wrong, f"{hint}Known {what}: {', '.join(known)}. {own}")

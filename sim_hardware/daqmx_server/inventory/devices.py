@@ -9,6 +9,7 @@ from nidaqmx.constants import BusType, ProductCategory
 from nidaqmx.utils import unflatten_channel_string
 
 from daq_app.config.hardware import catalogue
+from daq_app.config.hardware.own_products import own_products
 from daq_app.config.hardware.product_files import NO_PRODUCTS, ProductSet
 from daq_app.config.hardware.products import ChassisProduct, Counters, Product
 from daq_app.config.rig import Rig
@@ -97,12 +98,13 @@ class Inventory:
         A PXI chassis is no device of NI-DAQmx: its cards stand for themselves.
         """
         inventory = cls()
+        own = own_products(rig.hardware)
         for entry in rig.hardware.chassis:
-            chassis = catalogue.chassis(entry.product)
+            chassis = catalogue.chassis(entry.product, own.chassis)
             if chassis.bus == "cdaq":
                 inventory.add(cdaq_chassis(entry.name, chassis))
             for item in entry.modules:
-                product = catalogue.module(item.product)
+                product = catalogue.module(item.product, own.products)
                 name = item.name or catalogue.device_name(entry.name, chassis.bus, item.slot)
                 serial = int(item.serial, 16) if re.fullmatch(r"[0-9A-Fa-f]{1,8}", item.serial) else 0
                 owner = entry.name if chassis.bus == "cdaq" else ""
