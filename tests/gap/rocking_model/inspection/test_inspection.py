@@ -90,6 +90,17 @@ def test_electronics_are_named_by_channel_with_their_size(healthy: list[RockingR
         assert run.swings.peak_rad[1] == pytest.approx(clean.swings.peak_rad[1], rel=1e-3)
 
 
+def test_a_channel_with_far_more_pick_up_than_its_family_stands_for_itself() -> None:
+    runs = _prepared({"hum@wire": {"amplitude": 2e-4}, "hum@WP-2": {"amplitude": 8e-4}})
+    assert set(found_marks(runs)) == {"hum@wire", "hum@WP-2"}
+    for run in runs:
+        assert _mark(run, "hum@wire") == pytest.approx(2e-4, rel=0.2)
+        assert _mark(run, "hum@WP-2") > 5e-4
+    alone, all_of_them = (next(f for f in findings_of(runs) if f.name == n) for n in ("hum@WP-2", "hum@wire"))
+    assert alone.material
+    assert alone.in_noise > 2.0 * all_of_them.in_noise
+
+
 def test_exchanged_plugs_are_put_back() -> None:
     plain = simulate({}, LEVELS)
     for run in plain:
