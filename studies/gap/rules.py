@@ -1,41 +1,40 @@
-"""What each rule of the decision is worth: the same fits, concluded with one rule switched off at a time.
+"""What each rule of the decision is worth: stored answers, concluded anew with one rule switched off.
 
-    python -m studies.gap.rules DIR… --out RESULTS
+    python -m studies.gap.rules DIR… --results NAME
 
-Each DIR is a folder of sealed cases with its labels beside it as DIR-labels (``daq-app gap blind make``).
-Every case is fitted once; a rule is switched off when hypotheses are ranked and the answer is given, not
-while they are searched. A case that has a file in RESULTS is not fitted again.
+Each DIR is a folder of sealed cases with results in DIR/NAME (``daq-app gap blind run DIR --results NAME``)
+and labels beside it as DIR-labels. Nothing is fitted: the stored remainder, free forms and probabilities are
+judged by another policy. An answer that is then no longer refused is that of the best hypothesis.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from daq_app.config import load_rig
-from daq_app.gap.blind.layout import RIG_FILE, run_files
-from daq_app.gap.blind.running.runner import Outcome, case_folders
+from daq_app.gap.blind.names import class_of
+from daq_app.gap.blind.running.runner import case_folders, read_outcome
 from daq_app.gap.blind.scoring.judge import Judged, judge
 from daq_app.gap.blind.scoring.laboratories import by_laboratory
 from daq_app.gap.blind.seal import open_label
-from daq_app.gap.core import CannotDiagnose, Options
-from daq_app.gap.core.diagnose import _Study
-from daq_app.gap.core.fitting.experiment import Experiment
-from daq_app.gap.core.fitting.held_out import GapSize
-from daq_app.gap.core.fitting.parallel import Workers
-from daq_app.gap.core.judging.evidence import Hypothesis
-from daq_app.gap.core.judging.joined import with_findings
 from daq_app.gap.core.policy import POLICY, Policy
-from daq_app.gap.rocking_model.findings import findings_of
-from daq_app.gap.rocking_model.records import load_run
-from daq_app.gap.rocking_model.study import model_and_library, prepare
+from daq_app.gap.core.result import verdict_of
 
 NEVER = 1e9
 """A limit that nothing reaches."""
+COLUMNS = (
+    "decisions right",
+    "set holds truth",
+    "calibration error",
+    "AUROC outside",
+    "outside",
+    "outside blamed",
+    "wrong at p > 0.95",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,81 +42,99 @@ class Rule:
     """A rule of the decision and the policy without it."""
 
     words: str
-    without: Policy
-    findings_count: bool = True
-    """Whether what no effect does among the findings about instruments counts."""
+    policy: Policy = POLICY
+    other_forms: bool = True
+    """Whether another form of a family is a hypothesis."""
+    findings: bool = True
+    """Whether what is measured of an instrument and no effect does is something unknown."""
 
 
 RULES = (
-    Rule("all rules", POLICY),
-    Rule("a further cause explains a share or clears", replace(POLICY, further_share=0.0)),
-    Rule("… or clears what it improves", replace(POLICY, further_leaves=-1.0)),
-    Rule("a weak cause stands where nothing is excluded", replace(POLICY, null_excluded=0.0)),
-    Rule("a weak cause is told beside an unlikely null", replace(POLICY, null_probability=0.0)),
+    Rule("nothing"),
     Rule("a share that remains", replace(POLICY, unknown_share=NEVER)),
     Rule("a group that is off by far", replace(POLICY, unknown_misfit=NEVER)),
-    Rule("a free form gains on top", replace(POLICY, form_nats=NEVER)),
-    Rule("another form is a hypothesis", replace(POLICY, prior_other_form=1e-12)),
-    Rule("findings that no effect does", POLICY, findings_count=False),
-)
-COLUMNS = (
-    "decisions right",
-    "first right ≥ 4 sd",
-    "set holds truth",
-    "calibration error",
-    "AUROC outside",
-    "outside blamed",
-    "wrong at p > 0.95",
+    Rule("a free form that gains on top", replace(POLICY, form_nats=NEVER)),
+    Rule("another form as a hypothesis", other_forms=False),
+    Rule("both of these", replace(POLICY, form_nats=NEVER), other_forms=False),
+    Rule("what no effect does to an instrument", findings=False),
 )
 
 
-class _OnceHeldOut(_Study):
-    """A study that holds runs out once for each answer: no rule changes what a hypothesis predicts."""
-
-    held_out: dict[Hypothesis, tuple[GapSize | None, dict[str, float]]] | None = None
-
-    def _held_out(self, best: Hypothesis) -> tuple[GapSize | None, dict[str, float]]:
-        self.held_out = self.held_out or {}
-        if best not in self.held_out:
-            self.held_out[best] = super()._held_out(best)
-        return self.held_out[best]
-
-
-def conclusions(case: Path) -> list[dict[str, Any]]:
-    """The results of a case, one for each of `RULES`."""
-    rig = load_rig(case / RIG_FILE)
-    runs, limits = prepare([load_run(path, rig) for path in run_files(case)])
-    model, library = model_and_library(runs)
-    experiment, options = Experiment.of(model, runs), Options()
-    findings = findings_of(runs)
-    results = []
-    with Workers(experiment, options.workers) as workers:
-        study = _OnceHeldOut(experiment, library, options, workers)
-        study.fit_all()
-        for rule in RULES:
-            study.policy = rule.without
-            seen = findings if rule.findings_count else [replace(f, unknown=0.0) for f in findings]
-            result = with_findings(study.conclude(list(limits)), seen, rule.without)
-            results.append(result.to_dict())
-    return results
+def concluded(result: dict[str, Any], rule: Rule) -> dict[str, Any]:
+    """A stored result with the probability of something unknown and the decision without a rule."""
+    probes = {name for entry in result["probes"] for name in entry["effects"]}
+    entries = [e for e in result["which"] if rule.other_forms or not probes.intersection(e["effects"])]
+    total = math.fsum(e["probability"] for e in entries)
+    raw = [{**e, "probability": e["probability"] / total if total else 0.0} for e in entries]
+    named = [e for e in raw if not probes.intersection(e["effects"])]
+    unknown = _unknown(result, named, rule.policy)
+    measured = {f["name"] for f in result["findings"]}
+    strange = [f for f in result["findings"] if f["material"] and not f["parameter"]]
+    another_form = 1.0 - math.fsum(e["probability"] for e in named) >= rule.policy.name_probability
+    refused = unknown >= rule.policy.refused or another_form or (rule.findings and bool(strange))
+    decision = result["decision"]
+    if refused:
+        decision = "none_of_these"
+    elif decision == "none_of_these":
+        decision = _named(named, measured, rule.policy)
+    which = [{**e, "probability": (1.0 - unknown) * e["probability"]} for e in raw]
+    found = {**result, "which": which, "set95": _set(raw, rule.policy), "decision": decision}
+    return {**found, "p_unknown": unknown}
 
 
-def judged(folders: Sequence[Path], out: Path) -> list[list[Judged]]:
-    """All cases, judged once for each of `RULES`; a case that is refused counts as one that says nothing."""
+def _unknown(result: dict[str, Any], named: Sequence[dict[str, Any]], policy: Policy) -> float:
+    """Probability of something unknown behind what the best hypothesis leaves."""
+    rest = result["rest"]
+    largest = max((group["discrepancy"] for group in rest["groups"]), default=0.0)
+    share = policy.chance(rest["share"], policy.unknown_share)
+    known = 1.0 - share * policy.chance(rest["nats"], policy.unknown_nats)
+    known *= 1.0 - policy.chance(largest, policy.unknown_misfit)
+    gain = max((form["excess"] for form in result["free_forms"]), default=0.0)
+    best = named[0]["log_evidence"]
+    explained = max(best - next(_nulls(result), best), 0.0)
+    return 1.0 - known * (1.0 - policy.chance(gain, max(policy.form_nats, policy.form_share * explained)))
+
+
+def _nulls(result: dict[str, Any]) -> Iterator[float]:
+    """Log evidence of the hypothesis without a cause."""
+    measured = {finding["name"] for finding in result["findings"]}
+    return (e["log_evidence"] for e in result["which"] if not set(e["effects"]) - measured)
+
+
+def _named(named: Sequence[dict[str, Any]], measured: set[str], policy: Policy) -> str:
+    """The verdict where nothing is refused."""
+    classes: dict[tuple[str, ...], float] = {}
+    for entry in named:
+        key = class_of(tuple(entry["effects"]))
+        classes[key] = classes.get(key, 0.0) + entry["probability"]
+    best = max(classes, key=lambda key: classes[key])
+    if not set(best) - measured:
+        return "nothing_missing"
+    return verdict_of(len(best)) if classes[best] >= policy.name_probability else "cannot_tell"
+
+
+def _set(raw: Sequence[dict[str, Any]], policy: Policy) -> list[dict[str, Any]]:
+    """The most probable hypotheses until they hold what a set shall hold."""
+    kept, total = [], 0.0
+    for entry in raw:
+        if total >= policy.set_content:
+            break
+        kept.append(entry)
+        total += entry["probability"]
+    return kept
+
+
+def judged(folders: Sequence[Path], results: str) -> list[list[Judged]]:
+    """All cases that have a result, judged once for each of `RULES`."""
     found: list[list[Judged]] = [[] for _ in RULES]
     for folder in folders:
         for case in case_folders(folder):
-            kept = out / folder.name / f"{case.name}.json"
-            if not kept.exists():
-                kept.parent.mkdir(parents=True, exist_ok=True)
-                try:
-                    results: list[dict[str, Any]] = conclusions(case)
-                except CannotDiagnose:
-                    results = [{} for _ in RULES]
-                kept.write_text(json.dumps(results), encoding="utf-8")
+            outcome = read_outcome(folder, case.name, results)
+            if outcome is None or not outcome.result:
+                continue
             label = open_label(case, folder.with_name(f"{folder.name}-labels") / f"{case.name}.json")
-            for row, result in zip(found, json.loads(kept.read_text(encoding="utf-8")), strict=True):
-                row.append(judge(label, Outcome(case.name, "", "", 0.0, result or None)))
+            for row, rule in zip(found, RULES, strict=True):
+                row.append(judge(label, replace(outcome, result=concluded(outcome.result, rule))))
     return found
 
 
@@ -126,20 +143,18 @@ def table(found: Sequence[Sequence[Judged]]) -> str:
     lines = [f"| without | {' | '.join(COLUMNS)} |", "|---" * (len(COLUMNS) + 1) + "|"]
     for rule, cases in zip(RULES, found, strict=True):
         columns = by_laboratory(cases)[-1].columns
-        words = "nothing: all rules" if rule is RULES[0] else rule.words
-        lines.append(f"| {words} | {' | '.join(columns.get(name, '–') for name in COLUMNS)} |")
+        lines.append(f"| {rule.words} | {' | '.join(columns.get(name, '–') for name in COLUMNS)} |")
     return "\n".join(lines)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    form = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=form)
     parser.add_argument("folders", nargs="+", type=Path, metavar="DIR")
-    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--results", required=True, metavar="NAME")
     given = parser.parse_args(arguments)
-    print(table(judged(given.folders, given.out)))
+    print(table(judged(given.folders, given.results)))
 
 
 if __name__ == "__main__":
