@@ -19,6 +19,7 @@ from nidaqmx.constants import (
     LoggingOperation,
     LVDTSensitivityUnits,
     OverwriteMode,
+    Signal,
     TaskMode,
     TerminalConfiguration,
     VoltageUnits,
@@ -59,6 +60,9 @@ def create_task(connection: Connection, planned: PlannedTask) -> nidaqmx.Task:
         task.in_stream.overwrite = OverwriteMode.OVERWRITE_UNREAD_SAMPLES
         if planned.start_trigger_source:
             task.triggers.start_trigger.cfg_dig_edge_start_trig(planned.start_trigger_source)
+        if planned.exported_clock:
+            task.export_signals.export_signal(Signal.SAMPLE_CLOCK, planned.exported_clock)
+            task.export_signals.export_signal(Signal.START_TRIGGER, planned.exported_trigger)
     except BaseException:
         task.close()
         raise

@@ -65,6 +65,8 @@ def _check_text(file: Path, there: list[ListedDevice] | None) -> bool:
     for note in plan.notes:
         if note.severity == "warning":
             print_paragraph("Warning", f"{file}: {note.where}: {note.text}", style="bold yellow")
+        elif note.where == "hardware.chassis":
+            print_paragraph("Note", f"{file}: {note.text}", style="bold")
     wrong = [] if there is None else differences(rig.hardware, there)
     for sentence in wrong:
         print_paragraph("Error", f"{file}: {sentence}")

@@ -92,12 +92,22 @@ class Chassis(Table):
     modules: tuple[Module, ...] = Field(min_length=1)
 
 
+class ClockCable(Table):
+    """Cables between equal PFI terminals of cDAQ chassis that have no clock in common."""
+
+    clock: str = "PFI0"
+    """Terminal that carries the sample clock, of every chassis."""
+    trigger: str = "PFI1"
+    """Terminal that carries the start trigger."""
+
+
 class Hardware(Table):
     """The acquisition hardware and how it is reached."""
 
     connection: str = "simulated"
     """``local``, ``grpc://HOST:PORT`` or ``simulated``."""
     chassis: tuple[Chassis, ...] = Field(min_length=1)
+    clock_cable: ClockCable | None = None
     products: tuple[str, ...] = ()
     """Product files in the folder of the rig file, for products that the catalogue lacks."""
     _product_texts: tuple[str, ...] = PrivateAttr(())

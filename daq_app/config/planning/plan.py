@@ -39,6 +39,9 @@ class PlannedTask:
     clock_source: str = ""
     """Terminal of the shared sample clock; empty for the task's own clock."""
     start_trigger_source: str = ""
+    exported_clock: str = ""
+    """Terminal at which the master shows its sample clock to other chassis; empty without cables."""
+    exported_trigger: str = ""
     buffer_samples: int = 0
     """Samples per channel of the driver's circular buffer."""
 

@@ -31,6 +31,7 @@ def plan_notes(
         *geometry_notes(rig),
         *_certificate_notes(rig, today),
         *_task_notes(tasks, devices),
+        *_clock_notes(tasks, devices),
     ]
     return tuple(sorted(notes, key=lambda note: note.severity != "warning"))
 
@@ -185,3 +186,27 @@ def _task_notes(tasks: Sequence[PlannedTask], devices: Mapping[str, Device]) -> 
 
 
 __all__ = ["plan_notes"]
+
+
+def _clock_notes(tasks: Sequence[PlannedTask], devices: Mapping[str, Device]) -> Iterator[PlanNote]:
+    """How chassis come to one clock: over cables that somebody must plug, or over the network."""
+    chassis = list(
+        dict.fromkeys(_device(p.channel, devices).chassis_name for task in tasks for p in task.channels)
+    )
+    if len(chassis) < 2:
+        return
+    master = next(task for task in tasks if task.role == "master")
+    if master.exported_clock:
+        far = [task for task in tasks if task.clock_source.count("/") == 2]
+        clocks = ", ".join(task.clock_source for task in far)
+        starts = ", ".join(task.start_trigger_source for task in far)
+        yield _warning(
+            "hardware.clock_cable",
+            f"{' and '.join(chassis)} are synchronised by cables: {master.exported_clock} to {clocks} "
+            f"(sample clock), {master.exported_trigger} to {starts} (start)",
+        )
+    else:
+        yield _info(
+            "hardware.chassis",
+            f"{' and '.join(chassis)} are synchronised over the network: no cable is needed",
+        )

@@ -19,7 +19,7 @@ from daq_app.config.hardware.wiring import channel_key, terminal_of, wiring_prob
 from daq_app.config.planning.grouping import grouped
 from daq_app.config.planning.plan import PlannedChannel, PlannedTask, TaskPlan
 from daq_app.config.planning.plan_notes import plan_notes
-from daq_app.config.rig import Channel, Rig
+from daq_app.config.rig import Channel, ClockCable, Rig
 
 _GroupKey = tuple[str, str]
 """(clock domain, task family): modules of one group share a task."""
@@ -61,7 +61,7 @@ def channel_problems(
     devices = {name: device for name, device in listed.items() if device}
     members = _members(channels, devices)
     problems += _speed_problems(members, rig.acquisition.rate_hz, file)
-    problems += _clock_problems(members, file)
+    problems += _clock_problems(members, rig.hardware.clock_cable, file)
     return devices, problems
 
 
@@ -128,7 +128,7 @@ def _speed_problems(members: list[_Member], rate_hz: float, file: str) -> list[P
     return problems
 
 
-def _clock_problems(members: list[_Member], file: str) -> list[Problem]:
+def _clock_problems(members: list[_Member], cable: ClockCable | None, file: str) -> list[Problem]:
     """A run has one clock: all modules must be able to share it."""
     problems = []
     domains: dict[str, _Member] = {}
@@ -137,10 +137,15 @@ def _clock_problems(members: list[_Member], file: str) -> list[Problem]:
     if len(domains) > 1:
         first, *others = domains.values()
         for other in others:
+            if cable is not None and {first.device.chassis.bus, other.device.chassis.bus} == {"cdaq"}:
+                continue
             wrong = (
                 f"`{other.device.chassis_name}` and `{first.device.chassis_name}` have no common sample clock"
             )
-            right = "Put all modules into one chassis, or into network-synchronised ones (cDAQ-9185, 9189)"
+            right = (
+                "Put all modules into one chassis or into network-synchronised ones (cDAQ-9185, 9189), or "
+                "join PFI terminals of cDAQ chassis by cables and add [hardware.clock_cable]"
+            )
             if other.device.chassis.bus != first.device.chassis.bus:
                 wrong += " (cDAQ and PXIe cannot share a task)"
             problems.append(
@@ -150,7 +155,7 @@ def _clock_problems(members: list[_Member], file: str) -> list[Problem]:
     masters = [
         key for key, group in groups.items() if any(not m.device.product.external_clock for m in group)
     ]
-    if len(domains) == 1 and len(masters) > 1:
+    if (len(domains) == 1 or cable is not None) and len(masters) > 1:
         families = " and ".join(family for _, family in masters)
         wrong = f"modules of {families} each insist on their own sample clock"
         right = "Use modules of one of these families only"
@@ -182,6 +187,7 @@ def _tasks(groups: Mapping[_GroupKey, list[_Member]], rig: Rig, rate: float) -> 
     prefix = f"/{master_device.name}/ai"
     if master_device.chassis.bus == "cdaq":
         prefix = f"/{master_device.chassis_name}/ai"
+    domains = len({_clock_domain(group[0].device) for group in ordered})
     tasks = []
     for number, group in enumerate(ordered):
         skews = catalogue.task_skews_s([(m.device.name, m.device.product) for m in group], rate)
@@ -190,6 +196,13 @@ def _tasks(groups: Mapping[_GroupKey, list[_Member]], rig: Rig, rate: float) -> 
             for m, skew in zip(group, skews, strict=True)
         )
         slave = number > 0
+        cable = rig.hardware.clock_cable if domains > 1 else None
+        far = cable is not None and _clock_domain(group[0].device) != _clock_domain(master_device)
+        clock, trigger = f"{prefix}/SampleClock", f"{prefix}/StartTrigger"
+        if cable is not None and far:
+            place = f"/{group[0].device.chassis_name}"
+            clock, trigger = f"{place}/{cable.clock}", f"{place}/{cable.trigger}"
+        shown = f"/{master_device.chassis_name}"
         tasks.append(
             PlannedTask(
                 name=_task_name(group),
@@ -197,8 +210,10 @@ def _tasks(groups: Mapping[_GroupKey, list[_Member]], rig: Rig, rate: float) -> 
                 requested_rate_hz=rig.acquisition.rate_hz,
                 rate_hz=rate,
                 role="slave" if slave else "master",
-                clock_source=f"{prefix}/SampleClock" if slave else "",
-                start_trigger_source=f"{prefix}/StartTrigger" if slave else "",
+                clock_source=clock if slave else "",
+                start_trigger_source=trigger if slave else "",
+                exported_clock="" if slave or cable is None else f"{shown}/{cable.clock}",
+                exported_trigger="" if slave or cable is None else f"{shown}/{cable.trigger}",
                 buffer_samples=buffer_samples,
             )
         )

@@ -241,10 +241,11 @@ class Bench:
 
     def first_edge(self, terminal: str, after_s: float, rising: bool = True) -> float | None:
         """First edge at the terminal at or after the instant: commanded, or a pulse of another task."""
-        wanted = plain(terminal)
-        seen = [t for t, up in self._edges.get(wanted, ()) if t >= after_s and up is rising]
-        for task in self.tasks.values():
-            seen += [t for t in task.edges_at(wanted) if t >= after_s - 1e-12]
+        seen: list[float] = []
+        for end in self.inventory.joined(plain(terminal)):
+            seen += [t for t, up in self._edges.get(end, ()) if t >= after_s and up is rising]
+            for task in self.tasks.values():
+                seen += [t for t in task.edges_at(end) if t >= after_s - 1e-12]
         return min(seen, default=None)
 
     def reset(self) -> None:

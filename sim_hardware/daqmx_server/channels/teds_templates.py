@@ -1,7 +1,9 @@
 """Standard templates of IEEE 1451.4: which channel attributes a sensor's data sheet gives.
 
-Read here are the fields that NI-DAQmx takes over: sensitivities, bridge, thermocouple, RTD and thermistor
-constants, units. Widths and scalings are those of the standard's templates 25 to 38.
+Read here are fields that NI-DAQmx takes over: sensitivities, bridge, units, constants of thermocouples, RTDs
+and thermistors. Widths and scalings of templates 25, 27, 30 to 33 and 36 to 38 are those with which sample
+files of NI give the values that NI's tests expect; other values of the same fields are not confirmed, and
+fields that are passed over are not checked. The template of strain gauges (35) is not read.
 """
 
 from __future__ import annotations

@@ -87,6 +87,8 @@ class Inventory:
     devices: dict[str, Device] = field(default_factory=dict)
     accessories: dict[str, list[tuple[int, str]]] = field(default_factory=dict)
     """Device → (connector, product) of the terminal blocks on it."""
+    cables: list[frozenset[str]] = field(default_factory=list)
+    """Terminals that a cable joins, by their plain names (``cdaq1/pfi0``)."""
 
     def add(self, device: Device) -> None:
         self.devices[device.name] = device
@@ -98,6 +100,10 @@ class Inventory:
         A PXI chassis is no device of NI-DAQmx: its cards stand for themselves.
         """
         inventory = cls()
+        cable = rig.hardware.clock_cable
+        for terminal in () if cable is None else (cable.clock, cable.trigger):
+            ends = (f"{entry.name}/{terminal}".lower() for entry in rig.hardware.chassis)
+            inventory.cables.append(frozenset(ends))
         own = own_products(rig.hardware)
         for entry in rig.hardware.chassis:
             chassis = catalogue.chassis(entry.product, own.chassis)
@@ -116,6 +122,10 @@ class Inventory:
         return [
             device for device in self.devices.values() if device.product is None and not device.is_chassis
         ]
+
+    def joined(self, terminal: str) -> frozenset[str]:
+        """The plain name of a terminal, and those of the terminals that a cable joins with it."""
+        return next((cable for cable in self.cables if terminal in cable), frozenset({terminal}))
 
     def device(self, name: str) -> Device:
         """Case-insensitive, as in NI-DAQmx; a channel names its device, too. −200220 if there is none."""

@@ -265,14 +265,14 @@ class TaskTiming:
         """
         if not self.source_is_foreign:
             return None
-        wanted = plain(self.source)
+        wanted = self._task.bench.inventory.joined(plain(self.source))
         drivers = [
             other
             for other in cast("dict[str, TimedTask]", self._task.bench.tasks).values()
             if other is not self._task
             and other.is_reserved
             and not other.timing.source_is_foreign
-            and wanted in terminals_of(other, "SampleClock")
+            and wanted & terminals_of(other, "SampleClock")
         ]
         running = [other for other in drivers if other.run is not None]
         return next(iter(running or drivers), None)
