@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from daq_app.gap.core import diagnose
@@ -13,7 +15,7 @@ ALL = BY_WORDS["nothing"]
 
 
 @pytest.mark.parametrize("given", [{"slope_k": 0.05}, {"step_h": 0.05}, {}], ids=["effect", "form", "none"])
-def test_all_rules_conclude_what_the_diagnosis_did(given: dict[str, float]) -> None:
+def test_all_rules_conclude_what_the_diagnosis_did(given: dict[str, Any]) -> None:
     result = diagnose(DecayModel(), make_runs(2, scatter=0.002, **given), LIBRARY).to_dict()
     again = concluded(result, ALL)
     assert again["decision"] == result["decision"]

@@ -30,7 +30,7 @@ def _block(key: str, given: dict[str, float]) -> tuple[Block, np.ndarray]:
         ("drift@WP-1", {"rate": 8e-4}),
         ("wire_anchor@WP-2", {"height": 0.34}),
         ("wire_anchor@WP-3", {"height": -0.4}),
-        ("wire_anchor@WP-2", {"height": -0.12}),
+        ("wire_anchor@WP-2", {"height": -0.08}),
         ("wire_cosine@WP-4", {"kappa": 0.2}),
     ],
 )
