@@ -73,7 +73,7 @@ class ReplayDriver:
         return Opened(
             rate_hz=self._recording.rate_hz,
             ranges={
-                name: channel.input_range_v if channel.measurement == "voltage" else channel.range_si
+                name: channel.range_si if channel.scaled_by_driver else channel.input_range_v
                 for name, channel in channels.items()
             },
             buffer_samples=self._recording.n_samples,

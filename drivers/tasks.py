@@ -12,7 +12,10 @@ from nidaqmx.constants import (
     AccelSensitivityUnits,
     AccelUnits,
     AcquisitionType,
+    BridgeConfiguration,
+    BridgeUnits,
     Coupling,
+    CurrentUnits,
     ExcitationSource,
     LengthUnits,
     LoggingMode,
@@ -21,7 +24,9 @@ from nidaqmx.constants import (
     OverwriteMode,
     Signal,
     TaskMode,
+    TemperatureUnits,
     TerminalConfiguration,
+    ThermocoupleType,
     VoltageUnits,
 )
 
@@ -34,6 +39,11 @@ NOT_WHILE_LOGGING: Final = -201300
 """NI-DAQmx's code for an attribute that excludes its own logging (`nidaqmx.error_codes`)."""
 _DEFAULT_LVDT_EXCITATION_V = 3.0
 _DEFAULT_LVDT_FREQUENCY_HZ = 2500.0
+_BRIDGES = {
+    "full": BridgeConfiguration.FULL_BRIDGE,
+    "half": BridgeConfiguration.HALF_BRIDGE,
+    "quarter": BridgeConfiguration.QUARTER_BRIDGE,
+}
 _DEFAULT_IEPE_CURRENT_A = 0.002
 """What the NI 9234 delivers; nidaqmx would ask for 4 mA, which that module refuses."""
 
@@ -110,7 +120,14 @@ def log_to_tdms(task: nidaqmx.Task, path: PurePath) -> None:
 
 
 def _add_channel(task: nidaqmx.Task, channel: Channel) -> None:
-    add = {"voltage": _add_voltage, "iepe": _add_iepe, "lvdt_native": _add_lvdt}[channel.measurement]
+    add = {
+        "voltage": _add_voltage,
+        "iepe": _add_iepe,
+        "lvdt_native": _add_lvdt,
+        "current": _add_current,
+        "bridge": _add_bridge,
+        "thermocouple": _add_thermocouple,
+    }[channel.measurement]
     add(task, channel)
 
 
@@ -123,6 +140,46 @@ def _add_voltage(task: nidaqmx.Task, channel: Channel) -> None:
         min_val=low,
         max_val=high,
         units=VoltageUnits.VOLTS,
+    )
+
+
+def _add_current(task: nidaqmx.Task, channel: Channel) -> None:
+    low, high = channel.input_range_v
+    task.ai_channels.add_ai_current_chan(
+        channel.physical_channel,
+        name_to_assign_to_channel=virtual_name(channel),
+        terminal_config=TerminalConfiguration[channel.terminal_config],
+        min_val=low,
+        max_val=high,
+        units=CurrentUnits.AMPS,
+    )
+
+
+def _add_bridge(task: nidaqmx.Task, channel: Channel) -> None:
+    low, high = channel.input_range_v
+    internal = channel.excitation.kind == "internal_voltage"
+    task.ai_channels.add_ai_bridge_chan(
+        channel.physical_channel,
+        name_to_assign_to_channel=virtual_name(channel),
+        min_val=low,
+        max_val=high,
+        units=BridgeUnits.VOLTS_PER_VOLT,
+        bridge_config=_BRIDGES[channel.bridge],
+        voltage_excit_source=ExcitationSource.INTERNAL if internal else ExcitationSource.EXTERNAL,
+        voltage_excit_val=channel.excitation.value,
+        nominal_bridge_resistance=channel.bridge_ohm,
+    )
+
+
+def _add_thermocouple(task: nidaqmx.Task, channel: Channel) -> None:
+    low, high = channel.range_si
+    task.ai_channels.add_ai_thrmcpl_chan(
+        channel.physical_channel,
+        name_to_assign_to_channel=virtual_name(channel),
+        min_val=low,
+        max_val=high,
+        units=TemperatureUnits.DEG_C,
+        thermocouple_type=ThermocoupleType[channel.thermocouple],
     )
 
 
@@ -174,6 +231,9 @@ def read_ranges(task: nidaqmx.Task, planned: PlannedTask) -> dict[str, tuple[flo
     """Channel id → the module's input range, in the unit of the reading."""
     ranges = {}
     for item, created in zip(planned.channels, task.ai_channels, strict=True):
+        if item.channel.measurement == "thermocouple":  # its range is told in volts, its reading in °C
+            ranges[item.channel.id] = item.channel.range_si
+            continue
         volts = (float(created.ai_rng_low), float(created.ai_rng_high))
         per_reading = _volts_per_reading(item.channel)
         ranges[item.channel.id] = (volts[0] / per_reading, volts[1] / per_reading)

@@ -119,7 +119,7 @@ def _fill_group(
 
 def electrical_per_reading(channel: Channel) -> float:
     """Electrical units at the terminal per unit of the reading (1 where the reading is in volts)."""
-    if channel.measurement == "voltage":
+    if not channel.scaled_by_driver or channel.measurement == "thermocouple":
         return 1.0
     return channel.sensitivity_v_per_si / excitation_v(channel)
 
@@ -137,6 +137,8 @@ def converter_of(rig: Rig, channel: Channel) -> Converter:
         volts_per_electrical = channel.excitation.value or 1.0
         to_volts = electrical_per_reading(channel) * volts_per_electrical
         low, high = channel.range_si[0] * to_volts, channel.range_si[1] * to_volts
-    range_low, range_high = catalogue.coerce_range(device.product, low, high)
+    if channel.measurement == "thermocouple":
+        return Converter(*channel.range_si, device.product.bits)
+    range_low, range_high = catalogue.coerce_range(device.product, low, high, channel.measurement)
     scale = 1.0 / volts_per_electrical
     return Converter(range_low * scale, range_high * scale, device.product.bits)

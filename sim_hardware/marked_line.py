@@ -51,7 +51,7 @@ class MarkedLine:
         channel = self._channels[row]
         if channel.family != "lvdt":
             mixed = ((tick % PERIOD_SAMPLES + 911.0 * row).astype(np.int64) * _KNUTH) >> 13 & 0xFF
-            zero = channel.offset if channel.measurement == "voltage" else 0.0
+            zero = 0.0 if channel.scaled_by_driver else channel.offset
             return zero + _NOISE_V * (mixed / 127.5 - 1.0)
         low, high = channel.input_range_v
         phase = (tick + _LAG_SAMPLES * row) % PERIOD_SAMPLES / PERIOD_SAMPLES

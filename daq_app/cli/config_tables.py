@@ -12,6 +12,7 @@ from daq_app.config import Rig, TaskPlan
 from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.inventory import Device, devices_of
 from daq_app.config.hardware.wiring import terminal_of
+from daq_app.config.shown_units import shown_unit
 
 
 def plan_tables(rig: Rig, plan: TaskPlan) -> Iterator[RenderableType]:
@@ -70,7 +71,7 @@ def _sensor_table(rig: Rig) -> Table:
     )
     for channel in rig.channels:
         low, high = channel.range_si
-        scale, unit = {"m": (1e3, "mm"), "rad": (1e3, "mrad")}.get(channel.si_unit, (1.0, "m/s²"))
+        unit, scale = shown_unit(channel.si_unit)
         sign = "−" if channel.polarity < 0 else ""
         table.add_row(
             channel.id,
@@ -99,7 +100,9 @@ def _wiring_table(rig: Rig, plan: TaskPlan, devices: dict[str, Device]) -> Table
     for channel in rig.channels:
         product = devices[terminal_of(channel)[0]].product
         low, high = channel.input_range_v
-        coerced = catalogue.coerce_range(product, low, high)
+        coerced = (low, high)
+        if channel.measurement != "thermocouple":
+            coerced = catalogue.coerce_range(product, low, high, channel.measurement)
         table.add_row(
             channel.id,
             channel.physical_channel,

@@ -8,22 +8,28 @@ from typing import get_args
 
 from daq_app.config.connection import parse_connection
 from daq_app.config.errors import Problem
+from daq_app.config.families import AUXILIARY
 from daq_app.config.hardware.wiring import channel_key
 from daq_app.config.rig import Channel, Family, Rig, Specimen
-from daq_app.config.units import FAMILY_SI_UNIT, SENSITIVITY_TO_SI
+from daq_app.config.units import SENSITIVITY_TO_SI, sensitivity_units
 from daq_app.config.validation import nearest
 
 _P_TOLERANCE = 0.01
 _OUTPUT_TOLERANCE = 1e-6
 _FAR_M = 1.0
 """A sensor further than this outside the wall is a slip of units, not a sensor of the wall."""
-_A_SENSOR: Mapping[Family, str] = {
+_A_SENSOR: Mapping[str, str] = {
     "lvdt": "an LVDT",
     "wire": "a wire potentiometer",
     "accelerometer": "an accelerometer",
     "tiltmeter": "a tiltmeter",
+    **{name: family.sensor for name, family in AUXILIARY.items()},
 }
-_MEASUREMENT_FAMILY: Mapping[str, Family] = {"iepe": "accelerometer", "lvdt_native": "lvdt"}
+_MEASUREMENT_FAMILY: Mapping[str, tuple[Family, ...]] = {
+    "iepe": ("accelerometer",),
+    "lvdt_native": ("lvdt", "displacement"),
+    "thermocouple": ("temperature",),
+}
 
 
 def rig_problems(
@@ -100,14 +106,20 @@ def _channel_problems(rig: Rig, index: int, channel: Channel, file: str) -> Iter
         wrong = f"is due on {certificate.due}, before it was calibrated ({certificate.calibrated})"
         yield problem("certificate", wrong, "Correct one of the two dates")
     yield from _geometry_problems(rig, index, channel, file)
-    family = _MEASUREMENT_FAMILY.get(channel.measurement, channel.family)
-    if channel.family != family:
+    families = _MEASUREMENT_FAMILY.get(channel.measurement, (channel.family,))
+    if channel.family not in families:
         wrong = f"{_A_SENSOR[channel.family]} cannot be measured as `{channel.measurement}`"
-        yield problem("measurement", wrong, f'"{channel.measurement}" is for family "{family}"')
+        yield problem("measurement", wrong, f'"{channel.measurement}" is for family "{families[0]}"')
+    if (channel.family == "other") != bool(channel.unit.strip()):
+        if channel.unit:
+            yield problem("unit", f"{_A_SENSOR[channel.family]} has a unit already", "Remove it")
+        else:
+            yield problem("unit", "is missing", 'Write the unit of its quantity: unit = "N m"')
+        return
     unit_fault = _unit_problem(index, channel, file)
     if unit_fault:
         yield unit_fault
-    elif low < high and in_low < in_high:
+    elif low < high and in_low < in_high and channel.measurement != "thermocouple":
         yield from _output_problems(index, channel, file)
 
 
@@ -119,6 +131,8 @@ def _geometry_problems(rig: Rig, index: int, channel: Channel, file: str) -> Ite
         (0.0, specimen.height_m),
     )
     for axis, value, (low, high) in zip("xyz", channel.position_m, limits, strict=True):
+        if channel.auxiliary:  # a rope's load cell, a laser on its frame
+            break
         if not low - _FAR_M <= value <= high + _FAR_M:
             wrong = (
                 f"{axis} = {value:g} m is more than {_FAR_M:g} m outside the wall ({low:.3f} to {high:.3f} m)"
@@ -144,7 +158,8 @@ def _geometry_problems(rig: Rig, index: int, channel: Channel, file: str) -> Ite
         )
     if channel.family == "lvdt" and channel.axis != "z":
         wrong = f"an LVDT of the base joint measures along z, not {channel.axis}"
-        yield Problem(file, channel_key(index, channel, "axis"), wrong, 'Write axis = "z"')
+        right = 'Write axis = "z"; axis = "x" or "y" in so many words for one that measures sideways'
+        yield Problem(file, channel_key(index, channel, "axis"), wrong, right)
     if channel.family == "tiltmeter" and channel.axis == "z":
         right = 'Write axis = "x" for the rotation of the rocking motion, "y" for the one along the length'
         yield Problem(
@@ -153,19 +168,20 @@ def _geometry_problems(rig: Rig, index: int, channel: Channel, file: str) -> Ite
 
 
 def _unit_problem(index: int, channel: Channel, file: str) -> Problem | None:
-    unit, si = channel.sensitivity_unit, FAMILY_SI_UNIT[channel.family]
-    fitting = [name for name, (of, _) in SENSITIVITY_TO_SI.items() if of == si]
-    if channel.measurement == "lvdt_native":
-        fitting = ["mV/V/mm"]
-    else:
-        fitting = [name for name in fitting if name != "mV/V/mm"]
+    unit = channel.sensitivity_unit
+    fitting = sensitivity_units(channel.measurement, channel.si_unit)
     if unit in fitting:
         return None
     near = nearest(unit, fitting)
     hint = f"Did you mean `{near[0]}`? " if near and unit not in SENSITIVITY_TO_SI else ""
     kind = _A_SENSOR[channel.family]
-    if channel.measurement == "lvdt_native":
-        kind += " on a native LVDT module"
+    if channel.measurement not in ("voltage", "iepe"):
+        kind += {
+            "lvdt_native": " on a native LVDT module",
+            "current": " with a current output",
+            "bridge": " on a bridge module",
+            "thermocouple": ", which the NI driver scales",
+        }[channel.measurement]
     wrong = f"`{unit}` is no sensitivity unit for {kind}"
     right = f"{hint}Use {', '.join(fitting)}"
     return Problem(file, channel_key(index, channel, "sensitivity_unit"), wrong, right)
@@ -175,13 +191,15 @@ def _output_problems(index: int, channel: Channel, file: str) -> Iterator[Proble
     """The sensor's electrical output over its whole range must fit the input range."""
     low, high = electrical_range_v(channel)
     in_low, in_high = channel.input_range_v
+    volts = {"current": "A", "bridge": "V/V"}.get(channel.measurement, "V")
     slack = _OUTPUT_TOLERANCE * max(1.0, in_high - in_low)
     if low < in_low - slack or high > in_high + slack:
         wrong = (
-            f"over range_si the sensor gives {low:.4g} to {high:.4g} V, beyond {in_low:g} to {in_high:g} V"
+            f"over range_si the sensor gives {low:.4g} to {high:.4g} {volts}, beyond {in_low:g} to "
+            f"{in_high:g} {volts}"
         )
         right = (
-            "Widen input_range_v, or correct sensitivity, offset, range_si (metres, m/s², rad) or polarity"
+            f"Widen input_range_v, or correct sensitivity, offset, range_si ({channel.si_unit}) or polarity"
         )
         yield Problem(file, channel_key(index, channel, "input_range_v"), wrong, right)
 
@@ -190,7 +208,7 @@ def electrical_range_v(channel: Channel) -> tuple[float, float]:
     """Smallest and largest voltage at the terminals over the sensor's range."""
     ends = []
     for quantity in channel.range_si:
-        if channel.measurement == "voltage":
+        if not channel.scaled_by_driver:
             ends.append(channel.offset + channel.polarity * quantity * channel.sensitivity_reading_per_si)
         elif channel.measurement == "iepe":  # AC-coupled: an offset in m/s² adds no voltage
             ends.append(channel.polarity * quantity * channel.sensitivity_v_per_si)

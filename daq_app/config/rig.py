@@ -13,13 +13,19 @@ from __future__ import annotations
 import datetime as dt
 import math
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
-from daq_app.config.units import FAMILY_SI_UNIT, G_M_S2, SENSITIVITY_TO_SI
+from daq_app.config.families import AUXILIARY, Family
+from daq_app.config.units import (
+    FAMILY_SI_UNIT,
+    G_M_S2,
+    READING_UNIT,
+    SENSITIVITY_TO_SI,
+    sensitivity_units,
+)
 
-Family = Literal["lvdt", "wire", "accelerometer", "tiltmeter"]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Vector3 = tuple[Finite, Finite, Finite]
@@ -147,17 +153,27 @@ class Acquisition(Table):
     """|θ|/α from which the pull must stop and be eased back. Assumed."""
 
 
+Count = Annotated[int, Field(ge=0, le=1000, strict=True)]
+
+
 class ExpectedChannels(Table):
     """How many channels of each family the rig must have: a missing sensor is an error."""
 
-    lvdt: Annotated[int, Field(ge=0, le=1000, strict=True)] = 24
-    wire: Annotated[int, Field(ge=0, le=1000, strict=True)] = 5
-    accelerometer: Annotated[int, Field(ge=0, le=1000, strict=True)] = 8
-    tiltmeter: Annotated[int, Field(ge=0, le=1000, strict=True)] = 4
+    lvdt: Count = 24
+    wire: Count = 5
+    accelerometer: Count = 8
+    tiltmeter: Count = 4
+    load_cell: Count = 0
+    strain_gauge: Count = 0
+    laser: Count = 0
+    displacement: Count = 0
+    temperature: Count = 0
+    voltage: Count = 0
+    other: Count = 0
 
     @property
     def total(self) -> int:
-        return self.lvdt + self.wire + self.accelerometer + self.tiltmeter
+        return sum(getattr(self, family) for family in get_args(Family))
 
 
 class Excitation(Table):
@@ -182,8 +198,9 @@ class Channel(Table):
     """One analogue channel: where the sensor is, how it is wired, how its reading becomes SI.
 
     ``quantity_si = polarity · (reading − offset) / sensitivity_si`` where *reading* is what the NI
-    channel returns: volts, except for native LVDT channels (metres) and IEPE accelerometer
-    channels (m/s²), which the NI driver scales itself.
+    channel returns: volts, amperes or volts per volt of excitation (bridges), except for native LVDT
+    channels (metres), IEPE accelerometer channels (m/s²) and thermocouples (°C), which the NI driver
+    scales itself.
     """
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]{0,31}$")]
@@ -194,7 +211,15 @@ class Channel(Table):
     """Fixed end of a wire potentiometer."""
     axis: Literal["x", "y", "z"] = "x"
     """Sensitive axis: z for LVDTs (opening); direction of tilt for tiltmeters; wall-fixed otherwise."""
-    measurement: Literal["voltage", "iepe", "lvdt_native"] = "voltage"
+    unit: Annotated[str, Field(pattern=r"^[ -~°µ²]{0,16}$")] = ""
+    """Unit of the quantity, for family ``other`` only."""
+    measurement: Literal["voltage", "iepe", "lvdt_native", "current", "bridge", "thermocouple"] = "voltage"
+    bridge: Literal["full", "half", "quarter"] = "full"
+    """Bridge circuit of the sensor, for measurement ``bridge``."""
+    bridge_ohm: Positive = 350.0
+    """Resistance of the bridge, Ω."""
+    thermocouple: Literal["B", "E", "J", "K", "N", "R", "S", "T"] = "K"
+    """Type of the thermocouple, for measurement ``thermocouple``."""
     sensitivity: Positive
     sensitivity_unit: str
     offset: Finite = 0.0
@@ -207,7 +232,7 @@ class Channel(Table):
     critical_si: Positive | None = None
     """The same, for what must not be reached."""
     input_range_v: tuple[Finite, Finite] = (-10.0, 10.0)
-    """Range asked of the module, volts."""
+    """Range asked of the module: volts, amperes for ``current``, V/V for ``bridge``."""
     noise_si: Positive
     """Expected rms noise at rest, SI: the sensor check and the simulation use it."""
     time_constant_s: Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)] = 0.0
@@ -217,26 +242,51 @@ class Channel(Table):
     excitation: Excitation = Excitation()
     certificate: Certificate
 
+    @model_validator(mode="before")
+    @classmethod
+    def _joint_lvdts_are_displacements(cls, data: Any) -> Any:
+        """An LVDT along x or y, written so, measures no opening of the base joint: it is auxiliary."""
+        if isinstance(data, dict) and data.get("family") == "lvdt" and data.get("axis") in ("x", "y"):
+            return {**data, "family": "displacement"}
+        return data
+
+    @property
+    def auxiliary(self) -> bool:
+        """Whether rocking analysis and diagnosis leave the channel out."""
+        return self.family in AUXILIARY
+
+    @property
+    def zeroed(self) -> bool:
+        """Whether a zero is taken with the wall upright."""
+        return not self.auxiliary or AUXILIARY[self.family].zeroed
+
     @property
     def si_unit(self) -> str:
-        return FAMILY_SI_UNIT[self.family]
+        return FAMILY_SI_UNIT[self.family] or self.unit
 
     @property
     def reading_unit(self) -> str:
         """Unit of what the NI channel returns."""
-        return {"voltage": "V", "iepe": "m/s2", "lvdt_native": "m"}[self.measurement]
+        return READING_UNIT[self.measurement]
+
+    @property
+    def scaled_by_driver(self) -> bool:
+        """Whether the NI channel returns the quantity itself."""
+        return self.measurement in ("iepe", "lvdt_native", "thermocouple")
 
     @property
     def sensitivity_reading_per_si(self) -> float:
         """Reading per SI unit of the quantity; 1 where the NI driver scales."""
-        if self.measurement != "voltage":
-            return 1.0
-        return self.sensitivity_v_per_si
+        return 1.0 if self.scaled_by_driver else self.sensitivity_v_per_si
 
     @property
     def sensitivity_v_per_si(self) -> float:
-        """The sensor's own sensitivity in volts per SI unit (per volt of excitation for ``mV/V/mm``)."""
-        return self.sensitivity * SENSITIVITY_TO_SI[self.sensitivity_unit][1]
+        """The sensor's own sensitivity in volts (amperes, V/V) per SI unit; for ``mV/V/mm`` of a native
+        LVDT per volt of excitation. `KeyError` for a unit that the sensor cannot have."""
+        known, factor = SENSITIVITY_TO_SI.get(self.sensitivity_unit, ("", 1.0))
+        if known != self.si_unit:
+            factor = sensitivity_units(self.measurement, self.si_unit)[self.sensitivity_unit]
+        return self.sensitivity * factor
 
 
 class Simulation(Table):

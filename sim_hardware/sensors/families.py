@@ -48,6 +48,24 @@ def fill_shortening(
 
 
 @part
+def fill_displacement(
+    row: NDArray[np.float64], height: float, states: NDArray[np.float64], out: NDArray[np.float64]
+) -> None:
+    """Displacement of the wall point (x, y, z) along the laser's axis, seen from the ground, m."""
+    x, y, z, axis = row[la.RW_X], row[la.RW_Y], row[la.RW_Z], row[la.RW_AXIS]
+    bend = (z / height) ** 2
+    for k in range(out.size):
+        sin, versed = states[la.ST_SIN_TOTAL, k], 1.0 - states[la.ST_COS_TOTAL, k]
+        if axis == la.AXIS_X:
+            value = z * sin - x * versed + states[la.ST_UX, k] + bend * states[la.ST_MODE, k]
+            out[k] = value + states[la.ST_TWIST, k] * y * z - states[la.ST_YAW, k] * y
+        elif axis == la.AXIS_Y:
+            out[k] = states[la.ST_YAW, k] * x
+        else:
+            out[k] = states[la.ST_UZ, k] - z * versed - x * sin
+
+
+@part
 def fill_inclination(row: NDArray[np.float64], states: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     """Rotation at a tiltmeter before its slow response, rad; along y only its misalignment shows."""
     share = 1.0 if row[la.RW_AXIS] == la.AXIS_X else row[la.RW_CROSS]
@@ -141,5 +159,7 @@ def fill_quantity(
         fill_specific_force(row, times, events, height, states, out)
     elif family == la.TILTMETER:
         fill_inclination(row, states, out)
+    elif family == la.LASER:
+        fill_displacement(row, height, states, out)
     else:
         out[:] = 0.0

@@ -100,7 +100,15 @@ LVDT: Final = 1
 WIRE: Final = 2
 ACCELEROMETER: Final = 3
 TILTMETER: Final = 4
-FAMILY_CODE: Final = {"lvdt": LVDT, "wire": WIRE, "accelerometer": ACCELEROMETER, "tiltmeter": TILTMETER}
+LASER: Final = 5
+CONSTANT: Final = FLOATING  # nothing of the wall in it: forces, strains, temperatures, voltages
+FAMILY_CODE: Final = {
+    "lvdt": LVDT,
+    "wire": WIRE,
+    "accelerometer": ACCELEROMETER,
+    "tiltmeter": TILTMETER,
+    "laser": LASER,
+}
 
 AXIS_X: Final = 0
 AXIS_Y: Final = 1

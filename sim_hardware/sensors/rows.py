@@ -18,6 +18,8 @@ IEPE_CORNER_HZ: Final = 0.5
 RING_M_S2: Final = 110.0
 """Ringing of an accelerometer per rad/s of approach: several g for the first impacts of a test."""
 FLOATING_NOISE_V: Final = 2e-3
+ROOM_DEG_C: Final = 20.0
+"""What thermometers of the simulated laboratory show; nothing pulls, strains or commands there."""
 _LEVELLED_RAD: Final = 8e-3
 """A tiltmeter is levelled to within half a degree when it is mounted, however wide its range."""
 
@@ -50,21 +52,24 @@ def sensor_row(channel: Channel, height_m: float, offset_scatter: float, seed: i
     row = blank_row()
     rng = generator(seed, channel.id, "sensor")
     row[la.RW_HUM] = 0.0
-    row[la.RW_FAMILY] = la.FAMILY_CODE[channel.family]
+    row[la.RW_FAMILY] = la.FAMILY_CODE.get(channel.family, la.CONSTANT)
     row[la.RW_X : la.RW_X + 3] = channel.position_m
     if channel.anchor_m is not None:
         row[la.RW_ANCHOR : la.RW_ANCHOR + 3] = channel.anchor_m
     row[la.RW_AXIS] = _AXIS[channel.axis]
     slope = channel.sensitivity_v_per_si / excitation_v(channel)
     row[la.RW_SLOPE] = channel.polarity * slope
-    row[la.RW_ZERO] = channel.offset * (1.0 if channel.measurement == "voltage" else slope)
+    row[la.RW_ZERO] = channel.offset * (slope if channel.scaled_by_driver else 1.0)
     row[la.RW_NOISE] = channel.noise_si
     low, high = channel.range_si
     iepe = channel.measurement == "iepe"
     scatter = offset_scatter * (high - low) * rng.standard_normal()
     if channel.family == "tiltmeter":
         scatter = min(max(scatter, -_LEVELLED_RAD), _LEVELLED_RAD)
-    row[la.RW_OFFSET] = 0.0 if iepe else scatter  # an AC-coupled sensor shows no offset
+    # An AC-coupled sensor shows no offset, and one whose zero is never taken must have none.
+    row[la.RW_OFFSET] = 0.0 if iepe or not channel.zeroed else scatter
+    if channel.family == "temperature":
+        row[la.RW_OFFSET] = ROOM_DEG_C
     row[la.RW_LOW], row[la.RW_HIGH] = low, high
     if channel.family == "accelerometer":
         _ring(row, channel, height_m, rng)

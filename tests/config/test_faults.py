@@ -121,7 +121,7 @@ FAULTS: list[Fault] = [
         lambda t: lvdt(t).update(range_si=[-10.0, 85.0]),
         "channel_defaults.lvdt (LV-A01, LV-A02 … LV-B12: 24 channels).input_range_v",
         "beyond -10 to 10 V",
-        "range_si (metres",
+        "range_si (m)",
     ),
     (
         "empty range",
@@ -188,8 +188,8 @@ FAULTS: list[Fault] = [
     ),
     (
         "axis of an LVDT",
-        lambda t: channel(t, "LV-B01").update(axis="x"),
-        "channels[12] (LV-B01).axis",
+        lambda t: lvdt(t).pop("axis"),
+        "channel_defaults.lvdt (LV-A01, LV-A02 … LV-B12: 24 channels).axis",
         "measures along z",
         'axis = "z"',
     ),

@@ -74,7 +74,7 @@ def test_an_edited_file_is_never_replaced(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (("J2;LVDT", "J2;laser"), "laser"),
+        (("J2;LVDT", "J2;lidar"), "lidar"),
         (("-250;100", "left;100"), "line 2 (J1), column x"),
         (("id;family", "name;family"), "no column `id`"),
         (("16.02.2028", "next year"), "is not a day"),

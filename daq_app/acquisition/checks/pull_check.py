@@ -40,7 +40,7 @@ def expected_change(rig: Rig, rotation_rad: float) -> Floats:
 
     LVDT: opening at its place for a rigid rotation about the edge; wire: shortening by its true
     geometry; tiltmeter: the rotation (x axis) or nothing; accelerometer that responds to DC: the
-    component of gravity; IEPE accelerometer: nothing.
+    component of gravity; IEPE accelerometer: nothing; auxiliary channels: nothing that is known.
     """
     half = rig.specimen.base_width_m / 2.0
     wires = rig.of_family("wire")
@@ -62,7 +62,7 @@ def _expected(channel: Channel, theta: float, half_m: float, shortening_m: float
         case "tiltmeter":
             return theta if channel.axis == "x" else 0.0
         case _:
-            if channel.measurement == "iepe":
+            if channel.measurement == "iepe" or channel.auxiliary:
                 return 0.0
             # Specific force (acceleration − gravity): gravity turns towards −x in the wall's frame.
             components = {"x": -math.sin(theta), "y": 0.0, "z": math.cos(theta) - 1.0}
@@ -126,7 +126,7 @@ def _judge(
     channel: Channel, change: float, expected: float, rotation: float, rig: Rig
 ) -> tuple[float | None, Finding | None]:
     """(measured over expected or None, what is wrong or None)."""
-    if channel.measurement == "iepe":
+    if channel.measurement == "iepe" or channel.auxiliary:
         return None, None
     # The pivot of a real wall moves inwards by centimetres: the near face closes a little.
     slack = 0.15 * rig.specimen.base_width_m * abs(math.sin(rotation)) if channel.family == "lvdt" else 0.0

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.acquisition.checks.check_model import ChannelCheck, Finding, SensorCheck, Verdict
+from daq_app.config.families import AUXILIARY
 from daq_app.config.rig import Channel, Rig
 from daq_app.config.scaling import Scaling
 
@@ -35,6 +36,9 @@ RATE_TOLERANCE: Final = 1e-3
 LEAST_FREE_S: Final = 1800.0
 """The disk must hold at least half an hour of raw data."""
 LEAST_S: Final = 1.0
+_AUXILIARY_BEYOND: Final = 0.01
+"""Share of its range by which an auxiliary channel may stand beyond an end at rest. Assumed; raising it hides
+a zero that is off."""
 _CONVERTER_BITS: Final = 16
 _MAINS_HZ: Final = (50.0, 60.0)
 _N_HARMONICS: Final = 4
@@ -163,6 +167,9 @@ def _signal(channel: Channel, untared: Floats, readings: Floats, overloaded: boo
     spread = float(np.ptp(untared))
     centre = float(np.median(untared))
     smallest, largest = channel.range_si
+    if channel.auxiliary:  # a rope that hangs loose reads zero, which may be the end of the range
+        beyond = _AUXILIARY_BEYOND * (largest - smallest)
+        smallest, largest = smallest - beyond, largest + beyond
     dead = f"reads {float(np.median(readings)):.3g} {channel.reading_unit} at rest"
     if not smallest <= centre <= largest:
         text = (
@@ -172,7 +179,8 @@ def _signal(channel: Channel, untared: Floats, readings: Floats, overloaded: boo
     expected = channel.noise_si
     rms = float(untared.std())
     inset = END_OF_TRAVEL_SHARE * (largest - smallest)
-    if channel.family != "accelerometer" and not smallest + inset < centre < largest - inset:
+    travels = AUXILIARY[channel.family].travels if channel.auxiliary else channel.family != "accelerometer"
+    if travels and not smallest + inset < centre < largest - inset:
         text = f"End of travel: it {dead}, the stop of its range. Set it back, or use a longer sensor."
         return [Finding("travel", Verdict.NO_GO, text)]
     if spread == 0.0 and expected >= 0.5 * converter_step_si(channel):

@@ -71,7 +71,7 @@ def take_tare(rig: Rig, readings: Floats, first_sample: int, resolution: Floats 
     # The certificate's offset is subtracted anyway: the tare is what remains.
     beyond = readings.mean(axis=1) - scaling.zero[:, 0]
     return Tare(
-        {channel.id: float(value) for channel, value in zip(channels, beyond, strict=True)},
+        {channel.id: float(value) for channel, value in zip(channels, beyond, strict=True) if channel.zeroed},
         {
             "taken_utc": dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
             "first_sample": first_sample,
@@ -85,8 +85,11 @@ def take_tare(rig: Rig, readings: Floats, first_sample: int, resolution: Floats 
 def _objection(channel: Channel, mean: float, scatter: float, drift: float, noise: float) -> str:
     if not np.isfinite([mean, scatter]).all():
         return "gives no numbers"
+    if not channel.zeroed:
+        return ""
     span = channel.range_si[1] - channel.range_si[0]
-    if abs(mean) > _LARGEST_SHARE * span:
+    # An auxiliary sensor may stand anywhere in its range: a laser at its distance, a gauge in mid-stroke.
+    if not channel.auxiliary and abs(mean) > _LARGEST_SHARE * span:
         return (
             f"reads {mean:.3g} {channel.si_unit}, far from zero (connected? plugged into its own terminal?)"
         )

@@ -9,12 +9,14 @@ from daq_app.campaign.description import Publication
 from daq_app.campaign.publication.metadata import cited
 from daq_app.campaign.publication.record import PublishedTest
 from daq_app.config import Rig
+from daq_app.config.families import AUXILIARY
 
 _FAMILIES = {
     "lvdt": "LVDTs across the base joint",
     "wire": "wire potentiometers to a fixed frame",
     "accelerometer": "accelerometers",
     "tiltmeter": "tiltmeter axes",
+    **{name: family.plural for name, family in AUXILIARY.items()},
 }
 
 

@@ -38,7 +38,7 @@ _TESTS: Final = (
 _CHANNELS: Final = (
     ("rig", "", "rig file"),
     ("channel", "", "name of the channel; the netCDF variable has underscores for other signs"),
-    ("family", "", "lvdt, wire, accelerometer or tiltmeter"),
+    ("family", "", "lvdt, wire, accelerometer, tiltmeter, or one beside the rocking analysis"),
     ("unit", "", "unit of the values"),
     ("x", "m", "position: through the thickness, from the centre of the base"),
     ("y", "m", "position: along the length"),

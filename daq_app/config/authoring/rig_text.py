@@ -11,15 +11,17 @@ import tomli_w
 from daq_app.config.authoring.block import Block
 from daq_app.config.authoring.sensor import Sensor
 from daq_app.config.authoring.terminals import CHASSIS, chassis_name, modules_for, terminal_config, wire_up
+from daq_app.config.families import Family, is_auxiliary
 from daq_app.config.hardware import catalogue
 from daq_app.config.loader import parse_rig
 from daq_app.config.planning.planner import plan_tasks
-from daq_app.config.rig import Family
 from daq_app.config.shipped import shipped_configs
 from daq_app.config.toml_file import parse_toml, read_text
-from daq_app.config.units import SENSITIVITY_TO_SI
+from daq_app.config.units import FAMILY_SI_UNIT, sensitivity_units
 
 _REACH_V: Final = 10.0
+_NOISE_SHARE: Final = 1e-4
+"""Expected noise of an auxiliary sensor as a share of its range, where the list gives none. Assumed."""
 _WIRE_M: Final = 3.0
 """Distance of a wire's fixed end from the wall where the list gives none. Assumed."""
 _HEAD: Final = """# {name}: written by `daq-app rig new`; edit it, then check it:  daq-app config check FILE
@@ -65,7 +67,7 @@ def write_rig_text(
         _table("hardware", {"connection": "simulated"}),
         _chassis(chassis, modules),
         _table("acquisition", {"rate_hz": rate_hz}),
-        _table("expected_channels", {family: counts[family] for family in get_args(Family)}),
+        _table("expected_channels", _expected(counts)),
         '# The wall behind connection = "simulated"; a real test does not read it.\n'
         + _table("simulation", simulation),
     ]
@@ -77,6 +79,12 @@ def write_rig_text(
     return text
 
 
+def _expected(counts: Mapping[str, int]) -> dict[str, int]:
+    """The families of the rocking motion, and those auxiliary ones that are there."""
+    families = get_args(Family)
+    return {name: counts.get(name, 0) for name in families if name in counts or not is_auxiliary(name)}
+
+
 def _family_defaults() -> Mapping[str, Mapping[str, Any]]:
     """What the rig files that come with the program say of each family of sensors."""
     path = shipped_configs() / "fr2.toml"
@@ -86,7 +94,7 @@ def _family_defaults() -> Mapping[str, Mapping[str, Any]]:
 
 def _channel(sensor: Sensor, defaults: Mapping[str, Mapping[str, Any]], config: str) -> str:
     # A family that does not exist is told by the check of the whole text.
-    base = dict(defaults.get(sensor.family, {}))
+    base = dict(defaults.get(sensor.family, _auxiliary_base(sensor, defaults)))
     certificate = {"number": "unknown", **base.pop("certificate", {}), **sensor.keys.get("certificate", {})}
     base = {key: value for key, value in base.items() if key not in ("assumed", "terminal_config")}
     keys = dict(_reach(sensor, base))
@@ -112,12 +120,21 @@ def _channel(sensor: Sensor, defaults: Mapping[str, Mapping[str, Any]], config: 
     return "[[channels]]\n" + _lines(table)
 
 
+def _auxiliary_base(sensor: Sensor, defaults: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Keys that an auxiliary channel has where the list gives none; empty for a family that there is not."""
+    if not is_auxiliary(sensor.family):
+        return {}
+    noise = _NOISE_SHARE * max(map(abs, dict(_reach(sensor, {})).get("range_si", [1.0])))
+    return {"noise_si": noise, "certificate": defaults["lvdt"]["certificate"]}
+
+
 def _reach(sensor: Sensor, base: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Keys of the channel: the list's over the family's; the sensitivity tells a missing range."""
     given = {key: value for key, value in sensor.keys.items() if key != "certificate"}
     if "sensitivity" in given and "range_si" not in given:
         unit = str(given.get("sensitivity_unit", base.get("sensitivity_unit", "")))
-        per_si = float(given["sensitivity"]) * SENSITIVITY_TO_SI.get(unit, ("", 1.0))[1]
+        si_unit = FAMILY_SI_UNIT.get(sensor.family) or str(given.get("unit", ""))
+        per_si = float(given["sensitivity"]) * sensitivity_units("voltage", si_unit).get(unit, 1.0)
         reach = (_REACH_V - abs(float(given.setdefault("offset", 0.0)))) / per_si if per_si else 0.0
         given["range_si"] = [round(-0.999 * reach, 6), round(0.999 * reach, 6)]
     yield from {

@@ -36,6 +36,7 @@ _READ: Final[Mapping[str, tuple[Callable[[str], Any], str]]] = {
     "axis": (str.lower, "x, y or z"),
     "sensitivity": (_number, "a number"),
     "sensitivity unit": (str, "text"),
+    "unit": (str, "text"),
     "offset": (_number, "a number, in volts"),
     "polarity": (int, "1 or -1"),
     "noise": (_number, "a number, SI"),
@@ -153,6 +154,8 @@ def _keys(cells: dict[str, Any]) -> Iterator[tuple[str, Any]]:
     for name in ("axis", "sensitivity", "offset", "polarity"):
         if cells.get(name) is not None:
             yield name, cells[name]
+    if "unit" in cells:
+        yield "unit", cells["unit"]
     if "sensitivity unit" in cells:
         yield "sensitivity_unit", cells["sensitivity unit"]
     if cells.get("noise") is not None:

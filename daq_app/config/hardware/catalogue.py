@@ -20,7 +20,7 @@ from daq_app.config.validation import nearest
 PADDING_S = 10e-6
 """Settling time that NI-DAQmx adds between two conversions where there is room (NI cDAQ manuals)."""
 _DEFAULT_TIMEBASE_HZ = 80e6
-PLANNED: Final = frozenset({"voltage", "iepe", "lvdt_native"})
+PLANNED: Final = frozenset({"voltage", "iepe", "lvdt_native", "current", "bridge", "thermocouple"})
 """Measurements that a rig file can ask for."""
 _NONE: Final[Mapping[str, Any]] = MappingProxyType({})
 
@@ -120,13 +120,17 @@ def _delta_sigma_rate(clocks: Sequence[DeltaSigma], requested_hz: float) -> floa
     return base / max(lowest, min(highest, math.floor(base / requested_hz * (1 + 1e-12))))
 
 
-def coerce_range(product: str | Product, low_v: float, high_v: float) -> Range:
-    """The narrowest input range of the module that holds [low, high]. Raises `ValueError` if none does."""
+def coerce_range(product: str | Product, low: float, high: float, measurement: str = "voltage") -> Range:
+    """The narrowest input range of the module that holds [low, high]. Raises `ValueError` if none does.
+
+    In amperes for measurement ``current``, V/V for ``bridge``, volts otherwise.
+    """
     item = module(product) if isinstance(product, str) else product
     try:
-        return coerce_range_of(item.ranges_v, low_v, high_v)
+        return coerce_range_of(item.ranges.get(measurement, item.ranges_v), low, high)
     except ValueError as error:
-        raise ValueError(f"{error} V of {item.name}") from None
+        unit = {"current": "A", "bridge": "V/V"}.get(measurement, "V")
+        raise ValueError(f"{error} {unit} of {item.name}") from None
 
 
 def coerce_range_of(ranges: Sequence[Range], low: float, high: float) -> Range:

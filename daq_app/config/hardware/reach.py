@@ -26,6 +26,9 @@ def moved(specimen: Specimen, point: Vector3, theta_rad: float) -> Vector3:
 def expected_si(specimen: Specimen, channel: Channel, theta_rad: float) -> float:
     """What a slow displacement or tilt sensor shows at a rotation; 0 for the others."""
     place = moved(specimen, channel.position_m, theta_rad)
+    if channel.family == "laser":
+        axis = "xyz".index(channel.axis)
+        return place[axis] - channel.position_m[axis]
     if channel.family == "lvdt":
         return place[2] - channel.position_m[2]
     if channel.family == "wire" and channel.anchor_m is not None:

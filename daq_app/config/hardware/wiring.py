@@ -13,7 +13,14 @@ from daq_app.config.validation import nearest
 MAX_SOURCE_IMPEDANCE_OHM = 1e3
 """Above this a multiplexed converter shows part of the previous channel (ghosting; NI on settling time)."""
 
-_MEASURES = {"voltage": "a voltage", "iepe": "an IEPE sensor", "lvdt_native": "an LVDT directly"}
+_MEASURES = {
+    "voltage": "a voltage",
+    "iepe": "an IEPE sensor",
+    "lvdt_native": "an LVDT directly",
+    "current": "a current",
+    "bridge": "a bridge",
+    "thermocouple": "a thermocouple",
+}
 
 
 def channel_key(index: int, channel: Channel, key: str = "") -> str:
@@ -60,7 +67,7 @@ def _channel_problems(index: int, channel: Channel, device: Device, ai: int, fil
     if channel.measurement not in product.measurements:
         able = [_MEASURES[name] for name in _MEASURES if name in product.measurements]
         wrong = f"{product.name} cannot measure {_MEASURES[channel.measurement]}"
-        right = f"It measures {' or '.join(able)}" if able else "It is a bridge module; use another"
+        right = f"It measures {' or '.join(able)}" if able else "Use another module"
         yield Problem(file, channel_key(index, channel, "measurement"), wrong, right)
         return
     config = channel.terminal_config
@@ -72,14 +79,16 @@ def _channel_problems(index: int, channel: Channel, device: Device, ai: int, fil
             right += f"; {config} exists on {_span(product.terminals[config])}"
         yield Problem(file, channel_key(index, channel, "terminal_config"), wrong, right)
     low, high = channel.input_range_v
-    if low < high:
+    if low < high and channel.measurement != "thermocouple":
         try:
-            catalogue.coerce_range(product, low, high)
+            catalogue.coerce_range(product, low, high, channel.measurement)
         except ValueError:
-            ranges = ", ".join(f"{a:g} to {b:g}" for a, b in product.ranges_v)
-            wrong = f"{low:g} to {high:g} V is beyond {product.name}"
+            unit = {"current": "A", "bridge": "V/V"}.get(channel.measurement, "V")
+            spans = product.ranges.get(channel.measurement, product.ranges_v)
+            ranges = ", ".join(f"{a:g} to {b:g}" for a, b in spans)
+            wrong = f"{low:g} to {high:g} {unit} is beyond {product.name}"
             yield Problem(
-                file, channel_key(index, channel, "input_range_v"), wrong, f"Its ranges are {ranges} V"
+                file, channel_key(index, channel, "input_range_v"), wrong, f"Its ranges are {ranges} {unit}"
             )
     yield from _excitation_problems(index, channel, device, file)
 
@@ -109,6 +118,14 @@ def _excitation_problems(index: int, channel: Channel, device: Device, file: str
             wrong += f"{excitation.frequency_hz:g} Hz"
             right = f'kind = "internal_voltage", value = {v_low:g} to {v_high:g} V rms, '
             right += f"frequency_hz = {f_low:g} to {f_high:g}"
+            yield Problem(file, key, wrong, right)
+    elif channel.measurement == "bridge":
+        v_low, v_high = product.excitation_v
+        internal = excitation.kind == "internal_voltage"
+        if not excitation.value or (internal and v_high and not v_low <= excitation.value <= v_high):
+            wrong = f"a bridge needs its excitation, and has {excitation.kind}, {excitation.value:g} V"
+            range_v = f"{v_low:g} to {v_high:g}" if v_high else "the volts of its excitation"
+            right = f'Write excitation = {{ kind = "internal_voltage", value = … }} with {range_v}'
             yield Problem(file, key, wrong, right)
     elif excitation.kind in ("internal_voltage", "internal_current"):
         wrong = f"{product.name} does not supply voltage sensors"

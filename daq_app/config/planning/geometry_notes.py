@@ -65,7 +65,7 @@ def geometry_notes(rig: Rig) -> Iterator[PlanNote]:
             lambda far: f"are fixed up to {far:.2f} m in front of the wall's faces (x = ±{half:.3f} m)",
         )
     yield from _off(
-        rig.channels,
+        [channel for channel in rig.channels if not channel.auxiliary],
         lambda c: abs(c.position_m[1]) - length,
         BRACKET_M,
         lambda far: f"stand up to {far:.2f} m beyond the ends of the wall (y = ±{length:.2f} m)",

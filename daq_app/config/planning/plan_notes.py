@@ -24,6 +24,7 @@ def plan_notes(
         *_rate_notes(rig, tasks, devices),
         *_skew_notes(tasks, devices),
         *_delay_notes(tasks, devices),
+        *_auxiliary_notes(rig, devices),
         *_coupling_notes(rig),
         *_impedance_notes(rig, devices),
         *_potentiometer_notes(rig),
@@ -97,6 +98,27 @@ def _delay_notes(tasks: Sequence[PlannedTask], devices: Mapping[str, Device]) ->
             name,
             f"{devices[name].product.name} lags by {delay * 1e3:.2f} ms (digital filter); the driver does "
             "not correct it, the run file stores it and the analysis does",
+        )
+
+
+def _auxiliary_notes(rig: Rig, devices: Mapping[str, Device]) -> Iterator[PlanNote]:
+    beside = [channel for channel in rig.channels if channel.auxiliary]
+    if beside:
+        yield _info(
+            names(beside),
+            "are recorded, checked, shown and exported; rocking analysis and diagnosis leave them out",
+        )
+    slow: dict[str, list[Channel]] = {}
+    for channel in beside:
+        device = _device(channel, devices)
+        if device.product.converter == "slow":
+            slow.setdefault(device.name, []).append(channel)
+    for name, channels in slow.items():
+        product = devices[name].product
+        yield _warning(
+            names(channels),
+            f"{product.name} makes at most {product.max_rate_hz:g} values a second: each is repeated until "
+            "the next, as NI-DAQmx does for slow modules of a fast task",
         )
 
 

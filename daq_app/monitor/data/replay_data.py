@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from daq_app.config.rig import Channel
 from daq_app.config.shown_text import csv_cell
-from daq_app.monitor.data.shown_units import shown_unit
+from daq_app.config.shown_units import shown_unit
 from daq_app.rocking import RotationGeometry, VelocityFilter
 from daq_app.runfile import Event, Gap, open_run
 from daq_app.runfile.durable import written_whole

@@ -23,9 +23,9 @@ from PySide6.QtWidgets import (
 
 from daq_app.acquisition.messages.published import BlockMessage
 from daq_app.config.rig import Channel
+from daq_app.config.shown_units import shown_unit
 from daq_app.monitor.data.channel_look import ChannelLook, expected_density_si, look_at, neighbours
 from daq_app.monitor.data.session import Session
-from daq_app.monitor.data.shown_units import shown_unit
 from daq_app.monitor.plots.plot_base import Plot, envelope, line_pen
 from daq_app.monitor.widgets.labels import DASH, number, role_label, set_role
 from daq_app.monitor.widgets.theme import Colours, apply_theme

@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.config.rig import Family
+from daq_app.config.families import AUXILIARY
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.replay_data import ROTATION, VELOCITY, ReplayRun
 from daq_app.monitor.plots.replay_plots import ReplayPlots, shade
@@ -36,7 +36,7 @@ from daq_app.runfile.durable import written_whole
 from daq_app.runfile.folder import require_replaceable
 
 _NAME = Qt.ItemDataRole.UserRole
-_FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer", "tiltmeter")
+_FAMILIES = ("lvdt", "wire", "accelerometer", "tiltmeter")
 
 
 class ReplayPage(QWidget):
@@ -184,7 +184,8 @@ class ReplayPage(QWidget):
         self.tree.blockSignals(True)
         self.tree.clear()
         titles: dict[str, str] = {"motion": "Motion"}
-        titles.update((name, FAMILY_TITLES[name]) for name in _FAMILIES)
+        titles.update((name, FAMILY_TITLES[name].split(" · ")[0].split(" ")[0]) for name in _FAMILIES)
+        titles.update((name, kind.plural.partition(" (")[0].capitalize()) for name, kind in AUXILIARY.items())
         shown = {ROTATION, VELOCITY}
         accelerometers = [s.name for s in self.run.signals.values() if s.family == "accelerometer"]
         shown.update(accelerometers[:1])
@@ -192,7 +193,7 @@ class ReplayPage(QWidget):
             names = [s.name for s in self.run.signals.values() if s.family == family]
             if not names:
                 continue
-            parent = QTreeWidgetItem([title.split(" · ")[0].split(" ")[0], ""])
+            parent = QTreeWidgetItem([title, ""])
             parent.setFlags(parent.flags() | Qt.ItemFlag.ItemIsAutoTristate | Qt.ItemFlag.ItemIsUserCheckable)
             self.tree.addTopLevelItem(parent)
             for name in names:

@@ -21,6 +21,13 @@ TITLES = {
     "wire": "Wires  (mm)",
     "accelerometer": "Accel.  (m/s²)",
     "tiltmeter": "Tilt  (mrad)",
+    "load_cell": "Force  (kN)",
+    "strain_gauge": "Strain  (µm/m)",
+    "laser": "Lasers  (mm)",
+    "displacement": "Displacement  (mm)",
+    "temperature": "Temperature  (°C)",
+    "voltage": "Voltage  (V)",
+    "other": "Others",
 }
 _MARKED_EVENTS = {"released": "release", "at_rest": "rest", "marker": "marker", "gap": "gap", "note": "note"}
 

@@ -18,20 +18,23 @@ from PySide6.QtGui import QColor, QFontMetrics, QMouseEvent, QPainter, QPaintEve
 from PySide6.QtWidgets import QWidget
 
 from daq_app.acquisition.messages.published import BlockMessage
-from daq_app.config.rig import Channel, Family, Rig
+from daq_app.config.rig import Channel, Rig
+from daq_app.config.shown_units import shown_unit
 from daq_app.monitor.data.session import Session
-from daq_app.monitor.data.shown_units import shown_unit
 from daq_app.monitor.widgets.labels import DASH, number
-from daq_app.monitor.widgets.theme import DARK, Colours, font
+from daq_app.monitor.widgets.theme import AUXILIARY_GROUP, DARK, Colours, font
 
-FAMILY_TITLES: dict[Family, str] = {
+FAMILY_TITLES: dict[str, str] = {
     "lvdt": "LVDTs · opening of the base joint (mm)",
     "wire": "Wires (mm)",
     "accelerometer": "Accelerometers (m/s²)",
     "tiltmeter": "Tilt (mrad)",
+    AUXILIARY_GROUP: "Other sensors",
 }
 _SMALLEST_SPAN_SI = {"lvdt": 1e-3, "wire": 4e-3, "accelerometer": 1.0, "tiltmeter": 4e-3}
 """A quiet strip is not blown up beyond this, or noise would look like motion."""
+_SMALLEST_SPAN_NOISES = 20.0
+"""The same for auxiliary channels, in their own noise."""
 _TITLE_PX = 18
 _LEAST_ROW_PX = 28
 _LEAST_CELL_PX = 112
@@ -56,35 +59,38 @@ class Cell:
 
 def arrange(
     rig: Rig, width: float, height: float, scale: float = 1.0
-) -> tuple[list[Cell], list[tuple[Family, QRectF]]]:
+) -> tuple[list[Cell], list[tuple[str, QRectF]]]:
     """Cells of all channels and the title box of each family, for a panel of that size and type scale.
 
     Every family gets whole columns; there are as few rows as leave a cell wide enough for its name.
     """
     title = _TITLE_PX * scale
-    families = [family for family in FAMILY_TITLES if rig.of_family(family)]
+    groups: dict[str, list[Channel]] = {name: [] for name in FAMILY_TITLES}
+    for channel in rig.channels:
+        groups[_group(channel)].append(channel)
+    families = [family for family in FAMILY_TITLES if groups[family]]
     if not families:
         return [], []
-    most = max(len(rig.of_family(family)) for family in families)
+    most = max(len(groups[family]) for family in families)
     rows = most
     for candidate in range(1, most + 1):
-        needed = sum(math.ceil(len(rig.of_family(family)) / candidate) for family in families)
+        needed = sum(math.ceil(len(groups[family]) / candidate) for family in families)
         if width / needed >= _LEAST_CELL_PX * scale:
             rows = candidate
             break
     rows = max(1, min(rows, int((height - title) // (_LEAST_ROW_PX * scale))))
-    columns = {family: math.ceil(len(rig.of_family(family)) / rows) for family in families}
-    rows = max(math.ceil(len(rig.of_family(family)) / columns[family]) for family in families)
+    columns = {family: math.ceil(len(groups[family]) / rows) for family in families}
+    rows = max(math.ceil(len(groups[family]) / columns[family]) for family in families)
     total = sum(columns.values())
     cell_width = (width - _GAP_PX * 2 * (len(families) - 1)) / total
     cell_height = (height - title) / rows
     place = {channel.id: index for index, channel in enumerate(rig.channels)}
     cells: list[Cell] = []
-    titles: list[tuple[Family, QRectF]] = []
+    titles: list[tuple[str, QRectF]] = []
     left = 0.0
     for family in families:
         titles.append((family, QRectF(left, 0, columns[family] * cell_width, title)))
-        for order, channel in enumerate(rig.of_family(family)):
+        for order, channel in enumerate(groups[family]):
             column, row = divmod(order, rows)
             box = QRectF(
                 left + column * cell_width,
@@ -99,7 +105,7 @@ def arrange(
 
 def fit(
     rig: Rig, width: float, height: float, most: float
-) -> tuple[list[Cell], list[tuple[Family, QRectF]], float]:
+) -> tuple[list[Cell], list[tuple[str, QRectF]], float]:
     """The arrangement with the largest type scale from 1 to `most` that leaves room for the names."""
     for step in range(round(10 * most), 10, -1):
         cells, titles = arrange(rig, width, height, step / 10)
@@ -119,7 +125,7 @@ class StripPanel(QWidget):
         self._session = session
         self._colours = DARK
         self._cells: list[Cell] = []
-        self._titles: list[tuple[Family, QRectF]] = []
+        self._titles: list[tuple[str, QRectF]] = []
         self._arranged_for: object = None
         self._scale = 1.0
         """Type scale of the strips: where there is too little room for large names they stay smaller."""
@@ -158,7 +164,7 @@ class StripPanel(QWidget):
             )
         channels = rig.channels if rig is not None else ()
         self._spans = np.full((len(channels), 2), np.nan)
-        self._least = np.array([_SMALLEST_SPAN_SI[channel.family] for channel in channels])
+        self._least = np.array([_smallest_span(channel) for channel in channels])
 
     def paintEvent(self, event: QPaintEvent) -> None:
         self.paints += 1
@@ -221,7 +227,7 @@ class StripPanel(QWidget):
         self._follow_spans(low, high)
         painter.setBrush(Qt.BrushStyle.NoBrush)
         for family, _ in self._titles:
-            cells = [cell for cell in self._cells if cell.channel.family == family]
+            cells = [cell for cell in self._cells if _group(cell.channel) == family]
             rows = [cell.index for cell in cells]
             boxes = np.array([_trace_box(cell, self._scale).getRect() for cell in cells])
             if boxes[0, 3] <= _LEAST_TRACE_PX:
@@ -235,8 +241,10 @@ class StripPanel(QWidget):
         painter.setFont(font(8 * self._scale))
         painter.setPen(QColor(self._colours.muted))
         for cell in self._cells:
-            _, factor = shown_unit(cell.channel.si_unit)
+            unit, factor = shown_unit(cell.channel.si_unit)
             value = number(float(mean[cell.index]) * factor, 2) if live and mean is not None else DASH
+            if cell.channel.auxiliary:  # the title of the group names no unit
+                value = f"{value} {unit}"
             painter.drawText(_head(cell, self._scale), _RIGHT, value)
 
     def _follow_spans(self, low: Floats, high: Floats) -> None:
@@ -260,6 +268,15 @@ class StripPanel(QWidget):
             if cell.box.contains(event.position()):
                 self.channel_opened.emit(cell.channel.id)
                 return
+
+
+def _group(channel: Channel) -> str:
+    """Title under which a channel stands: its family, or one for all that is beside the rocking motion."""
+    return AUXILIARY_GROUP if channel.auxiliary else channel.family
+
+
+def _smallest_span(channel: Channel) -> float:
+    return _SMALLEST_SPAN_SI.get(channel.family, _SMALLEST_SPAN_NOISES * channel.noise_si)
 
 
 def _head(cell: Cell, scale: float) -> QRectF:

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHeaderView, QStyledItemDelegate, QStyleOptionView
 
 from daq_app.acquisition.checks.check_model import ChannelCheck, SensorCheck, Verdict
 from daq_app.config.rig import Rig
-from daq_app.monitor.data.shown_units import shown_unit
+from daq_app.config.shown_units import shown_unit
 from daq_app.monitor.widgets.labels import DASH, number
 from daq_app.monitor.widgets.shapes import draw_shape
 from daq_app.monitor.widgets.theme import DARK, Colours

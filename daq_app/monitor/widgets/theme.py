@@ -11,6 +11,10 @@ from typing import Final, Literal
 from PySide6.QtGui import QColor, QFont, QPalette
 from PySide6.QtWidgets import QApplication, QWidget
 
+from daq_app.config.families import is_auxiliary
+
+AUXILIARY_GROUP: Final = "auxiliary"
+"""All families that the rocking analysis leaves out, where they stand together."""
 USUAL_POINTS: Final = 10.0
 """Type size for which fixed sizes are written down."""
 ThemeName = Literal["dark", "light"]
@@ -45,6 +49,7 @@ class Colours:
     wire: str
     accelerometer: str
     tiltmeter: str
+    auxiliary: str
     points: float = 10.0
     """Base type size: everything that is drawn by hand grows with it."""
 
@@ -71,8 +76,8 @@ class Colours:
         return font(points * self.scale, bold=bold)
 
     def family(self, family: str) -> str:
-        """Colour of a sensor family."""
-        return str(getattr(self, family))
+        """Colour of a sensor family; auxiliary families share one."""
+        return str(getattr(self, AUXILIARY_GROUP if is_auxiliary(family) else family))
 
 
 DARK: Final = Colours(
@@ -98,6 +103,7 @@ DARK: Final = Colours(
     wire="#5fd3a2",
     accelerometer="#ffb357",
     tiltmeter="#d39bf5",
+    auxiliary="#d7c8a0",
 )
 
 LIGHT: Final = Colours(
@@ -123,6 +129,7 @@ LIGHT: Final = Colours(
     wire="#0b7a55",
     accelerometer="#b35900",
     tiltmeter="#7d3fb5",
+    auxiliary="#6b5a1f",
 )
 
 THEMES: Final[dict[str, Colours]] = {"dark": DARK, "light": LIGHT}

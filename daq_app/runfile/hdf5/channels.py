@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 
 from daq_app.config import Channel
+from daq_app.config.families import AUXILIARY
 from daq_app.runfile import layout
 from daq_app.runfile.model import RunHeader
 from daq_app.runfile.source import RunScaling
@@ -60,6 +61,8 @@ def _sensor(channel: Channel) -> dict[str, Any]:
 
 
 def _long_name(channel: Channel) -> str:
+    if channel.auxiliary:
+        return f"{AUXILIARY[channel.family].quantity} at {channel.id}"
     quantity = {
         "lvdt": "opening of the base joint",
         "wire": "shortening of the wire",

@@ -122,6 +122,8 @@ def _with_unit(channel: Channel, foreign: ForeignChannel, entry: ChannelMap | No
         raise ValueError(f"the file gives no unit for {foreign.name!r}; {ask}")
     if is_time(unit):
         raise ValueError(f"the file says {foreign.name!r} is in {unit!r}, which is a unit of time; {ask}")
+    if parsed is None and unit.strip() == channel.si_unit:
+        parsed = (channel.si_unit, 1.0)
     if parsed is None or parsed[0] not in (channel.si_unit, channel.reading_unit):
         raise ValueError(f"{unit!r} cannot be the unit of a sensor of family {channel.family}; {ask}")
     is_reading = parsed[0] == channel.reading_unit

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.config.families import AUXILIARY
 from daq_app.config.rig import Channel
 from daq_app.config.scaling import Scaling
 from drivers import Block
@@ -19,7 +20,7 @@ _TRAVEL_SHARE = 0.001
 """Within this share of its travel from either end a sensor stands at its stop: 0.1 mm of 100 mm. Assumed."""
 _BEYOND_SHARE = 0.01
 """A reading further than this share of the travel beyond its end comes from the line, not from the sensor."""
-TRAVELLING = ("lvdt", "wire", "tiltmeter")
+TRAVELLING = ("lvdt", "wire", "tiltmeter", *(name for name, family in AUXILIARY.items() if family.travels))
 """Families with a mechanical or stated end of travel."""
 
 

@@ -31,6 +31,8 @@ def ideal(channel: Channel, scene: Scene, anchor_shift_m: float = 0.0) -> FloatA
             return specific_force(channel, scene)
         case "tiltmeter":
             return tilt(channel, scene)
+        case _:  # nothing of the wall in it
+            return np.zeros_like(scene.theta)
 
 
 def opening(channel: Channel, scene: Scene) -> FloatArray:

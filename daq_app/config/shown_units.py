@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-_SI_SHOWN = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "m/s2": ("m/s²", 1.0)}
+_SI_SHOWN = {
+    "m": ("mm", 1e3),
+    "rad": ("mrad", 1e3),
+    "m/s2": ("m/s²", 1.0),
+    "N": ("kN", 1e-3),
+    "m/m": ("µm/m", 1e6),
+    "degC": ("°C", 1.0),
+}
 
 
 def shown_unit(si_unit: str) -> tuple[str, float]:
