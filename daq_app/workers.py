@@ -11,6 +11,10 @@ from multiprocessing import get_all_start_methods, get_context
 from multiprocessing.context import BaseContext
 from typing import Final, TypeVar
 
+from daq_app.machines import run_on_machines
+
+Workers = int | str | None
+"""Processes of this machine (None: one per core), or the address of a dask scheduler."""
 _Job = TypeVar("_Job")
 _Answer = TypeVar("_Answer")
 
@@ -30,16 +34,19 @@ _SURROUNDINGS: Final = {
 def run_all(
     work: Callable[[_Job], _Answer],
     jobs: Sequence[_Job],
-    workers: int | None = None,
+    workers: Workers = None,
     done: Callable[[int, _Job], None] | None = None,
 ) -> list[_Answer]:
     """`work(job)` of every job, in the order of the jobs; `work` and the jobs must be picklable.
 
     `done` is called with (number of jobs done, the job just done). The first exception of a job ends
     it all and is raised; so does Ctrl-C, as soon as the jobs at work have ended.
+    With the address of a scheduler (daq_app.machines) its workers do the jobs, whose paths must be absolute.
     """
     if not jobs:
         return []
+    if isinstance(workers, str):
+        return run_on_machines(work, jobs, workers, done)
     answers: dict[int, _Answer] = {}
     with process_pool(min(workers or os.cpu_count() or 1, len(jobs))) as pool:
         places = {pool.submit(work, job): index for index, job in enumerate(jobs)}

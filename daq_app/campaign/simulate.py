@@ -12,7 +12,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -27,7 +27,7 @@ from daq_app.config import ConfigError, Problem, Rig, TaskPlan, load_rig, plan_t
 from daq_app.runfile import RunFileError
 from daq_app.runfile.durable import replace_durably, write_whole
 from daq_app.runfile.folder import RUN_SUFFIX
-from daq_app.workers import run_all
+from daq_app.workers import Workers, run_all
 from sim_hardware.direct import synthesise_test
 
 TRUTH_FILE: Final = "truth.json"
@@ -83,7 +83,7 @@ def simulate_campaign(
     truth: CampaignTruth,
     out: Path,
     *,
-    workers: int | None = None,
+    workers: Workers = None,
     progress: Progress | None = None,
 ) -> list[Path]:
     """Write one run for every planned test into `out`, and `truth.json` beside them.
@@ -102,6 +102,8 @@ def simulate_campaign(
         if progress:
             progress(kept + number, len(tests), test.test)
 
+    if isinstance(workers, str):  # other machines do not know where this process stands
+        todo = [replace(test, rig=str(Path(test.rig).resolve())) for test in todo]
     with _workshop(out) as workshop:
         run_all(partial(_write_run, workshop=workshop, out=out), todo, workers, done)
     return [out / f"{test.test}{RUN_SUFFIX}" for test in tests]

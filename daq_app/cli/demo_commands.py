@@ -71,7 +71,7 @@ def demo(
         except DayEnded as error:
             print_paragraph("Incomplete", str(error))
             raise typer.Exit(EXIT_FAILED) from None
-    report(runs, campaign_file, folder / "report", None, 0, False)
+    report(runs, campaign_file, folder / "report", None, "", 0, False)
     console.print(f"Look at the last run: daq-app view {taken[-1].run}")
     console.print("Your own wall: daq-app rig new")
 

@@ -17,6 +17,7 @@ from rich.text import Text
 
 from daq_app.cli.terminal import Console
 from daq_app.config import ConfigError, Problem
+from daq_app.machines import SchedulerMissing
 from daq_app.runfile.errors import RunFileError
 from drivers.protocol import DriverError
 
@@ -59,7 +60,7 @@ def reported() -> Iterator[None]:
     except ConfigError as error:
         print_problems(error.problems)
         raise typer.Exit(EXIT_BAD_INPUT) from None
-    except RunFileError as error:
+    except (RunFileError, SchedulerMissing) as error:
         print_paragraph("Error", str(error))
         raise typer.Exit(EXIT_BAD_INPUT) from None
     except DriverError as error:

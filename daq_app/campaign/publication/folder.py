@@ -26,7 +26,7 @@ from daq_app.runfile import DerivedData, Run, RunFileError, open_run
 from daq_app.runfile.durable import write_whole
 from daq_app.runfile.exporters import export_run
 from daq_app.runfile.folder import find_runs
-from daq_app.workers import run_all
+from daq_app.workers import Workers, run_all
 
 Derive = Callable[[Run], DerivedData | None]
 _CHUNK: Final = 1 << 20
@@ -69,7 +69,7 @@ def publish(
     *,
     derive: Derive,
     draw: Callable[[Path], object],
-    workers: int | None = None,
+    workers: Workers = None,
     progress: Callable[[int, int, str], None] = lambda done, total, name: None,
 ) -> Path:
     """Write the folder `out`, which must not exist; returns it.

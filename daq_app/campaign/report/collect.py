@@ -21,7 +21,7 @@ from daq_app.rocking.analysis.results import Series, TestAnalysis
 from daq_app.rocking.record import TestRecord
 from daq_app.runfile import Run, RunFileError, open_run
 from daq_app.runfile.folder import RUN_SUFFIX, find_runs
-from daq_app.workers import run_all
+from daq_app.workers import Workers, run_all
 
 _KEYS = {"CRT": "crt", "EAV": "eav"}
 _SHOWN_RATE_HZ = 200.0
@@ -56,7 +56,7 @@ def collect(
     folder: Path,
     *,
     options: AnalysisOptions | None = None,
-    workers: int | None = None,
+    workers: Workers = None,
     progress: Progress | None = None,
 ) -> Collected:
     """Judge and analyse all runs of a folder and below; lost tests are not analysed.

@@ -11,10 +11,12 @@ import typer
 from daq_app.campaign.plan import Campaign
 from daq_app.cli.campaign.progress import DEFAULT_PLAN, open_plan, progress_bar
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
+from daq_app.cli.scheduler_option import SchedulerOption
 from daq_app.cli.terminal import Console, echo
 from daq_app.config import ConfigError, Problem
 from daq_app.runfile import RunFileError
 from daq_app.runfile.durable import write_whole
+from daq_app.workers import Workers
 
 if TYPE_CHECKING:
     from daq_app.campaign.publication.fields import Values
@@ -42,6 +44,7 @@ def publish(
         typer.Option("--fields", help="Only write an empty fields.csv beside the runs, to be filled in."),
     ] = False,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="all cores")] = None,
+    scheduler: SchedulerOption = "",
 ) -> None:
     """Make a folder that a repository takes: data, tables, figures, README, licence, metadata, checksums.
 
@@ -53,6 +56,8 @@ def publish(
         # Imported here: `--help` should not load SciPy.
         from daq_app.campaign.publication.folder import sources
 
+        if scheduler:  # its workers do not know where this process stands
+            folder = folder.resolve()
         found, left_out = sources(folder)
         if not found:
             raise RunFileError(f"{folder} holds no released test", advice="Give the folder of the runs.")
@@ -69,7 +74,16 @@ def publish(
             echo("Nothing is missing." if not missing else f"{len(missing)} things are missing.")
             raise typer.Exit(EXIT_FAILED if missing else 0)
         target = out or folder.with_name(f"{folder.resolve().name}-published")
-        _make(target, folder, found, left_out, campaign, values, workers)
+        target = target.resolve() if scheduler else target
+        _make(
+            target,
+            folder.resolve() if scheduler else folder,
+            found,
+            left_out,
+            campaign,
+            values,
+            scheduler or workers,
+        )
         Console().print(f"{target}: {len(found)} tests", highlight=False, markup=False, soft_wrap=True)
         if as_zip:
             made = _zipped(target)
@@ -118,7 +132,7 @@ def _make(
     left_out: list[str],
     campaign: Campaign,
     values: Values,
-    workers: int | None,
+    workers: Workers,
 ) -> None:
     """Write beside the name and rename: an interrupted publication leaves no half of one."""
     from daq_app.campaign.publication.folder import publish as write_folder
@@ -146,7 +160,7 @@ def _make(
         shutil.rmtree(beside, ignore_errors=True)
 
 
-def _report(place: Path, folder: Path, campaign: Campaign, workers: int | None) -> None:
+def _report(place: Path, folder: Path, campaign: Campaign, workers: Workers) -> None:
     """The campaign report with its figures; left out where no test can be analysed."""
     from daq_app.campaign.report.collect import collect
     from daq_app.campaign.report.write import write_report

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from daq_app.cli.campaign.progress import DEFAULT_PLAN, open_plan, progress_bar
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported, say_other_name
+from daq_app.cli.scheduler_option import SchedulerOption
 from daq_app.cli.terminal import Console, echo_json
 from daq_app.runfile import RunFileError
 from daq_app.workers import warm_up
@@ -27,6 +28,7 @@ def report(
     plan_file: Annotated[Path, typer.Option("--plan", help="Campaign file (TOML).")] = DEFAULT_PLAN,
     out: Annotated[Path | None, typer.Option(help="Folder of the report.", show_default="DIR/report")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="all cores")] = None,
+    scheduler: SchedulerOption = "",
     bias_runs: Annotated[
         int, typer.Option(min=0, help="Simulated tests behind each method's bias; 0 leaves it out.")
     ] = 6,
@@ -56,7 +58,12 @@ def report(
 
         with progress_bar("analysing") as advance:
             options = AnalysisOptions(bias_runs=bias_runs)
-            found = gathering.collect(folder, options=options, workers=workers, progress=advance)
+            found = gathering.collect(
+                folder.resolve() if scheduler else folder,
+                options=options,
+                workers=scheduler or workers,
+                progress=advance,
+            )
         tests, failures = found.tests, found.failures
         for failure in failures:
             print_paragraph("Not analysed", f"{failure.test} ({failure.path}): {failure.reason}")

@@ -10,6 +10,7 @@ import typer
 from daq_app.campaign.plan import Campaign
 from daq_app.cli.campaign.progress import DEFAULT_PLAN, open_plan, progress_bar
 from daq_app.cli.errors import reported
+from daq_app.cli.scheduler_option import SchedulerOption
 from daq_app.cli.terminal import Console
 from daq_app.config import ConfigError, Problem, load_rig
 
@@ -29,6 +30,7 @@ def simulate(
     ] = 0.004,
     seed: Annotated[int, typer.Option(min=0, help="Decides all that is random.")] = 1,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="all cores")] = None,
+    scheduler: SchedulerOption = "",
 ) -> None:
     """Simulate all tests of a campaign; the truth goes into truth.json beside the runs, not into them.
 
@@ -45,7 +47,11 @@ def simulate(
         }
         with progress_bar("simulating") as advance:
             runs = simulate_campaign(
-                campaign, CampaignTruth(specimens, seed), out, workers=workers, progress=advance
+                campaign,
+                CampaignTruth(specimens, seed),
+                out.resolve() if scheduler else out,
+                workers=scheduler or workers,
+                progress=advance,
             )
         truth = ", ".join(f"{name} r = {own.r:g}" for name, own in specimens.items())
         Console().print(f"{len(runs)} runs in {out} ({truth})", highlight=False, markup=False, soft_wrap=True)

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, reported
+from daq_app.cli.scheduler_option import SchedulerOption
 from daq_app.cli.terminal import Console, echo
 from daq_app.config import load_rig
 from daq_app.config.shipped import here_or_shipped
@@ -68,16 +69,15 @@ def register(app: typer.Typer) -> None:
 
 @contextmanager
 def _refusals() -> Iterator[None]:
-    """Broken seals, missing diagnosers, schedulers and engines are told in one paragraph."""
+    """Broken seals, missing diagnosers and engines are told in one paragraph."""
     from daq_app.gap.blind.running.diagnosers import DiagnoserError
-    from daq_app.gap.blind.running.scheduler import SchedulerMissing
     from daq_app.gap.blind.seal import SealBroken
     from daq_app.gap.blind.world.contact.motion import EngineMissing
 
     with reported():
         try:
             yield
-        except (DiagnoserError, EngineMissing, SchedulerMissing, ValueError) as error:
+        except (DiagnoserError, EngineMissing, ValueError) as error:
             print_paragraph("Error", str(error))
             raise typer.Exit(EXIT_BAD_INPUT) from None
         except SealBroken as error:
@@ -124,7 +124,7 @@ def run(
     folder: Annotated[Path, typer.Argument(help="Folder of the cases.", metavar="DIR")],
     diagnoser: Annotated[str, typer.Option(help="module:function that diagnoses a case.")] = _PRODUCT,
     without: _WithoutOption = "",
-    scheduler: Annotated[str, typer.Option(help="Address of a dask scheduler, tcp://HOST:PORT.")] = "",
+    scheduler: SchedulerOption = "",
     results: _ResultsOption = "",
     workers: _WorkersOption = 0,
     timeout: Annotated[float, typer.Option(min=1, help="Longest time for one case, seconds.")] = 1800.0,

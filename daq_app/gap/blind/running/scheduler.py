@@ -7,10 +7,7 @@ from pathlib import Path
 
 from daq_app.gap.blind.layout import RESULTS
 from daq_app.gap.blind.running.runner import Outcome, diagnose_apart, pending, save_outcome
-
-
-class SchedulerMissing(Exception):
-    """dask.distributed is not installed, or its scheduler does not answer."""
+from daq_app.machines import RETRIES, scheduler_client
 
 
 def run_on_scheduler(
@@ -19,20 +16,14 @@ def run_on_scheduler(
     """As `runner.run_pending`, on the workers of the scheduler at `address` (``tcp://HOST:PORT``).
 
     Every worker must see the folder under the same path and have this program installed. Outcomes
-    come back to this process, which alone writes them.
+    come back to this process, which alone writes them. Raises `SchedulerMissing`.
     """
-    try:
-        from distributed import Client, as_completed
-    except ImportError:
-        raise SchedulerMissing("dask.distributed is not installed. Install the extra `scale`") from None
-    try:
-        client = Client(address, timeout=20)
-    except (OSError, ValueError) as error:
-        raise SchedulerMissing(f"no scheduler answers at {address} ({error})") from None
-    with client:
+    with scheduler_client(address) as client:
+        from distributed import as_completed
+
         cases = [case.resolve() for case in pending(folder, diagnoser, kept)]
         jobs = client.map(
-            diagnose_apart, cases, diagnoser=diagnoser, timeout_s=timeout_s, pure=False, retries=2
+            diagnose_apart, cases, diagnoser=diagnoser, timeout_s=timeout_s, pure=False, retries=RETRIES
         )
         for job in as_completed(jobs):
             outcome: Outcome = job.result()
