@@ -130,6 +130,18 @@ def test_all_41_strips_have_their_own_place_inside_the_panel(rig, size):
         assert not any(cell.box.intersects(other.box) for other in cells[place + 1 :])
 
 
+def test_sensors_beside_the_rocking_motion_stand_under_one_title(rig):
+    load_cell = rig.channel("WP-1").model_copy(
+        update={"id": "ROPE", "family": "load_cell", "sensitivity_unit": "mV/kN", "anchor_m": None}
+    )
+    laser = rig.channel("WP-2").model_copy(update={"id": "TOP", "family": "laser", "anchor_m": None})
+    more = rig.model_copy(update={"channels": (load_cell, *rig.channels, laser)})
+    cells, titles = arrange(more, 1800, 260)
+    assert [family for family, _ in titles][-1] == "auxiliary"
+    assert sorted(cell.index for cell in cells) == list(range(43))
+    assert {cell.channel.id for cell in cells[-2:]} == {"ROPE", "TOP"}
+
+
 def test_drawing_decimation_keeps_every_extreme():
     rng = np.random.default_rng(2)
     y = rng.normal(size=20_000)
