@@ -136,7 +136,7 @@ def test_margin_alarms_by_word_and_role(session, clock, rig):
             rate_hz=4000.0,
             rotation_rad=[theta],
             velocity_rad_s=[0.0],
-            tilt_rad=theta,
+            judged_rad=theta,
         )
         session.feed(Published(motion, clock.now))
         text = tile_texts(session)["margin"]

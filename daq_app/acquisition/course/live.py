@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from daq_app.acquisition.course.judged_rotation import JudgedRotation
 from daq_app.acquisition.course.unheld_release import UnheldReleaseWatch
 from daq_app.acquisition.messages.published import BlockMessage, EstimateMessage, MotionMessage
 from daq_app.acquisition.messages.publisher import Publisher
@@ -31,8 +32,9 @@ class LiveView:
         self._analyser: LiveAnalyser | None = LiveAnalyser(rig, rate_hz, tare)
         self._step = max(1, round(rate_hz / _MOTION_RATE_HZ))
         self._unheld = UnheldReleaseWatch(rig, rate_hz)
+        self._judged = JudgedRotation(rig)
         self.rotation_rad = math.nan
-        """Mean rotation of the last block: from the tiltmeters, else from the wires."""
+        """The rotation that a pull is judged by, after the last block."""
         self.held_since: int | None = None
         """Sample from which on the wall has been held still; None while it is not."""
         self.estimate: Estimate | None = None
@@ -65,14 +67,12 @@ class LiveView:
                 "rest are not detected any more: stop by hand, and analyse the run afterwards"
             )
             return ()
+        self.rotation_rad = self._judge(result)
         self._publish(result)
         if result.excluded_wires != self._excluded:
             self._excluded = result.excluded_wires
             if self._excluded:
                 self.trouble = f"These wires disagree with the others: {', '.join(self._excluded)}"
-        self.rotation_rad = result.tilt_rad
-        if not math.isfinite(self.rotation_rad) and result.rotation_rad.size:
-            self.rotation_rad = float(result.rotation_rad[-1])
         events = result.events + self._follow_unheld(result)
         for event in events:
             if event.kind == "hold":
@@ -80,6 +80,17 @@ class LiveView:
             elif event.kind in ("hold_lost", "release"):
                 self.held_since = None
         return events
+
+    def _judge(self, result: LiveResult) -> float:
+        if not result.rotation_rad.size:
+            return self.rotation_rad
+        return self._judged.of_block(
+            float(result.rotation_rad[-1]),
+            float(np.max(np.abs(result.velocity_rad_s))),
+            result.tilt_rad,
+            result.rotation_rad.size / self._rate_hz,
+            free=result.phase not in (Phase.WAITING, Phase.HOLDING),
+        )
 
     def _follow_unheld(self, result: LiveResult) -> tuple[PhaseEvent, ...]:
         """A wall that moves freely without having been held: the phase detector knows nothing of it."""
@@ -117,6 +128,6 @@ class LiveView:
                 rate_hz=self._rate_hz,
                 rotation_rad=rotation.tolist(),
                 velocity_rad_s=result.velocity_rad_s[start :: self._step].tolist(),
-                tilt_rad=result.tilt_rad,
+                judged_rad=self.rotation_rad,
             )
             self._publisher.send("motion", motion)

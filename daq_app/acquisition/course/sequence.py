@@ -10,8 +10,6 @@ from daq_app.acquisition.messages.published import State
 from daq_app.config.rig import Acquisition
 from daq_app.rocking.motion.phases import PhaseEvent
 
-RECORDING = frozenset({State.ARMED, State.HOLDING, State.RELEASED, State.ROCKING, State.AT_REST})
-
 
 @dataclass(frozen=True, slots=True)
 class Change:

@@ -32,6 +32,10 @@ class State(StrEnum):
     FAILED = "failed"
 
 
+RECORDING = frozenset({State.ARMED, State.HOLDING, State.RELEASED, State.ROCKING, State.AT_REST})
+"""States in which an armed run is written."""
+
+
 class Message(BaseModel):
     # NaN (a half-cycle that could not be fitted) travels as the string "NaN": plain JSON has no such number.
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
@@ -121,8 +125,8 @@ class MotionMessage(Message):
     rate_hz: float
     rotation_rad: list[float]
     velocity_rad_s: list[float]
-    tilt_rad: float
-    """Mean of the tiltmeters' rotation over the block (slow, accurate: θ0)."""
+    judged_rad: float
+    """The rotation that a pull is judged by: movement of the wires, level of the tiltmeters."""
 
 
 class EstimatePoint(Message):

@@ -50,7 +50,6 @@ class RunView:
         self._health: HealthMessage | None = None
         self._estimate: EstimateMessage | None = None
         self._rotation_rad = math.nan
-        self._tilt_rad = math.nan
         self.zeroed = bool(about.get("tare"))
         """Whether the live r rests on a zero."""
         self._told_impacts = 0
@@ -79,11 +78,9 @@ class RunView:
                 self._on_state(message)
             case HealthMessage():
                 self._health = message
-            case MotionMessage(rotation_rad=rotation, tilt_rad=tilt, rate_hz=rate):
+            case MotionMessage(judged_rad=rotation_rad, rate_hz=rate):
                 self._rate_hz = rate
-                self._tilt_rad = tilt
-                if rotation:
-                    self._rotation_rad = rotation[-1]
+                self._rotation_rad = rotation_rad
             case EstimateMessage():
                 self._on_estimate(message)
             case EventMessage(kind="tare"):
@@ -134,7 +131,7 @@ class RunView:
         if math.isfinite(self._rotation_rad):
             share = max(-1.0, min(1.0, self._rotation_rad / reach))
             cells[middle + round(share * middle)] = "█"
-        return Text(f"θ {_mrad(self._rotation_rad)}  {''.join(cells)}  tilt {_mrad(self._tilt_rad)}")
+        return Text(f"θ {_mrad(self._rotation_rad)}  {''.join(cells)}")
 
     def _figures(self) -> Text:
         health = self._health

@@ -6,8 +6,8 @@ import math
 from enum import StrEnum
 from typing import Final
 
-from daq_app.acquisition.messages.published import Call, State
-from daq_app.monitor.data.session import RECORDING, Session
+from daq_app.acquisition.messages.published import RECORDING, Call, State
+from daq_app.monitor.data.session import Session
 
 REPEAT_S: Final = 3.0
 """What endangers wall or record is said again after so long, until it is over."""

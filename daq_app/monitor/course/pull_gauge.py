@@ -51,14 +51,14 @@ class PullGauge(QWidget):
         self._text.begin()
         width, height = float(self.width()), float(self.height())
         upper = QRectF(0, 0, 0.5 * width, 0.34 * height)
-        self._text.write(painter, upper, number(session.tilt_ratio, 3), colours.text, most_px=110)
+        self._text.write(painter, upper, number(session.judged_ratio, 3), colours.text, most_px=110)
         beside = QRectF(0.52 * width, 0, 0.48 * width, 0.3 * height)
-        detail = number(session.tilt_rad * 1e3, 1, "mrad") if live else DASH
+        detail = number(session.judged_rad * 1e3, 1, "mrad") if live else DASH
         usual_px = 1.35 * colours.points
         self._text.write(
             painter,
             beside,
-            f"θ/α by tiltmeters\n{detail}",
+            f"θ/α\n{detail}",
             colours.muted,
             bold=False,
             wrap=True,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from daq_app.acquisition.messages.published import HealthMessage, State
-from daq_app.monitor.data.session import RECORDING, Session
+from daq_app.acquisition.messages.published import RECORDING, HealthMessage, State
+from daq_app.monitor.data.session import Session
 
 
 @dataclass(frozen=True, slots=True)

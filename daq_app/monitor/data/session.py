@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from daq_app.acquisition.messages.published import (
+    RECORDING,
     BlockMessage,
     EstimateMessage,
     EventMessage,
@@ -50,9 +51,6 @@ RUNNING = frozenset(
     {State.PREVIEWING, State.ARMED, State.HOLDING, State.RELEASED, State.ROCKING, State.AT_REST}
 )
 """States in which the sample clock runs and data must flow."""
-
-RECORDING = frozenset({State.ARMED, State.HOLDING, State.RELEASED, State.ROCKING, State.AT_REST})
-"""States of a run: from arming to its end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +92,7 @@ class Session:
         self.block_mean: NDArray[np.float64] | None = None
         """Mean of each channel over the newest block, SI."""
         self.overloaded: frozenset[str] = frozenset()
-        self.tilt_rad = math.nan
+        self.judged_rad = math.nan
         self.rotation_rad = math.nan
         self.velocity_rad_s = math.nan
         self._running: dict[str, dict[int, tuple[float, float]]] = {"eav": {}, "crt": {}}
@@ -217,7 +215,7 @@ class Session:
             self._recent.popleft()
 
     def _on_motion(self, message: MotionMessage) -> None:
-        self.tilt_rad = message.tilt_rad
+        self.judged_rad = message.judged_rad
         if not message.rotation_rad:
             return
         capacity = max(1, round(TRACE_S * message.rate_hz / message.step))
@@ -238,7 +236,7 @@ class Session:
         self._recent.clear()
         self._newest_sample = 0
         self.block_mean = None
-        self.tilt_rad = self.rotation_rad = self.velocity_rad_s = math.nan
+        self.judged_rad = self.rotation_rad = self.velocity_rad_s = math.nan
 
     # -- reading ---------------------------------------------------------------------------------
 
@@ -266,14 +264,14 @@ class Session:
         return self.state.judgement if self.state is not None and self.linked else Judgement()
 
     @property
-    def tilt_ratio(self) -> float:
-        """|θ|/α by the tiltmeters, as the recorder judges it; NaN when it is not live."""
-        return abs(self.tilt_rad) / self.alpha_rad if self.fresh(MotionMessage) else math.nan
+    def judged_ratio(self) -> float:
+        """|θ|/α as the recorder judges it; NaN when it is not live."""
+        return abs(self.judged_rad) / self.alpha_rad if self.fresh(MotionMessage) else math.nan
 
     @property
     def live_judgement(self) -> Judgement:
         """The judgement with the ratio of this moment: the recorder repeats its own once a second."""
-        ratio = self.tilt_ratio
+        ratio = self.judged_ratio
         return self.judgement.model_copy(update={"ratio": ratio if math.isfinite(ratio) else None})
 
     @property

@@ -11,10 +11,11 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from daq_app.acquisition.checks.check_model import SensorCheck
+from daq_app.acquisition.messages.published import RECORDING
 from daq_app.config.rig import Rig
 from daq_app.monitor.course.pull_gauge import PullGauge
 from daq_app.monitor.data.background import Background
-from daq_app.monitor.data.session import RECORDING, Session
+from daq_app.monitor.data.session import Session
 from daq_app.monitor.widgets.actions import BETWEEN_TESTS
 from daq_app.monitor.widgets.check_table import SHAPES, TONES, CheckTable
 from daq_app.monitor.widgets.labels import PlainLabel, role_label, set_role

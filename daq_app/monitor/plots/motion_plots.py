@@ -12,8 +12,8 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from daq_app.acquisition.messages.published import EstimateMessage, MotionMessage
-from daq_app.monitor.data.session import RECORDING, Session
+from daq_app.acquisition.messages.published import RECORDING, EstimateMessage, MotionMessage
+from daq_app.monitor.data.session import Session
 from daq_app.monitor.plots.plot_base import Array, Axis, Plot, envelope, line_pen
 from daq_app.monitor.plots.theory_overlay import current_restitution, housner_motion
 from daq_app.monitor.widgets.theme import Colours

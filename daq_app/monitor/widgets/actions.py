@@ -11,8 +11,8 @@ from PySide6.QtCore import QTimer, Signal
 from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
-from daq_app.acquisition.messages.published import State
-from daq_app.monitor.data.session import RECORDING, RUNNING
+from daq_app.acquisition.messages.published import RECORDING, State
+from daq_app.monitor.data.session import RUNNING
 from daq_app.monitor.widgets.labels import set_role
 
 CONFIRM_WITHIN_S: Final = 2.5

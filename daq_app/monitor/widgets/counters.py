@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from daq_app.acquisition.messages.published import MotionMessage, State
+from daq_app.acquisition.messages.published import RECORDING, MotionMessage, State
 from daq_app.config.wording import plus_minus
-from daq_app.monitor.data.session import RECORDING, Session
+from daq_app.monitor.data.session import Session
 from daq_app.monitor.widgets.labels import DASH, Tile, number, restitution_text
 
 

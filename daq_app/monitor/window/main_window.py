@@ -17,6 +17,7 @@ from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QPushButton, QWidget
 
 from daq_app.acquisition.messages.published import (
+    RECORDING,
     BlockMessage,
     Call,
     CheckMessage,
@@ -30,7 +31,7 @@ from daq_app.acquisition.messages.published import (
 from daq_app.campaign.plan import Campaign
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.link import Link
-from daq_app.monitor.data.session import RECORDING, Session
+from daq_app.monitor.data.session import Session
 from daq_app.monitor.pages.campaign_page import CampaignPage
 from daq_app.monitor.pages.channel_window import ChannelWindow
 from daq_app.monitor.pages.gap_page import GapPage

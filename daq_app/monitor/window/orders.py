@@ -11,12 +11,12 @@ from PySide6.QtWidgets import QWidget
 
 from daq_app.acquisition.checks.check_model import Verdict
 from daq_app.acquisition.course.tare import UNZEROED
-from daq_app.acquisition.messages.published import Reply, StateMessage
+from daq_app.acquisition.messages.published import RECORDING, Reply, StateMessage
 from daq_app.campaign.plan import Campaign
 from daq_app.campaign.verdicts import give_verdict
 from daq_app.config import ConfigError
 from daq_app.monitor.data.link import Link
-from daq_app.monitor.data.session import RECORDING, Session
+from daq_app.monitor.data.session import Session
 from daq_app.monitor.pages.campaign_page import CampaignPage
 from daq_app.monitor.pages.prepare_page import PreparePage
 from daq_app.monitor.pages.result_page import ResultPage

@@ -26,7 +26,7 @@ def hear(window, state=State.ARMED, **words):
     for heard in (
         message,
         MotionMessage(
-            first_sample=0, step=1, rate_hz=4000.0, rotation_rad=[0.01], velocity_rad_s=[0.0], tilt_rad=0.01
+            first_sample=0, step=1, rate_hz=4000.0, rotation_rad=[0.01], velocity_rad_s=[0.0], judged_rad=0.01
         ),
     ):
         window.session.feed(Published(heard, window.clock.now))

@@ -193,7 +193,7 @@ class StandIn:
                         rate_hz=self.rate_hz,
                         rotation_rad=theta.tolist(),
                         velocity_rad_s=omega.tolist(),
-                        tilt_rad=float(theta.mean()),
+                        judged_rad=float(theta[-1]),
                     ),
                     None,
                 )
