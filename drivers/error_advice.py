@@ -286,11 +286,12 @@ def _from_daqmx(error: ni_errors.DaqError, doing: str, partial: Block | None) ->
 
 
 def _from_rpc(error: ni_errors.RpcError, doing: str, partial: Block | None) -> DriverError:
+    """In the words of the operator; status and text of the transport stay with the cause."""
     status = getattr(error.rpc_code, "name", str(error.rpc_code))
-    fallback = Advice(f"The call to the device server failed ({status})", "Start again", recoverable=True)
-    advice = BY_GRPC_STATUS.get(status, fallback)
+    said = f"The call to the device server failed ({_first_line(str(error.description))})"
+    advice = BY_GRPC_STATUS.get(status, Advice(said, "Start again", recoverable=True))
     return DriverError(
-        f"{advice.what} (while {doing}; gRPC {status}: {_first_line(str(error.description))})",
+        f"{advice.what} (while {doing})",
         advice=advice.do,
         partial=partial,
         retryable=advice.retryable,

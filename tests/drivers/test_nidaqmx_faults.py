@@ -6,13 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import grpc
 import numpy as np
 import pytest
+from nidaqmx.errors import RpcError
 
 from daq_app.config import PlannedChannel
 from daq_app.config.planning.plan import PlannedTask, TaskPlan
 from drivers import Block, Driver, DriverError, open_driver
-from drivers.error_advice import BY_CODE, BY_GRPC_STATUS, advice_for
+from drivers.error_advice import BY_CODE, BY_GRPC_STATUS, advice_for, translate
 
 Laboratories = Callable[..., Any]
 
@@ -471,3 +473,9 @@ def test_every_error_the_operator_will_meet_has_its_sentence() -> None:
         assert advice.do[0].isupper() and not advice.do.endswith(".")
     assert advice_for(-88705).recoverable
     assert "UNAVAILABLE" in BY_GRPC_STATUS
+
+
+@pytest.mark.parametrize("status", list(grpc.StatusCode), ids=lambda status: status.name)
+def test_no_word_of_the_transport_reaches_the_operator(status: grpc.StatusCode) -> None:
+    said = str(translate(RpcError(status, "Deadline Exceeded"), doing="reading"))
+    assert "while reading" in said and status.name not in said and "Deadline Exceeded (" not in said
