@@ -4,7 +4,8 @@ The plain mean is the paper's. The weighted mean is the generalised least-square
 (EAV: each side with a level of its own, so that only pairs of the same side count) or ½ ln E_n (CRT)
 against n, with two sources of error: what each speed or peak is known to (large for the last, small
 cycles), and the scatter of r from impact to impact, which all later values inherit (a random walk).
-The scatter is found by restricted maximum likelihood.
+How large the scatter is, few impacts tell: every size counts by its restricted likelihood, so that the
+standard error holds what is not known of it.
 """
 
 from __future__ import annotations
@@ -24,7 +25,12 @@ Floats = NDArray[np.float64]
 
 _USABLE_RELATIVE_SIGMA = 0.15
 """Speeds and energies known worse than this are listed but not used."""
-_SCATTERS = np.concatenate(([0.0], np.geomspace(5e-4, 0.15, 48)))
+_SCATTERS = np.concatenate(([0.0], np.geomspace(5e-5, 0.15, 56)))
+_SCATTER_STEPS = np.gradient(_SCATTERS)
+"""Weight of each size of the scatter before the values are seen: all sizes alike, up to 15 %. A prior that
+prefers small scatter makes the standard errors of tests with few impacts too small."""
+_FEWEST = 4
+"""Points below which a scatter cannot be told from the values' own errors: none is assumed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,15 +56,16 @@ class RestitutionEstimate:
     r: float | None = None
     """Weighted mean; None with fewer points than needed."""
     standard_error: float | None = None
-    degrees_of_freedom: int = 0
+    degrees_of_freedom: float = 0.0
+    """Infinite where the standard error holds what is not known of the scatter."""
     scatter: float = 0.0
-    """Relative standard deviation of r from impact to impact that the points suggest."""
+    """Relative standard deviation of r from impact to impact that is the likeliest."""
     plain_mean: float | None = None
     """Mean of the points, as in the paper."""
     plain_standard_error: float | None = None
 
     def interval95(self) -> tuple[float, float] | None:
-        """95 % confidence interval (Student t)."""
+        """95 % interval: Student's, or normal where the error holds what is not known of the scatter."""
         if self.r is None or self.standard_error is None or self.degrees_of_freedom < 1:
             return None
         reach = float(stdtrit(self.degrees_of_freedom, 0.975)) * self.standard_error
@@ -181,23 +188,11 @@ def _estimate(series: DecaySeries, slope: float, variance: float, scatter: float
         points=series.points,
         r=r,
         standard_error=r * math.sqrt(variance),
-        degrees_of_freedom=_degrees(series.variances[series.usable], len(series.points), scatter),
+        degrees_of_freedom=math.inf if len(series.points) >= _FEWEST else max(len(series.points) - 1, 1),
         scatter=scatter,
         plain_mean=float(single.mean()),
         plain_standard_error=float(single.std(ddof=1) / math.sqrt(single.size)) if single.size > 1 else None,
     )
-
-
-def _degrees(variances: Floats, points: int, scatter: float) -> int:
-    """Degrees of freedom of the standard error: how many impacts tell something of the scatter.
-
-    Steps between neighbouring values whose own error exceeds the scatter tell little of it.
-    """
-    if scatter == 0.0:
-        return max(points - 1, 1)
-    step = variances[1:] + variances[:-1]
-    informative = float(np.sum(scatter**2 / (scatter**2 + step)))
-    return max(round(informative) - 1, 1)
 
 
 def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float]]:
@@ -205,7 +200,8 @@ def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float]]
 
     Errors are independent (`variances`) plus a random walk of step s. Every s of a grid is tried at
     once, and every series (all of one length), by a Kalman filter that whitens values and regressors
-    (Harvey's GLS by prediction errors); the s of the largest restricted likelihood counts.
+    (Harvey's GLS by prediction errors). Slope and variance are those of the mixture over s, weighted by
+    the restricted likelihood; the scatter is the likeliest s.
     """
     usable = np.array([series.usable for series in together])
     variances = np.array([series.variances for series in together])
@@ -235,9 +231,12 @@ def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float]]
     solution = inverse @ (np.swapaxes(design, 2, 3) @ target)
     misfit = ((target - design @ solution) ** 2).sum(axis=(2, 3))
     likelihood = -0.5 * (log_spread + np.linalg.slogdet(normal)[1] + misfit)
-    # Fewer than four points tell nothing of a scatter: it counts as none.
-    few = np.array([len(series.points) < 4 for series in together])
-    best = np.where(few, 0, np.argmax(likelihood, axis=1))
-    places = np.arange(best.size)
-    slope, variance = solution[places, best, -1, 0], inverse[places, best, -1, -1]
+    few = np.array([len(series.points) < _FEWEST for series in together])
+    likelihood[few, 1:] = -np.inf
+    weights = _SCATTER_STEPS * np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
+    weights /= weights.sum(axis=1, keepdims=True)
+    slopes, variances_of_slope = solution[..., -1, 0], inverse[..., -1, -1]
+    slope = (weights * slopes).sum(axis=1)
+    variance = (weights * (variances_of_slope + (slopes - slope[:, None]) ** 2)).sum(axis=1)
+    best = np.argmax(likelihood, axis=1)
     return list(zip(slope.tolist(), variance.tolist(), _SCATTERS[best].tolist(), strict=True))

@@ -139,6 +139,19 @@ def test_scatter_of_r_is_found_and_in_the_standard_error():
     assert np.median(scatters) == pytest.approx(0.01, rel=0.3)
 
 
+def test_a_scatter_that_few_impacts_cannot_show_is_not_taken_as_none():
+    """The likeliest scatter is often none although there is one: its interval would hold r in 80 %."""
+    rng = np.random.default_rng(0)
+    tests, impacts, scatter, sigma = 150, 10, 3e-4, 1.2e-4
+    held = 0
+    for _ in range(tests):
+        walk = np.concatenate(([0.0], np.cumsum(rng.normal(0.0, scatter, impacts - 1))))
+        speeds = 0.4 * 0.9 ** np.arange(impacts) * np.exp(walk) + rng.normal(0.0, sigma, impacts)
+        low, high = eav(speeds.tolist(), [sigma] * impacts).interval95()
+        held += low <= 0.9 <= high
+    assert held >= 0.93 * tests
+
+
 def test_no_points_no_value():
     for estimate in (
         eav([0.3, 0.2], [1e-3, 1e-3]),

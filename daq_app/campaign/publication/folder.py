@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-import hashlib
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,13 +22,13 @@ from daq_app.campaign.status import RecordedTest
 from daq_app.campaign.verdicts import OperatorVerdict
 from daq_app.config import Rig
 from daq_app.runfile import DerivedData, Run, RunFileError, open_run
+from daq_app.runfile.digest import file_sha256
 from daq_app.runfile.durable import write_whole
 from daq_app.runfile.exporters import export_run
 from daq_app.runfile.folder import find_runs
 from daq_app.workers import Workers, run_all
 
 Derive = Callable[[Run], DerivedData | None]
-_CHUNK: Final = 1 << 20
 _NOTES: Final = ("note", "marker")
 
 
@@ -127,7 +126,7 @@ def _describe(
 
 def write_checksums(out: Path) -> None:
     """``SHA256SUMS`` of all files, as `sha256sum -c` reads it."""
-    sums = [f"{_sha256(out / name)}  {name}" for name in _names(out) if name != "SHA256SUMS"]
+    sums = [f"{file_sha256(out / name)}  {name}" for name in _names(out) if name != "SHA256SUMS"]
     write_whole(out / "SHA256SUMS", "\n".join(sums) + "\n")
 
 
@@ -189,7 +188,7 @@ def _publish_test(source: Source, out: Path, derive: Derive) -> PublishedTest:
             analysis=results.get("analysis") or {},
             data_file=data,
             source_name=source.path.name,
-            source_sha256=_sha256(source.path),
+            source_sha256=file_sha256(source.path),
         )
 
 
@@ -205,11 +204,3 @@ def _write_rigs(folder: Path, found: Sequence[Source]) -> None:
             path = folder / rig_file(run.header.rig_name)
             if run.header.rig_text and not path.exists():
                 write_whole(path, run.header.rig_text)
-
-
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while part := file.read(_CHUNK):
-            digest.update(part)
-    return digest.hexdigest()

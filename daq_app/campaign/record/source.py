@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,11 +14,10 @@ from daq_app.campaign.result.result import NoResult, load_result, make_result
 from daq_app.campaign.verdicts import OperatorVerdict
 from daq_app.config import Rig
 from daq_app.runfile import Event, Gap, RunHeader, open_run, verify
+from daq_app.runfile.digest import file_sha256
 from daq_app.runfile.hdf5.read import RunAttributes
 from daq_app.runfile.integrity.verification import VerifyReport
 from daq_app.runfile.seal.format import Seal
-
-_HASHED_AT_ONCE = 2**20
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,21 +80,12 @@ def read_source(path: Path) -> RecordSource:
         results=results,
         seal=seal,
         report=verify(path),
-        file_sha256=sha256_of(path),
+        file_sha256=file_sha256(path),
         given=verdicts_of(path.parent).get(header.run_id),
         test=test,
         no_result=no_result,
         made_utc=dt.datetime.now(dt.UTC),
     )
-
-
-def sha256_of(path: Path) -> str:
-    """SHA-256 of a file, as any tool computes it."""
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while piece := file.read(_HASHED_AT_ONCE):
-            digest.update(piece)
-    return digest.hexdigest()
 
 
 def planned_level(name: str) -> str:

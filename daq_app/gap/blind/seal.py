@@ -15,22 +15,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from daq_app.gap.blind.layout import SEAL_FILE
+from daq_app.runfile.digest import file_sha256
 
 _FORMAT: Final = 1
-_HASH_CHUNK: Final = 2**20
 
 
 class SealBroken(Exception):
     """A label or a file of a case is not what was sealed."""
-
-
-def file_sha256(path: Path) -> str:
-    """SHA-256 of a file, hexadecimal."""
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(_HASH_CHUNK):
-            digest.update(block)
-    return digest.hexdigest()
 
 
 def seal_case(folder: Path, label: dict[str, Any], label_path: Path) -> None:

@@ -153,7 +153,7 @@ def judge(
     error = math.hypot(math.sqrt(float(weights @ covariance @ weights)), _MODEL_R)
     if disagreements and values.size > 1:
         error = math.hypot(error, 0.5 * float(np.ptp(values)))
-    freedom = max(min(e.degrees_of_freedom for e in known), 1)
+    freedom = min(e.degrees_of_freedom for e in known)
     reach = float(stdtrit(freedom, 0.975)) * error
     return RVerdict(r, error, (r - reach, r + reach), trust, (lead,), left_out, reasons)
 

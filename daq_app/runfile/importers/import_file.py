@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import datetime as dt
-import hashlib
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from daq_app.config import Rig
+from daq_app.runfile.digest import file_sha256
 from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.importers.import_map import ImportMap, SourceMap
 from daq_app.runfile.importers.imported import ImportedRun
@@ -20,8 +20,6 @@ from daq_app.runfile.importers.timing import Timing, timing_of
 from daq_app.runfile.integrity.saving import save_run
 from daq_app.runfile.model import DerivedData, RunHeader, host_name, software_versions
 from daq_app.runfile.source import Provenance, RunSource
-
-_HASH_BYTES: Final = 2**20
 
 Derive = Callable[[RunSource], DerivedData | None]
 """What is computed from the samples of an imported run; must not raise."""
@@ -111,7 +109,7 @@ def _convert(
     import_map: ImportMap,
     derive: Derive | None,
 ) -> ImportReport:
-    digest = _sha256(path)
+    digest = _digest(path)
     with closing(opener(path, import_map.source)) as reader:
         mapped = map_channels(path, reader, rig, import_map)
         names = list(dict.fromkeys(item.foreign.name for item in mapped))
@@ -170,12 +168,8 @@ def _file_stem(name: str) -> str:
     return name
 
 
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
+def _digest(path: Path) -> str:
     try:
-        with path.open("rb") as file:
-            while piece := file.read(_HASH_BYTES):
-                digest.update(piece)
+        return file_sha256(path)
     except OSError as error:
         raise RunFileError(f"{path} cannot be read ({error.strerror})", advice="Check the name.") from error
-    return digest.hexdigest()

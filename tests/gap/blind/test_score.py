@@ -23,9 +23,10 @@ from daq_app.gap.blind.scoring.laboratories import by_laboratory
 from daq_app.gap.blind.scoring.report import write_markdown, write_report
 from daq_app.gap.blind.scoring.score import Row, Score, score_folder, table
 from daq_app.gap.blind.scoring.statistics import auroc, calibration_error, reliability, share
-from daq_app.gap.blind.seal import SealBroken, file_sha256, read_seal, seal_case
+from daq_app.gap.blind.seal import SealBroken, read_seal, seal_case
 from daq_app.gap.blind.world.effects.catalogue import ENTRIES, LIBRARY, OUTSIDE
 from daq_app.gap.rocking_model.library import rocking_library
+from daq_app.runfile.digest import file_sha256
 
 Answer = Callable[[dict[str, Any], np.random.Generator], dict[str, Any]]
 N = 200

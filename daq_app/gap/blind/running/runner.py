@@ -19,7 +19,8 @@ from typing import Any
 
 from daq_app.gap.blind.layout import CASE_PREFIX, RESULTS, SEAL_FILE
 from daq_app.gap.blind.running.apart import Apart
-from daq_app.gap.blind.seal import check_files, file_sha256, read_seal
+from daq_app.gap.blind.seal import check_files, read_seal
+from daq_app.runfile.digest import file_sha256
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,8 @@ from daq_app.gap.blind.scoring.statistics import (
     calibration_error,
     share,
 )
-from daq_app.gap.blind.seal import SealBroken, file_sha256, open_label
+from daq_app.gap.blind.seal import SealBroken, open_label
+from daq_app.runfile.digest import file_sha256
 
 _SURE = 0.95
 _FALSE_ALARMS = 0.05
