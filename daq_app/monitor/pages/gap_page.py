@@ -291,10 +291,7 @@ class GapPage(QWidget):
         parts = [f"In words: {'; '.join(causes)}."] if causes else []
         parts.append(str(result["where"]["sentence"]))
         if gap := result.get("gap"):
-            parts.append(
-                f"Gap on held-out runs {number(gap['before'], 2)} → {number(gap['after'], 2)} "
-                f"(1 is noise and scatter), {number(100 * gap['closure'], 0)} % of it closed."
-            )
+            parts.append(gap_in_words(gap))
         parts.append(f"Measure next: {result['next_measurement']}")
         parts.append(f"From {len(result['runs'])} runs: {', '.join(result['runs'][:8])}.")
         parts += [f"Limit: {limit}" for limit in result["limits"][:2]]
@@ -310,6 +307,15 @@ class GapPage(QWidget):
             page = self._result_file.with_suffix(".html")
             if not open_outside(page):
                 self.told.emit("warning", f"No program on this computer opens pages: {page}")
+
+
+def gap_in_words(gap: dict[str, Any]) -> str:
+    """The gap on held-out runs before and after the causes; a share only where a gap was there to close."""
+    change = f"{number(gap['before'], 2)} → {number(gap['after'], 2)}"
+    figures = f"Gap on held-out runs {change} (1 is noise and scatter)"
+    if gap["before"] <= 1.0:
+        return f"{figures}: there was none to close."
+    return f"{figures}, {number(100 * gap['closure'], 0)} % of it closed."
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -13,7 +13,7 @@ import pytest
 from daq_app.monitor.data import gap_runner
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.gap_runner import GapRunner
-from daq_app.monitor.pages.gap_page import GapPage
+from daq_app.monitor.pages.gap_page import GapPage, gap_in_words
 from daq_app.monitor.plots.gap_views import closure_bars, evidence_bars, map_cells
 from tests.support.gap.made_diagnosis import diagnosis
 
@@ -153,3 +153,8 @@ def test_the_page_shows_measured_beside_simulated_rotation(page):
     result.notes.clear()
     page._show(None, json.loads(result.to_json()))
     assert "no simulated rotation" in page.traces.legend.text()
+
+
+def test_a_gap_that_was_none_is_not_called_closed() -> None:
+    assert "closed" not in gap_in_words({"before": 0.93, "after": 0.93, "closure": 1.0})
+    assert "90 % of it closed" in gap_in_words({"before": 11.0, "after": 2.0, "closure": 0.9})
