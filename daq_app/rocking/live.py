@@ -13,6 +13,7 @@ from daq_app.config.rig import Rig
 from daq_app.config.scaling import Scaling
 from daq_app.rocking.estimators import RestitutionEstimate
 from daq_app.rocking.geometry.kinematics import RotationGeometry
+from daq_app.rocking.live_families import LiveFamilies
 from daq_app.rocking.motion.phases import Phase, PhaseDetector, PhaseEvent, PhaseSettings
 from daq_app.rocking.motion.rolling import RollingArray
 from daq_app.rocking.motion.swings import MotionSettings, MotionTrack
@@ -43,6 +44,8 @@ class Estimate:
     crt: RestitutionEstimate
     r_max: float
     """1 − 3/2 sin²α (1.2)."""
+    doubts: tuple[str, ...] = ()
+    """Sentences: which family, or which method, disagrees with this r."""
 
     def as_message(self) -> dict[str, object]:
         """Plain values for an `EstimateMessage`; half-cycles that could not be fitted are NaN."""
@@ -59,6 +62,7 @@ class Estimate:
             "crt_mean": self.crt.r,
             "crt_standard_error": self.crt.standard_error,
             "r_max": self.r_max,
+            "doubts": self.doubts,
         }
 
 
@@ -102,10 +106,12 @@ class LiveAnalyser:
         settings = PhaseSettings.from_rig(rig, rate_hz, self.geometry.rotation_noise_rad())
         self.velocity_filter = VelocityFilter(rate_hz, rig.acquisition.velocity_cutoff_hz)
         index = {channel_id: row for row, channel_id in enumerate(rig.channel_ids)}
-        used = [*self.geometry.wires.ids, *self.geometry.tilt_ids]
+        self._families = LiveFamilies(rig, rate_hz)
+        used = [*self.geometry.wires.ids, *self.geometry.tilt_ids, *self._families.ids]
         self._rows = np.array([index[channel_id] for channel_id in used])
         self._scaling = Scaling.of([rig.channel(channel_id) for channel_id in used], tare)
         self._n_wires = len(self.geometry.wires.ids)
+        self._tilts = slice(self._n_wires, self._n_wires + len(self.geometry.tilt_ids))
         self._phase_settings = settings
         self._motion_settings = MotionSettings(rate_hz, settings.p_rad_s, settings.alpha_rad)
         self._watch = self.geometry.watch()
@@ -119,6 +125,7 @@ class LiveAnalyser:
         self._release: PhaseEvent | None = None
         self._track: MotionTrack | None = None
         self._theta0_tilt = math.nan
+        self._doubts: tuple[str, ...] = ()
 
     @property
     def phase(self) -> Phase:
@@ -142,7 +149,7 @@ class LiveAnalyser:
             raise ValueError(f"sample {first_sample} was already analysed: the next is {self._next}")
         self._next = first_sample + readings.shape[1]
         si = self._scaling.to_si(readings[self._rows])
-        tilt = self.geometry.tilt(si[self._n_wires :], self._last_rotation)
+        tilt = self.geometry.tilt(si[self._tilts], self._last_rotation)
         gap = np.full((si.shape[0], missing), np.nan)
         joined = np.concatenate((self._pending, gap, si), axis=1)
         whole = joined.shape[1] // self._frame * self._frame
@@ -150,7 +157,7 @@ class LiveAnalyser:
         return self._analyse(joined[:, :whole], tilt)
 
     def _analyse(self, si: Floats, tilt_rad: float) -> LiveResult:
-        """Whole frames of SI values of wires and tiltmeters."""
+        """Whole frames of SI values of all channels that are used."""
         assert self._detector is not None
         first = self._shown
         rotations, velocities = [self._trailing], []
@@ -163,12 +170,13 @@ class LiveAnalyser:
             wires = self.geometry.rotation(piece[: self._n_wires], self._watch)
             # In a gap no wire has a value: none disagrees with the others.
             excluded |= (wires.excluded & ~wires.excluded.all(axis=0)).any(axis=1)
-            self._log.append(np.vstack((wires.rotation_rad[None], piece[self._n_wires :])))
+            self._log.append(np.vstack((wires.rotation_rad[None], piece[self._tilts])))
+            self._families.append(self._first, wires.rotation_rad, piece[self._tilts.stop :])
             bridged = _bridge(wires.rotation_rad, self._last_rotation)
             self._last_rotation = float(bridged[-1])
             rotations.append(bridged)
             velocities.append(self._stream.process(bridged))
-            for event in self._detector.process(bridged, piece[self._n_wires :]):
+            for event in self._detector.process(bridged, piece[self._tilts]):
                 events.append(event)
                 estimate = self._follow(event) or estimate
         velocity = np.concatenate(velocities) if velocities else np.empty(0)
@@ -193,6 +201,8 @@ class LiveAnalyser:
         if event.kind == "release":
             self._release, self._track = event, None
             self._theta0_tilt = self._tilt_before(event.sample)
+            self._families.forget()
+            self._doubts = ()
         elif event.kind == "caught":
             self._release = self._track = None
             return None
@@ -207,6 +217,7 @@ class LiveAnalyser:
                     self._detector.theta0_rad if self._detector else math.nan,
                 )
             self._track.add_impact(event.sample / self._rate, time, rotation)
+            self._doubts = self._families.look(self._track, self._theta0_tilt)
         else:
             return None
         return self._estimate()
@@ -243,6 +254,7 @@ class LiveAnalyser:
             eav=RestitutionEstimate("EAV", ()) if track is None else track.eav(),
             crt=RestitutionEstimate("CRT", ()) if track is None else track.crt(),
             r_max=float(theory.r_max_rectangular(alpha)),
+            doubts=self._doubts,
         )
 
 

@@ -117,3 +117,16 @@ def test_the_table_shows_each_family_beside_the_survey(made):
     assert families["wires"].remarks == ("slow",)
     assert families["LVDTs"].alpha_rad == pytest.approx(families["survey"].alpha_rad, rel=0.02)
     assert families["wires"].alpha_rad > 1.01 * families["survey"].alpha_rad
+
+
+def test_the_error_of_theta0_holds_the_noise_that_the_tiltmeters_show(made):
+    noise_rad, samples = 0.01, 2 * 0.48 * 4000
+
+    def noisy(values: Floats, rate_hz: float) -> Floats:
+        return values + np.random.default_rng(1).normal(0.0, noise_rad, values.shape)
+
+    quiet, loud = (
+        analysed(made, TILTS, change).theta0_by_family["tiltmeters"].sigma for change in (times(1.0), noisy)
+    )
+    of_noise = noise_rad / np.sqrt(samples)
+    assert 0.8 * of_noise < np.sqrt(loud**2 - quiet**2) < 2.5 * of_noise

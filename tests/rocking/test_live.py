@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 from daq_app.acquisition.messages.published import EstimateMessage
 from daq_app.rocking import LiveAnalyser, Phase
@@ -149,3 +150,42 @@ def test_wrong_blocks_are_refused_in_words(made):
     analyser.process(0, test.readings[:, :100])
     with pytest.raises(ValueError, match="already analysed"):
         analyser.process(50, test.readings[:, 50:100])
+
+
+def shifted(readings, rig, prefix, by):
+    """The same with the channels whose ids begin with `prefix` late by `by` samples."""
+    changed = readings.copy()
+    rows = [row for row, name in enumerate(rig.channel_ids) if name.startswith(prefix)]
+    changed[rows, by:], changed[rows, :by] = readings[rows, :-by], readings[rows, :1]
+    return changed
+
+
+def slowed(readings, rig, prefix, seconds):
+    """The same with the channels whose ids begin with `prefix` behind a first-order filter."""
+    changed = readings.copy()
+    rows = [row for row, name in enumerate(rig.channel_ids) if name.startswith(prefix)]
+    keep = np.exp(-1.0 / rig.acquisition.rate_hz / seconds)
+    start = readings[rows, :1] * keep
+    changed[rows] = lfilter([1.0 - keep], [1.0, -keep], readings[rows], axis=1, zi=start)[0]
+    return changed
+
+
+def test_families_that_agree_raise_no_doubt_while_live(made):
+    estimates = [result.estimate for result in run_live(made(phi=0.35, r=0.895, side=-1, seed=8, full=True))]
+    assert {estimate.doubts for estimate in estimates if estimate is not None} == {()}
+
+
+@pytest.mark.parametrize(
+    ("prefix", "change", "by", "told"),
+    [
+        ("WP-", slowed, 0.02, "wires are slow"),
+        ("LV-", slowed, 0.02, "LVDTs are slow"),
+        ("LV-", shifted, 80, "LVDTs are 20.0 ms late"),
+        ("AC-", shifted, 60, "accelerometers are"),
+    ],
+)
+def test_a_family_that_disagrees_is_told_while_the_wall_rocks(made, prefix, change, by, told):
+    test = made(phi=0.35, r=0.895, side=-1, seed=8, full=True)
+    estimate = last_estimate(run_live(test, readings=change(test.readings, test.rig, prefix, by)))
+    assert any(told in doubt for doubt in estimate.doubts), estimate.doubts
+    assert EstimateMessage(**estimate.as_message()).doubts == estimate.doubts

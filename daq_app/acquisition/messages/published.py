@@ -154,6 +154,8 @@ class EstimateMessage(Message):
     crt_mean: float | None = None
     crt_standard_error: float | None = None
     r_max: float
+    doubts: tuple[str, ...] = ()
+    """Which family, or which method, disagrees with this r; a sentence each."""
 
 
 class HealthMessage(Message):

@@ -100,12 +100,16 @@ class RunView:
                 self.say(f"{at}{message.state.value}: {message.text}")
 
     def _on_estimate(self, message: EstimateMessage) -> None:
+        told = self._estimate.doubts if self._estimate is not None else ()
         self._estimate = message
         count = len(message.impact_samples)
         if self._live is None and count > self._told_impacts:
             self._told_impacts = count
             at = message.impact_samples[-1] / self._rate_hz
             self.say(f"{at:8.2f} s  impact {count}: r EAV {_r(message.eav_mean)}  CRT {_r(message.crt_mean)}")
+            for doubt in message.doubts:
+                if doubt not in told:
+                    self.say(f"r is in doubt: {doubt}", "yellow")
 
     # -- the panel -------------------------------------------------------------------------------
 
@@ -117,6 +121,7 @@ class RunView:
         parts: list[Text | Table] = [heading, self._bar(), self._figures()]
         if self._estimate is not None and self._estimate.impact_samples:
             parts.append(self._impacts(self._estimate))
+            parts += [Text(doubt, style="yellow") for doubt in self._estimate.doubts]
             if not self.zeroed:
                 parts.append(Text(UNZEROED, style="yellow"))
         return Panel(Group(*parts), title=Text(self._test), title_align="left")

@@ -47,6 +47,7 @@ class LivePage(QWidget):
         self.strips_button.setToolTip("Give the whole page to the 41 channels, and back")
         self.strips_button.toggled.connect(self._on_strips)
         self._caption: QLabel = role_label("", "muted")
+        self._caption.setWordWrap(True)
 
         tools = QHBoxLayout()
         tools.setContentsMargins(0, 0, 0, 0)
@@ -103,12 +104,16 @@ class LivePage(QWidget):
         self._show_caption()
 
     def _show_caption(self) -> None:
-        """What must be known beside the plots: a missing zero first, then which theory is laid over."""
-        doubtful = self._session.run_zeroed is False and self._session.estimate is not None
-        parts = [UNZEROED if doubtful else "", self.motion.theory_caption()]
-        text = "  ".join(part for part in parts if part)
+        """What must be known beside the plots: a missing zero, doubts about r, which theory is laid over."""
+        estimate = self._session.estimate
+        parts = [UNZEROED] if self._session.run_zeroed is False and estimate is not None else []
+        if estimate is not None and estimate.doubts:
+            parts.append("r is in doubt: " + "; ".join(estimate.doubts))
+        doubtful = bool(parts)
+        text = "  ".join(part for part in (*parts, self.motion.theory_caption()) if part)
         if self._caption.text() != text:
             self._caption.setText(text)
+            self._caption.setToolTip(text if doubtful else "")
         set_role(self._caption, "warning" if doubtful else "muted")
 
     def show_estimate(self) -> None:

@@ -94,8 +94,8 @@ def _analyse(
     estimates = estimates_of(series)
     onsets = _onsets(instruments.record, signals, track)
     fit = _fit(signals, track, estimates, instruments.gain_sigma) if options.fit else None
-    theta0 = theta0_by_family(signals, track, instruments.gain_sigma)
-    verdict, findings = verdict_of(instruments, tracks, series, estimates, levels_apart(signals, theta0))
+    theta0 = theta0_by_family(signals, track, instruments.gains)
+    verdict, findings = verdict_of(instruments, tracks, series, estimates, levels_apart(theta0))
     headline = theta0.get("tiltmeters", theta0["wires"])
     bias = _bias(record, signals, track, estimates, velocity_filter, options)
     joint = summarise_joint(instruments.record, signals, track) if signals.joint is not None else None

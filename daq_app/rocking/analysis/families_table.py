@@ -70,7 +70,7 @@ def _rotation_view(
     crt: RestitutionEstimate,
     theta0: ValueWithSigma | None,
 ) -> FamilyView:
-    body = body_of(track, instruments.gain_sigma)
+    body = body_of(track, instruments.gains.of("lvdts" if family == "LVDTs" else "wires"))
     apart = [own - other for own, other in zip(track.impacts_s, lead.impacts_s, strict=True)]
     return FamilyView(
         family=family,

@@ -74,16 +74,3 @@ def best_value(families: Mapping[str, ValueWithSigma]) -> ValueWithSigma:
         birge = math.sqrt(float(weights @ (values - mean) ** 2) / (len(good) - 1))
         sigma *= max(1.0, birge)
     return ValueWithSigma(mean, sigma)
-
-
-def level(
-    signal: Floats, scale: float, noise: float, calibration: float = CALIBRATION_SHARE
-) -> ValueWithSigma:
-    """Mean of a steady stretch, its sigma from noise, calibration (a share of `scale`) and zero."""
-    good = signal[np.isfinite(signal)]
-    if good.size < 10:
-        return ValueWithSigma(math.nan, math.nan)
-    statistical = max(float(good.std()), noise) / math.sqrt(good.size)
-    return ValueWithSigma(
-        float(good.mean()), math.sqrt(statistical**2 + (calibration * scale) ** 2 + ZERO_SHARE_RAD**2)
-    )

@@ -13,15 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.rocking.analysis.gains import FamilyGains, gains_of
 from daq_app.rocking.analysis.signals import Lead, Signals, TestTimes, find_phases, quiet_end, read_signals
 from daq_app.rocking.families import words
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.hum import find_hum
 from daq_app.rocking.families.noise import slow_noise
-from daq_app.rocking.families.response import Response, compare
+from daq_app.rocking.families.response import LATE_S, SLOW_S, Response, compare
 from daq_app.rocking.families.scales import wrong_scales
-from daq_app.rocking.families.shocks import ShockTiming, shock_timing
-from daq_app.rocking.families.single_wires import CALIBRATION_SHARE, SingleWires, compare_wires
+from daq_app.rocking.families.shocks import LATE_SHOCKS_S, ShockTiming, shock_timing
+from daq_app.rocking.families.single_wires import SingleWires, compare_wires
 from daq_app.rocking.families.treated import Corrections, held_in_memory, without_hum
 from daq_app.rocking.geometry.joint import BaseJoint
 from daq_app.rocking.geometry.kinematics import RotationGeometry
@@ -30,13 +31,6 @@ from daq_app.rocking.record import TestRecord
 
 Floats = NDArray[np.float64]
 
-LATE_S = 1.5e-3
-"""Families further apart in time than this are named. Known skews are below 0.2 ms; raising it hides late
-families."""
-SLOW_S = 1.5e-3
-"""Time constant above which a family is named slow; raising it lets EAV be too low and nothing be said."""
-LATE_SHOCKS_S = 4e-3
-"""The same between shocks and rotation: a wall's contact lasts some milliseconds."""
 DRIFT_RAD = 3e-4
 """Drift of one family against the other over the motion that is named."""
 GAIN_SHARE = 0.01
@@ -49,8 +43,6 @@ _NOTABLE_HUM_NOISES = 1.5
 laboratories with noise twice the rig file's reach 1."""
 _HOLD_S = 1.0
 """Slow noise is looked for in this last part of the hold."""
-_GEOMETRY_SHARE = 0.0005
-"""Standard uncertainty of a family's gain from the places of its ends, common to all wires."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +56,12 @@ class Instruments:
     response: Response | None
     """How the wires follow the LVDTs after all corrections."""
     shocks: ShockTiming | None
-    gain_sigma: float
-    """Standard uncertainty of the gain of the rotation, as a share."""
+    gains: FamilyGains
+
+    @property
+    def gain_sigma(self) -> float:
+        """Standard uncertainty of the gain of the rotation that is analysed, as a share."""
+        return self.gains.of(self.signals.lead)
 
 
 def prepare(record: TestRecord, *, from_rest: bool) -> Instruments:
@@ -77,7 +73,7 @@ def prepare(record: TestRecord, *, from_rest: bool) -> Instruments:
     corrected = corrections.applied(held)
     signals, times = _zeroed_at_rest(corrected) if from_rest else _as_recorded(corrected)
     if times.release_s is None or not times.impacts_s:
-        return Instruments(corrected, signals, times, tuple(findings), None, None, CALIBRATION_SHARE)
+        return Instruments(corrected, signals, times, tuple(findings), None, None, FamilyGains())
     return _in_step(corrected, signals, times, findings, from_rest=from_rest)
 
 
@@ -185,7 +181,7 @@ def _in_step(
         findings.append(words.single_wire(name, kind, wires, place))
         changed = replace(changed, left_out=frozenset({name}))
     response = _follow(signals, times)
-    shocks = shock_timing(record, signals.first_s, times.impacts_s)
+    shocks = _shocks(record, signals, times)
     if response is not None:
         timing, lead, earlier = _timing(record, signals, times, response, shocks)
         findings += timing
@@ -197,15 +193,12 @@ def _in_step(
             signals, times = again, times_again
             wires = _single_wires(signals, times)
             response = _follow(signals, times)
-            shocks = shock_timing(record, signals.first_s, times.impacts_s)
+            shocks = _shocks(record, signals, times)
     if response is not None:
         findings += _levels(signals, times, response)
-    sigma = CALIBRATION_SHARE
-    if wires is not None:
-        sigma = wires.family_gain_sigma(signals.geometry.weights()[0])
     return Instruments(
         record, _with_errors(signals, times), times, tuple(findings), response, shocks,
-        math.hypot(sigma, _GEOMETRY_SHARE),
+        gains_of(signals, times, wires),
     )  # fmt: skip
 
 
@@ -231,6 +224,16 @@ def _follow(signals: Signals, times: TestTimes) -> Response | None:
         return None
     part = _motion(signals, times)
     return compare(signals.time_s[part], signals.joint.rotation_rad[part], signals.wire_rotation_rad[part])
+
+
+def _shocks(record: TestRecord, signals: Signals, times: TestTimes) -> ShockTiming | None:
+    ids = record.family("accelerometer")
+
+    def read(start: int, stop: int) -> Floats:
+        return record.load(ids, start, stop)
+
+    offsets = [record.offset_s(channel_id) for channel_id in ids]
+    return shock_timing(read, record.n_samples, record.rate_hz, signals.first_s, offsets, times.impacts_s)
 
 
 def _timing(

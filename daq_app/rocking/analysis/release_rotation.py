@@ -5,54 +5,45 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import numpy as np
-
-from daq_app.rocking.analysis.fusion import best_value, level
+from daq_app.rocking.analysis.fusion import best_value
+from daq_app.rocking.analysis.gains import FamilyGains, hold_samples
 from daq_app.rocking.analysis.results import ValueWithSigma
 from daq_app.rocking.analysis.signals import Signals
-from daq_app.rocking.families import words
 from daq_app.rocking.families.finding import FamilyFinding
-from daq_app.rocking.motion.swings import MotionTrack
+from daq_app.rocking.families.levels import level_outlier
+from daq_app.rocking.motion.swings import MotionTrack, steady_level
 
 _NAMES = {"tiltmeters": "tiltmeters", "wires": "wires", "lvdts": "LVDTs"}
-_APART = 0.01
-"""θ0 of a family off the other two by more than this share is named: three times what calibration leaves."""
-_APART_RAD = 2e-4
 
 
-def theta0_by_family(signals: Signals, track: MotionTrack, gain_sigma: float) -> dict[str, ValueWithSigma]:
+def theta0_by_family(signals: Signals, track: MotionTrack, gains: FamilyGains) -> dict[str, ValueWithSigma]:
     """θ0 over the last half second of the hold (slow tiltmeters have settled), and the best."""
-    start, stop = np.searchsorted(signals.time_s, [track.release.time_s - 0.5, track.release.time_s - 0.02])
-    scale = abs(track.theta0_rad)
+    hold, rate = hold_samples(signals, track.release.time_s), signals.record.rate_hz
+    zero = signals.settings.zero_sigma_rad
     found: dict[str, ValueWithSigma] = {}
-    if signals.tilts_rad.shape[0]:
-        value = signals.geometry.tilt(signals.tilts_rad[:, start:stop], track.theta0_rad)
-        noise = signals.geometry.tilt_noise_rad / math.sqrt(
-            max(signals.tilts_rad.shape[0] * (stop - start), 1)
-        )
-        if math.isfinite(value):
-            found["tiltmeters"] = level(np.full(10, value), scale, noise)
-    found[signals.lead] = level(np.full(10, track.theta0_rad), scale, track.sigma_theta0_rad, gain_sigma)
-    wires = level(signals.wire_rotation_rad[start:stop], scale, track.sigma_theta0_rad)
-    if signals.lead != "wires" and math.isfinite(wires.value):
-        found["wires"] = wires
-    if signals.joint is not None and signals.lead != "lvdts":
-        lvdts = level(signals.joint.rotation_rad[start:stop], scale, signals.lvdt_noise_rad)
-        if math.isfinite(lvdts.value):
-            found["lvdts"] = lvdts
+    tilts = signals.tilts_rad[:, hold]
+    value = signals.geometry.tilt(tilts, track.theta0_rad)
+    if math.isfinite(value):
+        _, noise = steady_level(tilts.mean(axis=0), rate)
+        found["tiltmeters"] = _level(value, math.hypot(noise, zero), gains.tiltmeters)
+    found[signals.lead] = _level(track.theta0_rad, track.sigma_theta0_rad, gains.of(signals.lead))
+    others = {"wires": signals.wire_rotation_rad}
+    if signals.joint is not None:
+        others["lvdts"] = signals.joint.rotation_rad
+    for name, rotation in others.items():
+        value, noise = steady_level(rotation[hold], rate)
+        if name != signals.lead and math.isfinite(value):
+            found[name] = _level(value, math.hypot(noise, zero), gains.of(name))
     found["best"] = best_value(found)
     return found
 
 
-def levels_apart(signals: Signals, theta0: Mapping[str, ValueWithSigma]) -> list[FamilyFinding]:
+def _level(value_rad: float, sigma_rad: float, gain_sigma: float) -> ValueWithSigma:
+    """`sigma_rad` holds noise and zero; the gain's error, a share, comes to it."""
+    return ValueWithSigma(value_rad, math.hypot(sigma_rad, gain_sigma * value_rad))
+
+
+def levels_apart(theta0: Mapping[str, ValueWithSigma]) -> list[FamilyFinding]:
     """The family whose θ0 is off where the two others agree."""
-    values = {name: theta0[name].value for name in _NAMES if name in theta0}
-    if len(values) < 3:
-        return []
-    for name, value in values.items():
-        others = [other for key, other in values.items() if key != name]
-        middle = sum(others) / 2.0
-        limit = max(_APART * abs(middle), _APART_RAD)
-        if abs(others[0] - others[1]) < 0.5 * abs(value - middle) and abs(value - middle) > limit:
-            return [words.level(_NAMES[name], value - middle, value / middle - 1.0)]
-    return []
+    found = level_outlier({_NAMES[name]: value.value for name, value in theta0.items() if name in _NAMES})
+    return [] if found is None else [found]

@@ -13,6 +13,11 @@ from scipy.signal import lfilter
 
 Floats = NDArray[np.float64]
 
+LATE_S = 1.5e-3
+"""Families further apart in time than this are named. Known skews are below 0.2 ms; raising it hides late
+families."""
+SLOW_S = 1.5e-3
+"""Time constant above which a family is named slow; raising it lets EAV be too low and nothing be said."""
 _RATE_HZ = 500.0
 _FEWEST = 200
 _STEP_S = 2e-4

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.rocking.motion.transients import find_onsets
-from daq_app.rocking.record import TestRecord
 
 Floats = NDArray[np.float64]
 
+LATE_SHOCKS_S = 4e-3
+"""Shocks further from the crossings than this are named late: a wall's contact lasts some milliseconds."""
 _MOST_IMPACTS = 12
 _REACH_S = 0.06
 _BIN_S = 0.001
@@ -31,27 +32,31 @@ class ShockTiming:
     impacts: int
 
 
-def shock_timing(record: TestRecord, first_s: float, crossings_s: Sequence[float]) -> ShockTiming | None:
-    """Lag of the shocks behind the first crossings; None where fewer than three impacts show one."""
-    ids = record.family("accelerometer")
+def shock_timing(
+    read: Callable[[int, int], Floats],
+    n_samples: int,
+    rate_hz: float,
+    first_s: float,
+    offsets_s: Sequence[float],
+    crossings_s: Sequence[float],
+) -> ShockTiming | None:
+    """Lag of the shocks behind the first crossings; None where fewer than three impacts show one.
+
+    `read(start, stop)` gives acceleration (channels, stop − start) of `n_samples` samples; sample k lies at
+    first_s + k / rate + its channel's offset.
+    """
     times = np.asarray(crossings_s, dtype=np.float64)[:_MOST_IMPACTS]
-    if len(ids) < 2 or times.size < _FEWEST:
+    if len(offsets_s) < 2 or times.size < _FEWEST:
         return None
-    rate = record.rate_hz
-    offset = float(np.mean([record.offset_s(channel_id) for channel_id in ids]))
-    start = max(round((times[0] - 2 * _REACH_S - first_s) * rate), 0)
-    stop = min(round((times[-1] + 2 * _REACH_S - first_s) * rate), record.n_samples)
-    if stop - start < rate * 4 * _REACH_S:
+    offset = float(np.mean(offsets_s))
+    start = max(round((times[0] - 2 * _REACH_S - first_s) * rate_hz), 0)
+    stop = min(round((times[-1] + 2 * _REACH_S - first_s) * rate_hz), n_samples)
+    if stop - start < rate_hz * 4 * _REACH_S:
         return None
-    coarse = _coarse(record.load(ids, start, stop), rate, first_s + start / rate + offset, times)
+    coarse = _coarse(read(start, stop), rate_hz, first_s + start / rate_hz + offset, times)
     if coarse is None:
         return None
-
-    def read(low: int, high: int) -> Floats:
-        return record.load(ids, low, high)
-
-    offsets = [record.offset_s(channel_id) for channel_id in ids]
-    onsets = find_onsets(read, record.n_samples, rate, first_s, offsets, (times + coarse).tolist())
+    onsets = find_onsets(read, n_samples, rate_hz, first_s, offsets_s, (times + coarse).tolist())
     lags = [onset.time_s - time for onset, time in zip(onsets, times, strict=True) if onset is not None]
     if len(lags) < max(_FEWEST, times.size // 3):
         return None

@@ -9,14 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr
 
+from daq_app.rocking.families.gain_error import gain_sigma_of_mean, single_gain_share
+
 Floats = NDArray[np.float64]
 
 _MEAN_S = 0.005
 _FEWEST = 100
-CALIBRATION_SHARE = 0.002
-"""Prior standard uncertainty of one wire's gain, place of its ends included; laboratories: 0.1 to 0.3 %."""
-_PRIOR_WEIGHT = 4.0
-"""Degrees of freedom that the prior counts for."""
 _GAIN_CHANCE = 0.005
 """A wire is named where chance alone would name one in a family this seldom."""
 _LEAST_GAIN = 0.006
@@ -43,10 +41,7 @@ class SingleWires:
         worst = int(np.argmax(np.abs(self.gain - np.median(self.gain))))
         others = np.delete(self.gain, worst)
         deviation = float(self.gain[worst] - others.mean())
-        freedom = _PRIOR_WEIGHT + others.size - 1.0
-        spread = math.sqrt(
-            (_PRIOR_WEIGHT * CALIBRATION_SHARE**2 + float(np.sum((others - others.mean()) ** 2))) / freedom
-        )
+        spread, freedom = single_gain_share(others - others.mean(), others.size - 1.0)
         t = abs(deviation) / (spread * math.sqrt(1.0 + 1.0 / others.size))
         if 2.0 * count * float(stdtr(freedom, -t)) < _GAIN_CHANCE and abs(deviation) > _LEAST_GAIN:
             candidates.append((abs(deviation) / _LEAST_GAIN, worst, "gain"))
@@ -64,10 +59,7 @@ class SingleWires:
 
     def family_gain_sigma(self, weights: Floats) -> float:
         """Standard uncertainty of the gain of the wires' weighted mean, from how the wires differ."""
-        spread = float(np.sum((self.gain - self.gain.mean()) ** 2))
-        freedom = _PRIOR_WEIGHT + self.gain.size - 1.0
-        single = math.sqrt((_PRIOR_WEIGHT * CALIBRATION_SHARE**2 + spread) / freedom)
-        return single * float(np.sqrt(np.sum(weights**2)))
+        return gain_sigma_of_mean(self.gain - self.gain.mean(), weights, self.gain.size - 1.0)
 
 
 def compare_wires(own_rad: Floats, rate_hz: float, y_over_lever: Floats) -> SingleWires | None:

@@ -139,3 +139,17 @@ def level(family: str, by_rad: float, share: float) -> FamilyFinding:
         "a gain or a zero is wrong, or a fixture slipped"
     )
     return FamilyFinding(family, (), "gain", share, "1", "none", "warning", text)
+
+
+def slow_while_live(family: str, time_constant_s: float) -> str:
+    """A family that follows slowly, said during the test."""
+    return (
+        f"{family} are slow: they follow like a first-order instrument of {time_constant_s * 1e3:.1f} ms; "
+        "r by EAV from them is too low, and the analysis after the test leaves them out"
+    )
+
+
+def late_while_live(family: str, by_s: float, others: str) -> str:
+    """A family that is late, said during the test: r is not off by it, times are."""
+    late = f"{family} are {by_s * 1e3:.1f} ms late against {others}"
+    return f"{late}: impact times are off by as much, r is not"

@@ -136,6 +136,15 @@ class BaseJoint:
             plane += np.outer(inverse @ height, 1.0 - cosine)
         return plane
 
+    def rotation_weights(self, used: Bools | slice = slice(None)) -> Floats:
+        """d(sin θ)/d(opening) of the LVDTs `used`, (k,), 1/m."""
+        return np.asarray(np.linalg.pinv(self._design(used))[1])
+
+    def misfit(self, openings_m: Floats, used: Bools) -> Floats:
+        """(k, n) what the plane through the openings (k, n) of the LVDTs `used` leaves of each, m."""
+        design = self._design(used)
+        return np.asarray(openings_m - design @ (np.linalg.pinv(design) @ openings_m))
+
     def find_outliers(self, openings_m: Floats, valid: Bools, tolerated_m: Floats | float) -> list[int]:
         """Places of the LVDTs that do not fit the plane through the others.
 

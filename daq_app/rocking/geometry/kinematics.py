@@ -234,14 +234,17 @@ class RotationGeometry:
 
         Where two tiltmeters differ by more than they should, the one nearer `reference_rad` counts.
         """
+        used = self.tilt_levels(tilt_rad, reference_rad)
+        return float(used.mean()) if used.size else float("nan")
+
+    def tilt_levels(self, tilt_rad: Floats, reference_rad: float | None = None) -> Floats:
+        """(k,) mean over the block of each tiltmeter that counts in `tilt`."""
         means = np.asarray(tilt_rad, dtype=np.float64).mean(axis=1) if tilt_rad.size else np.empty(0)
         means = means[np.isfinite(means)]
-        if not means.size:
-            return float("nan")
+        if means.size < 2 or reference_rad is None:
+            return means
         spread = 3.0 * _AGREEMENT_RAD + _AGREEMENT_RELATIVE * float(np.abs(means).max())
-        if means.size > 1 and np.ptp(means) > spread and reference_rad is not None:
-            return float(means[np.argmin(np.abs(means - reference_rad))])
-        return float(means.mean())
+        return means if np.ptp(means) <= spread else means[[np.argmin(np.abs(means - reference_rad))]]
 
 
 def _combine(weights: Floats, own: Floats) -> Floats:

@@ -184,13 +184,21 @@ def hold_level(
 ) -> tuple[float, float]:
     """Rotation in the last 0.3 s before the release, and its sigma (unsteadiness included)."""
     low, high = np.searchsorted(time_s, [release_s - _HOLD_S, release_s - 0.005])
-    size = max(1, round(_HOLD_POINT_S * settings.rate_hz))
-    count = int(high - low) // size
+    level, sigma = steady_level(rotation_rad[low:high], settings.rate_hz)
+    return level, math.hypot(sigma, settings.zero_sigma_rad)
+
+
+def steady_level(signal: Floats, rate_hz: float) -> tuple[float, float]:
+    """Mean of a signal (n,) that should stand still, and its sigma from how its 20 ms means scatter.
+
+    NaN for both with fewer than three such means.
+    """
+    size = max(1, round(_HOLD_POINT_S * rate_hz))
+    count = signal.size // size
     if count < 3:
         return math.nan, math.nan
-    points = rotation_rad[high - count * size : high].reshape(count, size).mean(axis=1)
+    points = signal[signal.size - count * size :].reshape(count, size).mean(axis=1)
     points = points[np.isfinite(points)]
     if points.size < 3:
         return math.nan, math.nan
-    sigma = float(points.std(ddof=1)) / math.sqrt(points.size)
-    return float(points.mean()), math.hypot(sigma, settings.zero_sigma_rad)
+    return float(points.mean()), float(points.std(ddof=1)) / math.sqrt(points.size)

@@ -104,6 +104,15 @@ def test_the_running_mean_is_the_one_that_the_acquisition_tells(window):
     assert window.session.running_mean("crt")[1].tolist() == [0.80]
 
 
+def test_a_doubt_about_r_stands_beside_the_plots(window, stand_in):
+    doubt = "wires are slow"
+    estimate = stand_in.estimate(8.0).model_copy(update={"doubts": (doubt,)})
+    window.session.feed(Published(estimate, window.clock.now))
+    window.live.draw_slow()
+    assert doubt in window.live._caption.text()
+    assert window.live._caption.property("role") == "warning"
+
+
 def test_the_strips_keep_an_impact_that_lasts_one_sample(window, stand_in, play, rig):
     play(window.session, window.clock, stand_in, 3.0)
     row = rig.channel_ids.index("AC-1")

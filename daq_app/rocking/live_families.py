@@ -1,0 +1,147 @@
+"""While the test runs: whether LVDTs, tiltmeters and accelerometers speak against the r of the wires.
+
+Looked at once per impact, on what the other families showed meanwhile. Nothing is corrected: the analysis
+after the test does that.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.config.rig import Rig
+from daq_app.rocking.families import words
+from daq_app.rocking.families.levels import level_outlier
+from daq_app.rocking.families.response import LATE_S, SLOW_S, compare
+from daq_app.rocking.families.shocks import LATE_SHOCKS_S, shock_timing
+from daq_app.rocking.families.verdict import compare_series, families_apart, methods_apart
+from daq_app.rocking.geometry.joint import BaseJoint
+from daq_app.rocking.motion.rolling import RollingArray
+from daq_app.rocking.motion.swings import MotionTrack
+
+Floats = NDArray[np.float64]
+
+_MEMORY_S: Final = 8.0
+"""How far back the families are kept: hold and first impacts are compared at once."""
+_TIMED_AT: Final = (6, 12)
+"""Impacts after which timing is looked at: it costs more than all else, and six impacts tell it."""
+_FEWEST: Final = 5
+"""Impacts from which on values of r are compared."""
+_HOLD_S: Final = 1.0
+"""So much of the hold is shown to the other families."""
+
+
+class LiveFamilies:
+    """Doubts about the r of one motion after another, in sentences. Times in s, sample / rate."""
+
+    def __init__(self, rig: Rig, rate_hz: float) -> None:
+        self._rate = rate_hz
+        self._joint: BaseJoint | None
+        try:
+            self._joint = BaseJoint.from_rig(rig)
+        except ValueError:
+            self._joint = None  # too few LVDTs for a profile: said after the test
+        lvdts = () if self._joint is None else self._joint.ids
+        self.ids = (*lvdts, *(channel.id for channel in rig.of_family("accelerometer")))
+        """Channels that are looked at beside the wires and tiltmeters."""
+        self._lvdts = slice(1, 1 + len(lvdts))
+        self._shaken = slice(1 + len(lvdts), 1 + len(self.ids))
+        self._log = RollingArray(round(_MEMORY_S * rate_hz), 1 + len(self.ids))
+        self._first = 0
+        self.forget()
+
+    def forget(self) -> None:
+        """A new release: what was found about the last one is gone."""
+        self._track: MotionTrack | None = None
+        self._level: tuple[str, ...] = ()
+        self._timing: tuple[str, ...] = ()
+
+    def append(self, first_sample: int, rotation_rad: Floats, values: Floats) -> None:
+        """Rotation (n,) of the wires and SI values (ids, n) from sample `first_sample` on."""
+        if not self._log.end:
+            self._first = first_sample
+        self._log.append(np.vstack((rotation_rad[None], values)))
+
+    def look(self, wires: MotionTrack, tilt_rad: float) -> tuple[str, ...]:
+        """Doubts after the last impact of `wires`; `tilt_rad`: θ0 of the tiltmeters, NaN without."""
+        if self._joint is not None:
+            self._follow(wires, tilt_rad, self._joint)
+        if len(wires.crossings_s) in _TIMED_AT:
+            self._timing = (*self._lag_of_families(wires), *self._lag_of_shocks(wires))
+        return (*self._level, *self._timing, *self._restitution(wires))
+
+    def _follow(self, wires: MotionTrack, tilt_rad: float, joint: BaseJoint) -> None:
+        """The half-cycle that ended, as the LVDTs show it; at the first, the level of the hold as well."""
+        known = len(wires.crossings_s) - 1
+        start_s = wires.crossings_s[known - 1] if known else wires.release.time_s - _HOLD_S
+        time, kept = self._between(start_s, wires.crossings_s[known])
+        if time.size < 2:
+            return
+        rotation = joint.motion(kept[self._lvdts]).rotation_rad
+        if not known:
+            self._track = MotionTrack.begin(
+                wires.settings, time, rotation, wires.release.time_s, wires.theta0_rad
+            )
+            levels = {"wires": wires.theta0_rad, "LVDTs": self._track.theta0_rad, "tiltmeters": tilt_rad}
+            finding = level_outlier({name: level for name, level in levels.items() if math.isfinite(level)})
+            self._level = () if finding is None else (finding.text,)
+        if self._track is not None and len(self._track.arcs) == known:
+            self._track.add_impact(wires.crossings_s[known], time, rotation)
+
+    def _restitution(self, wires: MotionTrack) -> tuple[str, ...]:
+        """Where wires and LVDTs, or EAV and CRT, give r that differ beyond their errors."""
+        if len(wires.crossings_s) < _FEWEST:
+            return ()
+        said = [methods_apart(wires.eav(), wires.crt())]
+        lvdts = self._track
+        if lvdts is not None and len(lvdts.arcs) == len(wires.arcs):
+            pairs = (
+                ("EAV", wires.eav_series(), lvdts.eav_series()),
+                ("CRT", wires.crt_series(), lvdts.crt_series()),
+            )
+            said += [families_apart(method, compare_series(own, other)) for method, own, other in pairs]
+        return tuple(sentence for sentence in said if sentence is not None)
+
+    def _lag_of_families(self, wires: MotionTrack) -> tuple[str, ...]:
+        """Wires and LVDTs that are slow or late against each other."""
+        if self._joint is None:
+            return ()
+        time, kept = self._between(wires.release.time_s - 0.3, wires.crossings_s[-1])
+        rotation = self._joint.motion(kept[self._lvdts]).rotation_rad
+        found = compare(time, rotation, kept[0])
+        if found is None:
+            return ()
+        if abs(found.response_s) > SLOW_S:
+            slow = "wires" if found.response_s > 0 else "LVDTs"
+            return (words.slow_while_live(slow, abs(found.response_s)),)
+        if abs(found.delay_s) > LATE_S:
+            later = "wires" if found.delay_s > 0 else "LVDTs"
+            return (words.late_while_live(later, abs(found.delay_s), "the other family"),)
+        return ()
+
+    def _lag_of_shocks(self, wires: MotionTrack) -> tuple[str, ...]:
+        """Shocks that come elsewhere than the zero crossings of the wires."""
+        start = self._log.start
+
+        def read(low: int, high: int) -> Floats:
+            return self._log.slice(start + low, start + high)[self._shaken]
+
+        first_s = (self._first + start) / self._rate
+        inside = [crossing for crossing in wires.crossings_s if crossing > first_s + 0.2]
+        offsets = [0.0] * (self._shaken.stop - self._shaken.start)
+        found = shock_timing(read, self._log.end - start, self._rate, first_s, offsets, inside)
+        if found is None or abs(found.lag_s) <= LATE_SHOCKS_S:
+            return ()
+        later = "accelerometers" if found.lag_s > 0 else "wires"
+        others = "the wires" if found.lag_s > 0 else "the accelerometers"
+        return (words.late_while_live(later, abs(found.lag_s), others),)
+
+    def _between(self, start_s: float, stop_s: float) -> tuple[Floats, Floats]:
+        """Times (n,) and rows (1 + ids, n) from one time to another, cut to what is kept."""
+        start = max(math.floor(start_s * self._rate) - self._first, self._log.start)
+        stop = min(math.ceil(stop_s * self._rate) - self._first + 1, self._log.end)
+        time = (self._first + np.arange(start, stop)) / self._rate
+        return time, self._log.slice(start, stop)

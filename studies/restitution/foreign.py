@@ -1,0 +1,75 @@
+"""Recordings of a laboratory and an engine that are not ours, as tests that faults can be put into."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from daq_app.config import Rig, load_rig
+from daq_app.config.rig import Channel, Family
+from studies.restitution.laboratory import LaboratoryTest
+
+_TO_SI: Final = {"mm": 1e-3, "m/s2": 1.0, "m/s²": 1.0, "deg": math.pi / 180.0}
+_FAMILIES: Final[dict[str, Family]] = {
+    "LVDT": "lvdt",
+    "WIREPOT": "wire",
+    "ACCEL": "accelerometer",
+    "TILT": "tiltmeter",
+}
+
+
+def foreign_tests(folder: Path, configs: Path, names: tuple[str, ...] = ()) -> Iterator[LaboratoryTest]:
+    """Every recording of the cases `names` of a folder of labelled cases (of all if none is named)."""
+    labels = json.loads((folder / "labels.json").read_text(encoding="utf-8"))
+    for name in names or sorted(labels):
+        case = json.loads((folder / name / "case.json").read_text(encoding="utf-8"))
+        rig = rig_of(case, configs)
+        for entry, run in zip(case["runs"], labels[name]["runs"], strict=True):
+            truth = _truth(labels[name]["true_body"], run)
+            yield _test(folder / name / entry["npz"], rig, truth)
+
+
+def rig_of(case: Mapping[str, Any], configs: Path) -> Rig:
+    """The shipped rig of the specimen with the sensors where the case has them."""
+    rig = load_rig(configs / f"{case['specimen']['name'].lower()}.toml")
+    return rig.model_copy(update={"channels": tuple(_channel(rig, entry) for entry in case["channels"])})
+
+
+def _channel(rig: Rig, entry: Mapping[str, Any]) -> Channel:
+    (family,) = (ours for theirs, ours in _FAMILIES.items() if entry["kind"].startswith(theirs))
+    unit = _TO_SI[entry["unit"]]
+    changes: dict[str, Any] = {
+        "id": entry["name"],
+        "position_m": tuple(entry["position_m"]),
+        "range_si": tuple(value * unit for value in entry["range"]),
+    }
+    if family == "wire":
+        changes["anchor_m"] = tuple(entry["anchor_m"])
+    if family == "tiltmeter":
+        changes["axis"] = entry["name"][-1].lower()
+    return rig.of_family(family)[0].model_copy(update=changes)
+
+
+def _truth(body: Mapping[str, float], run: Mapping[str, Any]) -> dict[str, Any]:
+    """`r_factor` is the share of the upper bound of any block, 1 − 2 m R² sin²α / I_O."""
+    r_max = 1.0 - 2.0 * body["m"] * body["R"] ** 2 * math.sin(body["alpha"]) ** 2 / body["IO"]
+    return {
+        "restitution": run["r_factor"] * r_max,
+        "theta0_rad": run["theta0"],
+        "alpha_rad": body["alpha"],
+        "p_rad_s": body["p"],
+    }
+
+
+def _test(path: Path, rig: Rig, truth: dict[str, Any]) -> LaboratoryTest:
+    with np.load(path) as stored:
+        units = np.array([_TO_SI[str(unit)] for unit in stored["units"]])
+        scale, offset = stored["scale"] * units, stored["offset"] * units
+        si = stored["data"] * scale[:, None] + offset[:, None]
+        rows = [list(map(str, stored["names"])).index(channel_id) for channel_id in rig.channel_ids]
+        return LaboratoryTest(rig, float(stored["fs"]), si[rows], {}, truth)
