@@ -120,7 +120,9 @@ def verdict_of(
     theta0_findings: Sequence[FamilyFinding],
 ) -> tuple[RVerdict, tuple[FamilyFinding, ...]]:
     """The verdict of r, and every finding behind it."""
-    findings = [*instruments.findings, *theta0_findings]
+    named = {(finding.family, finding.kind) for finding in instruments.findings}
+    findings = list(instruments.findings)
+    findings += [finding for finding in theta0_findings if (finding.family, finding.kind) not in named]
     lead, other = instruments.signals.lead, tracks.other_name
     blamed = any(
         f.kind in ("slow", "late", "drift") and _LEADS[other] in f.family and f.treatment != "put in step"

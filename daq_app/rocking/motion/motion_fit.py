@@ -32,6 +32,10 @@ _SMALLEST_SHARE = 0.02
 
 _POOR = 1.5
 """A fit that leaves more than this many times the noise may have ended in a minimum that is not the least."""
+_ZERO_WALK_RAD = 1e-5
+"""By how much the zero of the rotation may walk over the fitted motion: what a zero from rest, seconds old,
+may be wrong by. The fit takes up a zero that stands still; one that walks bends late half-cycles against
+early ones, which p and α of small motions answer to."""
 _CORRELATED_POINTS = 12
 """Residuals this many points (0.1 s) apart may still be correlated: slow noise, hum, sway of the wall."""
 
@@ -171,6 +175,16 @@ def _long_run_variance(residuals: Floats) -> float:
     return max(plain + 2.0 * together, plain)
 
 
+def _of_walking_zero(jacobian: Floats, points: int, sigma: float) -> Floats:
+    """Covariance that a zero adds which walks by `_ZERO_WALK_RAD` from the first fitted point to the last.
+
+    The parameters answer to the points by (JᵀJ)⁻¹Jᵀ; each step of the walk moves all points before it.
+    """
+    answer = np.linalg.solve(jacobian.T @ jacobian, jacobian[:points].T) / sigma
+    steps = np.cumsum(answer, axis=1) * (_ZERO_WALK_RAD / math.sqrt(points))
+    return np.asarray(steps @ steps.T)
+
+
 def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: float) -> MotionFit | None:
     x = found.x
     data = found.fun[: found.fun.size - 3 - (x.size - FIXED)]
@@ -179,7 +193,7 @@ def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: floa
     scaled = found.jac.copy()
     scaled[: data.size] /= math.sqrt(excess)
     try:
-        covariance = np.linalg.inv(scaled.T @ scaled)
+        covariance = np.linalg.inv(scaled.T @ scaled) + _of_walking_zero(found.jac, data.size, sigma)
     except np.linalg.LinAlgError:
         return None
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
