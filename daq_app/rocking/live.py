@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,7 +125,6 @@ class LiveAnalyser:
         self._release: PhaseEvent | None = None
         self._track: MotionTrack | None = None
         self._theta0_tilt = math.nan
-        self._doubts: tuple[str, ...] = ()
 
     @property
     def phase(self) -> Phase:
@@ -202,7 +201,6 @@ class LiveAnalyser:
             self._release, self._track = event, None
             self._theta0_tilt = self._tilt_before(event.sample)
             self._families.forget()
-            self._doubts = ()
         elif event.kind == "caught":
             self._release = self._track = None
             return None
@@ -217,7 +215,9 @@ class LiveAnalyser:
                     self._detector.theta0_rad if self._detector else math.nan,
                 )
             self._track.add_impact(event.sample / self._rate, time, rotation)
-            self._doubts = self._families.look(self._track, self._theta0_tilt)
+            estimate = self._estimate()
+            doubts = self._families.look(self._track, self._theta0_tilt, estimate.eav, estimate.crt)
+            return replace(estimate, doubts=doubts)
         else:
             return None
         return self._estimate()
@@ -254,7 +254,6 @@ class LiveAnalyser:
             eav=RestitutionEstimate("EAV", ()) if track is None else track.eav(),
             crt=RestitutionEstimate("CRT", ()) if track is None else track.crt(),
             r_max=float(theory.r_max_rectangular(alpha)),
-            doubts=self._doubts,
         )
 
 

@@ -1,6 +1,6 @@
 """While the test runs: whether LVDTs, tiltmeters and accelerometers speak against the r of the wires.
 
-Looked at once per impact, on what the other families showed meanwhile. Nothing is corrected: the analysis
+Looked at after impacts, on what the other families showed meanwhile. Nothing is corrected: the analysis
 after the test does that.
 """
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.config.rig import Rig
+from daq_app.rocking.estimators import RestitutionEstimate
 from daq_app.rocking.families import words
 from daq_app.rocking.families.levels import level_outlier
 from daq_app.rocking.families.response import LATE_S, SLOW_S, compare
@@ -28,8 +29,8 @@ _MEMORY_S: Final = 8.0
 """How far back the families are kept: hold and first impacts are compared at once."""
 _TIMED_AT: Final = (6, 12)
 """Impacts after which timing is looked at: it costs more than all else, and six impacts tell it."""
-_FEWEST: Final = 5
-"""Impacts from which on values of r are compared."""
+_COMPARED_AT: Final = (5, 8, 11, 14, 17)
+"""Impacts after which values of r are compared; later half-cycles are small and tell little more."""
 _HOLD_S: Final = 1.0
 """So much of the hold is shown to the other families."""
 
@@ -58,6 +59,7 @@ class LiveFamilies:
         self._track: MotionTrack | None = None
         self._level: tuple[str, ...] = ()
         self._timing: tuple[str, ...] = ()
+        self._values: tuple[str, ...] = ()
 
     def append(self, first_sample: int, rotation_rad: Floats, values: Floats) -> None:
         """Rotation (n,) of the wires and SI values (ids, n) from sample `first_sample` on."""
@@ -65,13 +67,31 @@ class LiveFamilies:
             self._first = first_sample
         self._log.append(np.vstack((rotation_rad[None], values)))
 
-    def look(self, wires: MotionTrack, tilt_rad: float) -> tuple[str, ...]:
-        """Doubts after the last impact of `wires`; `tilt_rad`: θ0 of the tiltmeters, NaN without."""
-        if self._joint is not None:
+    def look(
+        self, wires: MotionTrack, tilt_rad: float, eav: RestitutionEstimate, crt: RestitutionEstimate
+    ) -> tuple[str, ...]:
+        """Doubts after the last impact of `wires`, which gives these r.
+
+        `tilt_rad`: θ0 of the tiltmeters, NaN without. Families that cannot be compared are told and do not
+        stop the test's own analysis.
+        """
+        try:
+            self._compare(wires, tilt_rad, eav, crt)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            self._values = (f"the other families could not be compared with the wires ({error})",)
+        return (*self._level, *self._timing, *self._values)
+
+    def _compare(
+        self, wires: MotionTrack, tilt_rad: float, eav: RestitutionEstimate, crt: RestitutionEstimate
+    ) -> None:
+        """What is due after this impact."""
+        impacts = len(wires.crossings_s)
+        if self._joint is not None and impacts <= _COMPARED_AT[-1]:
             self._follow(wires, tilt_rad, self._joint)
-        if len(wires.crossings_s) in _TIMED_AT:
+        if impacts in _TIMED_AT:
             self._timing = (*self._lag_of_families(wires), *self._lag_of_shocks(wires))
-        return (*self._level, *self._timing, *self._restitution(wires))
+        if impacts in _COMPARED_AT:
+            self._values = self._restitution(wires, eav, crt)
 
     def _follow(self, wires: MotionTrack, tilt_rad: float, joint: BaseJoint) -> None:
         """The half-cycle that ended, as the LVDTs show it; at the first, the level of the hold as well."""
@@ -91,11 +111,11 @@ class LiveFamilies:
         if self._track is not None and len(self._track.arcs) == known:
             self._track.add_impact(wires.crossings_s[known], time, rotation)
 
-    def _restitution(self, wires: MotionTrack) -> tuple[str, ...]:
+    def _restitution(
+        self, wires: MotionTrack, eav: RestitutionEstimate, crt: RestitutionEstimate
+    ) -> tuple[str, ...]:
         """Where wires and LVDTs, or EAV and CRT, give r that differ beyond their errors."""
-        if len(wires.crossings_s) < _FEWEST:
-            return ()
-        said = [methods_apart(wires.eav(), wires.crt())]
+        said = [methods_apart(eav, crt)]
         lvdts = self._track
         if lvdts is not None and len(lvdts.arcs) == len(wires.arcs):
             pairs = (

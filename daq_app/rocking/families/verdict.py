@@ -80,8 +80,7 @@ def compare_series(wires: DecaySeries, lvdts: DecaySeries) -> tuple[float, float
         variances=np.where(usable, wires.variances + lvdts.variances, 0.0),
         usable=usable,
     )
-    ratio = estimate_all([apart])[0]
-    typical = estimate_all([wires])[0]
+    ratio, typical = estimate_all([apart, wires])
     if ratio.r is None or ratio.standard_error is None or typical.r is None:
         return None
     return typical.r * (ratio.r - 1.0), typical.r * ratio.standard_error
