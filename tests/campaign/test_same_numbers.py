@@ -8,15 +8,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PySide6.QtWidgets import QLabel
+from pytestqt.qtbot import QtBot
 from typer.testing import CliRunner
 
 from daq_app.acquisition.closing.derive import derive
 from daq_app.campaign.recorded import recorded_test
 from daq_app.campaign.report.collect import collect, read_and_summarise
 from daq_app.campaign.report.summary import TestSummary
+from daq_app.campaign.result.result import make_result
 from daq_app.campaign.status import TestVerdict
 from daq_app.cli.app import build_app
 from daq_app.config import load_rig, plan_tasks
+from daq_app.config.wording import plus_minus
+from daq_app.monitor.data.background import Background
+from daq_app.monitor.pages.result_page import ResultPage
 from daq_app.rocking import AnalysisOptions, TestRecord, analyse_record
 from daq_app.runfile import JournalWriter, RunHeader, finalise, open_run, plan_to_dict, read_journal
 from daq_app.runfile.exporters import export_run
@@ -78,6 +84,25 @@ def test_every_door_gives_the_same_r_to_the_last_digit(tmp_path: Path, configs: 
     assert by_python.theta0_rad == by_command["theta0_rad"] == in_window["theta0_rad"]
     assert by_python.zero == by_command["zero"] == in_window["zero"]
     assert by_python.zero == ("tare" if tared else "rest")
+
+
+def test_the_windows_result_page_shows_the_r_of_the_command(
+    qtbot: QtBot, tmp_path: Path, configs: Path
+) -> None:
+    run = write_run(tmp_path, configs, tared=False)
+    make_result(run)
+    page = ResultPage(Background())
+    qtbot.addWidget(page)
+    with qtbot.waitSignal(page.shown, timeout=60_000):
+        page.open(run)
+    by_command = command(run)
+    assert page.result is not None
+    for method in ("eav", "crt"):
+        estimate = by_command["estimates"][method]
+        assert page.result.test.methods[method.upper()].r == estimate["r"]
+        value, detail = (label.text() for label in page.tiles[method.upper()].findChildren(QLabel)[1:3])
+        assert value == f"{estimate['r']:.3f}"
+        assert detail.startswith(plus_minus(estimate["standard_error"]))
 
 
 def test_the_zero_of_a_run_without_a_tare_can_be_chosen(tmp_path: Path, configs: Path) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 import pytest
@@ -138,6 +139,24 @@ def test_decimal_commas_go_with_semicolons(tmp_path: Path, run: Path) -> None:
     rotation = [float(text.replace(",", ".")) for text in columns_of(path, ";")["rotation"]]
     np.testing.assert_array_equal(rotation, ROTATION)
     assert "0,8951" in columns_of(beside(path), ";")["value"]
+
+
+@pytest.mark.parametrize(("decimal", "separator", "point"), [("point", ",", "."), ("comma", ";", ",")])
+def test_pandas_reads_the_tidy_table_of_either_locale(
+    tmp_path: Path, run: Path, decimal: str, separator: str, point: str
+) -> None:
+    path = export_run(run, tmp_path, "csv", derive=derive, decimal=decimal)
+    table = pd.read_csv(beside(path), sep=separator, decimal=point)
+    (r,) = table[(table["source"] == "verdict: good") & (table["quantity"] == "r")]["value"]
+    assert r == 0.8951
+
+
+def test_the_netcdf_library_reads_rotation_and_r(tmp_path: Path, run: Path) -> None:
+    netcdf = pytest.importorskip("netCDF4", reason="Unidata's netCDF4 is not installed")
+    with netcdf.Dataset(export_run(run, tmp_path, "netcdf", derive=derive)) as content:
+        columns = [content[f"result_{name}"][:].tolist() for name in ("source", "quantity", "value")]
+        np.testing.assert_array_equal(content["rotation"][:], ROTATION)
+        assert r_of(*columns) == 0.8951
 
 
 def test_a_part_of_the_run_has_the_rotation_of_that_part(tmp_path: Path, run: Path) -> None:
