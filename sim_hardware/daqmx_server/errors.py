@@ -51,6 +51,7 @@ class Code(IntEnum):
     EVENT_WHILE_RUNNING = -200960
     DEVICE_LOST = -201003
     NETWORK_LOST = -201390
+    SAMPLES_NOT_YET_WRITABLE = -200292
     DUPLICATE_TASK = -200089
     TASK_NOT_IN_MAX = -200485
     SCALAR_OF_MANY = -200523
@@ -249,6 +250,10 @@ _TEXT: Final[dict[int, str]] = {
     Code.ATTRIBUTE_NOT_SUPPORTED: "Specified property is not supported by this device.",
     Code.GLOBAL_CHANNEL_UNKNOWN: "There is no global channel of that name in NI MAX.",
     Code.TIMESTAMP_NOT_ENABLED: "The time stamp of this event is not enabled in the task.",
+    Code.SAMPLES_NOT_YET_WRITABLE: (
+        "Some of the samples could not be written yet: the buffer and the memory of the device are full, and "
+        "the generation has made no room within the time-out."
+    ),
     Code.NO_MORE_SPACE: "There is no room for more samples behind the last one of the generation.",
     Code.NO_LIMITS: (
         "Minimum and maximum of the channel are not set, and there is no default for them: set both."
@@ -288,13 +293,16 @@ class DaqmxError(Exception):
     """An error of the driver.
 
     `details` are paragraphs such as ``Device Specified: cDAQ9Mod1`` that NI appends to its sentence.
-    `samples_read` is sent along where a read failed half-way.
+    `samples_read` or `samples_written` is sent along where a read or a write failed half-way.
     """
 
-    def __init__(self, code: int, *details: str, samples_read: int | None = None) -> None:
+    def __init__(
+        self, code: int, *details: str, samples_read: int | None = None, samples_written: int | None = None
+    ) -> None:
         self.code = int(code)
         self.details = details
         self.samples_read = samples_read
+        self.samples_written = samples_written
         super().__init__(self.text())
 
     def text(self, task: str = "") -> str:

@@ -225,8 +225,10 @@ class Bench:
         return float(self.source.volts((terminal,), np.array([time_s]))[0, 0])
 
     def digital_edge(self, terminal: str, time_s: float, rising: bool = True) -> None:
-        """An edge at a terminal such as ``/cDAQ1/PFI0``."""
+        """An edge at a terminal such as ``/cDAQ1/PFI0``, or of a line such as ``Dev1/port0/line3``."""
         self._edges.setdefault(plain(terminal), []).append((time_s, rising))
+        for line in self.inventory.lines_at(terminal):
+            self.loopback.hold(line, time_s, float(rising))
         self.world_changed()
 
     def level_spans(self, terminal: str, high: bool) -> list[tuple[float, float]]:

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 Values = NDArray[np.float64]
-Player = Callable[[Values], Values]
-"""Values put out at instants; NaN before the output has begun."""
 _KEPT: Final = 4096
 """Changes that a terminal remembers: late readers see the past as it was."""
+
+
+@dataclass(frozen=True, slots=True)
+class Player:
+    """A generation at one terminal."""
+
+    values: Callable[[Values], Values]
+    """Values put out at instants; NaN before the output has begun."""
+    steps: Callable[[float, float], Values]
+    """Instants, after one and up to another, at which the value may change."""
 
 
 class Loopback:
@@ -39,9 +48,22 @@ class Loopback:
         """The generation ends; the terminal keeps its last value."""
         player = self._players.pop(terminal, None)
         if player is not None:
-            last = float(player(np.array([time_s]))[0])
+            steps = player.steps(-np.inf, time_s)[-_KEPT:]
+            for instant, value in zip(steps, player.values(steps), strict=True):
+                self.hold(terminal, float(instant), float(value))
+            last = float(player.values(np.array([time_s]))[0])
             if not np.isnan(last):
                 self.hold(terminal, time_s, last)
+
+    def changes(self, terminal: str, after_s: float, until_s: float) -> list[tuple[float, bool]]:
+        """Changes of a line after one instant and up to another: instant, and whether it rises."""
+        held = [t for t in self._held.get(terminal, ([], []))[0] if after_s < t <= until_s]
+        player = self._players.get(terminal)
+        steps = held if player is None else [*held, *player.steps(after_s, until_s)]
+        instants = np.array(sorted({after_s, *map(float, steps)}))
+        levels = self.at(terminal, instants) > 0.5
+        turned = np.flatnonzero(levels[1:] != levels[:-1]) + 1
+        return [(float(instants[place]), bool(levels[place])) for place in turned]
 
     def at(self, terminal: str, times_s: Values) -> Values:
         """Values at instants; 0 before anything was put out."""
@@ -50,7 +72,7 @@ class Loopback:
         out = known[np.array([bisect_right(times, float(t)) for t in times_s], dtype=np.intp)]
         player = self._players.get(terminal)
         if player is not None:
-            played = player(times_s)
+            played = player.values(times_s)
             out = np.where(np.isnan(played), out, played)
         return np.asarray(out)
 

@@ -180,6 +180,11 @@ class Inventory:
             raise _no_channel(device, terminal or name)
         return device, lines
 
+    def lines_at(self, terminal: str) -> list[str]:
+        """The line of that name, in its own spelling; none where the terminal is no line."""
+        wanted = terminal.lower().strip("/")
+        return [line for device in self.devices.values() for line in device.lines if line.lower() == wanted]
+
     def host_of(self, device: Device) -> str:
         """The device that owns clocks and triggers: the chassis of a module, else the device itself."""
         return device.chassis or device.name

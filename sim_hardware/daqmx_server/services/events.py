@@ -160,11 +160,15 @@ def done(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
 
 
 def signal(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
-    """Sample clock or sample complete: one event per sample; others are not known to these devices."""
+    """One event per sample, detected change or pulse; −200987 for a signal that the task does not make."""
     wanted = fields_of(request)["signal_id"]
-    if wanted not in (Signal.SAMPLE_CLOCK.value, Signal.SAMPLE_COMPLETE.value):
-        raise DaqmxError(Code.SIGNAL_EVENT_UNSUPPORTED)
     with bench.changed:
+        task = task_named(bench, request.task.name)
+        known = {Signal.SAMPLE_CLOCK.value, Signal.SAMPLE_COMPLETE.value}
+        known |= {Signal.CHANGE_DETECTION_EVENT.value} if task.detects_changes else set()
+        known |= {Signal.COUNTER_OUTPUT_EVENT.value} if task.io == "CO" else set()
+        if wanted not in known:
+            raise DaqmxError(Code.SIGNAL_EVENT_UNSUPPORTED)
         stream = EventStream(bench, request, context, f"signal{wanted}", Code.SIGNAL_REGISTERED)
     context.send_initial_metadata(())
     event = pb.RegisterSignalEventResponse(signal_id=wanted)

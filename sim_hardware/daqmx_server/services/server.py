@@ -101,6 +101,8 @@ def _fail(context: Any, error: Exception, task: str) -> None:
         metadata = [("ni-error", str(error.code))]
         if error.samples_read is not None:
             metadata.append(("ni-samps-per-chan-read", str(error.samples_read)))
+        if error.samples_written is not None:
+            metadata.append(("ni-samps-per-chan-written", str(error.samples_written)))
         context.set_trailing_metadata(tuple(metadata))
         context.abort(grpc.StatusCode.UNKNOWN, error.text(task))
     if isinstance(error, SessionExistsError):

@@ -21,18 +21,23 @@ from sim_hardware.daqmx_server.requests import fields_of
 from sim_hardware.daqmx_server.services.attributes.groups import Handler
 from sim_hardware.daqmx_server.services.attributes.tasks import line_bytes
 from sim_hardware.daqmx_server.tasks.generation import line_levels
+from sim_hardware.daqmx_server.tasks.samplers import pulse_times_s
 from sim_hardware.daqmx_server.tasks.task import State, Task, task_named
+from sim_hardware.daqmx_server.tasks.writing import write_once
 
 Samples = NDArray[np.float64]
 
 
-def put_out(task: Task, samples: Samples, auto_start: bool) -> int:
+def put_out(task: Task, samples: Samples, auto_start: bool, timeout_s: float) -> int:
     """Samples (channels, samples) to the buffer, or at once where the task has no clock; their number."""
     if not task.channels:
         raise DaqmxError(Code.NO_OUTPUT_CHANNELS)
     if task.is_buffered:
-        room = task.output_buffer or task.timing.samples_per_channel
-        count = task.generation.write(samples, room)
+        if task.generation.regenerates:
+            room = task.output_buffer or task.timing.samples_per_channel
+            count = task.generation.write(samples, room)
+        else:
+            count = write_once(task, samples, timeout_s)
         if auto_start and task.state is not State.RUNNING:
             task.start()
         elif task.run is not None:
@@ -101,7 +106,7 @@ def _array_handler(rpc: str) -> Handler:
         samples = _arranged(values, len(task.channels), fields["data_layout"])
         if "Binary" in rpc:
             samples = samples * np.array([[_volts_per_code(channel)] for channel in task.channels])
-        return reply(samps_per_chan_written=put_out(task, samples, fields["auto_start"]))
+        return reply(samps_per_chan_written=put_out(task, samples, fields["auto_start"], fields["timeout"]))
 
     return handler
 
@@ -118,7 +123,8 @@ def write_lines(bench: Bench, request: Any) -> Any:
     else:
         bits = bits.reshape(shape)
     words = (bits * (2.0 ** np.arange(width))).sum(axis=2)
-    return pb.WriteDigitalLinesResponse(samps_per_chan_written=put_out(task, words, fields["auto_start"]))
+    written = put_out(task, words, fields["auto_start"], fields["timeout"])
+    return pb.WriteDigitalLinesResponse(samps_per_chan_written=written)
 
 
 def _scalar_handler(rpc: str) -> Handler:
@@ -128,7 +134,7 @@ def _scalar_handler(rpc: str) -> Handler:
         task = task_named(bench, request.task.name)
         if len(task.channels) > 1:
             raise DaqmxError(Code.SCALAR_OF_MANY)
-        put_out(task, np.array([[float(request.value)]]), request.auto_start)
+        put_out(task, np.array([[float(request.value)]]), request.auto_start, request.timeout)
         return reply()
 
     return handler
@@ -143,7 +149,9 @@ def write_raw(bench: Bench, request: Any) -> Any:
     samples = np.ascontiguousarray(values[:whole].reshape(-1, len(task.channels)).T)
     if task.io == "AO":
         samples = samples * np.array([[_volts_per_code(channel)] for channel in task.channels])
-    return pb.WriteRawResponse(samps_per_chan_written=put_out(task, samples, request.auto_start))
+    return pb.WriteRawResponse(
+        samps_per_chan_written=put_out(task, samples, request.auto_start, request.timeout)
+    )
 
 
 def _check_count(task: Task, waveforms: Sequence[Any]) -> None:
@@ -157,7 +165,7 @@ def write_analog_waveforms(bench: Bench, request: Any) -> Any:
     _check_count(task, request.waveforms)
     waveforms = [float64_analog_waveform_from_protobuf(waveform) for waveform in request.waveforms]
     samples = np.array([waveform.scaled_data for waveform in waveforms], dtype=np.float64)
-    written = put_out(task, samples, request.auto_start)
+    written = put_out(task, samples, request.auto_start, request.timeout)
     return pb.WriteAnalogWaveformsResponse(samps_per_chan_written=written)
 
 
@@ -172,7 +180,7 @@ def write_digital_waveforms(bench: Bench, request: Any) -> Any:
             raise DaqmxError(Code.NUM_LINES_MISMATCH, f"Channel Name: {channel.name}")
         weights = [2.0 ** channel.lines.index(line) for line in channel.columns]
         words.append((waveform.data != 0) @ np.array(weights))
-    written = put_out(task, np.array(words, dtype=np.float64), request.auto_start)
+    written = put_out(task, np.array(words, dtype=np.float64), request.auto_start, request.timeout)
     return pb.WriteDigitalWaveformsResponse(samps_per_chan_written=written)
 
 
@@ -184,20 +192,25 @@ _PULSES: Final = {
 
 
 def _pulse_handler(rpc: str, scalar: bool) -> Handler:
-    """The last pulse of a request is the one that goes on."""
-    reply = getattr(pb, f"{rpc}Scalar Response".replace(" ", "") if scalar else f"{rpc}Response")
+    """Several pulses written before the start follow each other; at other times the last one goes on."""
+    reply = getattr(pb, f"{rpc}ScalarResponse" if scalar else f"{rpc}Response")
     keys = _PULSES[rpc]
 
     def handler(bench: Bench, request: Any) -> Any:
         task = task_named(bench, request.task.name)
-        n_channels = len(task.channels)
-        written = 1
-        for field, attribute in keys.items():
-            given = getattr(request, field)
-            values = [given] if scalar else list(given)
-            written = len(values) // max(n_channels, 1)
+        arrays = [[getattr(request, field)] if scalar else list(getattr(request, field)) for field in keys]
+        n_channels = max(len(task.channels), 1)
+        written = len(arrays[0]) // n_channels
+        in_turn = written > 1 and task.run is None and task.timing.is_implicit
+        pulses = []
+        for number in range(0 if in_turn else written - 1, written):
             for row, channel in enumerate(task.channels):
-                channel.attributes[attribute] = values[(row + 1) * written - 1]
+                place = row * written + number
+                channel.attributes |= {
+                    attribute: values[place] for attribute, values in zip(keys.values(), arrays, strict=True)
+                }
+            pulses.append(pulse_times_s(task.channels[0]))
+        task.generation.pulses = np.array(pulses).T if in_turn else np.empty((2, 0))
         task.generation.written += written
         if request.auto_start and task.state is not State.RUNNING:
             task.start()

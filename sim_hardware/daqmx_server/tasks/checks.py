@@ -124,6 +124,8 @@ def _check_triggers(task: ConfiguredTask) -> None:
         raise DaqmxError(Code.REF_TRIGGER_WHEN_CONTINUOUS)
     if task.trigger.get("START_TRIG_RETRIGGERABLE") and endless and task.io in ("AI", "DI"):
         raise DaqmxError(Code.RETRIGGER_INVALID)
+    if triggers.holds_by_analog(task.trigger) and task.io == "AI":
+        trigger_channel(task, triggers.source_of(task.trigger, "PAUSE"))
     for which in _TRIGGERS:
         if task.trigger[f"{which}_TRIG_TYPE"] in (triggers.ANALOG, triggers.WINDOW):
             trigger_channel(task, triggers.source_of(task.trigger, which))

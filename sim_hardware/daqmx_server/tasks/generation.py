@@ -20,8 +20,12 @@ class Generation:
     def __init__(self, settings: dict[str, Any]) -> None:
         self._settings = settings
         self._samples: Samples = np.empty((0, 0))
+        self.pulses: Samples = np.empty((2, 0))
+        """Low and high times of pulses that a counter output makes in turn, s, shape (2, pulses)."""
         self.written = 0
         """Samples per channel written so far."""
+        self.written_before_start = 0
+        """Samples per channel that had been written when the task was last started."""
 
     @property
     def regenerates(self) -> bool:
@@ -32,10 +36,6 @@ class Generation:
     @property
     def samples(self) -> Samples:
         return self._samples
-
-    def clear(self) -> None:
-        self._samples = np.empty((0, 0))
-        self.written = 0
 
     def write(self, samples: Samples, buffer: int | None) -> int:
         """Append samples, or begin anew where a regenerated buffer is full; their number."""

@@ -28,6 +28,10 @@ class BufferedTask(Protocol):
     def is_output(self) -> bool: ...
 
 
+ONBOARD_OUTPUT_SAMPLES: Final = 8191
+"""Samples that the memory of a device with analogue outputs holds (X Series)."""
+
+
 def resources_of(channels: Sequence[VirtualChannel]) -> list[str]:
     """Parts of devices that a task with these channels reserves; inputs that only look need none."""
     out: list[str] = []

@@ -28,6 +28,8 @@ class Reading:
     status: int
     first_time_s: float
     """Bench time of the first sample."""
+    position: int = 0
+    """Number of the first sample in the run."""
 
     @property
     def count(self) -> int:
@@ -98,7 +100,7 @@ def read(task: Task, asked: int, timeout_s: float, room: int | None = None) -> R
     _end_automatic(task, run)
     task.bench.changed.notify_all()
     late = not in_time or taken < count
-    return Reading(codes, rows, int(Code.SAMPLES_NOT_YET_AVAILABLE) if late else 0, first)
+    return Reading(codes, rows, int(Code.SAMPLES_NOT_YET_AVAILABLE) if late else 0, first, start)
 
 
 def _wait(task: Task, run: Run, end: int, timeout_s: float) -> bool:

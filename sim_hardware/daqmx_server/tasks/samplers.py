@@ -5,15 +5,18 @@ from __future__ import annotations
 from typing import Any, Final, Protocol, cast
 
 import numpy as np
+from nidaqmx.constants import Level
 from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.bench.bench import Bench
+from sim_hardware.daqmx_server.bench.loopback import Player
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.inventory.terminals import plain
 from sim_hardware.daqmx_server.tasks.generation import Generation
 from sim_hardware.daqmx_server.timing.acquisition import Run
 from sim_hardware.daqmx_server.timing.counting import TIMEBASE_HZ, CounterSampler, Pulses
 from sim_hardware.daqmx_server.timing.digital import DigitalSampler
+from sim_hardware.daqmx_server.timing.found_times import FoundTimes, HeldClock
 from sim_hardware.daqmx_server.timing.routing import terminals_of
 from sim_hardware.daqmx_server.timing.sample_times import SampleTimes
 from sim_hardware.daqmx_server.timing.sampling import BlockSource, Sampler
@@ -43,6 +46,9 @@ class ChannelTask(Protocol):
     def devices(self) -> list[str]: ...
 
     @property
+    def detects_changes(self) -> bool: ...
+
+    @property
     def scan(self) -> Scan: ...
 
 
@@ -56,10 +62,15 @@ class NoSamples:
 def sampler_of(task: ChannelTask, times: SampleTimes) -> BlockSource:
     """Samples of the task's channels by a clock."""
     bench = task.bench
+    if isinstance(times, FoundTimes) and isinstance(times.finder, HeldClock):
+        return times.finder
     if task.io == "DI":
         return DigitalSampler(task.channels, times, bench.loopback)
     if task.io == "CI":
-        return CounterSampler(task.channels, times, task.armed_s, lambda channel: pulses_at(task, channel))
+        implicit = task.timing.is_implicit
+        return CounterSampler(
+            task.channels, times, task.armed_s, lambda channel: pulses_at(task, channel), implicit
+        )
     if task.io == "AI":
         return Sampler(bench.wiring, bench.faults, task.scan.inputs, times, bench.helper)
     return NoSamples()
@@ -104,7 +115,7 @@ def pulses_at(task: ChannelTask, channel: VirtualChannel) -> Pulses | None:
     for terminal in wanted:
         timebase_hz = _TIMEBASES_HZ.get(terminal.rpartition("/")[2])
         if timebase_hz is not None:
-            return Pulses(0.0, 0.5 / timebase_hz, 0.5 / timebase_hz, np.inf)
+            return Pulses.regular(0.0, 0.5 / timebase_hz, 0.5 / timebase_hz)
     for other in cast("dict[str, ChannelTask]", task.bench.tasks).values():
         run = other.run
         if other.io != "CO" or run is None:
@@ -113,10 +124,19 @@ def pulses_at(task: ChannelTask, channel: VirtualChannel) -> Pulses | None:
         if run.times is None:
             continue
         if wanted & terminals_of(other, "SampleClock"):
-            low_s, high_s = pulse_times_s(other.channels[0])
+            lows_s, highs_s = _pulse_sequence_s(other)
             total = run.last_sample()
-            return Pulses(run.times.first_s, low_s, high_s, np.inf if total is None else float(total))
+            high_first = other.channels[0].attributes.get("CO_PULSE_IDLE_STATE") == Level.HIGH.value
+            count = np.inf if total is None else float(total)
+            return Pulses(run.times.first_s, lows_s, highs_s, count, high_first)
     return None
+
+
+def _pulse_sequence_s(task: ChannelTask) -> NDArray[np.float64]:
+    """Low and high times of the pulses that a counter output makes in turn, s, shape (2, pulses)."""
+    if task.generation.pulses.shape[1]:
+        return task.generation.pulses
+    return np.array([[time_s] for time_s in pulse_times_s(task.channels[0])])
 
 
 def play(task: ChannelTask, run: Run) -> None:
@@ -135,11 +155,20 @@ def play(task: ChannelTask, run: Run) -> None:
 
         return values
 
+    def steps(after_s: float, until_s: float) -> NDArray[np.float64]:
+        run.look(task.bench.clock.now())
+        if run.times is None or not task.generation.samples.size:
+            return np.empty(0)
+        end = run.times.count(until_s)
+        if run.plan.total is not None:
+            end = min(end, run.plan.total)
+        return run.times.at(np.arange(run.times.count(after_s), end))
+
     for row, channel in enumerate(task.channels):
         if task.io == "AO":
-            task.bench.loopback.play(channel.physical, player(row, None))
+            task.bench.loopback.play(channel.physical, Player(player(row, None), steps))
         for bit, line in enumerate(channel.lines):
-            task.bench.loopback.play(line, player(row, bit))
+            task.bench.loopback.play(line, Player(player(row, bit), steps))
     task.bench.world_changed()
 
 

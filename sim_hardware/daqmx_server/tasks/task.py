@@ -130,6 +130,16 @@ class Task:
         return self.io == "CO" or bool(self.timing.timing_type != SampleTimingType.ON_DEMAND.value)
 
     @property
+    def detects_changes(self) -> bool:
+        """Whether changes of digital lines are its sample clock."""
+        return self.io == "DI" and self.timing.timing_type == SampleTimingType.CHANGE_DETECTION.value
+
+    @property
+    def pulse_periods_s(self) -> NDArray[np.float64]:
+        """Periods of the pulses that a counter output makes in turn; empty for a regular train."""
+        return np.asarray(self.generation.pulses.sum(axis=0))
+
+    @property
     def is_reserved(self) -> bool:
         """Whether the task holds its devices, and so may drive their lines."""
         return self.state >= State.RESERVED
@@ -241,6 +251,7 @@ class Task:
         # A task that waits for another one's clock or edge does not set the world going by itself.
         clock = self.bench.clock
         self.armed_s = clock.now() if self.timing.waits_for_others else clock.power_on()
+        self.generation.written_before_start = self.generation.written
         self.run = make_run(self, self.armed_s)
         self.run.look(clock.now())
         if self.io in ("AO", "DO"):

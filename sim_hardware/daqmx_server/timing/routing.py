@@ -8,6 +8,7 @@ from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.inventory.devices import channel_list
 from sim_hardware.daqmx_server.inventory.terminals import plain
 from sim_hardware.daqmx_server.timing.acquisition import Run
+from sim_hardware.daqmx_server.timing.found_times import FoundTimes
 
 _TIMING_ENGINES: Final = ("te0", "te1", "te2")
 _EXPORTS: Final = {
@@ -33,6 +34,11 @@ class SignalTask(Protocol):
     @property
     def devices(self) -> list[str]: ...
 
+    @property
+    def detects_changes(self) -> bool:
+        """Whether changes of lines are its sample clock."""
+        ...
+
 
 def terminals_of(task: SignalTask, signal: str) -> set[str]:
     """Plain names of the terminals at which a signal of the task appears."""
@@ -43,6 +49,9 @@ def terminals_of(task: SignalTask, signal: str) -> set[str]:
     owners = [(host, engine) for host in task.hosts for engine in engines]
     owners += [(device, kind) for device in task.devices]
     out = {plain(f"{owner}/{engine}/{signal}") for owner, engine in owners}
+    if signal == "SampleClock" and task.detects_changes:
+        out |= {plain(f"{host}/ChangeDetectionEvent") for host in task.hosts}
+        out |= {plain(t) for t in channel_list(str(task.exported.get("CHANGE_DETECT_EVENT_OUTPUT_TERM", "")))}
     return out | {plain(term) for term in channel_list(str(task.exported.get(_EXPORTS[signal], "")))}
 
 
@@ -64,12 +73,14 @@ def counter_output(channel: VirtualChannel) -> str:
 def edges_of(task: SignalTask, terminal: str) -> list[float]:
     """Instants of the task's edges at a (plain) terminal, as far as they have happened.
 
-    Of a sample clock only the first edge counts: it is what starts whoever listens.
+    Only the first edge of a regular sample clock counts: it is what starts whoever listens.
     """
     run = task.run
     if run is None or run.times is None:
         return []
     out = [run.times.first_s for s in ("StartTrigger", "SampleClock") if terminal in terminals_of(task, s)]
+    if isinstance(run.times, FoundTimes) and terminal in terminals_of(task, "SampleClock"):
+        out += run.times.finder.known()
     if run.ref_sample is not None and terminal in terminals_of(task, "ReferenceTrigger"):
         out.append(run.times.time_of(run.ref_sample))
     return out

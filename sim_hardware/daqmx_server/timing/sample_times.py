@@ -61,6 +61,34 @@ class SampleTimes:
         return int(np.floor(position + 1e-6)) + 1
 
 
+class PulseTimes(SampleTimes):
+    """Starts of pulses whose periods come one after the other, and then again from the first one."""
+
+    def __init__(self, first_s: float, periods_s: NDArray[np.float64], skipped: int = 0) -> None:
+        """`skipped` pulses of the train from `first_s` on are not counted."""
+        super().__init__(first_s, 1.0 / float(np.mean(periods_s)))
+        self._periods_s = np.asarray(periods_s, dtype=np.float64)
+        self._starts_s = np.concatenate(([0.0], np.cumsum(self._periods_s)))
+        self._skipped = skipped
+
+    def at(self, index: NDArray[np.int64]) -> NDArray[np.float64]:
+        turn, place = np.divmod(np.asarray(index) + self._skipped, len(self._periods_s))
+        return np.asarray(self.first_s + turn * self._starts_s[-1] + self._starts_s[place])
+
+    def later(self, delay_s: float) -> SampleTimes:
+        return PulseTimes(self.first_s + delay_s, self._periods_s, self._skipped)
+
+    def from_sample(self, index: int) -> SampleTimes:
+        return PulseTimes(self.first_s, self._periods_s, self._skipped + index)
+
+    def count(self, now_s: float) -> int:
+        if now_s < self.first_s:
+            return 0
+        turn, rest_s = divmod(now_s - self.first_s + 1e-6 * float(self._periods_s.min()), self._starts_s[-1])
+        begun = int(turn) * len(self._periods_s) + int(np.searchsorted(self._starts_s, rest_s, side="right"))
+        return max(begun - self._skipped, 0)
+
+
 class BurstTimes(SampleTimes):
     """A clock that gives the same number of samples after each of its triggers."""
 

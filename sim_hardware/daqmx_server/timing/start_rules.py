@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from nidaqmx.constants import DigitalWidthUnits, Edge
 
 from sim_hardware.daqmx_server.timing import triggers
 from sim_hardware.daqmx_server.timing.acquisition import StartRule
+from sim_hardware.daqmx_server.timing.found_times import FoundTimes, HeldClock, LineChanges
 from sim_hardware.daqmx_server.timing.sample_times import BurstTimes, SampleTimes
 from sim_hardware.daqmx_server.timing.task_timing import TimedTask
 from sim_hardware.daqmx_server.timing.triggers import CrossingSearch
@@ -33,6 +36,7 @@ class _OwnClock:
         self._armed_s = armed_s
         self._kind = int(task.trigger["START_TRIG_TYPE"])
         self._search: CrossingSearch | None = None
+        self._held: HeldClock | None = None
         if self._kind in (triggers.ANALOG, triggers.WINDOW):
             self._search = CrossingSearch(triggers.Condition.of(task.trigger, "START"), 0)
             self._listen()
@@ -40,6 +44,9 @@ class _OwnClock:
     def disturbed(self) -> None:
         if self._search is not None:
             self._listen()
+        if self._held is not None:
+            times = self._task.timing.retimed(self._held.times)
+            self._held.renew(times, self._task.make_sampler(times))
 
     def _listen(self) -> None:
         """An analogue trigger looks at its channel at the rate of the acquisition to come."""
@@ -51,8 +58,29 @@ class _OwnClock:
         if times is None:
             return None
         self._task.bench.faults.acquisition_started(times.first_s, times.rate_hz)
-        retriggers = self._task.timing.retriggers
-        return BurstTimes([times], self._task.timing.samples_per_channel) if retriggers else times
+        if self._task.timing.retriggers:
+            return BurstTimes([times], self._task.timing.samples_per_channel)
+        return self._found(times)
+
+    def _found(self, times: SampleTimes) -> SampleTimes:
+        """The same clock, or one whose instants lines or an analogue signal decide."""
+        task = self._task
+        if task.detects_changes and not any(channel.device.simulated for channel in task.channels):
+            lines = [
+                (partial(task.bench.loopback.changes, line), rising)
+                for line, rising in task.timing.changing_lines()
+            ]
+            return FoundTimes(LineChanges(times.first_s, lines), times.rate_hz)
+        if triggers.holds_by_analog(task.trigger) and task.io == "AI":
+            source = triggers.source_of(task.trigger, "PAUSE")
+            self._held = HeldClock(
+                times,
+                task.make_sampler(times),
+                lambda sampler, start, stop: task.trigger_readings(sampler, source, start, stop),
+                triggers.Hold(task.trigger),
+            )
+            return FoundTimes(self._held, times.rate_hz)
+        return times
 
     def again(self, times: SampleTimes, now_s: float) -> SampleTimes | None:
         if not isinstance(times, BurstTimes) or times.end_s >= now_s:

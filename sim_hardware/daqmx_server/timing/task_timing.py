@@ -16,10 +16,12 @@ from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.channels.analog_input import AnalogInput
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
+from sim_hardware.daqmx_server.inventory.devices import channel_list
 from sim_hardware.daqmx_server.inventory.terminals import plain
 from sim_hardware.daqmx_server.timing import triggers
+from sim_hardware.daqmx_server.timing.found_times import FoundTimes
 from sim_hardware.daqmx_server.timing.routing import SignalTask, terminals_of
-from sim_hardware.daqmx_server.timing.sample_times import BurstTimes, SampleTimes
+from sim_hardware.daqmx_server.timing.sample_times import BurstTimes, PulseTimes, SampleTimes
 from sim_hardware.daqmx_server.timing.sampling import BlockSource
 from sim_hardware.faults.model import ClockChange
 
@@ -47,6 +49,11 @@ class TimedTask(SignalTask, Protocol):
         """Frequency of a task that puts out pulses; 0 for any other."""
         ...
 
+    @property
+    def pulse_periods_s(self) -> NDArray[np.float64]:
+        """Periods of the pulses that a counter output makes in turn; empty for a regular train."""
+        ...
+
     def make_sampler(self, times: SampleTimes) -> BlockSource: ...
 
     def trigger_readings(
@@ -64,6 +71,11 @@ class TaskTiming:
     @property
     def timing_type(self) -> int:
         return int(self.settings.get("SAMP_TIMING_TYPE", SampleTimingType.ON_DEMAND.value))
+
+    @property
+    def is_implicit(self) -> bool:
+        """Whether the measured or generated pulses are themselves the clock."""
+        return self.timing_type == int(SampleTimingType.IMPLICIT.value)
 
     @property
     def mode(self) -> int:
@@ -166,6 +178,30 @@ class TaskTiming:
                 f"Maximum Value: {self.max_rate_hz}",
             )
         self._verify_convert_clock()
+        if self.timing_type == SampleTimingType.CHANGE_DETECTION.value:
+            self._verify_change_detection()
+
+    def changing_lines(self) -> list[tuple[str, bool]]:
+        """Lines that change detection watches, and whether their rising edges count or their falling ones."""
+        inventory = self._task.bench.inventory
+        return [
+            (line, edge == "RISING")
+            for edge in ("RISING", "FALLING")
+            for text in channel_list(
+                str(self.settings.get(f"CHANGE_DETECT_DI_{edge}_EDGE_PHYSICAL_CHANS", ""))
+            )
+            for line in inventory.digital_lines(text)[1]
+        ]
+
+    def _verify_change_detection(self) -> None:
+        """−200077 for a task that has no digital input, or that watches no line."""
+        if self._task.io != "DI":
+            raise DaqmxError(Code.INVALID_VALUE, "Property: DAQmx_SampTimingType")
+        if not self.changing_lines():
+            raise DaqmxError(
+                Code.INVALID_VALUE,
+                "Property: DAQmx_ChangeDetect_DI_RisingEdge_PhysicalChans\nRequested Value: (none)",
+            )
 
     def verify_count(self) -> None:
         """−200077 for fewer than two samples per channel of a clocked finite task."""
@@ -223,6 +259,9 @@ class TaskTiming:
 
     def clock_from(self, first_s: float, rate_hz: float) -> SampleTimes:
         """A sample clock from an instant on, with what faults and pauses do to it."""
+        periods_s = self._task.pulse_periods_s
+        if len(periods_s):
+            return PulseTimes(first_s, periods_s)
         owner = self.source_task() or self._task
         places = [*owner.hosts, *owner.devices]
         return SampleTimes(
@@ -231,6 +270,8 @@ class TaskTiming:
 
     def retimed(self, times: SampleTimes) -> SampleTimes:
         """A clock that runs already, with what faults and pauses do to it by now."""
+        if isinstance(times, FoundTimes):
+            return times
         if isinstance(times, BurstTimes):
             bursts = [self.clock_from(burst.first_s, burst.rate_hz) for burst in times.bursts]
             return BurstTimes(bursts, times.samples)

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 import numpy as np
-from nidaqmx.constants import Edge, Slope, TriggerType, WindowTriggerCondition1
+from nidaqmx.constants import (
+    ActiveLevel,
+    Edge,
+    Slope,
+    TriggerType,
+    WindowTriggerCondition1,
+    WindowTriggerCondition2,
+)
 from numpy.typing import NDArray
 
 Readings = Callable[[int, int], NDArray[np.float64]]
@@ -19,6 +26,7 @@ DIGITAL: Final[int] = TriggerType.DIGITAL_EDGE.value
 ANALOG: Final[int] = TriggerType.ANALOG_EDGE.value
 WINDOW: Final[int] = TriggerType.ANALOG_WINDOW.value
 LEVEL: Final[int] = TriggerType.DIGITAL_LEVEL.value
+ANALOG_LEVEL: Final[int] = TriggerType.ANALOG_LEVEL.value
 TIME: Final[int] = TriggerType.TIME.value
 
 
@@ -57,6 +65,41 @@ class Condition:
         return inside if self.leaving else ~inside
 
 
+class Hold:
+    """An analogue pause trigger: holds the clock from where it comes on to where it goes off."""
+
+    def __init__(self, settings: Mapping[str, Any]) -> None:
+        """From a task's trigger attributes."""
+        self._settings = settings
+        self._held = False
+
+    def holds(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which samples are held, for values that follow those of the call before."""
+        on, off = self._window(values) if self._settings["PAUSE_TRIG_TYPE"] == WINDOW else self._level(values)
+        turns = np.concatenate(([1 if self._held else -1], np.where(on, 1, np.where(off, -1, 0))))
+        last_turn = np.maximum.accumulate(np.where(turns != 0, np.arange(len(turns)), 0))
+        held: NDArray[np.bool_] = (turns[last_turn] > 0)[1:]
+        if len(held):
+            self._held = bool(held[-1])
+        return held
+
+    def _level(self, values: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Hysteresis lets the clock go only beyond level ∓ hysteresis."""
+        level = float(self._settings.get("ANLG_LVL_PAUSE_TRIG_LVL", 0.0))
+        hysteresis = float(self._settings.get("ANLG_LVL_PAUSE_TRIG_HYST", 0.0))
+        when = self._settings.get("ANLG_LVL_PAUSE_TRIG_WHEN", ActiveLevel.ABOVE.value)
+        if when == ActiveLevel.BELOW.value:
+            return values < level, values >= level + hysteresis
+        return values > level, values <= level - hysteresis
+
+    def _window(self, values: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        low = float(self._settings.get("ANLG_WIN_PAUSE_TRIG_BTM", 0.0))
+        high = float(self._settings.get("ANLG_WIN_PAUSE_TRIG_TOP", 0.0))
+        inside = (values >= low) & (values <= high)
+        when = self._settings.get("ANLG_WIN_PAUSE_TRIG_WHEN", WindowTriggerCondition2.INSIDE_WINDOW.value)
+        return (inside, ~inside) if when == WindowTriggerCondition2.INSIDE_WINDOW.value else (~inside, inside)
+
+
 class CrossingSearch:
     """Looks for the first crossing, continuing where it stopped, armed or not."""
 
@@ -87,6 +130,11 @@ def is_rising(settings: Mapping[str, Any], which: Which) -> bool:
     return bool(settings.get(f"DIG_EDGE_{which}_TRIG_EDGE", Edge.RISING.value) == Edge.RISING.value)
 
 
+def holds_by_analog(settings: Mapping[str, Any]) -> bool:
+    """Whether an analogue signal holds the sample clock."""
+    return settings.get("PAUSE_TRIG_TYPE", NONE) in (ANALOG_LEVEL, WINDOW)
+
+
 def digital_start(settings: Mapping[str, Any]) -> Which | None:
     """Which digital edge a task waits for: the start trigger's, or a counter's arm start trigger's."""
     if settings["START_TRIG_TYPE"] == DIGITAL:
@@ -96,5 +144,6 @@ def digital_start(settings: Mapping[str, Any]) -> Which | None:
 
 def source_of(settings: Mapping[str, Any], which: str) -> str:
     """Channel or terminal that the configured trigger listens to."""
-    prefix = {DIGITAL: "DIG_EDGE", ANALOG: "ANLG_EDGE", WINDOW: "ANLG_WIN"}[settings[f"{which}_TRIG_TYPE"]]
+    prefixes = {DIGITAL: "DIG_EDGE", ANALOG: "ANLG_EDGE", WINDOW: "ANLG_WIN", ANALOG_LEVEL: "ANLG_LVL"}
+    prefix = prefixes[settings[f"{which}_TRIG_TYPE"]]
     return str(settings.get(f"{prefix}_{which}_TRIG_SRC", ""))

@@ -17,6 +17,7 @@ from sim_hardware.daqmx_server.inventory.terminals import full_name
 from sim_hardware.daqmx_server.services.attributes.groups import unsupported
 from sim_hardware.daqmx_server.services.attributes.timestamps import timestamp
 from sim_hardware.daqmx_server.tasks.checks import refuse_while_logging
+from sim_hardware.daqmx_server.tasks.needs import ONBOARD_OUTPUT_SAMPLES
 from sim_hardware.daqmx_server.tasks.reading import default_count
 from sim_hardware.daqmx_server.tasks.task import Task, task_named
 from sim_hardware.daqmx_server.timing import triggers
@@ -368,7 +369,7 @@ class BufferGroup:
             return task.output_buffer or task.buffer_size
         if name == "INPUT_ONBRD_BUF_SIZE":
             return 127 if task.channels and task.channels[0].device.chassis else 4095
-        return 8191
+        return ONBOARD_OUTPUT_SAMPLES
 
     def set(self, bench: Bench, request: Any, name: str, value: int) -> None:
         task = self._changing(bench, request, name)

@@ -17,12 +17,13 @@ from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.requests import fields_of
 from sim_hardware.daqmx_server.services.attributes.groups import Handler
 from sim_hardware.daqmx_server.services.reads.digital_reads import chosen_channels
-from sim_hardware.daqmx_server.tasks.reading import read
+from sim_hardware.daqmx_server.tasks.reading import Reading, read
 from sim_hardware.daqmx_server.tasks.samplers import pulses_at
 from sim_hardware.daqmx_server.tasks.task import Task, task_named
 from sim_hardware.daqmx_server.timing.counting import TIMEBASE_HZ
 
-Pair = Callable[[Task, VirtualChannel], tuple[float, float]]
+Numbers = NDArray[np.float64] | float
+Pair = Callable[[Task, VirtualChannel, Reading], tuple[Numbers, Numbers]]
 _VOLT_CODES: Final = 4096
 _AMPERE_CODES: Final = 8192
 
@@ -53,37 +54,42 @@ def _scalar_handler(rpc: str, integer: bool) -> Handler:
     return handler
 
 
-def _pulse(task: Task, channel: VirtualChannel) -> tuple[float, float]:
-    """Low and high time of what reaches the counter, s."""
+def _pulse(task: Task, channel: VirtualChannel, reading: Reading) -> tuple[Numbers, Numbers]:
+    """Low and high time of what reaches the counter, s, of each sample."""
     pulses = pulses_at(task, channel)
-    return (0.5e-3, 0.5e-3) if pulses is None else (pulses.low_s, pulses.high_s)
+    if pulses is None:
+        return 0.5e-3, 0.5e-3
+    index = np.arange(reading.position, reading.position + reading.count)
+    times = None if task.run is None else task.run.times
+    instants = np.full(reading.count, reading.first_time_s) if times is None else times.at(index)
+    return pulses.measured(index, instants, task.armed_s, task.timing.is_implicit)
 
 
-def _frequency(task: Task, channel: VirtualChannel) -> tuple[float, float]:
-    low_s, high_s = _pulse(task, channel)
+def _frequency(task: Task, channel: VirtualChannel, reading: Reading) -> tuple[Numbers, Numbers]:
+    low_s, high_s = _pulse(task, channel, reading)
     return 1.0 / (low_s + high_s), high_s / (low_s + high_s)
 
 
-def _time(task: Task, channel: VirtualChannel) -> tuple[float, float]:
-    low_s, high_s = _pulse(task, channel)
+def _time(task: Task, channel: VirtualChannel, reading: Reading) -> tuple[Numbers, Numbers]:
+    low_s, high_s = _pulse(task, channel, reading)
     return high_s, low_s
 
 
-def _ticks(task: Task, channel: VirtualChannel) -> tuple[float, float]:
-    low_s, high_s = _pulse(task, channel)
-    return round(high_s * TIMEBASE_HZ), round(low_s * TIMEBASE_HZ)
+def _ticks(task: Task, channel: VirtualChannel, reading: Reading) -> tuple[Numbers, Numbers]:
+    low_s, high_s = _pulse(task, channel, reading)
+    return np.rint(high_s * TIMEBASE_HZ), np.rint(low_s * TIMEBASE_HZ)
 
 
-def _power(task: Task, channel: VirtualChannel) -> tuple[float, float]:
+def _power(task: Task, channel: VirtualChannel, reading: Reading) -> tuple[float, float]:
     attributes = channel.attributes
     if not attributes.get("PWR_OUTPUT_ENABLE", False):
         return math.nan, math.nan
     return float(attributes["PWR_VOLTAGE_SETPOINT"]), float(attributes["PWR_CURRENT_SETPOINT"])
 
 
-def _power_codes(task: Task, channel: VirtualChannel) -> tuple[float, float]:
+def _power_codes(task: Task, channel: VirtualChannel, reading: Reading) -> tuple[float, float]:
     """Codes of a power channel; 0 while its output is off."""
-    volts, amperes = _power(task, channel)
+    volts, amperes = _power(task, channel, reading)
     if math.isnan(volts):
         return 0, 0
     return int(volts * _VOLT_CODES), int(amperes * _AMPERE_CODES)
@@ -109,11 +115,11 @@ def _pair_handler(rpc: str) -> Handler:
         if rpc.startswith("ReadPower") and any(c.measurement != "POWER" for c in task.channels):
             raise DaqmxError(Code.READ_TYPE_MISMATCH, samples_read=0)
         got = read(task, fields["num_samps_per_chan"], fields["timeout"], fields["array_size_in_samps"])
-        both = np.array([pair(task, channel) for channel in chosen_channels(task, got)])
+        both = [pair(task, channel, got) for channel in chosen_channels(task, got)]
         by_scan = fields.get("fill_mode") == FillMode.GROUP_BY_SCAN_NUMBER.value
 
         def column(index: int) -> list[Any]:
-            values: NDArray[Any] = np.repeat(both[:, index, None], got.count, axis=1)
+            values: NDArray[Any] = np.array([np.broadcast_to(numbers[index], got.count) for numbers in both])
             flat = (values.T if by_scan else values).ravel()
             return list((flat.astype(int) if integer else flat.astype(float)).tolist())
 
@@ -123,13 +129,15 @@ def _pair_handler(rpc: str) -> Handler:
     return handler
 
 
-def _pair_scalar_handler(rpc: str, pair: Pair, first: str, second: str) -> Handler:
+def _pair_scalar_handler(rpc: str) -> Handler:
+    pair, first, second, integer = _PAIRS[_PAIR_SCALARS[rpc]]
     reply = getattr(pb, f"{rpc}Response")
 
     def handler(bench: Bench, request: Any) -> Any:
         task = task_named(bench, request.task.name)
         got = read(task, 1, request.timeout)
-        one, two = pair(task, chosen_channels(task, got)[0])
+        numbers = (float(np.ravel(value)[0]) for value in pair(task, chosen_channels(task, got)[0], got))
+        one, two = (int(number) if integer else number for number in numbers)
         return reply(status=got.status, **{first: one, second: two})
 
     return handler
@@ -150,10 +158,4 @@ def counter_read_handlers() -> dict[str, Handler]:
         out[rpc] = _single_handler(rpc, "U32" in rpc)
     for rpc in ("ReadCounterScalarF64", "ReadCounterScalarU32"):
         out[rpc] = _scalar_handler(rpc, "U32" in rpc)
-    out["ReadCtrFreqScalar"] = _pair_scalar_handler(
-        "ReadCtrFreqScalar", _frequency, "frequency", "duty_cycle"
-    )
-    out["ReadCtrTimeScalar"] = _pair_scalar_handler("ReadCtrTimeScalar", _time, "high_time", "low_time")
-    out["ReadCtrTicksScalar"] = _pair_scalar_handler("ReadCtrTicksScalar", _ticks, "high_ticks", "low_ticks")
-    out["ReadPowerScalarF64"] = _pair_scalar_handler("ReadPowerScalarF64", _power, "voltage", "current")
-    return out
+    return out | {rpc: _pair_scalar_handler(rpc) for rpc in _PAIR_SCALARS}
