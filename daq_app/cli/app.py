@@ -15,6 +15,7 @@ from typing import Annotated, Any, Final
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from daq_app import ni_daqmx
 from daq_app.extras import missing_extra
 from daq_app.streams import use_utf8
 
@@ -85,6 +86,10 @@ _COMMANDS: Final[Mapping[str, _Entry]] = {
 """In the order of the help page."""
 
 
+_EXIT_HARDWARE: Final = 3
+"""As `errors.EXIT_HARDWARE`, whose module loads what a first look at the command line does not need."""
+
+
 class LazyCommands(TyperGroup):
     """Knows every command's name and first sentence; loads the command itself when it is called."""
 
@@ -102,6 +107,9 @@ class LazyCommands(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Load what the command line names, then do as any group does."""
         if args and args[0] in _COMMANDS:
+            if ni_daqmx.is_asked_for(args) and not {"--help", "-h"} & {*args} and not ni_daqmx.is_installed():
+                print(f"Hardware: {ni_daqmx.NOT_INSTALLED}. {ni_daqmx.ADVICE}", file=sys.stderr)
+                raise typer.Exit(_EXIT_HARDWARE)
             self.commands[args[0]] = load_command(args[0])
         return super().resolve_command(ctx, args)
 

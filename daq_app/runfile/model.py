@@ -71,6 +71,8 @@ class RunHeader(BaseModel):
     rig_name: _Text = ""
     rig_text: _Text = ""
     """The rig file, letter by letter."""
+    product_texts: Annotated[tuple[_Text, ...], Field(max_length=64)] = ()
+    """The product files that the rig file names, in its order, letter by letter."""
     channel_ids: Annotated[tuple[str, ...], Field(min_length=1, max_length=4096)]
     """Row order of every block."""
     reading_units: tuple[Annotated[_Text, Field(max_length=64)], ...]

@@ -79,15 +79,15 @@ def rig_of(header: RunHeader) -> Rig | None:
 
     A run is never refused for its rig: the readings stand without it.
     """
-    if not header.rig_text or len(header.rig_text) > _MAX_RIG_CHARACTERS:
+    if not header.rig_text or sum(map(len, (header.rig_text, *header.product_texts))) > _MAX_RIG_CHARACTERS:
         return None
-    return _parsed(header.rig_text)
+    return _parsed(header.rig_text, header.product_texts)
 
 
 @lru_cache(maxsize=8)
-def _parsed(rig_text: str) -> Rig | None:
+def _parsed(rig_text: str, product_texts: tuple[str, ...]) -> Rig | None:
     """The runs of a campaign share one or two rig texts: each is read and checked once."""
     try:
-        return parse_rig(rig_text, "rig text of the run")
+        return parse_rig(rig_text, "rig text of the run", product_texts)
     except ConfigError:
         return None

@@ -1,7 +1,8 @@
 """pytest plugin inside NI's suite: its server process becomes ours, and only its gRPC tests are kept.
 
 NI's fixtures start `ni_grpc_device_server.exe`, which exists on Windows only. Here the address of a
-running simulated server is taken from the environment instead; nothing else of the suite is changed.
+running simulated server is taken from the environment instead. Names of encodings compare without case:
+the suite asks for "utf-8" where Linux says "UTF-8". Nothing else of the suite is changed.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Any
 import grpc
 import nidaqmx
 import pytest
+from nidaqmx import _lib
 from nidaqmx.system import System
 
 PORT_VARIABLE = "NI_SUITE_PORT"
@@ -78,4 +80,6 @@ def pytest_configure(config: pytest.Config) -> None:
     channel = grpc.insecure_channel(f"127.0.0.1:{os.environ[PORT_VARIABLE]}")
     options = nidaqmx.GrpcSessionOptions(channel, "")
     System.local = staticmethod(lambda: System.remote(options))
+    encoding = _lib.get_encoding_from_locale()
+    _lib.get_encoding_from_locale = encoding.lower
     config.pluginmanager.register(Results(Path(os.environ[RESULTS_VARIABLE])), "ni-suite-results")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -173,6 +176,16 @@ def test_a_file_that_is_no_export_is_told_in_words(tmp_path: Path) -> None:
     (tmp_path / "a.ini").write_text("hello", encoding="utf-8")
     with pytest.raises(ConfigError, match="the export cannot be read"):
         listed_in_export(tmp_path / "a.ini")
+
+
+def test_a_computer_without_ni_daqmx_says_so_before_anything_is_loaded(configs: Path) -> None:
+    """Loading takes the seconds that nobody should wait for this answer."""
+    command = [sys.executable, "-X", "importtime", "-m", "daq_app.cli", "run", str(configs / "fr1.toml")]
+    done = subprocess.run([*command, "--connection=local"], capture_output=True, text=True, check=False)
+
+    assert done.returncode == 3
+    assert "NI-DAQmx is not installed on this computer" in done.stderr
+    assert not re.search(r"\| +(numpy|h5py|grpc|nidaqmx)$", done.stderr, re.MULTILINE)
 
 
 def test_a_computer_without_ni_daqmx_says_so_before_anything_is_started(

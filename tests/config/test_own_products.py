@@ -6,7 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from daq_app.acquisition.course.header import make_header
+from daq_app.acquisition.course.tare import Tare
 from daq_app.config import ConfigError, load_rig, parse_rig, plan_tasks
+from daq_app.runfile import RunHeader, rig_of
+from drivers import Opened
 from sim_hardware.daqmx_server.inventory.devices import Inventory
 
 PRODUCT = """
@@ -42,6 +46,21 @@ def test_the_simulated_hardware_has_it(rig_file: Path) -> None:
     module = Inventory.from_rig(load_rig(rig_file)).devices["cDAQ1Mod1"]
     assert module.product is not None
     assert (module.product.name, module.product.bits, len(module.physical_channels)) == ("NI 9999", 18, 32)
+
+
+def test_a_run_brings_the_product_files_that_its_rig_names(rig_file: Path) -> None:
+    """The plan can be worked out again from the run alone, where the product file has gone or changed."""
+    rig = load_rig(rig_file)
+    plan = plan_tasks(rig)
+    opened = Opened(rate_hz=4000.0, ranges={}, buffer_samples=0, devices=(), driver="")
+    header = make_header(rig, rig_file.read_text(encoding="utf-8"), plan, opened, Tare(), test="T1")
+    stored = RunHeader.model_validate_json(header.model_dump_json())
+    (rig_file.parent / "our_cards.toml").unlink()
+
+    again = rig_of(stored)
+    assert again is not None
+    assert stored.product_texts == (PRODUCT,)
+    assert plan_tasks(again) == plan
 
 
 def test_a_run_s_text_can_be_read_where_the_product_file_is_not(rig_file: Path) -> None:

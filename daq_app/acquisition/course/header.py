@@ -33,6 +33,7 @@ def make_header(
         specimen=rig.specimen.name,
         rig_name=rig.name,
         rig_text=rig_text,
+        product_texts=rig.hardware.product_texts,
         channel_ids=rig.channel_ids,
         reading_units=tuple(channel.reading_unit for channel in rig.channels),
         rate_hz=opened.rate_hz,

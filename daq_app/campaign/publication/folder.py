@@ -204,3 +204,8 @@ def _write_rigs(folder: Path, found: Sequence[Source]) -> None:
             path = folder / rig_file(run.header.rig_name)
             if run.header.rig_text and not path.exists():
                 write_whole(path, run.header.rig_text)
+                rig = run.rig
+                for name, text in zip(
+                    rig.hardware.products if rig else (), run.header.product_texts, strict=False
+                ):
+                    write_whole(folder / Path(name).name, text)

@@ -145,6 +145,7 @@ def _header(
         specimen=import_map.run.specimen or rig.specimen.name,
         rig_name=rig.name,
         rig_text=rig_text,
+        product_texts=rig.hardware.product_texts,
         channel_ids=tuple(item.channel.id for item in mapped),
         reading_units=tuple(item.channel.reading_unit for item in mapped),
         rate_hz=timing.rate_hz,
