@@ -21,12 +21,11 @@ from sim_hardware.daqmx_server.services.attributes.devices import (
     SystemGroup,
 )
 from sim_hardware.daqmx_server.services.attributes.groups import AttributeGroup, Handler, attribute_handlers
+from sim_hardware.daqmx_server.services.attributes.signals import EXPORT, TRIGGER
 from sim_hardware.daqmx_server.services.attributes.tasks import (
-    EXPORT,
     READ,
     REAL_TIME,
     TIMING,
-    TRIGGER,
     WRITE,
     BufferGroup,
     TaskGroup,

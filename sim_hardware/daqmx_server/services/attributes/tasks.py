@@ -1,4 +1,4 @@
-"""Attributes of tasks and of their timing, triggers, reads, writes, buffers and exported signals."""
+"""Attributes of tasks and of their timing, reads, writes and buffers."""
 
 from __future__ import annotations
 
@@ -10,86 +10,17 @@ from nidaqmx import constants
 from nidaqmx.constants import Edge, ReadRelativeTo, SampleTimingType
 
 from sim_hardware.daqmx_server.bench.bench import Bench
-from sim_hardware.daqmx_server.channels import metadata
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory.devices import channel_list
 from sim_hardware.daqmx_server.inventory.terminals import full_name
 from sim_hardware.daqmx_server.services.attributes.groups import unsupported
+from sim_hardware.daqmx_server.services.attributes.settings import SettingsGroup
 from sim_hardware.daqmx_server.services.attributes.timestamps import timestamp
 from sim_hardware.daqmx_server.tasks.checks import refuse_while_logging
 from sim_hardware.daqmx_server.tasks.needs import ONBOARD_OUTPUT_SAMPLES
 from sim_hardware.daqmx_server.tasks.reading import default_count
 from sim_hardware.daqmx_server.tasks.task import Task, task_named
 from sim_hardware.daqmx_server.timing import triggers
-
-Derived = dict[str, Callable[[Task], Any]]
-
-
-class SettingsGroup:
-    """Attributes that a task keeps as plain values: types and defaults by NI's metadata, some derived.
-
-    `defaults` are those that are not the zero of their type; `absent` are attributes of hardware that is
-    not simulated (−200452).
-    """
-
-    def __init__(
-        self,
-        group: str,
-        settings: Callable[[Task], dict[str, Any]],
-        defaults: dict[str, Any],
-        derived: Derived,
-        while_running: frozenset[str] = frozenset(),
-        absent: frozenset[str] = frozenset(),
-    ) -> None:
-        self._group = group
-        self._settings = settings
-        self._defaults = defaults
-        self._derived = derived
-        self._while_running = while_running
-        self._absent = absent
-
-    def get(self, bench: Bench, request: Any, name: str) -> Any:
-        task = task_named(bench, request.task.name)
-        if name in self._derived:
-            return self._derived[name](task)
-        self._check(name)
-        value = self._settings(task).get(name, self._defaults.get(name))
-        return metadata.default_of(self._group, name) if value is None else value
-
-    def set(self, bench: Bench, request: Any, name: str, value: Any) -> None:
-        task = self._changing(bench, request, name)
-        if isinstance(value, int) and not metadata.is_value(self._group, name, value):
-            raise DaqmxError(Code.INVALID_VALUE, f"Property: DAQmx_{name}\nRequested Value: {value}")
-        self._settings(task)[name] = value
-
-    def reset(self, bench: Bench, request: Any, name: str) -> None:
-        task = self._changing(bench, request, name)
-        self._settings(task).pop(name, None)
-        if name in _RESET_TO:
-            self._settings(task)[name] = _RESET_TO[name]
-
-    def _changing(self, bench: Bench, request: Any, name: str) -> Task:
-        task = task_named(bench, request.task.name)
-        self._check(name)
-        no_trigger = task.io in ("CI", "CO") and name.startswith(("REF_TRIG", "HSHK_TRIG"))
-        if name not in metadata.resettable(self._group) or no_trigger:
-            raise unsupported(name)
-        if name not in self._while_running:
-            task.configure()
-        return task
-
-    def _check(self, name: str) -> None:
-        known = metadata.attributes_of(self._group)
-        if (name not in known and name not in self._defaults) or name in self._absent:
-            raise unsupported(name)
-
-
-_RESET_TO: Final = {
-    "START_TRIG_TYPE": triggers.NONE,
-    "REF_TRIG_TYPE": triggers.NONE,
-    "SAMP_QUANT_SAMP_MODE": constants.AcquisitionType.CONTINUOUS.value,
-}
-"""Values after a reset, where they are not those of a task that nothing was set in."""
 
 
 def _samples_now(task: Task, of: str) -> int:
@@ -209,7 +140,7 @@ WRITE: Final = SettingsGroup(
 )
 
 
-def _terminal(name: str) -> Callable[[Task], str]:
+def engine_terminal(name: str) -> Callable[[Task], str]:
     """A terminal of the task's own engine, such as ``/Dev1/ai/SampleClock``."""
 
     def get(task: Task) -> str:
@@ -225,7 +156,7 @@ def _source(task: Task) -> str:
     host = task.host
     if host is None or not task.timing.source_is_foreign:
         on_card = host is not None and not host.is_chassis
-        return _terminal("SampleClockTimebase")(task) if on_card else "OnboardClock"
+        return engine_terminal("SampleClockTimebase")(task) if on_card else "OnboardClock"
     return full_name(task.bench.inventory, host, task.timing.source, Code.SOURCE_TERMINAL_UNKNOWN)
 
 
@@ -249,7 +180,7 @@ def _convert_divisor(task: Task) -> int:
     return math.floor(_convert_period(task) * task.timing.timebase_hz * (1 + 1e-12)) + 1
 
 
-def _first_sample(task: Task) -> Any:
+def first_sample_utc(task: Task) -> Any:
     """UTC of the first sample; −200983 before there is one."""
     run = task.run
     if run is None or run.times is None:
@@ -283,9 +214,9 @@ TIMING: Final = SettingsGroup(
         "SAMP_CLK_RATE": lambda task: task.timing.rate_hz,
         "SAMP_CLK_MAX_RATE": lambda task: task.timing.max_rate_hz,
         "SAMP_CLK_SRC": _source,
-        "SAMP_CLK_TERM": _terminal("SampleClock"),
+        "SAMP_CLK_TERM": engine_terminal("SampleClock"),
         "SAMP_CLK_TIMEBASE_RATE": lambda task: task.timing.timebase_hz,
-        "SAMP_CLK_TIMEBASE_SRC": _terminal("SampleClockTimebase"),
+        "SAMP_CLK_TIMEBASE_SRC": engine_terminal("SampleClockTimebase"),
         "SAMP_CLK_TIMEBASE_DIV": lambda task: round(task.timing.timebase_hz / task.timing.rate_hz),
         "AI_CONV_RATE": lambda task: 1.0 / _convert_period(task),
         "AI_CONV_TIMEBASE_DIV": _convert_divisor,
@@ -293,7 +224,7 @@ TIMING: Final = SettingsGroup(
             (c.product.aggregate_rate_hz or c.product.max_rate_hz for c in task.timing.inputs), default=0.0
         ),
         "FIRST_SAMP_TIMESTAMP_ENABLE": is_first_sample_stamped,
-        "FIRST_SAMP_TIMESTAMP_VAL": _first_sample,
+        "FIRST_SAMP_TIMESTAMP_VAL": first_sample_utc,
         "CHANGE_DETECT_DI_RISING_EDGE_PHYSICAL_CHANS": _lines("CHANGE_DETECT_DI_RISING_EDGE_PHYSICAL_CHANS"),
         "CHANGE_DETECT_DI_FALLING_EDGE_PHYSICAL_CHANS": _lines(
             "CHANGE_DETECT_DI_FALLING_EDGE_PHYSICAL_CHANS"
@@ -302,60 +233,7 @@ TIMING: Final = SettingsGroup(
 )
 
 
-def _trigger_source(name: str) -> Callable[[Task], str]:
-    """Source of a digital edge in NI's spelling; as it was given where no device has it."""
-
-    def get(task: Task) -> str:
-        given = str(task.trigger.get(name, ""))
-        host = task.host
-        try:
-            return given if host is None else full_name(task.bench.inventory, host, given, Code.INVALID_VALUE)
-        except DaqmxError:
-            return given
-
-    return get
-
-
-TRIGGER: Final = SettingsGroup(
-    "Trig",
-    lambda task: task.trigger,
-    defaults={
-        "START_TRIG_TYPE": triggers.NONE,
-        "REF_TRIG_TYPE": triggers.NONE,
-        "PAUSE_TRIG_TYPE": triggers.NONE,
-        "ARM_START_TRIG_TYPE": triggers.NONE,
-        "START_TRIG_DELAY_UNITS": constants.DigitalWidthUnits.SAMPLE_CLOCK_PERIODS.value,
-        "REF_TRIG_PRETRIG_SAMPLES": 2,
-        **{f"DIG_EDGE_{which}_TRIG_EDGE": Edge.RISING.value for which in ("START", "REF")},
-        **{f"ANLG_EDGE_{which}_TRIG_SLOPE": Edge.RISING.value for which in ("START", "REF")},
-        **{f"ANLG_WIN_{which}_TRIG_WHEN": 10163 for which in ("START", "REF")},
-        **{
-            f"{which}_TIMESCALE": constants.Timescale.USE_HOST.value
-            for which in (
-                "START_TRIG_TIMESTAMP",
-                "REF_TRIG_TIMESTAMP",
-                "ARM_START_TRIG_TIMESTAMP",
-                "START_TRIG",
-                "ARM_START_TRIG",
-            )
-        },
-    },
-    derived={
-        "START_TRIG_TERM": _terminal("StartTrigger"),
-        "REF_TRIG_TERM": _terminal("ReferenceTrigger"),
-        **{
-            f"{kind}_{which}_TRIG_SRC": _trigger_source(f"{kind}_{which}_TRIG_SRC")
-            for kind in ("DIG_EDGE", "ANLG_EDGE", "ANLG_WIN")
-            for which in ("START", "REF")
-        },
-        "START_TRIG_TIMESTAMP_VAL": _first_sample,
-        "REF_TRIG_TIMESTAMP_VAL": _first_sample,
-        "ARM_START_TRIG_TIMESTAMP_VAL": _first_sample,
-    },
-)
-
 REAL_TIME: Final = SettingsGroup("RealTime", lambda task: task.real_time, defaults={}, derived={})
-EXPORT: Final = SettingsGroup("ExportedSignal", lambda task: task.exported, defaults={}, derived={})
 
 
 class BufferGroup:
