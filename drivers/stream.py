@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from nidaqmx import Task
 from nidaqmx import errors as ni_errors
@@ -13,6 +15,9 @@ from daq_app.config.planning.plan import PlannedTask
 from drivers.protocol import DriverError
 from drivers.tasks import NOT_WHILE_LOGGING, virtual_name
 
+_NO_SEEKING: Final = (NOT_WHILE_LOGGING, -200557)
+"""Codes of a driver that does not let a running task be read from another place: NI's help on the property
+RelativeTo says "settable while task is running: device-specific"."""
 _SURE_SAMPLES = 200
 """Counters that moved by more than this while they were asked for prove nothing."""
 
@@ -147,7 +152,7 @@ class TaskStream:
             self.task.in_stream.relative_to = ReadRelativeTo.FIRST_SAMPLE
             self.task.in_stream.offset = position
         except ni_errors.DaqError as error:
-            if int(error.error_code) != NOT_WHILE_LOGGING:
+            if int(error.error_code) not in _NO_SEEKING:
                 raise
             self._pass_over(position, timeout_s)
         else:

@@ -36,7 +36,8 @@ from daq_app.config.units import G_M_S2
 from drivers.connection import Connection
 
 NOT_WHILE_LOGGING: Final = -201300
-"""NI-DAQmx's code for an attribute that excludes its own logging (`nidaqmx.error_codes`)."""
+"""NI-DAQmx's code for an attribute that excludes its own logging (ATTRIBUTE_NOT_SUPPORTED_WHEN_LOGGING in
+`nidaqmx.error_codes`). No document of NI's that was found says which attributes; both answers are dealt with."""
 _DEFAULT_LVDT_EXCITATION_V = 3.0
 _DEFAULT_LVDT_FREQUENCY_HZ = 2500.0
 _BRIDGES = {
@@ -67,6 +68,8 @@ def create_task(connection: Connection, planned: PlannedTask) -> nidaqmx.Task:
             task.in_stream.input_buf_size = planned.buffer_samples
         # A computer that was deaf for longer than the buffer must find the newest samples and know
         # how many it missed; with the default the device would stop, and the rest of the test be lost.
+        # Set before the start: NI's help on the property OverWrite says "settable while task is running:
+        # device-specific".
         task.in_stream.overwrite = OverwriteMode.OVERWRITE_UNREAD_SAMPLES
         if planned.start_trigger_source:
             task.triggers.start_trigger.cfg_dig_edge_start_trig(planned.start_trigger_source)

@@ -23,7 +23,7 @@ from sim_hardware.daqmx_server.bench.clock import BenchClock, PacedClock, Steppe
 from sim_hardware.daqmx_server.inventory.devices import Inventory, device_from_text
 from sim_hardware.daqmx_server.inventory.max_export import MaxExport, load_max_export
 from sim_hardware.daqmx_server.services.devices.storage import fill
-from sim_hardware.daqmx_server.services.server import DaqmxServer, missing_calls
+from sim_hardware.daqmx_server.services.server import DaqmxServer, missing_table
 from sim_hardware.faults.script import load_faults
 from sim_hardware.marked_line import MarkedLine
 from sim_hardware.signals import NothingWired, SignalSource
@@ -179,7 +179,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Serve until a signal, or until the parent has gone. Exit code 2 for a bad configuration."""
     arguments = parser().parse_args(argv)
     if arguments.missing:
-        print(*missing_calls(), sep="\n")
+        print(missing_table())
         return 0
     try:
         server = DaqmxServer(build_bench(arguments), arguments.port)

@@ -15,6 +15,7 @@ from daq_app.config import PlannedChannel
 from daq_app.config.planning.plan import PlannedTask, TaskPlan
 from drivers import Block, Driver, DriverError, open_driver
 from drivers.error_advice import BY_CODE, BY_GRPC_STATUS, advice_for, translate
+from sim_hardware.daqmx_server.services.attributes.tasks import READ
 
 Laboratories = Callable[..., Any]
 
@@ -437,6 +438,21 @@ def test_where_logging_excludes_seeking_a_reply_cut_short_is_a_gap(
 ) -> None:
     lab = laboratory()
     driver = logging_driver(lab, tmp_path)
+    lab.break_something("reply_cut_short")
+
+    blocks, errors = read_through(driver, lab, 8000)
+
+    assert len(errors) == 1
+    assert lost(blocks) == lab.plan.read_samples
+    driver.close()
+
+
+def test_a_device_that_cannot_seek_while_it_runs_is_read_on_with_a_gap(
+    laboratory: Laboratories, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(READ, "_while_running", frozenset())  # the server refuses with −200557
+    lab = laboratory()
+    driver = started(lab)
     lab.break_something("reply_cut_short")
 
     blocks, errors = read_through(driver, lab, 8000)

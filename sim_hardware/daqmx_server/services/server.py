@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final
@@ -9,6 +11,7 @@ from typing import Any, Final
 import grpc
 import session_pb2
 import session_pb2_grpc
+from nidaqmx import _grpc_interpreter
 from nidaqmx._stubs import nidaqmx_pb2
 
 from sim_hardware.daqmx_server.bench.bench import Bench
@@ -151,6 +154,18 @@ def missing_calls() -> list[str]:
     for part in _PARTS:
         known |= set(part())
     return [method.name for method in _SERVICE.methods if method.name not in known]
+
+
+def missing_table() -> str:
+    """Markdown: calls without a handler, those that the stock Python client makes first."""
+    made = set(re.findall(r"self\._client\.(\w+)", inspect.getsource(_grpc_interpreter)))
+    missing = missing_calls()
+    rows = {
+        "the Python client makes them": [call for call in missing if call in made],
+        "the Python client does not know them": [call for call in missing if call not in made],
+    }
+    lines = ["| calls without a handler | |", "|---|---|"]
+    return "\n".join([*lines, *(f"| {', '.join(calls)} | {who} |" for who, calls in rows.items())])
 
 
 def daqmx_handler(bench: Bench, gate: Gate) -> grpc.GenericRpcHandler:

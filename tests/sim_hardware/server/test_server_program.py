@@ -25,7 +25,7 @@ from daq_app.config.errors import ConfigError
 from sim_hardware.control import SimControl, SimControlError
 from sim_hardware.daqmx_server.inventory.max_export import load_max_export
 from sim_hardware.daqmx_server.program import build_bench, main, parser
-from sim_hardware.daqmx_server.services.server import DaqmxServer
+from sim_hardware.daqmx_server.services.server import DaqmxServer, missing_calls, missing_table
 
 RIG = Path(__file__).parents[3] / "configs" / "fr1.toml"
 Start = Callable[..., tuple[subprocess.Popen[str], str]]
@@ -223,3 +223,10 @@ def test_what_is_no_ni_max_export(tmp_path: Path, text: str) -> None:
     path.write_text(text)
     with pytest.raises(ConfigError, match=r"lab\.ini"):
         load_max_export(path)
+
+
+def test_the_page_lists_the_calls_that_have_no_handler() -> None:
+    page = Path(__file__).parents[3] / "docs/how-to/nidaqmx-without-hardware.md"
+    said = page.read_text(encoding="utf-8")
+    assert f"<!-- missing: begin -->\n{missing_table()}\n<!-- missing: end -->" in said
+    assert set(missing_calls()).isdisjoint({"ReadAnalogF64", "StartTask"})
