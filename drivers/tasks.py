@@ -37,7 +37,7 @@ from drivers.connection import Connection
 
 NOT_WHILE_LOGGING: Final = -201300
 """NI-DAQmx's code for an attribute that excludes its own logging (ATTRIBUTE_NOT_SUPPORTED_WHEN_LOGGING in
-`nidaqmx.error_codes`). No document of NI's that was found says which attributes; both answers are dealt with."""
+`nidaqmx.error_codes`). No document of NI's that was found says which attributes: both answers must do."""
 _DEFAULT_LVDT_EXCITATION_V = 3.0
 _DEFAULT_LVDT_FREQUENCY_HZ = 2500.0
 _BRIDGES = {
