@@ -142,6 +142,8 @@ def main() -> None:
     parser.add_argument("--first-seed", type=int, default=5000)
     parser.add_argument("--foreign", type=Path, help="folder of labelled recordings to put faults into")
     parser.add_argument("--cases", nargs="*", default=(), help="cases of that folder; all if none is named")
+    kinds = sorted({fault.kind for fault in FAULTS})
+    parser.add_argument("--kinds", nargs="*", choices=kinds, default=kinds, help="kinds of fault to put in")
     options = parser.parse_args()
     rig = load_rig(RIG)
     seeds = range(options.first_seed, options.first_seed + options.tests)
@@ -154,7 +156,7 @@ def main() -> None:
         tests = list(foreign_tests(options.foreign, RIG.parent, tuple(options.cases)))
     sound = [answer_of(test.record(), test.truth["restitution"]) for test in tests]
     print(f"largest |error| of r:       {' '.join(f'{name:>8s}' for name in _METHODS)}  quiet  trust, said")
-    for fault in FAULTS:
+    for fault in (fault for fault in FAULTS if fault.kind in options.kinds):
         print(fault_row(fault, tests, sound), flush=True)
 
 
