@@ -2,9 +2,11 @@
 
 Each round starts an acquisition process on a simulated device server (marked line: every sample proves its
 place), kills it somewhere between arming and the finished run file, and sometimes kills the next one while it
-recovers. Afterwards one last process recovers what is left. Counted: runs that can be read and verify, and
-samples that had been read but are not in the run. Prints a table, writes JSON; exit code 1 unless all are
-readable and none lacks more than one block.
+recovers. In other rounds the operator's window, or a process that makes runs or results, is killed first: the
+recorder must go on. Afterwards one last process recovers what is left. Counted: runs that can be read and
+verify, samples that had been read but are not in the run, and recorders that ended with what was killed
+beside them. Prints a table, writes JSON; exit code 1 unless all runs are readable, none lacks more than one
+block, and every recorder went on.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from __future__ import annotations
 import contextlib
 import os
 import random
+import subprocess
 import sys
 import tempfile
 import time
@@ -19,10 +22,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import psutil
 from rich.console import Console
 
 from daq_app.acquisition import AcquisitionClient, read_session_file
-from daq_app.acquisition.messages.published import HealthMessage
+from daq_app.acquisition.messages.published import HealthMessage, State, StateMessage
 from daq_app.acquisition.process.process import run_and_exit
 from daq_app.config import load_rig
 from daq_app.runfile import open_run, verify
@@ -30,7 +34,11 @@ from studies.recording.marked_recording import RIG, command_line, console, marke
 from tests.support.recorder.marked_check import check_marked
 from tests.support.recorder.processes import free_the_hardware, quick_context
 
-MOMENTS: Final = ("arming", "rocking", "rocking", "finalising", "recovering")
+MOMENTS: Final = (
+    *("arming", "rocking", "rocking", "finalising", "making the result"),
+    *("recovering", "the window", "a helper"),
+)
+"""When, or what beside the recorder, is killed in the rounds."""
 _LIMIT_S: Final = 240.0
 
 
@@ -47,6 +55,8 @@ class Killed:
     readable: bool = False
     end_sample: int = 0
     problem: str = ""
+    went_on: bool = True
+    """The recorder, after something beside it was killed."""
 
     @property
     def lost_blocks(self) -> int:
@@ -83,20 +93,22 @@ class Life:
                 raise RuntimeError(f"the process did not start: {self.process.exitcode}")
             self.process.join(0.01)
             session = read_session_file(folder)
-        self.client = AcquisitionClient(session.address, session.token, topics=("health",), timeout_s=60.0)
+        self.session = session
+        topics = ("health", "state")
+        self.client = AcquisitionClient(session.address, session.token, topics=topics, timeout_s=60.0)
         self.read = self.safe = 0
+        self.state: State | None = None
 
-    def listen(self, seconds: float) -> None:
-        """Keep the newest health for so long."""
-        until = time.monotonic() + seconds
-        while (left := until - time.monotonic()) > 0:
+    def listen(self, seconds: float, *until: State) -> None:
+        """Keep the newest health and state for so long, or until a state comes."""
+        deadline = time.monotonic() + seconds
+        while (left := deadline - time.monotonic()) > 0 and self.state not in until:
             received = self.client.receive(left)
-            if (
-                received is not None
-                and isinstance(received.message, HealthMessage)
-                and received.message.recording
-            ):
-                self.read, self.safe = received.message.sample, received.message.acknowledged_sample
+            match received.message if received is not None else None:
+                case HealthMessage() as health if health.recording:
+                    self.read, self.safe = health.sample, health.acknowledged_sample
+                case StateMessage() as told:
+                    self.state = told.state
 
     def arm(self, test: str) -> Path:
         deadline = time.monotonic() + _LIMIT_S
@@ -107,6 +119,27 @@ class Life:
             if time.monotonic() > deadline:
                 raise RuntimeError(reply.text)
             time.sleep(0.02)
+
+    def kill_a_helper(self, rng: random.Random) -> None:
+        """One of the processes that make runs, results and verdicts for it, if one is there."""
+        with contextlib.suppress(psutil.Error, IndexError):
+            rng.choice(psutil.Process(self.process.pid).children(recursive=True)).kill()
+
+    def kill_a_window(self, seconds: float) -> None:
+        """A window with all its processes, so long after it was started."""
+        command = (*("-m", "daq_app.cli", "monitor", "--connect"), self.session.address)
+        window = subprocess.Popen(
+            [sys.executable, *command],
+            env=os.environ | {"QT_QPA_PLATFORM": "offscreen", "DAQ_APP_TOKEN": self.session.token},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        self.listen(seconds)
+        family = [psutil.Process(window.pid), *psutil.Process(window.pid).children(recursive=True)]
+        for process in reversed(family):
+            with contextlib.suppress(psutil.Error):
+                process.kill()
+        window.wait()
 
     def kill(self) -> None:
         self.process.kill()
@@ -122,17 +155,23 @@ def one_round(number: int, rng: random.Random, folder: Path, connection: str, sp
         if moment == "recovering":  # what the rounds before have left is being made good just now
             life.listen(rng.uniform(0.0, 0.5))
         journal = life.arm(f"KILL-L3-{number}")
-        if moment == "arming":
-            life.listen(rng.uniform(0.0, 0.05))
-        else:
-            life.listen(rng.uniform(0.1, 1.5))
-        if moment == "finalising":
+        life.listen(rng.uniform(0.0, 0.05) if moment == "arming" else rng.uniform(0.1, 1.5))
+        if moment == "the window":
+            life.kill_a_window(rng.uniform(0.5, 8.0))
+            life.listen(0.5)
+        elif moment in ("finalising", "making the result", "a helper"):
             life.client.request("stop", timeout_s=60.0)
-            time.sleep(rng.uniform(0.0, 1.0))
+            if moment == "making the result":
+                life.listen(_LIMIT_S, State.SAVED)
+            life.listen(rng.uniform(0.0, 1.0))
+            if moment == "a helper":
+                life.kill_a_helper(rng)
+                life.listen(_LIMIT_S, State.SAVED, State.FAILED)
+        went_on = life.process.exitcode is None
     finally:
         life.kill()
     free_the_hardware(connection)
-    return Killed(moment, journal.stem, life.read, life.safe)
+    return Killed(moment, journal.stem, life.read, life.safe, went_on=went_on)
 
 
 def _judge(kill: Killed, folder: Path) -> None:
@@ -181,15 +220,17 @@ def _summary(done: list[Killed]) -> dict[str, Any]:
     readable = sum(kill.readable for kill in done)
     worst = max(kill.lost_blocks for kill in done)
     unsafe = sum(kill.end_sample < kill.safe_sample for kill in done)
+    bad = [kill for kill in done if not (kill.readable and kill.went_on) or kill.lost_blocks > 1]
     return {
         "kills": len(done),
         "readable": readable,
         "most_blocks_lost": worst,
         "acknowledged_samples_missing": unsafe,
+        "recorders_ended": sum(not kill.went_on for kill in done),
         "by_moment": {
             moment: sum(kill.moment == moment for kill in done) for moment in dict.fromkeys(MOMENTS)
         },
-        "bad": [asdict(kill) for kill in done if not kill.readable or kill.lost_blocks > 1],
+        "bad": [asdict(kill) for kill in bad],
     }
 
 
@@ -205,11 +246,12 @@ def main() -> int:
     terminal.print(
         f"{found['readable']} of {found['kills']} readable and right in every sample; at most "
         f"{found['most_blocks_lost']} block lost in each; {found['acknowledged_samples_missing']} lack an "
-        f"acknowledged sample ({', '.join(f'{n} while {m}' for m, n in found['by_moment'].items())}; "
+        f"acknowledged sample; {found['recorders_ended']} recorders ended with what was killed beside them "
+        f"({', '.join(f'{m} {n}' for m, n in found['by_moment'].items())}; "
         f"{time.monotonic() - began:.0f} s; seed {options.seed})",
         soft_wrap=True,
     )
-    return 0 if found["readable"] == found["kills"] and found["most_blocks_lost"] <= 1 else 1
+    return 0 if not found["bad"] else 1
 
 
 if __name__ == "__main__":
