@@ -1,8 +1,12 @@
-"""Numbers as people read them, the same in the window, the terminal and the reports."""
+"""Numbers and marks as people read them, the same in the window, the terminal and the reports."""
 
 from __future__ import annotations
 
 import math
+from typing import Final
+
+METHOD_MARKS: Final = {"EAV": "o", "CRT": "s", "fit": "D"}
+"""Mark of each method for r in every figure, as matplotlib and pyqtgraph both spell circle and square."""
 
 
 def plus_minus(error: float | None, decimals: int = 4) -> str:

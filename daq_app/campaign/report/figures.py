@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from daq_app.campaign.report.summary import TestSummary
+from daq_app.config.wording import METHOD_MARKS
 from daq_app.rocking import amplitude_after, period, period_after
 
 SPECIMEN_COLOURS: Final = ("#1f5fa8", "#c2571a", "#3a7d44", "#7b4fa3")
 METHOD_COLOURS: Final = {"CRT": "#1f5fa8", "EAV": "#c2571a", "fit": "#3a7d44"}
-METHOD_MARKS: Final = {"CRT": "o", "EAV": "s", "fit": "D"}
 _THEORY: dict[str, Any] = {"color": "#333333", "lw": 1.2}
 _GRID: dict[str, Any] = {"color": "#dddddd", "lw": 0.6}
 

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from daq_app.campaign.report.figures import METHOD_COLOURS, METHOD_MARKS
+from daq_app.campaign.report.figures import METHOD_COLOURS
 from daq_app.campaign.report.summary import TestSummary
-from daq_app.config.wording import plus_minus
+from daq_app.config.wording import METHOD_MARKS, plus_minus
 from daq_app.rocking import free_rocking, period
 
 Floats = NDArray[np.float64]

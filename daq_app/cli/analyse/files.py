@@ -13,6 +13,7 @@ import numpy as np
 
 from daq_app.cli.analyse.joint import joint_figure, profile_csv
 from daq_app.config.shown_text import shortened
+from daq_app.config.wording import METHOD_MARKS
 from daq_app.runfile.durable import write_whole
 
 if TYPE_CHECKING:
@@ -112,14 +113,14 @@ def _picture(analysis: TestAnalysis, path: Path) -> Path:
     rotation.plot(peak_times, [c.peak_rad / alpha for c in cycles], "k.", ms=4)
     impacts = [c for c in analysis.half_cycles[1:] if math.isfinite(c.speed_before_rad_s)]
     velocity.plot([c.start_s - start for c in impacts], [c.speed_before_rad_s for c in impacts], "kx", ms=4)
-    for key, marker in (("eav", "o"), ("crt", "s")):
+    for key, method in (("eav", "EAV"), ("crt", "CRT")):
         estimate = analysis.estimates.get(key)
         if estimate is not None and estimate.points:
             points.errorbar(
                 [p.impact for p in estimate.points],
                 [p.r for p in estimate.points],
                 [p.sigma for p in estimate.points],
-                fmt=marker, ms=4, lw=0.8, label=f"{key.upper()} {estimate.r:.4f}",
+                fmt=METHOD_MARKS[method], ms=4, lw=0.8, label=f"{method} {estimate.r:.4f}",
             )  # fmt: skip
     points.axhline(analysis.theory.r_max, color="0.5", ls="--", lw=0.8, label="r_max (1.2)")
     points.set_xlabel("impact")

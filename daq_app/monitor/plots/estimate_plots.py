@@ -8,6 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from daq_app.acquisition.messages.published import EstimateMessage
+from daq_app.config.wording import METHOD_MARKS
 from daq_app.monitor.data.session import Session
 from daq_app.monitor.plots.plot_base import Plot, line_pen
 from daq_app.monitor.plots.theory_overlay import measured_periods, period_curve
@@ -27,13 +28,13 @@ class RestitutionPlot(QWidget):
         self._bands: dict[str, tuple[object, object, object]] = {}
         self._points: dict[str, pg.ScatterPlotItem] = {}
         self._means: dict[str, pg.PlotCurveItem] = {}
-        for name, symbol in (("eav", "o"), ("crt", "s")):
+        for name, method in (("eav", "EAV"), ("crt", "CRT")):
             edges = (self.plot.curve(), self.plot.curve())
             band = pg.FillBetweenItem(*edges)
             self.plot.addItem(band)
             self._bands[name] = (*edges, band)
             self._means[name] = self.plot.curve()
-            self._points[name] = pg.ScatterPlotItem(symbol=symbol, size=8)
+            self._points[name] = pg.ScatterPlotItem(symbol=METHOD_MARKS[method], size=8)
             self.plot.addItem(self._points[name])
         self._bound = pg.InfiniteLine(angle=0, movable=False)
         self._bound.setVisible(False)

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.result.figures import measured_periods, theory_motion
 from daq_app.campaign.result.result import Result
+from daq_app.config.wording import METHOD_MARKS
 from daq_app.monitor.plots.plot_base import Plot, line_pen
 from daq_app.monitor.widgets.theme import DARK, Colours
 from daq_app.rocking.theory import classic as theory
@@ -118,7 +119,7 @@ class ResultPlots(QWidget):
         c, test = self._colours, result.test
         values = [test.r_max]
         last = 5
-        for name, symbol, colour in (("EAV", "o", c.eav), ("CRT", "s", c.crt)):
+        for name, colour in (("EAV", c.eav), ("CRT", c.crt)):
             method = test.methods.get(name)
             if method is None:
                 continue
@@ -132,7 +133,7 @@ class ResultPlots(QWidget):
             x = [impact for impact, _ in method.points]
             y = [r for _, r in method.points]
             self.restitution.addItem(
-                pg.ScatterPlotItem(x, y, symbol=symbol, size=8, brush=colour, pen=colour)
+                pg.ScatterPlotItem(x, y, symbol=METHOD_MARKS[name], size=8, brush=colour, pen=colour)
             )
             values += y
             last = max([last, *x])

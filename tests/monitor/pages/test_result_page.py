@@ -1,0 +1,47 @@
+"""The result of a test in the window: what its page shows, opens and says."""
+
+from __future__ import annotations
+
+import pyqtgraph as pg
+import pytest
+from PySide6.QtGui import QDesktopServices
+
+from daq_app.campaign.result.figures import result_figure
+from daq_app.monitor.data.background import Background
+from daq_app.monitor.pages.result_page import ResultPage
+from daq_app.monitor.widgets.theme import LIGHT
+
+
+@pytest.fixture
+def page(qtbot, run_file):
+    page = ResultPage(Background())
+    qtbot.addWidget(page)
+    page.restyle(LIGHT)
+    with qtbot.waitSignal(page.shown, timeout=120_000):
+        page.open(run_file)
+    page.show()
+    return page
+
+
+def test_eav_and_crt_have_the_same_marks_in_the_window_and_on_paper(page):
+    points = page.plots.restitution.plot_item.items
+    shown = {item.opts["symbol"] for item in points if isinstance(item, pg.ScatterPlotItem)}
+    drawn = {
+        line.get_label().split()[0]: line.get_marker()
+        for axis in result_figure(page.result.test).axes
+        for line in axis.lines
+    }
+    assert {drawn["EAV"], drawn["CRT"]} == shown == {"o", "s"}
+    circle, square = page.plots.legend.text().index("●"), page.plots.legend.text().index("■")
+    in_legend = ("EAV", "CRT") if circle < square else ("CRT", "EAV")
+    assert [drawn[name] for name in in_legend] == ["o", "s"]
+
+
+def test_a_page_that_nothing_here_opens_is_told_with_its_place(qtbot, page, monkeypatch):
+    monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: False)
+    told = []
+    page.told.connect(lambda severity, text: told.append((severity, text)))
+    page.buttons["page"].click()
+    assert told == [
+        ("warning", f"No program on this computer opens pages: {page.run.with_suffix('.result.html')}")
+    ]
