@@ -76,6 +76,8 @@ class Analyst(threading.Thread):
         self._live: LiveView | None = None
         self._sensors: SensorNews | None = None
         self._sequence: Course | None = None
+        self._unclosed = 0
+        """Courses that are over and whose journal is not closed yet."""
         self.voice.sample = 0
         self._fault = ""
         self._standing: dict[str, EventMessage] = {}
@@ -137,10 +139,7 @@ class Analyst(threading.Thread):
             case SourceEnded():
                 self._on_source_ended(item)
             case Closed():
-                self._sequence = None
-                self._aborted = item.end.outcome == "aborted"
-                self._new_live()
-                self._go(State.SAVING, f"{item.end.text}. The run file is being made")
+                self._on_closed(item.end)
             case Saved():
                 # The next test may be armed already: then its state is the one that matters.
                 if self._sequence is None:
@@ -149,8 +148,6 @@ class Analyst(threading.Thread):
             case Noted(event=event):
                 if event.kind == "clock" and event.data.get("clock") in ("rate", "planned_rate", "drift"):
                     self._standing[str(event.data["clock"])] = event
-            case End():
-                return
 
     # -- blocks ----------------------------------------------------------------------------------
 
@@ -210,8 +207,23 @@ class Analyst(threading.Thread):
                 return
 
     def _finish(self, end: End) -> None:
-        self._sequence = None
+        course, self._sequence = self._sequence, None
+        self._unclosed += 1
         self._around.post(end)
+        if course is not None and course.release_sample is not None:
+            # The next release is looked for from now on: a disk may keep the journal open for long.
+            self._new_live()
+
+    def _on_closed(self, end: End) -> None:
+        """A journal is closed; one that had to wait for a disk may be older than the course of now."""
+        if self._unclosed:
+            self._unclosed -= 1
+        else:  # the recorder gave the run up
+            self._sequence = None
+            self._new_live()
+        if self._sequence is None:
+            self._aborted = end.outcome == "aborted"
+            self._go(State.SAVING, f"{end.text}. The run file is being made")
 
     # -- course of a session ---------------------------------------------------------------------
 

@@ -99,11 +99,6 @@ class LiveView:
             return ()
         return self._unheld.process(result.first_sample, result.rotation_rad, result.velocity_rad_s)
 
-    @property
-    def over(self) -> bool:
-        """Whether the analyser has seen a test to its end: the next one needs a new one."""
-        return self._analyser is not None and self._analyser.phase is Phase.AT_REST
-
     def _publish_block(self, block: Block, overloaded: tuple[str, ...]) -> None:
         heading = BlockMessage(
             first_sample=block.first_sample,

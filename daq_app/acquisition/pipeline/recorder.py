@@ -72,6 +72,8 @@ class Recorder(threading.Thread):
         self._recent = recent or Recent(0)
         self._run: RunRecording | None = None
         """The run that is being recorded."""
+        self._ended: list[RunRecording] = []
+        """Runs that are over and wait for a disk, while the next one is recorded."""
         self._faults = 0
         self._last_read_ns = 0
 
@@ -95,7 +97,12 @@ class Recorder(threading.Thread):
 
     @property
     def _pending(self) -> bool:
-        return self._run is not None and self._run.pending
+        return bool(self._ended) or (self._run is not None and self._run.pending)
+
+    @property
+    def _runs(self) -> list[RunRecording]:
+        """All that is not on disk as a whole, oldest first."""
+        return [*self._ended, *([] if self._run is None else [self._run])]
 
     def _guarded(self, step: Callable[[], None]) -> None:
         """This thread never dies of an error: what waits stays in memory and is tried again.
@@ -118,10 +125,11 @@ class Recorder(threading.Thread):
                 f"Writing failed ({type(error).__name__}: {error}). It is tried again; if this stays, stop "
                 "the test: what is on disk is safe",
             )
-            if self._faults > _MOST_FAULTS and self._run is not None:
+            if self._faults > _MOST_FAULTS and self._runs:
                 self._faults = 0
-                self._run.give_up(f"writing failed again and again ({type(error).__name__}: {error})")
-                self._after_writing(self._run)
+                oldest = self._runs[0]
+                oldest.give_up(f"writing failed again and again ({type(error).__name__}: {error})")
+                self._after_writing(oldest)
 
     def _raise_alarm(self, trouble: str, text: str) -> None:
         if self._run is not None:
@@ -176,6 +184,7 @@ class Recorder(threading.Thread):
             self._recent.add(piece)
 
     def _begin(self, begin: Begin) -> None:
+        self._let_an_ended_run_wait()
         if self._run is not None:
             begin.done.set_exception(
                 RequestRefused("A run is being recorded already. Stop or abort it before the next one.")
@@ -204,26 +213,40 @@ class Recorder(threading.Thread):
         if self._ring is not None and run.whole_on_disk:
             self._ring.clear()  # what mattered of it is in the run
 
+    def _let_an_ended_run_wait(self) -> None:
+        """A disk that does not take the end of a run must not keep the next release from being recorded."""
+        run = self._run
+        if run is None or not run.ended:
+            return
+        self._ended.append(run)
+        self._run, self.status = None, RecorderStatus(sample=self.status.sample)
+        for piece in run.take_behind_the_end():
+            self._keep(piece)
+
     def _write(self) -> None:
-        if self._run is not None:
-            self._run.write()
-            self._after_writing(self._run)
+        for run in self._runs:
+            run.write()
+            self._after_writing(run)
 
     def _commit(self) -> None:
-        if self._run is not None:
-            self._run.commit()
-            self._after_writing(self._run)
+        for run in self._runs:
+            run.commit()
+            self._after_writing(run)
 
     def _after_writing(self, run: RunRecording) -> None:
         """A run that is over is handed on; what came behind its end is the beginning of what comes next."""
         recorded = run.recorded
         if recorded is None:
             return
-        self._run = None
-        self.status.waiting_bytes = 0
-        self.status.recording = False
-        self.status.journal = None
-        for piece in run.behind_the_end():
+        behind_the_end = run.forget()
+        if run is self._run:
+            self._run = None
+            self.status.waiting_bytes = 0
+            self.status.recording = False
+            self.status.journal = None
+        else:
+            self._ended.remove(run)
+        for piece in behind_the_end:
             self._keep(piece)
         self._hand_over(recorded)
 
@@ -246,15 +269,14 @@ class Recorder(threading.Thread):
 
     def _shut(self) -> None:
         """The process ends: whatever is open is closed in good order."""
-        run = self._run
-        if run is None:
-            return
-        run.add(End("stopped", self.status.sample, "The acquisition process was ended"))
+        if self._run is not None:
+            self._run.add(End("stopped", self.status.sample, "The acquisition process was ended"))
         deadline = time.monotonic() + _SHUT_S
-        while run.recorded is None and time.monotonic() < deadline:
-            run.write()
-            if run.recorded is None:
-                time.sleep(_RETRY_S)
-        if run.recorded is None:
-            run.give_up("no disk took data while the process ended")
-        self._after_writing(run)
+        for run in self._runs:
+            while run.recorded is None:
+                run.write()
+                if run.recorded is None and time.monotonic() > deadline:
+                    run.give_up("no disk took data while the process ended")
+                elif run.recorded is None:
+                    time.sleep(_RETRY_S)
+            self._after_writing(run)

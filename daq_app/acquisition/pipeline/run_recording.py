@@ -140,8 +140,17 @@ class RunRecording:
         if not self._unwritten.end_waits:
             self._unwritten.add(event)
 
-    def behind_the_end(self) -> list[Piece]:
-        """What came after the end of the run; forgets the rest."""
+    @property
+    def ended(self) -> bool:
+        """Whether the run is over, though no disk has taken its end yet."""
+        return self._unwritten.end_waits
+
+    def take_behind_the_end(self) -> list[Piece]:
+        """What came after the end of the run, which still waits for a disk."""
+        return self._unwritten.take_behind_the_end()
+
+    def forget(self) -> list[Piece]:
+        """What came after the end of the run; the rest is on disk, or given up."""
         return self._unwritten.clear()
 
     # -- to disk ---------------------------------------------------------------------------------

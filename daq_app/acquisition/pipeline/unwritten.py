@@ -79,13 +79,20 @@ class Unwritten:
         self.waiting_bytes += sum(p.block.readings.nbytes for p in again if isinstance(p, Arrived))
         return again
 
-    def clear(self) -> list[Piece]:
-        """Forget the run; what stands behind its end belongs to no run and is handed out."""
-        behind: list[Piece] = []
+    def take_behind_the_end(self) -> list[Piece]:
+        """Hand out what stands behind the end of the run, and belongs to no run; the run itself stays."""
         pieces = list(self._waiting)
         ends = [place for place, piece in enumerate(pieces) if isinstance(piece, End)]
-        if ends:
-            behind = [piece for piece in pieces[ends[0] + 1 :] if not isinstance(piece, End)]
+        if not ends:
+            return []
+        behind = [piece for piece in pieces[ends[0] + 1 :] if not isinstance(piece, End)]
+        self._waiting = deque(pieces[: ends[0] + 1])
+        self.waiting_bytes -= sum(p.block.readings.nbytes for p in behind if isinstance(p, Arrived))
+        return behind
+
+    def clear(self) -> list[Piece]:
+        """Forget the run; what stands behind its end is handed out."""
+        behind = self.take_behind_the_end()
         self._waiting.clear()
         self._unsafe.clear()
         self.waiting_bytes = self.dropped_samples = 0

@@ -224,7 +224,8 @@ class Session:
     def _hand_over(self, recorded: Recorded) -> None:
         """On the recorder's thread, when a journal is closed."""
         self.analyst.inbox.put(Closed(recorded.journal, recorded.end))
-        self._stop_backup()
+        if not self.recording:
+            self._stop_backup()
         if recorded.journal is None:
             self._tell_saved(recorded, Finished(False, ""))
             return

@@ -37,7 +37,7 @@ from daq_app.acquisition.session.requests import answer
 from daq_app.acquisition.session.session import Session, SessionSettings
 from daq_app.config import Rig, Scaling, load_rig, plan_tasks
 from daq_app.rocking import RotationGeometry, free_rocking
-from daq_app.runfile import Run, finalise, open_run, recover
+from daq_app.runfile import Run, RunFileError, finalise, open_run, recover
 from daq_app.runfile.folder import find_runs
 from drivers import Block, DriverError, Opened
 
@@ -161,13 +161,20 @@ class QuickFinaliser:
     def submit(self, job: dict[str, str], then: Callable[[Finished], None] | None = None) -> Future[Finished]:
         done: Future[Finished] = Future()
         if job["job"] == "finalise":
-            path = finalise(Path(job["journal"]), Path(job["out"]), None, keep_journal=False)
-            done.set_result(Finished(True, f"Saved as {path.name}", str(path)))
+            done.set_result(self._finalised(Path(job["journal"]), Path(job["out"])))
         else:
             done.set_result(Finished(True, ""))
         if then is not None:
             then(done.result())
         return done
+
+    @staticmethod
+    def _finalised(journal: Path, out: Path) -> Finished:
+        try:
+            path = finalise(journal, out, None, keep_journal=False)
+        except (OSError, RunFileError) as error:
+            return Finished(False, f"{out.name} could not be made: {error}")
+        return Finished(True, f"Saved as {path.name}", str(path))
 
 
 class BadDisk:
@@ -213,7 +220,7 @@ class Storm:
             plan_tasks(self.rig),
             self.folder,
             lambda: driver,  # type: ignore[arg-type, return-value]
-            spare_folder=self.folder.with_name(f"{self.folder.name}-spare"),
+            spare_folder=self._spare,
             patience=Patience(read_timeout_s=0.02, silence_limit_s=600.0),
         )
         kills: list[tuple[Path, int, int]] = []
@@ -231,7 +238,7 @@ class Storm:
                     kills.append(self._kill(session, listener, driver.allowed, len(kills)))
             disk.trouble = 0
             self._end(session, listener)
-        self._check_runs(wall, find_runs(self.folder))
+        self._check_runs(wall, [*self._runs_in(self.folder), *self._runs_in(self._spare)])
         self._check_words(listener.states)
         for copy, safe, sample in kills:
             self._check_kill(wall, copy, safe, sample)
@@ -242,20 +249,7 @@ class Storm:
     def _order(self, session: Session) -> None:
         if self.rng.random() > 0.35:
             return
-        names = [
-            "tare",
-            "check",
-            "pull",
-            "plan",
-            "arm",
-            "arm",
-            "abort",
-            "stop",
-            "marker",
-            "nonsense",
-            "preview",
-        ]
-        name = str(self.rng.choice(names))
+        name = str(self.rng.choice(_ORDERS))
         arguments: dict[str, float | str] = {}
         if name in ("plan", "arm"):
             level = int(self.rng.integers(1, 5))
@@ -298,19 +292,35 @@ class Storm:
 
     # -- what must hold --------------------------------------------------------------------------
 
+    @property
+    def _spare(self) -> Path:
+        return self.folder.with_name(f"{self.folder.name}-spare")
+
+    @staticmethod
+    def _runs_in(folder: Path) -> list[Path]:
+        """All runs of a folder; what no disk took as a run file is recovered, as the next start does."""
+        if not folder.is_dir():
+            return []
+        recover(folder)
+        return find_runs(folder)
+
     def _check_runs(self, wall: Wall, paths: list[Path]) -> None:
         spans = []
-        for path in [*paths, *find_runs_or_none(self.folder.with_name(f"{self.folder.name}-spare"))]:
+        for path in paths:
             with open_run(path) as run:
                 spans.append((run.first_sample, run.first_sample + run.n_samples))
                 self._check_samples(wall, run, path)
+        spans.sort()
         for release in wall.releases:
             low, high = release - _AROUND_RELEASE[0], release + _AROUND_RELEASE[1]
             high = min(high, wall.readings.shape[1] // 400 * 400)
-            if not any(first <= max(0, low) and end >= high for first, end in spans):
-                # Stopped by the operator in mid-motion: what came until then is what there is to keep.
-                if any(first <= max(0, low) and release < end for first, end in spans) and self._stopped():
-                    continue
+            # Stopped by the operator in mid-motion: what came until then is what there is to keep.
+            least = release + 1 if self._stopped() else high
+            joined = max(0, low)
+            for first, end in spans:
+                joined = max(joined, end) if first <= joined else joined
+            together = any(first < release and end >= least for first, end in spans)
+            if not together or joined < least:
                 self.broken.append(f"the release at {release} is in no run; runs: {spans}")
 
     def _stopped(self) -> bool:
@@ -362,11 +372,6 @@ class Storm:
                 self.broken.append(
                     f"{copy.name}: killed at {sample}, the release at {release} is lost: {spans}"
                 )
-
-
-def find_runs_or_none(folder: Path) -> list[Path]:
-    """Runs of a folder that need not be there."""
-    return find_runs(folder) if folder.is_dir() else []
 
 
 def storm_once(rig_file: Path, folder: Path, seed: int) -> tuple[list[str], list[str]]:
