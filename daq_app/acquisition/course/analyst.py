@@ -78,6 +78,8 @@ class Analyst(threading.Thread):
         self._sequence: Course | None = None
         self._unclosed = 0
         """Courses that are over and whose journal is not closed yet."""
+        self._moves_on = False
+        """Whether what the wall does still belongs to the course that was ended last."""
         self.voice.sample = 0
         self._fault = ""
         self._standing: dict[str, EventMessage] = {}
@@ -163,10 +165,12 @@ class Analyst(threading.Thread):
         events = self._live.show(block, self.overloaded, quietly=self.inbox.qsize() > 20)
         if self._live.trouble:
             self._note("analysis", self._live.trouble, "error")
-        if self._sequence is None:
-            self._keep_unarmed(events)
-        else:
+        if self._sequence is not None:
             self._follow(self._sequence, events)
+        elif not self._moves_on:
+            self._keep_unarmed(events)
+        elif not self._live.moves:
+            self._new_live()  # a disk may keep the journal open for long: the next release is looked for now
         self._judge()
 
     def _keep_unarmed(self, events: Sequence[PhaseEvent]) -> None:
@@ -207,22 +211,21 @@ class Analyst(threading.Thread):
                 return
 
     def _finish(self, end: End) -> None:
-        course, self._sequence = self._sequence, None
+        self._sequence = None
         self._unclosed += 1
+        self._moves_on = self._live is not None and self._live.released
         self._around.post(end)
-        if course is not None and course.release_sample is not None:
-            # The next release is looked for from now on: a disk may keep the journal open for long.
-            self._new_live()
 
     def _on_closed(self, end: End) -> None:
         """A journal is closed; one that had to wait for a disk may be older than the course of now."""
         if self._unclosed:
             self._unclosed -= 1
-        else:  # the recorder gave the run up
-            self._sequence = None
-            self._new_live()
+        else:
+            self._sequence = None  # the recorder gave the run up
         if self._sequence is None:
             self._aborted = end.outcome == "aborted"
+            if self._moves_on:
+                self._new_live()
             self._go(State.SAVING, f"{end.text}. The run file is being made")
 
     # -- course of a session ---------------------------------------------------------------------
@@ -250,6 +253,7 @@ class Analyst(threading.Thread):
         self._go(State.PREVIEWING, f"Sampling at {opened.rate_hz:g} Hz")
 
     def _new_live(self) -> None:
+        self._moves_on = False
         if self._opened is not None:
             self._live = LiveView(self._rig, self._opened.rate_hz, self.tare.readings, self._publisher)
             self._hold.restart(self.voice.sample)

@@ -99,6 +99,18 @@ class LiveView:
             return ()
         return self._unheld.process(result.first_sample, result.rotation_rad, result.velocity_rad_s)
 
+    @property
+    def released(self) -> bool:
+        """Whether the wall has been let go since this view began: the next test needs a new one."""
+        return self.moves or (self._analyser is not None and self._analyser.phase is Phase.AT_REST)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the wall has been let go and does not rest yet."""
+        return self._unheld.rocks or (
+            self._analyser is not None and self._analyser.phase in (Phase.FALLING, Phase.ROCKING)
+        )
+
     def _publish_block(self, block: Block, overloaded: tuple[str, ...]) -> None:
         heading = BlockMessage(
             first_sample=block.first_sample,
