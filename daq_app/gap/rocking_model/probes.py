@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from daq_app.gap.core import Confusion, Effect, Parameter
 from daq_app.gap.core.parameters import signed
+from daq_app.gap.rocking_model.features.families import sensor_families
 from daq_app.gap.rocking_model.prediction.vector import PROBE_SPEEDS
 
 _LAWS = ("restitution_slope",)
@@ -48,8 +49,8 @@ def probes() -> Iterable[Effect]:
         confusable_with=tuple(Confusion(loss, _MORE_ROTATIONS) for loss in _LOSSES),
         kind="probe",
     )
-    for family, count in (("wire", 5), ("accelerometer", 2), ("joint", 5), ("base", 2), ("tiltmeter", 3)):
-        kind = {"joint": "interface", "base": "contact"}.get(family, "sensor")
+    free = {block: form for family in sensor_families() for block, form in family.probes.items()}
+    for family, (kind, count) in free.items():
         yield Effect(
             f"free_{family}",
             kind,

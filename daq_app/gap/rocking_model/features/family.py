@@ -95,11 +95,11 @@ class SensorFamily:
 
     `observe`: blocks of a run. `predict`: by the block's rule (`Block.rule`). `sizes`: by (block,
     coefficient). `priors`: parameters of the sensors that all runs share. `probes`: by block, the effect
-    family of its free form.
+    family of its free form and how many of its coefficients are free.
     """
 
     observe: Callable[[Scene], Iterable[Block | None]]
     predict: Mapping[str, Predict]
     sizes: Mapping[tuple[str, str], Size] = field(default_factory=dict)
     priors: Callable[[Survey], tuple[Parameter, ...]] = lambda survey: ()
-    probes: Mapping[str, str] = field(default_factory=dict)
+    probes: Mapping[str, tuple[str, int]] = field(default_factory=dict)

@@ -40,6 +40,17 @@ def slip_shape(grid: Grid) -> FloatArray:
 
     The mean over each interval of the grid: in that of an impact only a part of it is after the slip.
     """
-    after = (grid.time_s[:, None] - grid.impact_s[None, :]) * GRID_HZ + 0.5
-    shape: FloatArray = np.clip(after, 0.0, 1.0) @ grid.approach - float(np.sum(grid.approach))
+    shape: FloatArray = _after(grid) @ grid.approach - float(np.sum(grid.approach))
     return shape
+
+
+def turn_shape(grid: Grid, impact: int) -> FloatArray:
+    """The approach speed of one impact, without sign, from that impact on; 0 before."""
+    shape: FloatArray = _after(grid)[:, impact] * abs(float(grid.approach[impact]))
+    return shape
+
+
+def _after(grid: Grid) -> FloatArray:
+    """Share of each interval of the grid that is after each impact, (m, n)."""
+    after: FloatArray = np.clip((grid.time_s[:, None] - grid.impact_s[None, :]) * GRID_HZ + 0.5, 0.0, 1.0)
+    return after

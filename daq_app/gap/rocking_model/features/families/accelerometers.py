@@ -158,5 +158,5 @@ FAMILY = SensorFamily(
         ("swing timing", "delay"): Size(1e-4, 2e-4, "s"),
     },
     _priors,
-    probes={"accelerometer": "sensor"},
+    probes={"accelerometer": ("sensor", 2)},
 )

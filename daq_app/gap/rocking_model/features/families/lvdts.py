@@ -164,5 +164,5 @@ FAMILY = SensorFamily(
         ("twist", "follows rotation"): Size(1.5e-4),
     },
     _priors,
-    {"joint": "interface"},
+    {"joint": ("interface", 5)},
 )

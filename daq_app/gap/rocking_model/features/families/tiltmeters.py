@@ -170,5 +170,5 @@ FAMILY = SensorFamily(
         ("tiltmeter", "drift"): Size(2e-6, 6e-6, "rad/s"),
     },
     _priors,
-    probes={"tiltmeter": "sensor"},
+    probes={"tiltmeter": ("sensor", 3)},
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -21,7 +22,7 @@ from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size,
 from daq_app.gap.rocking_model.features.oscillations.ring_response import bent_form, bent_wall
 from daq_app.gap.rocking_model.features.pivots import travel
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.features.shapes import moment_shape, slip_shape
+from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape, turn_shape
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import (
@@ -36,6 +37,10 @@ from daq_app.gap.rocking_model.tolerances import CALIBRATION
 
 _OTHER_WIRES = 2e-3
 """Difference in calibration between the mean of some wires and that of all."""
+
+
+_TURNS = 8
+"""Impacts at which a turn about the vertical is looked for: those with most speed."""
 
 
 def _wire_block(scene: Scene) -> Block | None:
@@ -98,6 +103,45 @@ def _translation_block(scene: Scene) -> Block | None:
     return with_crosstalk(found, at_base @ _leaked(run, names))
 
 
+def _turn_block(scene: Scene) -> Block | None:
+    """Rotation about the vertical, from wires at both ends of the wall: what each of the first impacts turns.
+
+    What the wires' calibration, times and anchors leave in it is fitted and dropped; a zero that walks is
+    taken up by the next impact, so that each turn is measured over the half-cycles on either side of it.
+    """
+    run, grid = scene.run, scene.grid
+    _, _, names = wall_rotation(run)
+    chosen = [i for i in run.indices("wire") if run.sensors[i].id in names]
+    y = np.array([run.sensors[i].position_m[1] for i in chosen])
+    z = np.array([run.sensors[i].position_m[2] for i in chosen])
+    design = np.column_stack([np.ones_like(y), z, y])
+    if len(chosen) < len(run.indices("wire")) or np.linalg.matrix_rank(design) < 3 or len(chosen) < 4:
+        return None
+    ideal = [Wire(run.sensors[i], run.survey.half_base_m).shortening(grid.theta) for i in chosen]
+    shift = np.array([gridded(run, i) for i in chosen]) - np.array(ideal)
+    turned = -np.linalg.pinv(design)[2] @ shift
+    theta, count = grid.theta, min(_TURNS, grid.impact_s.size - 1)
+    absorbed = {
+        "zero": (np.ones_like(theta), "rad"),
+        "gain": (theta, "1"),
+        "lag": (-grid.omega, "s"),
+        "even": (theta**2, "1/rad"),
+        "side": (np.abs(theta), "1"),
+        "backlash": (side_of(theta), "rad"),
+    }
+    turns = {f"impact {k + 1}": (turn_shape(grid, k), "s") for k in range(count)}
+    pick = scene.rocking & grid.settled & (grid.time_s < grid.impact_s[count])
+    found = regress("turn", turned, absorbed | turns, pick, tuple(absorbed))
+    sides = {name: "+" if grid.approach[k] > 0.0 else "−" for k, name in enumerate(turns)}
+    said = {name: ("turn", f"turn per speed at impacts to {side}") for name, side in sides.items()}
+    return found and replace(found, said=said)
+
+
+def _predict_turn(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """A rigid wall on its two edges does not turn about the vertical, and no effect makes it stay turned."""
+    return np.zeros(len(block.names))
+
+
 def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     theta = run.grid.theta
     found = values["cal_wire"] * unit_coefficients(run, block, "theta", lambda: theta)
@@ -152,6 +196,7 @@ def _predict_base(run: RockingRun, block: Block, values: Mapping[str, float]) ->
 def _observe(scene: Scene) -> Iterator[Block | None]:
     yield _wire_block(scene)
     yield _translation_block(scene)
+    yield _turn_block(scene)
 
 
 def _priors(survey: Survey) -> tuple[Parameter, ...]:
@@ -164,7 +209,7 @@ def _priors(survey: Survey) -> tuple[Parameter, ...]:
 
 FAMILY = SensorFamily(
     _observe,
-    {"wire": _predict_wire, "base": _predict_base},
+    {"wire": _predict_wire, "base": _predict_base, "turn": _predict_turn},
     {
         ("wire", "gain"): Size(1e-4),
         ("wire", "lag"): Size(2e-5, 1e-4, "s"),
@@ -173,7 +218,8 @@ FAMILY = SensorFamily(
         ("wire", "drift"): Size(2e-6, 5e-6, "rad/s"),
         ("base", "slip per speed"): Size(5e-5, 1e-4, "m s/rad"),
         ("base", "follows rotation"): Size(3e-4),
+        **{("turn", f"impact {k + 1}"): Size(3e-5) for k in range(_TURNS)},
     },
     _priors,
-    {"wire": "sensor", "base": "contact"},
+    {"wire": ("sensor", 5), "base": ("contact", 2), "turn": ("structure", _TURNS)},
 )
