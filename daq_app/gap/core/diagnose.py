@@ -11,7 +11,7 @@ import numpy as np
 
 from daq_app.gap.core.effects import Library
 from daq_app.gap.core.features import Run
-from daq_app.gap.core.findings import Finding
+from daq_app.gap.core.findings import Finding, material
 from daq_app.gap.core.fitting.experiment import Experiment
 from daq_app.gap.core.fitting.fit import Fit, effects_of
 from daq_app.gap.core.fitting.held_out import GapSize, HeldOutRun, gap_size
@@ -54,7 +54,7 @@ def diagnose(
     if len(runs) == 1:
         stated.append("One run only: nothing is held out, and repeatability comes from its prior.")
     with Workers(experiment, options.workers, options.progress, options.cancelled) as workers:
-        study = _Study(experiment, library, options, workers)
+        study = _Study(experiment, library, options, workers, measured=bool(material(findings)))
         study.fit_all()
         result = study.conclude(stated)
     return replace(with_findings(result, findings, options.policy), seconds=time.perf_counter() - began)

@@ -44,9 +44,18 @@ class Options:
 class Hypotheses:
     """The fits of one diagnosis, made by `fit_all`."""
 
-    def __init__(self, experiment: Experiment, library: Library, options: Options, workers: Workers) -> None:
+    def __init__(
+        self,
+        experiment: Experiment,
+        library: Library,
+        options: Options,
+        workers: Workers,
+        *,
+        measured: bool = False,
+    ) -> None:
+        """`measured`: whether something material was measured directly about an instrument."""
         self.experiment, self.library, self.options, self.workers = experiment, library, options, workers
-        self.policy = options.policy
+        self.policy, self.measured = options.policy, measured
         self.fits: dict[Hypothesis, Fit] = {}
         self.evidence: dict[Hypothesis, float] = {}
         """Log evidence of every hypothesis; where it was not refitted, by one linear step."""
@@ -173,8 +182,8 @@ class Hypotheses:
         return rank(kept, self.library, self.policy)
 
     def _worth_it(self, hypothesis: Hypothesis) -> bool:
-        """Whether the last of several causes explains enough."""
-        if len(hypothesis) < 2:
+        """Whether the last of several causes explains enough; what was measured directly counts as one."""
+        if len(hypothesis) + self.measured < 2 or not hypothesis:
             return True
         evidence = self.evidence[hypothesis]
         without = {

@@ -157,7 +157,7 @@ FAMILY = SensorFamily(
     {"joint": _predict_joint, "twist": _predict_twist},
     {
         ("joint", "pivot"): Size(3e-4),
-        ("joint", "pivot left against right"): Size(5e-5, 1e-4, "m"),
+        ("joint", "pivot left against right"): Size(5e-5, 3e-4, "m"),
         ("joint", "pivot with rotation"): Size(5e-3),
         ("joint", "contact length"): Size(5e-5, 3e-5, "m"),
         ("joint", "drift"): Size(1e-6, 2e-6, "m/s"),

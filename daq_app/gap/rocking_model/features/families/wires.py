@@ -212,7 +212,7 @@ FAMILY = SensorFamily(
     {"wire": _predict_wire, "base": _predict_base, "turn": _predict_turn},
     {
         ("wire", "gain"): Size(1e-4),
-        ("wire", "lag"): Size(2e-5, 1e-4, "s"),
+        ("wire", "lag"): Size(2e-5, 2e-4, "s"),
         ("wire", "even harmonic"): Size(3e-3),
         ("wire", "step with moment"): Size(3e-6, 4e-6, "rad"),
         ("wire", "drift"): Size(2e-6, 5e-6, "rad/s"),
