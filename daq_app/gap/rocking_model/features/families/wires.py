@@ -218,7 +218,7 @@ FAMILY = SensorFamily(
         ("wire", "drift"): Size(2e-6, 5e-6, "rad/s"),
         ("base", "slip per speed"): Size(5e-5, 1e-4, "m s/rad"),
         ("base", "follows rotation"): Size(3e-4),
-        **{("turn", f"impact {k + 1}"): Size(3e-5) for k in range(_TURNS)},
+        **{("turn", f"impact {k + 1}"): Size(1e-4) for k in range(_TURNS)},
     },
     _priors,
     {"wire": ("sensor", 5), "base": ("contact", 2), "turn": ("structure", _TURNS)},
