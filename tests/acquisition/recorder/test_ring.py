@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from daq_app.acquisition.messages.items import End
 from daq_app.acquisition.pipeline.recent import Recent
 from daq_app.acquisition.pipeline.ring import Ring
 from tests.support.recorder.recorder_bench import Bench, Disk, contents, header
@@ -24,6 +25,27 @@ def test_a_release_that_nobody_armed_waits_in_memory_for_a_disk(
     recorded = lab.end()
     assert recorded.journal is not None and recorded.end.outcome == "complete"
     assert contents(recorded.journal) == {n: float(n) for n in range(1000)}
+
+
+def test_a_run_whose_end_no_disk_takes_keeps_no_release_from_being_recorded(
+    bench: Callable[..., Bench], disk: Disk
+) -> None:
+    """The wall goes on while the disk is full: the run that is over waits, and the release is a run as well."""
+    lab = bench(recent=Recent(2000))
+    first = lab.begin_and_keep(5)
+    disk.full = True
+    lab.recorder.inbox.put(End("stopped", 500, "Stopped by the operator"))
+    lab.blocks(5, 5)
+    lab.until(lambda: lab.recorder.status.sample == 1000)
+    second = lab.begin("unarmed", before_samples=2000, kept=True)
+    lab.blocks(10, 5)
+    lab.until(lambda: lab.recorder.status.sample == 1500)
+    disk.full = False
+    lab.recorder.inbox.put(End("complete", 1500, "At rest"))
+    lab.until(lambda: len(lab.handed) == 2)
+    assert [recorded.end.outcome for recorded in lab.handed] == ["stopped", "complete"]
+    assert contents(first) == {n: float(n) for n in range(500)}
+    assert contents(second) == {n: float(n) for n in range(500, 1500)}
 
 
 def test_the_ring_holds_the_last_minutes_and_no_more(bench: Callable[..., Bench], tmp_path: Path) -> None:
