@@ -107,7 +107,8 @@ def _turn_block(scene: Scene) -> Block | None:
     """Rotation about the vertical, from wires at both ends of the wall: what each of the first impacts turns.
 
     What the wires' calibration, times and anchors leave in it is fitted and dropped; a zero that walks is
-    taken up by the next impact, so that each turn is measured over the half-cycles on either side of it.
+    taken up by the next impact, so that each turn is measured over the half-cycles on either side of it. What
+    goes to and fro with the side is play of a wire rather than turning: by least norm that one shape has it.
     """
     run, grid = scene.run, scene.grid
     _, _, names = wall_rotation(run)
