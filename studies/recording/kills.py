@@ -25,7 +25,7 @@ from typing import Any, Final
 import psutil
 from rich.console import Console
 
-from daq_app.acquisition import AcquisitionClient, read_session_file
+from daq_app.acquisition import AcquisitionClient, SessionFile, read_session_file
 from daq_app.acquisition.messages.published import HealthMessage, State, StateMessage
 from daq_app.acquisition.process.process import run_and_exit
 from daq_app.config import load_rig
@@ -86,18 +86,29 @@ class Life:
         ]
         self.process = quick_context().Process(target=run_quietly, args=(arguments,))
         self.process.start()
+        try:
+            self.session = self._started()
+        except BaseException:  # Ctrl-C too: nothing may hold the folder when the rounds are judged
+            self.process.kill()
+            self.process.join()
+            raise
+        topics = ("health", "state")
+        self.client = AcquisitionClient(
+            self.session.address, self.session.token, topics=topics, timeout_s=60.0
+        )
+        self.read = self.safe = 0
+        self.state: State | None = None
+
+    def _started(self) -> SessionFile:
+        """What the process says of itself once it runs."""
         deadline = time.monotonic() + _LIMIT_S
-        session = None
-        while session is None or session.pid != self.process.pid:
+        while True:
+            session = read_session_file(self._folder)
+            if session is not None and session.pid == self.process.pid:
+                return session
             if self.process.exitcode is not None or time.monotonic() > deadline:
                 raise RuntimeError(f"the process did not start: {self.process.exitcode}")
             self.process.join(0.01)
-            session = read_session_file(folder)
-        self.session = session
-        topics = ("health", "state")
-        self.client = AcquisitionClient(session.address, session.token, topics=topics, timeout_s=60.0)
-        self.read = self.safe = 0
-        self.state: State | None = None
 
     def listen(self, seconds: float, *until: State) -> None:
         """Keep the newest health and state for so long, or until a state comes."""
