@@ -30,7 +30,7 @@ def test_a_release_that_nobody_armed_waits_in_memory_for_a_disk(
 def test_a_run_whose_end_no_disk_takes_keeps_no_release_from_being_recorded(
     bench: Callable[..., Bench], disk: Disk
 ) -> None:
-    """The wall goes on while the disk is full: the run that is over waits, and the release is a run as well."""
+    """The wall goes on while the disk is full: the run that is over waits, the release is a run as well."""
     lab = bench(recent=Recent(2000))
     first = lab.begin_and_keep(5)
     disk.full = True
