@@ -52,9 +52,10 @@ def demo(
         if not planned:
             print_paragraph("Error", f"{runs} has every test of the day already. Name another folder")
             raise typer.Exit(EXIT_BAD_INPUT)
-        console.print("Starting the simulated wall; the first start on a machine compiles it (some seconds)")
+        console.print("Starting the acquisition and the simulated wall")
         try:
-            process = AcquisitionProcess(["--rig", str(rig_file), "--out", str(runs), "--speed", speed])
+            options = ["--rig", str(rig_file), "--out", str(runs), "--speed", speed]
+            process = AcquisitionProcess(options, say=console.print)
             with process.client() as client:
                 window = None if headless else _open_window(process.address, process.token, campaign_file)
                 try:
@@ -64,7 +65,8 @@ def demo(
                         window.wait()
                 finally:
                     client.request("shutdown", 60.0, force=1.0)
-            process.wait(300.0)
+            console.print("Finishing the results of the tests")
+            process.wait()
         except (AcquisitionDied, AcquisitionUnreachable) as error:
             print_paragraph("Error", str(error))
             raise typer.Exit(EXIT_HARDWARE) from None

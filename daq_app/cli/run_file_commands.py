@@ -27,7 +27,7 @@ from daq_app.runfile import (
     verify,
 )
 from daq_app.runfile.exporters import Decimal, ExportFormat, export_run
-from daq_app.runfile.importers import import_file, load_import_map
+from daq_app.runfile.importers import ImportMap, ImportReport, import_file, load_import_map, propose_map
 from daq_app.runfile.source import RunSource
 
 
@@ -250,8 +250,8 @@ def export_command(
 
 
 def import_command(
-    file: Annotated[Path, typer.Argument(help="TDMS, LVM, CSV, MAT or NPZ file.", metavar="FILE")],
-    rig: Annotated[Path, typer.Option("--rig", help="Rig file of the test.")],
+    files: Annotated[list[Path], typer.Argument(help="TDMS, LVM, CSV, MAT or NPZ files.", metavar="FILE…")],
+    rig: Annotated[Path, typer.Option("--rig", help="Rig file of the tests.")],
     map_: Annotated[
         Path | None,
         typer.Option("--map", help="Which column is which channel (TOML); without it, names must agree."),
@@ -260,19 +260,55 @@ def import_command(
         Path,
         typer.Option("--out", help="Folder of runs (made if need be), or the run file, named with .h5."),
     ] = Path(),
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    propose: Annotated[
+        bool,
+        typer.Option(
+            "--propose-map", help="Import nothing; print a map for the first file, guessed from its contents."
+        ),
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object for each file.")] = False,
 ) -> None:
-    """Turn a recording of another program into a run.
+    """Turn recordings of another program into runs.
 
-    What the file says that cannot be true (units, increments, lengths) is reported and not believed;
-    where it matters, the import is refused and says what to put into the map.
+    What a file says that cannot be true (units, increments, lengths) is reported and not believed;
+    where it matters, the import is refused and says what to put into the map. One file that is refused
+    does not stop the others.
     """
     with reported():
         rig_text = read_text(rig)
-        import_map = load_import_map(map_) if map_ else None
+        import_map = load_import_map(map_) if map_ else ImportMap()
         parsed = parse_rig(rig_text, str(rig))
-        with _file_or_folder(out) as place, Console(stderr=True).status(f"importing {file.name} …"):
-            report = import_file(file, parsed, rig_text, place, import_map, _derived_of_import)
+        if propose:
+            with Console(stderr=True).status(f"comparing {files[0].name} with {parsed.name} …"):
+                proposal = propose_map(files[0], parsed, import_map.source)
+            for line in proposal.text(files[0].name).splitlines():
+                echo(line)
+            return
+        if len(files) > 1 and import_map.run.test:
+            raise RunFileError(
+                f"{map_} names the test {import_map.run.test}, and {len(files)} files are given",
+                advice="Leave `test` out: each run is then called as its file.",
+            )
+        if len(files) > 1 and out.suffix:
+            raise RunFileError(f"{out} is one file, and {len(files)} are given", advice="Name a folder.")
+    refused = 0
+    for file in files:
+        try:
+            working = Console(stderr=True).status(f"importing {file.name} …")
+            with reported(), _file_or_folder(out) as place, working:
+                report = import_file(file, parsed, rig_text, place, import_map, _derived_of_import)
+        except typer.Exit:
+            if len(files) == 1:
+                raise
+            refused += 1
+            continue
+        _print_import(report, as_json)
+    if refused:
+        print_paragraph("Incomplete", f"{refused} of {len(files)} files were not imported")
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _print_import(report: ImportReport, as_json: bool) -> None:
     if as_json:
         document = {
             "run": str(report.run),

@@ -169,10 +169,24 @@ def warm_up(bench: Bench, arguments: argparse.Namespace) -> None:
     release, so a scripted one is let go in its place.
     """
     terminals = tuple(name for device in bench.present() for name in device.physical_channels)
+    if arguments.wall == "commanded":
+        _compile_beside(bench, terminals)
     bench.source.volts(terminals, np.linspace(0.0, 0.01, 11))
     if arguments.wall == "commanded":
         rehearsed = argparse.Namespace(**{**vars(arguments), "wall": "scripted"})
         _wall(load_rig(arguments.config), rehearsed).volts(terminals, np.arange(0.0, 60.0, 0.5))
+
+
+def _compile_beside(bench: Bench, terminals: tuple[str, ...]) -> None:
+    from sim_hardware import compiling  # compiles its kernels: only for a wall
+
+    if compiling.motion_is_compiled():
+        return
+    print("Compiling the simulated wall, once on this machine: its motion and its sensors", flush=True)
+    motion = compiling.start_compiling_motion()
+    bench.source.volts(terminals, np.linspace(0.0, 0.01, 11))
+    print("The sensors are compiled; the motion follows", flush=True)
+    compiling.finish_compiling_motion(motion)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -24,8 +24,8 @@ def test_files_held_open_and_guarded_children_on_windows(repository: Path, tmp_p
     windows = [f"Z:{argument}".replace("/", "\\") for argument in arguments]
     done = subprocess.run(
         [WINE, PYTHON, *windows],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
+        input=b"",  # a pipe: the null device of Linux is no file to a Windows Python
+        capture_output=True,
         env={**os.environ, "WINEDEBUG": "-all"},
         check=True,
     )

@@ -11,7 +11,6 @@ import json
 import queue
 import subprocess
 import threading
-import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -20,9 +19,12 @@ from pathlib import Path
 from typing import Final
 
 from daq_app.guarded import end_guarded, start_guarded
+from daq_app.waiting import WorkWatch
 
 _WORKER: Final = "daq_app.acquisition.closing.finalise_worker"
 _LEAST_LIMIT_S: Final = 120.0
+"""Processor time within which a small job must be done, and time without any work after which its worker
+counts as hung, s. A slow machine stretches neither."""
 _SLOWEST_BYTES_PER_S: Final = 1e6
 _LOOK_EVERY_S: Final = 0.1
 _CLOSING_S: Final = 10.0
@@ -171,7 +173,7 @@ class _Worker:
 
 
 def _time_limit_s(job: dict[str, str]) -> float:
-    """Far more than a job can take: packing handles some 20 MB of journal a second."""
+    """Far more processor time than a job can take: packing handles some 20 MB of journal a second."""
     try:
         n_bytes = Path(job["journal"]).stat().st_size
     except OSError:
@@ -184,7 +186,7 @@ def _exchange(
 ) -> Finished | None:
     """One job and its answer; None if the worker died over it or is to be stopped.
 
-    Raises `TimeoutError` if it takes longer than `limit_s`.
+    Raises `TimeoutError` if it uses more processor time than `limit_s`, or none for that long.
     """
     assert worker.stdin is not None and worker.stdout is not None
     answers: queue.SimpleQueue[str] = queue.SimpleQueue()
@@ -193,9 +195,9 @@ def _exchange(
         worker.stdin.flush()
         output = worker.stdout
         threading.Thread(target=lambda: answers.put(output.readline()), daemon=True).start()
-        until_s = time.monotonic() + limit_s
+        watch = WorkWatch(worker.pid, limit_s)
         while not stopped.is_set():
-            if time.monotonic() > until_s:
+            if watch.worked_s > limit_s or not watch.works():
                 raise TimeoutError
             with contextlib.suppress(queue.Empty):
                 line = answers.get(timeout=_LOOK_EVERY_S)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import subprocess
 import threading
@@ -13,11 +14,10 @@ from types import TracebackType
 from typing import Self
 
 from daq_app.guarded import end_guarded, start_guarded
+from daq_app.waiting import wait_for_start
 from drivers import DriverError
 
 _READY = re.compile(r"^Server listening on port (\d+)")
-_START_LIMIT_S = 240.0
-"""The first start compiles the wall's dynamics; on a busy machine that takes minutes."""
 
 
 class SimulatedServer:
@@ -43,11 +43,11 @@ class SimulatedServer:
 
     @property
     def connection(self) -> str:
-        """What to give to `drivers.open_driver`; waits until the server listens.
+        """What to give to `drivers.open_driver`; waits until the server listens, as long as it works.
 
         Raises `DriverError` with what it said if it does not.
         """
-        self._ready.wait(_START_LIMIT_S)
+        wait_for_start(self._ready, self._process.pid, lambda text: None)
         if not self._port:
             self.close()
             said = " ".join(self._said) or "it said nothing"
@@ -73,6 +73,11 @@ class SimulatedServer:
     ) -> None:
         self.close()
 
+    def _pass_on(self, line: str) -> None:
+        """What the server says while it starts, for whoever started us."""
+        with contextlib.suppress(OSError):  # who may be gone
+            print(line.strip(), flush=True)
+
     def _listen(self) -> None:
         """Drain what the server says: a full pipe would stop it."""
         assert self._process.stdout is not None
@@ -83,6 +88,8 @@ class SimulatedServer:
                 if match:
                     self._port = int(match[1])
                     self._ready.set()
+                elif not self._port:
+                    self._pass_on(line)
         except ValueError:  # closed while reading: we are ending it
             pass
         self._ready.set()

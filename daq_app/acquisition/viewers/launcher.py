@@ -7,15 +7,20 @@ import secrets
 import subprocess
 import threading
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
 
 from daq_app.acquisition.messages.options import READY
 from daq_app.acquisition.viewers.client import AcquisitionClient
 from daq_app.guarded import apart, program
 from daq_app.streams import CHILD_ENVIRONMENT
+from daq_app.waiting import wait_for_start
 
-_START_LIMIT_S = 240.0
-"""Loading everything and starting the simulated server, on a machine that is busy."""
+_HUNG: Final = "The acquisition process hung while it started: it did nothing for minutes. Start it again."
+
+
+def _say_nothing(text: str) -> None:
+    del text
 
 
 class AcquisitionDied(Exception):
@@ -33,8 +38,17 @@ class AcquisitionProcess:
     The child does not get the terminal's Ctrl-C; `stop` of its client ends a test in good order.
     """
 
-    def __init__(self, options: Sequence[str], environment: Mapping[str, str] | None = None) -> None:
-        """Start it and wait until it listens. Raises `AcquisitionDied`."""
+    def __init__(
+        self,
+        options: Sequence[str],
+        environment: Mapping[str, str] | None = None,
+        say: Callable[[str], None] = _say_nothing,
+    ) -> None:
+        """Start it and wait until it listens, as long as it works. Raises `AcquisitionDied`.
+
+        `say` gets what goes on while it starts, in words, from other threads too.
+        """
+        self._say = say
         self.token = secrets.token_urlsafe(24)
         self.process = subprocess.Popen(
             [program(), "-u", "-m", "daq_app.acquisition", *options],
@@ -56,11 +70,17 @@ class AcquisitionProcess:
         ]
         for listener in self._listeners:
             listener.start()
-        self._ready.wait(_START_LIMIT_S)
+        try:
+            wait_for_start(self._ready, self.process.pid, say)
+        except BaseException:  # Ctrl-C: nothing is recorded yet
+            self.kill()
+            raise
         if not self.address:
-            if self.process.poll() is None:
+            hung = self.process.poll() is None
+            if hung:
                 self.process.kill()
-            raise AcquisitionDied(self.wait(), self.said)
+            code, said = self.wait(), self.said
+            raise AcquisitionDied(code, f"{_HUNG} {said}".strip() if hung else said)
 
     @property
     def said(self) -> str:
@@ -91,6 +111,8 @@ class AcquisitionProcess:
             if line.startswith(READY):
                 self.address = line.removeprefix(READY).strip()
                 self._ready.set()
+            else:
+                self._say(line.strip())
         self._ready.set()
 
     def _listen_err(self) -> None:

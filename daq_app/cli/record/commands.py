@@ -81,6 +81,9 @@ def run(
     from daq_app.cli.record.follow import RunOptions, follow_run
     from daq_app.cli.record.results import as_document, results_table
 
+    if headless:
+        with reported():
+            _require_rotation(rig)
     level = level_of(test)
     options = RunOptions(
         rig=rig,
@@ -109,6 +112,20 @@ def run(
     if ended.text:
         print_paragraph("Error" if ended.exit_code != EXIT_FAILED else "Incomplete", ended.text)
     raise typer.Exit(ended.exit_code)
+
+
+def _require_rotation(rig: Path) -> None:
+    """Refuse a test that nobody watches and whose end nothing would notice."""
+    from daq_app.config import load_rig
+
+    if any(channel.family == "wire" for channel in load_rig(rig).channels):
+        return
+    print_paragraph(
+        "Error",
+        f"{rig} has no wire potentiometer, from which the rotation is computed: without a window nothing would "
+        "end the test. Add one wire at least, or record with the window and stop by hand (F7)",
+    )
+    raise typer.Exit(EXIT_BAD_INPUT)
 
 
 def simulate(

@@ -91,7 +91,7 @@ def follow_run(options: RunOptions, console: Console) -> RunEnd:
     try:
         if options.connection == "local":
             require_ni_daqmx()  # a process would need seconds to say the same
-        process = AcquisitionProcess(options.command_line())
+        process = AcquisitionProcess(options.command_line(), say=console.print)
     except DriverError as error:
         return RunEnd(EXIT_HARDWARE, str(error), None, "")
     except AcquisitionDied as died:

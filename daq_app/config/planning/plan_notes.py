@@ -24,6 +24,7 @@ def plan_notes(
         *_rate_notes(rig, tasks, devices),
         *_skew_notes(tasks, devices),
         *_delay_notes(tasks, devices),
+        *_rotation_notes(rig),
         *_auxiliary_notes(rig, devices),
         *_coupling_notes(rig),
         *_impedance_notes(rig, devices),
@@ -98,6 +99,15 @@ def _delay_notes(tasks: Sequence[PlannedTask], devices: Mapping[str, Device]) ->
             name,
             f"{devices[name].product.name} lags by {delay * 1e3:.2f} ms (digital filter); the driver does "
             "not correct it, the run file stores it and the analysis does",
+        )
+
+
+def _rotation_notes(rig: Rig) -> Iterator[PlanNote]:
+    if not any(channel.family == "wire" for channel in rig.channels):
+        yield _warning(
+            rig.name,
+            "has no wire potentiometer, from which the rotation is computed: tests are recorded, but their end "
+            "is not noticed and r is not computed. Add one wire at least",
         )
 
 

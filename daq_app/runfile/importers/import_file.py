@@ -66,6 +66,11 @@ def _opener(suffix: str) -> _Opener:
     return reader
 
 
+def open_foreign(path: Path, source: SourceMap) -> Reader:
+    """The reader of a foreign file, by its suffix. Raises `RunFileError`."""
+    return _opener(path.suffix.lower())(path, source)
+
+
 def import_file(
     path: Path,
     rig: Rig,

@@ -1,0 +1,50 @@
+"""The first start on a machine: the wall's motion is compiled beside its sensors, in a process of its own.
+
+Each takes about ten seconds of processor time; Numba keeps the result on disk, and later starts load it.
+``python -m sim_hardware.compiling`` compiles the motion.
+"""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+from daq_app.guarded import end_guarded, start_guarded
+from sim_hardware.dynamics import Body, Release, Restitution, simulate_motion
+from sim_hardware.dynamics.kernel import integrate
+from sim_hardware.dynamics.pieces import constant_piece, evaluate
+from sim_hardware.sensors import layout
+from sim_hardware.sensors.state import march
+
+
+def motion_is_compiled() -> bool:
+    """Whether Numba has the motion on disk. True too where it compiles nothing (NUMBA_DISABLE_JIT)."""
+    stats = getattr(integrate, "stats", None)
+    return stats is None or any(Path(stats.cache_path).glob("kernel.integrate*.nbc"))
+
+
+def start_compiling_motion() -> subprocess.Popen[str]:
+    """Begin to compile the motion in another process, which ends with this one."""
+    return start_guarded("sim_hardware.compiling", [], quiet=True)
+
+
+def finish_compiling_motion(process: subprocess.Popen[str]) -> None:
+    """Compile here what is compiled quickly, then wait for the other process.
+
+    Where that one fails, the motion is compiled at its first use.
+    """
+    evaluate(constant_piece(0.0, 0.0).reshape(1, -1), np.zeros(1), np.zeros(1), np.zeros(0), np.zeros(0))
+    march(np.zeros((0, layout.N_EVENT)), np.zeros((1, layout.N_EPOCH)))
+    process.wait()
+    end_guarded(process)
+
+
+def main() -> None:
+    """Compile the motion."""
+    simulate_motion(Body(0.2, 2.0, 1.4, 5000.0), Release(0.02), Restitution(0.9))
+
+
+if __name__ == "__main__":
+    main()
