@@ -16,6 +16,8 @@ EXTRA_OF: Final[Mapping[str, str]] = {
     "xarray": "formats",
     "h5netcdf": "formats",
     "nptdms": "formats",
+    "pyuff": "formats",
+    "asammdf": "mdf",
     "distributed": "scale",
     "mujoco": "contact",
 }

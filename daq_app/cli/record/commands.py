@@ -122,8 +122,8 @@ def _require_rotation(rig: Path) -> None:
         return
     print_paragraph(
         "Error",
-        f"{rig} has no wire potentiometer, from which the rotation is computed: without a window nothing would "
-        "end the test. Add one wire at least, or record with the window and stop by hand (F7)",
+        f"{rig} has no wire potentiometer, from which the rotation is computed: without a window nothing "
+        "would end the test. Add one wire at least, or record with the window and stop by hand (F7)",
     )
     raise typer.Exit(EXIT_BAD_INPUT)
 

@@ -106,8 +106,8 @@ def _rotation_notes(rig: Rig) -> Iterator[PlanNote]:
     if not any(channel.family == "wire" for channel in rig.channels):
         yield _warning(
             rig.name,
-            "has no wire potentiometer, from which the rotation is computed: tests are recorded, but their end "
-            "is not noticed and r is not computed. Add one wire at least",
+            "has no wire potentiometer, from which the rotation is computed: tests are recorded, but their "
+            "end is not noticed and r is not computed. Add one wire at least",
         )
 
 

@@ -53,6 +53,10 @@ def _opener(suffix: str) -> _Opener:
             from daq_app.runfile.importers.formats.from_mat import open_mat as reader  # type: ignore[assignment]
         case ".npz":
             from daq_app.runfile.importers.formats.from_npz import NpzReader as reader  # type: ignore[assignment]
+        case ".uff" | ".unv":
+            from daq_app.runfile.importers.formats.from_uff import UffReader as reader  # type: ignore[assignment]
+        case ".mf4" | ".mdf" | ".dat":
+            from daq_app.runfile.importers.formats.from_mdf import MdfReader as reader  # type: ignore[assignment]
         case ".h5" | ".journal":
             raise RunFileError(
                 "runs and journals of this program need no import",
@@ -61,7 +65,7 @@ def _opener(suffix: str) -> _Opener:
         case _:
             raise RunFileError(
                 f"files of the kind {suffix or '(no suffix)'} cannot be imported",
-                advice="Known kinds: .tdms, .lvm, .csv, .txt, .mat, .npz.",
+                advice="Known kinds: .tdms, .lvm, .csv, .txt, .mat, .npz, .uff, .unv, .mf4, .mdf, .dat.",
             )
     return reader
 

@@ -103,6 +103,31 @@ def test_lvm_pieces_empty_fields_and_comments(tmp_path: Path, bring) -> None:
     assert any("2 pieces" in doubt for doubt in report.doubts)
 
 
+def test_decimal_commas_under_a_head_that_says_points_are_believed_and_said(
+    tmp_path: Path, bring, si_of
+) -> None:
+    path = tmp_path / "x.lvm"
+    head = LVM_HEAD.replace("Separator\t,", "Separator\t.") + "***End_of_Header***\t\n\n"
+    piece = lvm_piece("10:00:00", ["1,5\t10,5", "2,5\t20"]).replace("0,010000", "0.010000")
+    path.write_text(head + piece, encoding="latin-1")
+    report = bring(path)
+    with open_run(report.run) as run:
+        np.testing.assert_array_equal(run.readings(["WP-1"])[0], [1.5, 2.5])
+    assert report.rate_hz == 100.0
+    assert any("decimal commas and its head says '.'" in doubt for doubt in report.doubts)
+
+
+def test_local_time_without_a_zone_is_doubted_until_the_map_gives_one(tmp_path: Path, bring) -> None:
+    path = tmp_path / "x.lvm"
+    head = LVM_HEAD + "***End_of_Header***\t\n\n"
+    path.write_text(head + lvm_piece("10:00:00", ["1\t1", "2\t2"]), encoding="latin-1")
+    assert any("start_utc" in doubt for doubt in bring(path).doubts)
+    told = bring(path, source={"start_utc": "2024-01-02T10:00:00+02:00"}, test="told")
+    assert not any("start_utc" in doubt for doubt in told.doubts)
+    with open_run(told.run) as run:
+        assert run.header.start_utc_ns == 1_704_182_400 * 10**9
+
+
 @pytest.mark.parametrize(
     ("text", "why"),
     [

@@ -47,12 +47,19 @@ class LvmReader:
                 self._head.get("separator", "tab").casefold(), "\t"
             )
             piece = self._read_piece(lines, None)
+            first_row = next(lines, "")
         if piece is None:
             raise RunFileError(f"{path} holds no channels")
         decimal = self._head.get("decimal_separator", "")
         self._comma = (source.decimal or decimal) == ","
         if not decimal and not source.decimal:
             self._comma = self._guess_comma(piece)
+        self._believe_the_numbers(first_row, decimal, source)
+        if source.start_utc is None and self._moment(piece, 1) is not None:
+            self.findings.doubts.append(
+                "LVM files have local time without its zone: taken as UTC. Give start_utc in the map, "
+                "with its zone"
+            )
         self._piece = piece
         self._columns = self._value_columns(piece)
         self.channels = tuple(self._describe(column) for column in self._columns)
@@ -179,6 +186,20 @@ class LvmReader:
 
     def _decimal_is_comma(self, piece: _Piece, key: str, column: int) -> bool:
         return "," in piece.value(key, column) and self._separator != ","
+
+    def _believe_the_numbers(self, row: str, decimal: str, source: SourceMap) -> None:
+        """A head that promises points above numbers with commas: edited, or saved under another language."""
+        commas = self._separator != "," and any(
+            not math.isfinite(number(field, comma=False)) and math.isfinite(number(field, comma=True))
+            for field in row.split(self._separator)
+        )
+        if commas and not self._comma and not source.decimal:
+            self._comma = True
+            said = f"its head says {decimal!r}" if decimal else "its head does not say so"
+            self.findings.doubts.append(
+                f"the numbers have decimal commas and {said}: the numbers are believed (decimal in the map "
+                "goes over it)"
+            )
 
     def _guess_comma(self, piece: _Piece) -> bool:
         """Old writers do not say; the head's own numbers show it where they have a fraction."""
