@@ -73,6 +73,9 @@ class Search:
         linear = self.linear
         for _ in range(_TRIALS):
             trial = linear.solution(damping=self._damping)
+            if not np.all(np.isfinite(trial)):  # the equations are singular at so little damping
+                self._damping = max(self._damping * 10, 1e-3)
+                continue
             if self.objective - linear.objective_at(trial) < 0.1 * TOLERANCE:
                 return 0.0
             predictions = [self.problem.predict(i, trial) for i in range(len(self.problem.runs))]

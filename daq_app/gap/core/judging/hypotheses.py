@@ -78,7 +78,13 @@ class Hypotheses:
         self._polish()
 
     def _keep(self, found: Fit) -> None:
-        """The better of two fits of one hypothesis, which may have ended at different discrepancies."""
+        """The better of two fits of one hypothesis, which may have ended at different discrepancies.
+
+        One that ended at no number says nothing; what was promised for its hypothesis goes.
+        """
+        if not math.isfinite(found.log_evidence):
+            self.evidence.pop(found.effects, None)
+            return
         known = self.fits.get(found.effects)
         if known is None or found.log_evidence > known.log_evidence:
             self.fits[found.effects] = found
