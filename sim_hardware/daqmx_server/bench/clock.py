@@ -86,6 +86,7 @@ class SteppedClock:
 
     _SEARCH_S = 0.02
     _GLANCE_S = 1e-3
+    _LET_IN_S = 1e-3  # of real time: whoever can end a search for an unknown instant gets the lock this often
 
     def __init__(self) -> None:
         self._now = 0.0
@@ -110,6 +111,8 @@ class SteppedClock:
         target = self._now + self._SEARCH_S if target_s is None or target_s <= self._now else target_s
         self._now = min(target, deadline)
         changed.notify_all()
+        if target_s is None:
+            changed.wait(self._LET_IN_S)
         return True
 
     def skip(self, seconds: float) -> None:

@@ -60,7 +60,8 @@ class EventStream:
     def wait_for_count(self, count: int, interval: int) -> bool:
         """Wait until `count` samples have been acquired; False if the run ended before.
 
-        Where time moves with the readers, the samples of the event before must have been read.
+        Where time moves with the readers, the samples of the event before must have been read, and a
+        sample whose instant a line or another task decides is waited for, not searched for.
         """
         run = self.task.run
         clock = self.bench.clock
@@ -70,11 +71,18 @@ class EventStream:
                 return True
             last = run.last_sample()
             unread = self.bench.readers_drive_time and run.read_position < count - interval
-            if unread or (last is not None and last < count):
+            when = run.time_of_count(count)
+            others_decide = when is None and run.times is not None and self.bench.readers_drive_time
+            if unread or others_decide or (last is not None and last < count):
                 self.bench.changed.wait(_LISTEN_S)
             else:
-                clock.wait(self.bench.changed, run.time_of_count(count), forever)
+                clock.wait(self.bench.changed, when, forever)
         return False
+
+    def wait_for_end(self, run: Run | None) -> None:
+        """Wait until that run makes room for another one or the stream ends."""
+        while self.open and run is not None and self.task.run is run:
+            self.bench.changed.wait(_LISTEN_S)
 
 
 def every_n_samples(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
@@ -95,6 +103,7 @@ def every_n_samples(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
             with bench.changed:
                 if not stream.wait_for_run():
                     return
+                run = stream.task.run
             number = 0
             while True:
                 with bench.changed:
@@ -103,10 +112,7 @@ def every_n_samples(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
                 number += 1
                 yield event
             with bench.changed:
-                while stream.open and task.run is not None and task.run.failure is not None:
-                    bench.changed.wait(_LISTEN_S)
-                if not stream.open:
-                    return
+                stream.wait_for_end(run)
     finally:
         with bench.changed:
             stream.close()
@@ -150,10 +156,7 @@ def done(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
             if status is not None:
                 yield pb.RegisterDoneEventResponse(status=status)
             with bench.changed:
-                while stream.open and stream.task.run is run and run is not None:
-                    bench.changed.wait(_LISTEN_S)
-                if not stream.open:
-                    return
+                stream.wait_for_end(run)
     finally:
         with bench.changed:
             stream.close()
@@ -177,6 +180,7 @@ def signal(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
             with bench.changed:
                 if not stream.wait_for_run():
                     return
+                run = stream.task.run
             count = 0
             while True:
                 with bench.changed:
@@ -184,6 +188,8 @@ def signal(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
                         break
                 count += 1
                 yield event
+            with bench.changed:
+                stream.wait_for_end(run)
     finally:
         with bench.changed:
             stream.close()
