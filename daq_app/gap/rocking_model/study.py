@@ -24,7 +24,7 @@ from daq_app.gap.rocking_model.inspection.inspect_runs import (
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.prediction.model import RockingModel, UnscatteredModel
 from daq_app.gap.rocking_model.records import GapRun, check_consistent
-from daq_app.gap.rocking_model.tolerances import FAR_FROM_SURVEY
+from daq_app.gap.rocking_model.tolerances import EITHER, FAR_FROM_SURVEY
 from daq_app.workers import warm_up
 
 
@@ -145,9 +145,10 @@ def model_and_library(prepared: Sequence[RockingRun]) -> tuple[RockingModel, Lib
 
 
 def _doubt_the_survey(result: Diagnosis) -> Diagnosis:
-    """With α, p or b far from the survey the rig file is more likely wrong than physics missing.
+    """With α, p or b far from the survey either the rig file is wrong or something unknown moves the wall.
 
-    Where not even other numbers make the runs fit, the answer stays that none of these explains them.
+    These runs cannot say which: a wall that turns on other edges looks like another wall. Where not even
+    other numbers make the runs fit, the answer stays that none of these explains them.
     """
     far = [
         p
@@ -163,4 +164,5 @@ def _doubt_the_survey(result: Diagnosis) -> Diagnosis:
     verdict: Verdict = "none_of_these" if old.verdict == "none_of_these" else "cannot_tell"
     decision = Decision(verdict, old.effects, old.family, sentence, 0.0)
     advice = "Check that the rig file is that of this specimen, and survey its weight, height and base again."
-    return replace(result, decision=decision, next_measurement=advice)
+    rest = replace(result.rest, unknown=max(result.rest.unknown, EITHER))
+    return replace(result, decision=decision, next_measurement=advice, rest=rest)

@@ -156,3 +156,5 @@ FAR_FROM_SURVEY = 4.0
 
 Raising it lets a diagnosis with a wrong rig file name an effect.
 """
+EITHER = 0.5
+"""Probability, 1, of something unknown that far from the survey: the rig file is as likely wrong."""
