@@ -11,6 +11,7 @@ import threading
 from collections.abc import Sequence
 from typing import Final
 
+from daq_app.acquisition.course.clock_warnings import ClockWarnings, unplanned_rate
 from daq_app.acquisition.course.live import LiveView
 from daq_app.acquisition.course.orders import Orders
 from daq_app.acquisition.course.preparation import Preparation, Surroundings
@@ -37,18 +38,13 @@ from daq_app.acquisition.messages.items import (
     SourceEnded,
     Started,
 )
-from daq_app.acquisition.messages.published import (
-    CheckMessage,
-    EventMessage,
-    State,
-)
+from daq_app.acquisition.messages.published import CheckMessage, EventMessage, State
 from daq_app.acquisition.messages.publisher import Publisher
 from daq_app.config.rig import Rig
 from daq_app.rocking.motion.phases import PhaseEvent
 from daq_app.runfile import TestPlan
 from drivers import Block, Opened
 
-_SAME_RATE: Final = 1e-6
 _MOVING: Final = frozenset({State.RELEASED, State.ROCKING})
 
 
@@ -82,8 +78,7 @@ class Analyst(threading.Thread):
         """Whether what the wall does still belongs to the course that was ended last."""
         self.voice.sample = 0
         self._fault = ""
-        self._standing: dict[str, EventMessage] = {}
-        """What was wrong before arming and still is: every run must say it."""
+        self._clock = ClockWarnings()
         self._preparation: Preparation | None = None
         self._tare = Tare()
         """The zero of the last preparation, for whoever asks while nothing is sampled."""
@@ -148,8 +143,7 @@ class Analyst(threading.Thread):
                     self.voice.run_path = item.path
                     self._go(State.SAVED if item.ok else State.FAILED, item.text)
             case Noted(event=event):
-                if event.kind == "clock" and event.data.get("clock") in ("rate", "planned_rate", "drift"):
-                    self._standing[str(event.data["clock"])] = event
+                self._clock.take(event)
 
     # -- blocks ----------------------------------------------------------------------------------
 
@@ -241,13 +235,8 @@ class Analyst(threading.Thread):
         self._preparation = Preparation(self._rig, opened, self._planned_rate_hz, surroundings)
         self._preparation.tare = self._tare
         self._sensors = SensorNews(self._rig, opened, self._note)
-        self._standing = {}
-        planned = self._planned_rate_hz
-        if planned and abs(opened.rate_hz / planned - 1.0) > _SAME_RATE:
-            text = (
-                f"The hardware samples at {opened.rate_hz:g} Hz where {planned:g} Hz were planned. Times "
-                "use the rate that was read back. Check that the modules are the ones of the rig file"
-            )
+        self._clock.forget()
+        if text := unplanned_rate(opened.rate_hz, self._planned_rate_hz):
             self._note("clock", text, "warning", data={"clock": "planned_rate", "value": opened.rate_hz})
         self._new_live()
         self._go(State.PREVIEWING, f"Sampling at {opened.rate_hz:g} Hz")
@@ -286,7 +275,7 @@ class Analyst(threading.Thread):
 
     def _tell_standing(self) -> None:
         """Whatever is wrong now has been told before; this run must say it as well."""
-        for event in self._standing.values():
+        for event in self._clock.standing:
             self._note(event.kind, event.text, event.severity, data=event.data)
         if self._sensors is not None:
             self._sensors.forget()

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from daq_app.config.rig import Channel, Rig
-from daq_app.rocking.geometry.wires import lever, wire_rotation, wire_shortening
+from daq_app.rocking.geometry.wires import WireInverse, lever, wire_shortening
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -81,11 +81,11 @@ class WireGeometry:
 
     def rotation_of_each(self, shortening_m: Floats) -> Floats:
         """(wires, n) rotation that each wire alone shows; NaN where no rotation explains the reading."""
-        rotation = np.empty_like(shortening_m)
-        for wire, row in enumerate(shortening_m):
-            position, anchor = self.position_m[wire], self.anchor_m[wire]
-            rotation[wire] = wire_rotation(row, position, anchor, self.half_width_m)
-        return rotation
+        return self._inverse.rotation(shortening_m)
+
+    @cached_property
+    def _inverse(self) -> WireInverse:
+        return WireInverse(self.position_m, self.anchor_m, self.half_width_m)
 
 
 class WireWatch:
@@ -212,7 +212,8 @@ class RotationGeometry:
     def _agreeing(self, own: Floats) -> Bools:
         """(wires, frames) which wires agree with the median of all."""
         frames = -(-own.shape[1] // self.frame_samples)
-        padded = np.pad(own, ((0, 0), (0, frames * self.frame_samples - own.shape[1])), mode="edge")
+        missing = frames * self.frame_samples - own.shape[1]
+        padded = np.pad(own, ((0, 0), (0, missing)), mode="edge") if missing else own
         mean = padded.reshape(own.shape[0], frames, self.frame_samples).mean(axis=2)
         finite = np.isfinite(mean)
         if finite.all():

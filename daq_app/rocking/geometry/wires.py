@@ -41,20 +41,39 @@ def lever(position_m: ArrayLike, anchor_m: ArrayLike, half_width_m: float) -> Fl
 def wire_rotation(
     shortening_m: Floats, position_m: ArrayLike, anchor_m: ArrayLike, half_width_m: float
 ) -> Floats:
-    """Rotation in rad, (n,), that one wire shows at shortenings (n,); NaN where no rotation explains one."""
-    position, anchor = (np.asarray(place, dtype=np.float64) for place in (position_m, anchor_m))
-    # Only two pivots exist: everything that does not depend on the sample is known per side.
-    pivots = np.array([half_width_m, -half_width_m])
-    ax, px = anchor[0] - pivots, position[0] - pivots
-    az, pz = anchor[2], position[2]
-    dy = anchor[1] - position[1]
-    squares = ax * ax + az * az + px * px + pz * pz + dy * dy
-    products = 2.0 * np.sqrt((ax * ax + az * az) * (px * px + pz * pz))
-    gammas = np.arctan2(ax, az) - np.arctan2(px, pz)
-    direction = np.sign(float(lever(position, anchor, half_width_m)))
-    side = (shortening_m * direction < 0.0).astype(np.intp)
-    length = float(np.linalg.norm(anchor - position)) - shortening_m
-    with np.errstate(invalid="ignore"):
-        opening = np.arccos((squares[side] - length * length) / products[side])
-    gamma = gammas[side]
-    return np.asarray(gamma - np.copysign(opening, gamma))
+    """Rotation in rad, (…, n), that each wire alone shows at shortenings (…, n); NaN where none explains one.
+
+    Wires lead from `position_m` to `anchor_m`, (…, 3) each.
+    """
+    return WireInverse(position_m, anchor_m, half_width_m).rotation(shortening_m)
+
+
+class WireInverse:
+    """Shortening to rotation of wires from `position_m` to `anchor_m`, (…, 3) each.
+
+    Only two pivots exist: everything that does not depend on the sample is known per side, and found once.
+    """
+
+    def __init__(self, position_m: ArrayLike, anchor_m: ArrayLike, half_width_m: float) -> None:
+        position, anchor = (np.asarray(place, dtype=np.float64) for place in (position_m, anchor_m))
+        pivots = np.array([half_width_m, -half_width_m])
+        ax, px = anchor[..., 0, None] - pivots, position[..., 0, None] - pivots
+        az, pz = anchor[..., 2, None], position[..., 2, None]
+        dy = anchor[..., 1, None] - position[..., 1, None]
+        self._squares = ax * ax + az * az + px * px + pz * pz + dy * dy
+        self._products = 2.0 * np.sqrt((ax * ax + az * az) * (px * px + pz * pz))
+        self._gammas = np.arctan2(ax, az) - np.arctan2(px, pz)
+        self._direction = np.sign(lever(position, anchor, half_width_m))[..., None]
+        self._length_m = np.linalg.norm(anchor - position, axis=-1)[..., None]
+
+    def rotation(self, shortening_m: Floats) -> Floats:
+        """Rotation in rad, (…, n), at shortenings (…, n)."""
+        negative = shortening_m * self._direction < 0.0
+        squares, products, gamma = (
+            np.where(negative, values[..., 1:], values[..., :1])
+            for values in (self._squares, self._products, self._gammas)
+        )
+        length = self._length_m - shortening_m
+        with np.errstate(invalid="ignore"):
+            opening = np.arccos((squares - length * length) / products)
+        return np.asarray(gamma - np.copysign(opening, gamma))
