@@ -42,6 +42,8 @@ _COMPARED_IMPACTS = 12
 _NOTABLE_HUM_NOISES = 1.5
 """Hum above this many times a channel's noise is a warning; below it is taken out and remarked. Ordinary
 laboratories with noise twice the rig file's reach 1."""
+_CRUDE_MEAN_S = 0.005
+"""Signs and units are found from means of this length: whatever they hide is no factor of 10."""
 _HOLD_S = 1.0
 """Slow noise is looked for in this last part of the hold."""
 
@@ -124,7 +126,8 @@ def _without_hum(record: TestRecord, ids: tuple[str, ...]) -> tuple[TestRecord, 
 def _put_to_scale(record: TestRecord) -> tuple[list[FamilyFinding], Corrections]:
     """Signs and units of whole families, from rotations that need no hold to be found."""
     found, factors = [], {}
-    wrong = wrong_scales(_crude_rotations(record), record.rate_hz)
+    size = max(1, round(_CRUDE_MEAN_S * record.rate_hz))
+    wrong = wrong_scales(_crude_rotations(record, size), record.rate_hz / size)
     for name, factor in wrong.items():
         family = words.families_by_name()[name]
         axis = "x" if family == "tiltmeter" else None
@@ -133,8 +136,14 @@ def _put_to_scale(record: TestRecord) -> tuple[list[FamilyFinding], Corrections]
     return found, Corrections(factors=factors)
 
 
-def _crude_rotations(record: TestRecord) -> dict[str, Floats]:
-    """Rotation by family, linear in the readings, so that a wrong sign or unit stays a factor."""
+def _crude_rotations(record: TestRecord, size: int) -> dict[str, Floats]:
+    """Rotation by family from means of `size` samples, linear in the readings: a wrong unit stays a factor."""
+
+    def means(channel_ids: tuple[str, ...]) -> Floats:
+        rows = record.load(channel_ids)
+        count = rows.shape[1] // size
+        return np.asarray(rows[:, : count * size].reshape(rows.shape[0], count, size).mean(axis=2))
+
     rotations: dict[str, Floats] = {}
     ids = record.family("wire")
     if len(ids) >= 2:
@@ -142,7 +151,7 @@ def _crude_rotations(record: TestRecord) -> dict[str, Floats]:
         levers = {
             wire: float(lever) for wire, lever in zip(geometry.wires.ids, geometry.wires.lever_m, strict=True)
         }
-        own = record.load(ids) / np.array([[levers[channel_id]] for channel_id in ids])
+        own = means(ids) / np.array([[levers[channel_id]] for channel_id in ids])
         rotations["wires"] = np.median(own - np.nanmedian(own, axis=1, keepdims=True), axis=0)
     lvdts = record.family("lvdt")
     try:
@@ -150,13 +159,13 @@ def _crude_rotations(record: TestRecord) -> dict[str, Floats]:
     except ValueError:
         joint = None
     if joint is not None:
-        openings = record.load(lvdts)
+        openings = means(lvdts)
         left = joint.x_m < 0
         across = float(joint.x_m[~left].mean() - joint.x_m[left].mean())
         rotations["LVDTs"] = (np.median(openings[left], axis=0) - np.median(openings[~left], axis=0)) / across
     tilts = record.family("tiltmeter", "x")
     if tilts:
-        rotations["tiltmeters"] = record.load(tilts).mean(axis=0)
+        rotations["tiltmeters"] = means(tilts).mean(axis=0)
     return rotations
 
 
