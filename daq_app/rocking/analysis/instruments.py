@@ -137,7 +137,7 @@ def _put_to_scale(record: TestRecord) -> tuple[list[FamilyFinding], Corrections]
 
 
 def _crude_rotations(record: TestRecord, size: int) -> dict[str, Floats]:
-    """Rotation by family from means of `size` samples, linear in the readings: a wrong unit stays a factor."""
+    """Rotation by family from means of `size` samples, linear, so that a wrong unit stays a factor."""
 
     def means(channel_ids: tuple[str, ...]) -> Floats:
         rows = record.load(channel_ids)
