@@ -72,6 +72,18 @@ def test_errors_of_arcs_are_as_claimed():
     assert abs(np.mean(normalised)) < 0.3
 
 
+def test_a_wrong_zero_moves_impacts_by_turns_and_by_the_stated_error():
+    motion, time, rotation = rock(0.35, 0.9, smallest=3e-3)
+    true = follow(motion, time, rotation).impacts_s
+    off = follow(motion, time, rotation + SETTINGS.zero_sigma_rad).impacts
+
+    moved = [impact.time_s - before for impact, before in zip(off, true, strict=True)]
+
+    signs = np.sign(moved)
+    assert (signs[1:] == -signs[:-1]).all()
+    np.testing.assert_allclose(np.abs(moved), [impact.zero_s for impact in off], rtol=0.1)
+
+
 def test_too_little_to_fit_is_none_not_nonsense():
     time = np.arange(100) / RATE
     assert fit_arc(time, np.full(100, np.nan), 0.0, 0.02, index=1, p_rad_s=P, alpha_rad=ALPHA) is None

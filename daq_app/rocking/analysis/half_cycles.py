@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.rocking.analysis.results import HalfCycle
-from daq_app.rocking.motion.swings import MotionTrack
+from daq_app.rocking.motion.swings import ImpactTime, MotionTrack
 from daq_app.rocking.motion.transients import Onset
 from daq_app.rocking.theory import classic as theory
 
@@ -24,9 +24,10 @@ def half_cycles_of(
 ) -> tuple[HalfCycle, ...]:
     """One for the release and one per impact; `gain_sigma` is the relative error of the family's gain."""
     settings = track.settings
-    impacts = track.impacts_s
-    starts = [track.release.time_s, *impacts]
-    sigma_starts = [math.nan, *(math.hypot(sigma, _TIMING_S) for sigma in track.sigma_impacts_s)]
+    impacts = track.impacts
+    starts = [track.release.time_s, *(impact.time_s for impact in impacts)]
+    sigma_starts = [math.nan, *(math.hypot(one.noise_s, one.zero_s, _TIMING_S) for one in impacts)]
+    sigma_durations = [math.nan, *map(_sigma_between, impacts, impacts[1:]), math.nan]
     before, after = [math.nan, *track.speeds_before_rad_s], [math.nan, *track.speeds_after_rad_s]
     sigma_before = [math.nan, *track.sigma_speeds_before_rad_s]
     sigma_after = [math.nan, *track.sigma_speeds_after_rad_s]
@@ -45,7 +46,7 @@ def half_cycles_of(
                 start_s=start,
                 sigma_start_s=sigma_starts[n],
                 duration_s=math.nan if last else starts[n + 1] - start,
-                sigma_duration_s=math.nan if last else math.hypot(sigma_starts[n], sigma_starts[n + 1]),
+                sigma_duration_s=sigma_durations[n],
                 peak_rad=peak[n],
                 sigma_peak_rad=math.hypot(sigma[n], gain_sigma * peak[n]),
                 phi=phi,
@@ -60,3 +61,11 @@ def half_cycles_of(
             )
         )
     return tuple(cycles)
+
+
+def _sigma_between(first: ImpactTime, second: ImpactTime) -> float:
+    """Standard uncertainty of the time between two impacts, s.
+
+    A wrong zero moves one forwards and the other backwards; a wrong time base moves both alike.
+    """
+    return math.hypot(first.noise_s, second.noise_s, first.zero_s + second.zero_s)

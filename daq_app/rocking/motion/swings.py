@@ -17,9 +17,10 @@ Floats = NDArray[np.float64]
 
 ZERO_SIGMA_RAD = 2e-5
 """What the tared zero of the rotation may be wrong by."""
-REST_ZERO_SIGMA_RAD = 1e-5
+REST_ZERO_SIGMA_RAD = 5e-6
 """What a zero from the rest after the test may be wrong by: it is seconds old, where a tare is minutes old.
-Raising it widens the stated errors of impact times, peaks and speeds."""
+The walking zeros of drawn laboratories (0.15 of a channel's noise in a record) leave about this; raising it
+widens the stated errors of impact times, half-cycles and peaks."""
 _HOLD_S = 0.3
 _HOLD_POINT_S = 0.02
 
@@ -34,6 +35,17 @@ class MotionSettings:
     zero_sigma_rad: float = ZERO_SIGMA_RAD
     slow_noise_rad: float = 0.0
     """rms of one sample of the white noise whose long means scatter as the rotation's do; 0: not known."""
+
+
+@dataclass(frozen=True, slots=True)
+class ImpactTime:
+    """When an impact was, by the half-cycles beside it; errors are NaN where none was fitted."""
+
+    time_s: float
+    noise_s: float
+    """Standard uncertainty by noise, another one at every impact."""
+    zero_s: float
+    """The same by the zero of the rotation: one error for all impacts, forwards and backwards by turns."""
 
 
 @dataclass
@@ -96,32 +108,33 @@ class MotionTrack:
     @property
     def impacts_s(self) -> list[float]:
         """Impact times: both neighbouring half-cycles' zero crossings, weighted; else as detected."""
-        return [self._impact(index) for index in range(len(self.crossings_s))]
+        return [impact.time_s for impact in self.impacts]
 
     @property
-    def sigma_impacts_s(self) -> list[float]:
-        """Standard uncertainties of `impacts_s`; NaN where neither half-cycle could be fitted.
+    def impacts(self) -> list[ImpactTime]:
+        """Impact times with their errors."""
+        return [self._impact(index) for index in range(len(self.crossings_s))]
 
-        Both crossings share the error of the zero: their mean is no better known than the better of them.
-        """
-        return [
-            min((sigma for _, sigma in self._crossings(index)), default=math.nan)
-            for index in range(len(self.crossings_s))
-        ]
-
-    def _crossings(self, index: int) -> list[tuple[float, float]]:
-        """(time, sigma) of impact `index` as the half-cycles before and after it show it."""
+    def _impact(self, index: int) -> ImpactTime:
         before = self.arcs[index]
         after = self.arcs[index + 1] if index + 1 < len(self.arcs) else None
-        known = [(arc.end_s, arc.sigma_end_s) for arc in (before,) if arc is not None]
-        return known + [(arc.start_s, arc.sigma_start_s) for arc in (after,) if arc is not None]
-
-    def _impact(self, index: int) -> float:
-        known = self._crossings(index)
+        known = [(arc.end_s, arc.sigma_end_s, arc.speed_end_rad_s) for arc in (before,) if arc is not None]
+        known += [
+            (arc.start_s, arc.sigma_start_s, arc.speed_start_rad_s) for arc in (after,) if arc is not None
+        ]
         if not known:
-            return self.crossings_s[index]
-        weights = [1.0 / max(sigma, 1e-9) ** 2 for _, sigma in known]
-        return sum(w * t for w, (t, _) in zip(weights, known, strict=True)) / sum(weights)
+            return ImpactTime(self.crossings_s[index], math.nan, math.nan)
+        weights = [1.0 / max(sigma, 1e-9) ** 2 for _, sigma, _ in known]
+        total = sum(weights)
+        time_s = sum(w * t for w, (t, _, _) in zip(weights, known, strict=True)) / total
+        # The wall passes both crossings in one direction: an error of the zero moves both alike.
+        zeros = [self.settings.zero_sigma_rad / abs(speed) for _, _, speed in known]
+        noises = [math.sqrt(max(s**2 - zero**2, 0.0)) for zero, (_, s, _) in zip(zeros, known, strict=True)]
+        return ImpactTime(
+            time_s,
+            math.hypot(*(w * noise for w, noise in zip(weights, noises, strict=True))) / total,
+            sum(w * zero for w, zero in zip(weights, zeros, strict=True)) / total,
+        )
 
     @property
     def peaks_rad(self) -> list[float]:
