@@ -82,7 +82,8 @@ def inspect_channel(run: GapRun, index: int) -> Condition:
     clean = values if wave is None else values - wave
     step, step_sd = _stairs(values, run.sensors[index].noise_si)
     frozen, frozen_sd = _frozen(values, rate, step, run.sensors[index].range_si)
-    spikes = _spikes(clean, noise, rate) if step == 0.0 and frozen == 0.0 else 0.0
+    # A channel that rests at the end of its range shows no noise there.
+    spikes = _spikes(clean, usual, rate) if step == 0.0 and frozen == 0.0 else 0.0
     return Condition(hum, hum_sd, wave, step, step_sd, frozen, frozen_sd, spikes, usual)
 
 
