@@ -50,9 +50,23 @@ class Ranked:
     log_evidence: float
 
 
-def rank(evidence: Mapping[Hypothesis, float], library: Library, policy: Policy = POLICY) -> list[Ranked]:
-    """Hypotheses by probability ∝ prior · evidence, most probable first; `evidence` is its logarithm."""
-    logs = {effects: log_prior(effects, library, policy) + value for effects, value in evidence.items()}
+def rank(
+    evidence: Mapping[Hypothesis, float],
+    library: Library,
+    policy: Policy = POLICY,
+    *,
+    measured: bool = False,
+) -> list[Ranked]:
+    """Hypotheses by probability ∝ prior · evidence, most probable first; `evidence` is its logarithm.
+
+    `measured`: something material was measured directly, beside which a first cause is a further one already.
+    """
+    logs = {
+        effects: log_prior(effects, library, policy)
+        + value
+        - policy.further_nats * max(len(effects) - (not measured), 0)
+        for effects, value in evidence.items()
+    }
     top = max(logs.values())
     weights = {effects: math.exp(value - top) for effects, value in logs.items()}
     total = math.fsum(weights.values())

@@ -80,12 +80,13 @@ class Hypotheses:
     def _keep(self, found: Fit) -> None:
         """The better of two fits of one hypothesis, which may have ended at different discrepancies.
 
-        One that ended at no number says nothing; what was promised for its hypothesis goes.
+        One that ended at no number says nothing; what was only promised for its hypothesis goes.
         """
-        if not math.isfinite(found.log_evidence):
-            self.evidence.pop(found.effects, None)
-            return
         known = self.fits.get(found.effects)
+        if not math.isfinite(found.log_evidence):
+            if known is None:
+                self.evidence.pop(found.effects, None)
+            return
         if known is None or found.log_evidence > known.log_evidence:
             self.fits[found.effects] = found
             self.evidence[found.effects] = found.log_evidence
@@ -185,7 +186,7 @@ class Hypotheses:
     def ranked(self) -> list[Ranked]:
         """All hypotheses but those of which one cause explains too little beside the others."""
         kept = {h: e for h, e in self.evidence.items() if self._worth_it(h)}
-        return rank(kept, self.library, self.policy)
+        return rank(kept, self.library, self.policy, measured=self.measured)
 
     def _worth_it(self, hypothesis: Hypothesis) -> bool:
         """Whether the last of several causes explains enough; what was measured directly counts as one."""
@@ -199,8 +200,6 @@ class Hypotheses:
         explained = evidence - self.evidence[NULL]
         last = max(without, key=lambda name: without[name])
         gained = evidence - without[last]
-        if gained < self.policy.further_nats:
-            return False
         return gained >= self.policy.further_share * explained or self._clears(hypothesis, last)
 
     def _clears(self, hypothesis: Hypothesis, last: str) -> bool:

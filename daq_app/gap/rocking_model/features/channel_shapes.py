@@ -19,6 +19,7 @@ from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Wire
 from daq_app.gap.rocking_model.tolerances import CALIBRATION
 
 _SHAPES = ("gain", "lag", "curvature", "drift")
+_GAIN, _CURVATURE = _SHAPES.index("gain"), _SHAPES.index("curvature")
 SHAPES: dict[Family, tuple[str, ...]] = {
     "lvdt": _SHAPES,
     "wire": (*_SHAPES, "side"),
@@ -35,7 +36,7 @@ _UNITS: dict[Family, tuple[str, ...]] = {
 TOLERANCE: dict[Family, tuple[float, ...]] = {
     "lvdt": (3.2e-3, 1e-4, 0.06, 4e-6),
     "wire": (3.2e-3, 1e-4, 0.005, 6e-6, 5e-4),
-    "accelerometer": (8e-3, 2e-3, 2e-3, 1.5e-3),
+    "accelerometer": (3.2e-3, 2e-3, 2e-3, 1.5e-3),
 }
 """What healthy channels differ by: calibration, and how well the others predict them. Accelerometers also
 by the place's own ringing, which a hop of the wall carries beyond the mask. An LVDT's lag is as good as what
@@ -58,6 +59,9 @@ class Others:
     pick: NDArray[np.bool_]
     spread: float
     """How many times one channel's calibration error the relative error of the prediction is."""
+    curved: float = 1.0
+    """How many times one channel's curvature that of the prediction is: an error that goes with the square of
+    a large reading is predicted into a small one."""
     rough: float = 0.0
     """Rms of what the steps of these readings make of the difference; 0 where they have none."""
     repeats: int = 1
@@ -166,5 +170,13 @@ def block_of(name: str, family: Family, beside: Others, usual: float, wire: Wire
         noise=found.noise * float(np.exp(usual)),
         wire=wire,
         tags={name: family},
-        levers=(CALIBRATION * beside.spread, *(_SOUND * beside.spread * t for t in TOLERANCE[family][1:])),
+        levers=_levers(family, beside),
     )
+
+
+def _levers(family: Family, beside: Others) -> tuple[float, ...]:
+    """What a sound channel is off by from the others' prediction (sd), by shape."""
+    usual = _SOUND * beside.spread * np.array(TOLERANCE[family])
+    usual[_GAIN] = CALIBRATION * beside.spread
+    usual[_CURVATURE] *= max(beside.curved / beside.spread, 1.0)
+    return tuple(usual.tolist())

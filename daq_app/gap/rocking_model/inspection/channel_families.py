@@ -107,6 +107,7 @@ def beside(data: ChannelFamily, name: str, without: tuple[str, ...]) -> Others:
     sizes = np.sqrt(np.mean(data.signals[others] ** 2, axis=1))
     own = float(np.sqrt(np.mean(expected**2))) + 1e-300
     spread = float(np.sqrt(1.0 + np.sum((weights * sizes / own) ** 2)))
+    curved = float(np.sqrt(1.0 + np.sum((weights * (sizes / own) ** 2) ** 2)))
     rough = data.step / np.sqrt(12.0) * float(np.sqrt(1.0 + np.sum(weights**2)))
     # The imperfections of the others are in the prediction.
     rows = [] if data.leaked is None else [data.leaked[place] - weights @ data.leaked[others]]
@@ -114,7 +115,15 @@ def beside(data: ChannelFamily, name: str, without: tuple[str, ...]) -> Others:
         rows += [data.turned[place], *(weights[:, None] * data.turned[others])]
     own_and_others = np.array(rows) if rows else None
     return Others(
-        data.signals[place], expected, data.pick, spread, rough, data.repeats, data.sided, own_and_others
+        data.signals[place],
+        expected,
+        data.pick,
+        spread,
+        curved,
+        rough,
+        data.repeats,
+        data.sided,
+        own_and_others,
     )
 
 

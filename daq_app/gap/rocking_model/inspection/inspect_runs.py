@@ -159,23 +159,29 @@ def without_suspects(
     runs = [e.run for e in examined]
     along_z = odd_vertical(runs, grids, [_late(e.features) for e in examined])
     found = suspects(runs, grids, _steps(marks)).plus("accelerometer", along_z)
-    again = list(examined)
-    if found.ids:
-        again = []
-        for entry in examined:
-            run = replace(entry.run.excluding(found.ids), impacts_before=entry.features.impacts_before)
-            again.append(examine(run, reference))
-    odd = dict(found.several)
-    gross = _left_out(again)
+    again = _examined_without(examined, found.ids, reference)
+    gross = _left_out(again).difference(found.ids)
+    for name in sorted(gross):
+        found = found.plus("lvdt", name)
     if gross:
-        odd["lvdt"] = tuple(sorted({*odd.get("lvdt", ()), *gross}))
+        again = _examined_without(examined, found.ids, reference)
     more = [
         Mark(f"disagreement@{family}", f"disagreement ({', '.join(names)})", "1", float(len(names)), COUNT_SD)
-        for family, names in odd.items()
+        for family, names in found.several.items()
     ]
     turned = second_axis([e.run for e in again], [e.features.grid for e in again])
     rows = [[*row, *more, *own] for row, own in zip(marks, turned, strict=True)]
     return again, {name: family for family, name in found.single.items()}, rows
+
+
+def _examined_without(examined: Sequence[Examined], ids: Sequence[str], reference: str) -> list[Examined]:
+    """The runs examined anew less these channels."""
+    if not ids:
+        return list(examined)
+    return [
+        examine(replace(e.run.excluding(ids), impacts_before=e.features.impacts_before), reference)
+        for e in examined
+    ]
 
 
 def _left_out(examined: Sequence[Examined]) -> set[str]:

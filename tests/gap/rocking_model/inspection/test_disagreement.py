@@ -85,3 +85,19 @@ def test_nothing_missing_is_not_said_over_channels_that_disagree(levels: tuple[f
     )
     assert result.decision.verdict == "none_of_these"
     assert "disagreement (LV-A03, LV-B07, LV-B08)" in result.decision.sentence
+
+
+def test_one_accelerometer_is_told_from_the_others_to_two_per_cent() -> None:
+    """A certificate holds to 0.3 %, and ringing places differ by less than that over half-cycles."""
+    runs = simulate({"gain@AC-6": {"error": -0.02}}, (0.25, -0.35))
+    assert found_channels(prepare(runs)[0]) == {"AC-6": "accelerometer"}
+
+
+def test_a_channel_that_rests_at_the_end_of_its_range_has_no_lone_samples() -> None:
+    """It shows no noise there, against which every sample of the motion would stand alone."""
+    runs = simulate({}, (0.25, -0.35))
+    for run in runs:
+        place = next(i for i, sensor in enumerate(run.sensors) if sensor.id == "LV-A04")
+        walk = np.linspace(0.0, 1.5 * run.sensors[place].range_si[1], run.channels.shape[1])
+        run.channels[place] = np.minimum(run.channels[place] + walk, run.sensors[place].range_si[1])
+    assert not any("lone samples" in finding.words for finding in findings_of(prepare(runs)[0]))
