@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,45 +94,56 @@ def find_swings(theta: FloatArray, noise_rad: float, rate_hz: float, name: str) 
             f"Run {name}: only {len(peaks)} half-cycles are larger than {1e3 * SMALLEST_RAD:.0f} mrad.",
             "Release it from a larger rotation.",
         )
-    rest = float(np.flatnonzero(np.abs(smooth) > max(5 * noise_rad, 2e-4))[-1]) / rate_hz
-    times = np.array([release / rate_hz, *(p[0] for p in peaks)]) - release / rate_hz
-    values = np.array([held, *(p[1] for p in peaks)])
-    sds = np.array([held_sd, *(p[2] for p in peaks)])
-    count = len(RELEASE_FRACTIONS)
-    levels = np.abs(values)[:, None] * np.array([*FRACTIONS, *[FRACTIONS[-1]] * (count - len(FRACTIONS))])
-    levels[0] = abs(held) * np.array(RELEASE_FRACTIONS)
-    shape = (values.size, count)
-    fall, fall_sd, rise, rise_sd = (np.full(shape, np.nan) for _ in range(4))
-    for k, value in enumerate(values):
-        side = np.sign(value)
-        begin = int(release) if k == 0 else int(peaks[k - 1][3])
-        end = int(peaks[k][3]) if k < len(peaks) else min(begin + int(1.0 * rate_hz), theta.size - 1)
-        for j in range(count if k == 0 else len(FRACTIONS)):
-            if k == 0 and RELEASE_FRACTIONS[j] > 1.0 - 6.0 * sway / abs(held):
-                continue  # the sway alone may keep the wall below this level
-            fall[k, j], fall_sd[k, j] = _crossing(
-                side * theta, side * smooth, levels[k, j], begin, end, noise_rad, rate_hz
-            )
-            if k > 0:
-                before = int(release) if k == 1 else int(peaks[k - 2][3])
-                rise[k, j], rise_sd[k, j] = _crossing(
-                    side * theta, side * smooth, levels[k, j], begin, before, noise_rad, rate_hz
-                )
     offset = release / rate_hz
-    return Swings(
-        offset,
-        times,
-        values,
-        sds,
-        levels,
-        fall - offset,
-        fall_sd,
-        rise - offset,
-        rise_sd,
-        rest,
-        sway,
-        sway_rate,
+    values = np.array([held, *(p[1] for p in peaks)])
+    levels = np.abs(values)[:, None] * np.array(
+        [*FRACTIONS, *[FRACTIONS[-1]] * (len(RELEASE_FRACTIONS) - len(FRACTIONS))]
     )
+    levels[0] = abs(held) * np.array(RELEASE_FRACTIONS)
+    samples = [int(release), *(p[3] for p in peaks)]
+    fall, fall_sd, rise, rise_sd = _level_times(
+        theta, smooth, samples, values, levels, sway, noise_rad, rate_hz
+    )
+    return Swings(
+        release_s=offset,
+        peak_s=np.array([offset, *(p[0] for p in peaks)]) - offset,
+        peak_rad=values,
+        peak_sd=np.array([held_sd, *(p[2] for p in peaks)]),
+        levels=levels,
+        fall_s=fall - offset,
+        fall_sd=fall_sd,
+        rise_s=rise - offset,
+        rise_sd=rise_sd,
+        rest_s=float(np.flatnonzero(np.abs(smooth) > max(5 * noise_rad, 2e-4))[-1]) / rate_hz,
+        hold_sd=sway,
+        hold_rate_sd=sway_rate,
+    )
+
+
+def _level_times(
+    theta: FloatArray,
+    smooth: FloatArray,
+    samples: Sequence[int],
+    peaks: FloatArray,
+    levels: FloatArray,
+    sway: float,
+    noise: float,
+    rate_hz: float,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """(fall, its sd, rise, its sd), s in the record, of every peak (n,) through its levels (n, F)."""
+    fall, fall_sd, rise, rise_sd = (np.full(levels.shape, np.nan) for _ in range(4))
+    after = [*samples[1:], min(samples[-1] + int(1.0 * rate_hz), theta.size - 1)]
+    for k, value in enumerate(peaks):
+        folded, near = np.sign(value) * theta, np.sign(value) * smooth
+        for j in range(levels.shape[1] if k == 0 else len(FRACTIONS)):
+            if k == 0 and RELEASE_FRACTIONS[j] > 1.0 - 6.0 * sway / abs(value):
+                continue  # the sway alone may keep the wall below this level
+            level, begin = levels[k, j], samples[k]
+            fall[k, j], fall_sd[k, j] = _crossing(folded, near, level, begin, after[k], noise, rate_hz)
+            if k > 0:
+                before = samples[k - 1]
+                rise[k, j], rise_sd[k, j] = _crossing(folded, near, level, begin, before, noise, rate_hz)
+    return fall, fall_sd, rise, rise_sd
 
 
 def _hold(
