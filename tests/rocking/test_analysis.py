@@ -271,10 +271,21 @@ def test_records_cut_short_are_told_without_an_exception(made, stop_s, words):
 def test_a_record_without_wires_is_refused_in_words(made):
     test = made(phi=0.35, r=0.895, side=-1, seed=8, full=True)
     record = TestRecord.from_array(test.rig, test.rate_hz, test.si[:3], channel_ids=test.rig.channel_ids[:3])
-    with pytest.raises(ValueError, match="at least two wire"):
+    with pytest.raises(ValueError, match="the record has none"):
         analyse_record(record)
     with pytest.raises(ValueError, match="as many rows"):
         TestRecord.from_array(test.rig, test.rate_hz, test.si[:3])
+
+
+def test_one_wire_gives_a_rotation_and_a_warning(made):
+    test = made(phi=0.35, r=0.895, side=-1, seed=8, full=True)
+    kept = [k for k, name in enumerate(test.rig.channel_ids) if not name.startswith("WP") or name == "WP-5"]
+    ids = tuple(test.rig.channel_ids[k] for k in kept)
+    analysis = analyse_record(
+        TestRecord.from_array(test.rig, test.rate_hz, test.si[kept], channel_ids=ids), QUICK
+    )
+    assert analysis.estimates["crt"].r == pytest.approx(0.895, abs=0.002)
+    assert any("that of one wire" in note.text for note in analysis.notes)
 
 
 def test_known_delays_of_a_family_are_taken_out(made):

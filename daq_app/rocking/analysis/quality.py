@@ -64,6 +64,8 @@ def _sensors(record: TestRecord, signals: Signals) -> list[QualityNote]:
         edge, zero = 0.002 * (high - low), signals.zeros.get(name, 0.0)
         if np.any((values <= low + edge - zero) | (values >= high - edge - zero)):
             notes.append(_warn(f"wire {name} reached the end of its range"))
+    if len(record.family("wire")) == 1:
+        notes.append(_warn("the rotation is that of one wire: what is wrong with it shows in no other"))
     joint = signals.joint
     if joint is None:
         notes.append(_warn("too few LVDTs for a profile of the base joint"))
