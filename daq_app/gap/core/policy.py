@@ -44,8 +44,8 @@ class Policy:
     """Odds of any other form of a law against the library's."""
     further_nats: float = 8.0
     """What a further cause, or a first one beside a material finding, costs in log evidence beyond its prior:
-    what the form of the others leaves, it takes up. In development laboratories five of six that gained 10
-    to 14 were false, three of five that gained 15 to 25 true; raising it loses weak causes beside strong
+    what the form of the others leaves, it takes up. In development laboratories four of five that gained 10
+    to 14 were false, three of six that gained 15 to 25 true; raising it loses weak causes beside strong
     ones."""
     further_share: float = 0.05
     """Share of what is explained that a further cause must explain, or else clear what it improves
