@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 from daq_app.config.rig import Rig
 from daq_app.rocking.estimators import RestitutionEstimate
 from daq_app.rocking.families import words
+from daq_app.rocking.families.block_checks import pattern_findings
 from daq_app.rocking.families.levels import level_outlier
 from daq_app.rocking.families.response import LATE_S, SLOW_S, compare
 from daq_app.rocking.families.shocks import LATE_SHOCKS_S, shock_timing
 from daq_app.rocking.families.verdict import compare_series, families_apart, methods_apart
 from daq_app.rocking.geometry.joint import BaseJoint
+from daq_app.rocking.motion.impact_pattern import impact_pattern
 from daq_app.rocking.motion.rolling import RollingArray
 from daq_app.rocking.motion.swings import MotionTrack
 
@@ -114,8 +116,8 @@ class LiveFamilies:
     def _restitution(
         self, wires: MotionTrack, eav: RestitutionEstimate, crt: RestitutionEstimate
     ) -> tuple[str, ...]:
-        """Where wires and LVDTs, or EAV and CRT, give r that differ beyond their errors."""
-        said = [methods_apart(eav, crt)]
+        """Where wires and LVDTs, or EAV and CRT, give r that differ beyond their errors, and impacts do."""
+        said = [methods_apart(eav, crt), *(f.text for f in pattern_findings(impact_pattern(wires)))]
         lvdts = self._track
         if lvdts is not None and len(lvdts.arcs) == len(wires.arcs):
             pairs = (

@@ -1,5 +1,6 @@
-"""``python -m studies.restitution faults --tests 20`` and ``coverage --tests 200``.
+"""``python -m studies.restitution faults --tests 20``, ``walls --tests 5`` and ``coverage --tests 200``.
 
+`walls`: the same for what walls do that a rigid block with one r does not.
 `faults`: error of r by each method under each fault, how far the verdict trusts it, and what was said.
 `coverage`: how often each stated interval holds the truth on sound tests, and how many are warned falsely.
 """
@@ -20,6 +21,7 @@ from daq_app.rocking import AnalysisOptions, TestAnalysis, TestRecord, analyse_r
 from studies.restitution.faults import FAULTS, Fault
 from studies.restitution.foreign import foreign_tests
 from studies.restitution.laboratory import LaboratoryTest, draw_test
+from studies.restitution.walls import WALLS, Wall
 
 RIG = Path(__file__).parents[2] / "configs" / "fr1.toml"
 _OPTIONS = AnalysisOptions(bias_runs=0, keep_series=False)
@@ -82,6 +84,23 @@ def fault_row(fault: Fault, tests: Sequence[LaboratoryTest], sound: Sequence[Ans
     return f"{what:28s} {numbers} {quiet:6d}  {dict(trusts)}  {dict(said)}"
 
 
+def wall_row(wall: Wall, tests: Sequence[LaboratoryTest]) -> str:
+    """One line of the table of walls: error of r at the impacts, and what was said.
+
+    Counted are tests that are called good although the verdict is off by more than `_OFF_R` and by more than
+    `_OFF_SIGMAS` of its standard errors.
+    """
+    answers = [answer_of(test.record(), test.truth["restitution"]) for test in tests]
+    place = _METHODS.index("verdict")
+    off = [max(_OFF_R, _OFF_SIGMAS * answer.standard_error) for answer in answers]
+    quiet = sum(a.trust == "good" and abs(a.errors[place]) > o for a, o in zip(answers, off, strict=True))
+    table = np.abs(np.array([answer.errors for answer in answers]))
+    numbers = " ".join(f"{value:8.4f}" for value in np.nanmax(table, axis=0, initial=0.0))
+    trusts = Counter(answer.trust for answer in answers)
+    said = Counter(warning for answer in answers for warning in answer.warnings)
+    return f"{wall.name:28s} {numbers} {quiet:6d}  {dict(trusts)}  {dict(said)}"
+
+
 def deviations(test: LaboratoryTest, analysis: TestAnalysis) -> list[tuple[str, float]]:
     """(quantity, error over its standard uncertainty) of one sound test, as far as its truth is known."""
     truth, found = test.truth, []
@@ -139,7 +158,7 @@ def coverage(tests: Iterable[LaboratoryTest]) -> list[str]:
 def main() -> None:
     """Print the table that was asked for."""
     parser = argparse.ArgumentParser(prog="python -m studies.restitution", description=__doc__)
-    parser.add_argument("table", choices=["faults", "coverage"])
+    parser.add_argument("table", choices=["faults", "walls", "coverage"])
     parser.add_argument("--tests", type=int, default=20, help="simulated tests, for each fault or in all")
     parser.add_argument("--first-seed", type=int, default=5000)
     parser.add_argument("--foreign", type=Path, help="folder of labelled recordings instead")
@@ -156,9 +175,16 @@ def main() -> None:
     if options.table == "coverage":
         print("\n".join(coverage(tests)))
         return
+    head = f"largest |error| of r:       {' '.join(f'{name:>8s}' for name in _METHODS)}  quiet  trust, said"
+    if options.table == "walls":
+        seeds = range(options.first_seed, options.first_seed + options.tests)
+        print(head)
+        for wall in WALLS:
+            print(wall_row(wall, [wall.test(load_rig(RIG), seed) for seed in seeds]), flush=True)
+        return
     tests = list(tests)
     sound = [answer_of(test.record(), test.truth["restitution"]) for test in tests]
-    print(f"largest |error| of r:       {' '.join(f'{name:>8s}' for name in _METHODS)}  quiet  trust, said")
+    print(head)
     for fault in (fault for fault in FAULTS if fault.kind in options.kinds):
         print(fault_row(fault, tests, sound), flush=True)
 

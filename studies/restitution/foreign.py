@@ -12,6 +12,7 @@ import numpy as np
 
 from daq_app.config import Rig, load_rig
 from daq_app.config.rig import Channel, Family
+from daq_app.rocking.theory.block import STANDARD_GRAVITY_M_S2, RigidBlock
 from studies.restitution.laboratory import LaboratoryTest
 
 _TO_SI: Final = {"mm": 1e-3, "m/s2": 1.0, "m/s²": 1.0, "deg": math.pi / 180.0}
@@ -30,7 +31,7 @@ def foreign_tests(folder: Path, configs: Path, names: tuple[str, ...] = ()) -> I
         case = json.loads((folder / name / "case.json").read_text(encoding="utf-8"))
         rig = rig_of(case, configs)
         for entry, run in zip(case["runs"], labels[name]["runs"], strict=True):
-            truth = _truth(labels[name]["true_body"], run)
+            truth = _truth(labels[name], run)
             yield _test(folder / name / entry["npz"], rig, truth)
 
 
@@ -55,14 +56,17 @@ def _channel(rig: Rig, entry: Mapping[str, Any]) -> Channel:
     return rig.of_family(family)[0].model_copy(update=changes)
 
 
-def _truth(body: Mapping[str, float], run: Mapping[str, Any]) -> dict[str, Any]:
-    """`r_factor` is the share of the upper bound of any block, 1 − 2 m R² sin²α / I_O."""
-    r_max = 1.0 - 2.0 * body["m"] * body["R"] ** 2 * math.sin(body["alpha"]) ** 2 / body["IO"]
+def _truth(label: Mapping[str, Any], run: Mapping[str, Any]) -> dict[str, Any]:
+    """`r_factor` is the share of the upper bound of a block on the points that the wall turns about."""
+    body = label["true_body"]
+    block = RigidBlock(body["m"] * STANDARD_GRAVITY_M_S2, body["R"], body["IO"], body["alpha"])
+    inset = sum(effect["params"].get("inset", 0.0) for effect in label["effects"])
+    pivoted = block.with_pivots_inside(inset)
     return {
-        "restitution": run["r_factor"] * r_max,
+        "restitution": run["r_factor"] * pivoted.r_max,
         "theta0_rad": run["theta0"],
-        "alpha_rad": body["alpha"],
-        "p_rad_s": body["p"],
+        "alpha_rad": pivoted.alpha0_rad,
+        "p_rad_s": pivoted.p_rad_s,
     }
 
 

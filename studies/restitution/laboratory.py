@@ -6,8 +6,9 @@ The analysis is given the nominal rig; the wall and its sensors are those of ano
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from sim_hardware.direct import synthesise_test
 
 Floats = NDArray[np.float64]
 
+_NO_EFFECTS: Final[Mapping[str, Mapping[str, float]]] = {}
 _BODY_SHARE = 0.01
 """Relative standard deviation of α, R and I of the wall about the survey's."""
 _POSITION_SIGMA_M = 0.001
@@ -54,8 +56,17 @@ class LaboratoryTest:
         ]
 
 
-def draw_test(nominal: Rig, seed: int, *, ordinary: bool = True) -> LaboratoryTest:
-    """A test of a laboratory drawn by `seed`; without `ordinary` its sensors are perfect but for noise."""
+def draw_test(
+    nominal: Rig,
+    seed: int,
+    *,
+    ordinary: bool = True,
+    effects: Mapping[str, Mapping[str, float]] = _NO_EFFECTS,
+) -> LaboratoryTest:
+    """A test of a laboratory drawn by `seed`; without `ordinary` its sensors are perfect but for noise.
+
+    `effects`: what its wall does that Housner's block does not, by name with parameters.
+    """
     rng = np.random.default_rng(seed)
     rig = _drawn_rig(nominal, rng) if ordinary else nominal
     timing = {"upright_s": 1.0, "pull_s": 1.0, "hold_s": float(rng.uniform(4.0, 6.0))}
@@ -65,7 +76,8 @@ def draw_test(nominal: Rig, seed: int, *, ordinary: bool = True) -> LaboratoryTe
     )
     plan = plan_tasks(rig)
     level = float(rng.uniform(0.15, 0.4)) * float(rng.choice([-1.0, 1.0]))
-    test = synthesise_test(rig, plan, level, seed, restitution=float(rng.uniform(0.82, 0.94)))
+    r = float(rng.uniform(0.82, 0.94))
+    test = synthesise_test(rig, plan, level, seed, restitution=r, effects=effects)
     upright = test.readings[:, : test.upright_samples].mean(axis=1)
     zeros = {c.id: float(mean - c.offset) for c, mean in zip(rig.channels, upright, strict=True)}
     si = Scaling.of(rig.channels, zeros).to_si(test.readings)

@@ -22,6 +22,7 @@ from daq_app.rocking.analysis.residuals import residuals_after
 from daq_app.rocking.analysis.results import Bias, Series, TestAnalysis, Theory
 from daq_app.rocking.analysis.signals import Signals
 from daq_app.rocking.analysis.tracks import decay_series, estimates_of, follow_families
+from daq_app.rocking.analysis.wall_checks import wall_findings
 from daq_app.rocking.estimators import RestitutionEstimate
 from daq_app.rocking.families.verdict import judge
 from daq_app.rocking.geometry.joint import JointMotion
@@ -95,10 +96,12 @@ def _analyse(
     onsets = _onsets(instruments.record, signals, track)
     fit = _fit(signals, track, estimates, instruments.gain_sigma) if options.fit else None
     theta0 = theta0_by_family(signals, track, instruments.gains)
-    verdict, findings = verdict_of(instruments, tracks, series, estimates, levels_apart(theta0))
+    joint = summarise_joint(instruments.record, signals, track) if signals.joint is not None else None
+    further = levels_apart(theta0)
+    further += wall_findings(instruments, tracks, joint, further)
+    verdict, findings = verdict_of(instruments, tracks, series, estimates, further)
     headline = theta0.get("tiltmeters", theta0["wires"])
     bias = _bias(record, signals, track, estimates, velocity_filter, options)
-    joint = summarise_joint(instruments.record, signals, track) if signals.joint is not None else None
     residuals = residuals_after(signals, times.rest)
     analysis = TestAnalysis(
         label=record.label,

@@ -28,7 +28,8 @@ from daq_app.rocking.motion.transients import Onset
 from daq_app.rocking.record import TestRecord
 from daq_app.rocking.theory.block import RigidBlock
 
-_LEADS = {"wires": "wires", "lvdts": "LVDTs"}
+LEADS = {"wires": "wires", "lvdts": "LVDTs"}
+"""Families that a motion can be read from: the reader's word by the key."""
 
 
 def families_of(
@@ -42,7 +43,7 @@ def families_of(
     """One row per family that was recorded, and the survey's."""
     findings = instruments.findings
     rows = []
-    for name, family in _LEADS.items():
+    for name, family in LEADS.items():
         track = tracks.of(name)
         suffix = "" if name == instruments.signals.lead else f"_{name}"
         if track is not None and f"eav{suffix}" in estimates:
@@ -117,19 +118,15 @@ def verdict_of(
     tracks: FamilyTracks,
     series: Mapping[str, DecaySeries],
     estimates: Mapping[str, RestitutionEstimate],
-    theta0_findings: Sequence[FamilyFinding],
+    further: Sequence[FamilyFinding],
 ) -> tuple[RVerdict, tuple[FamilyFinding, ...]]:
-    """The verdict of r, and every finding behind it."""
+    """The verdict of r, and every finding behind it; `further` are those of θ0 and of the wall."""
     named = {(finding.family, finding.kind) for finding in instruments.findings}
     findings = list(instruments.findings)
-    findings += [finding for finding in theta0_findings if (finding.family, finding.kind) not in named]
+    findings += [finding for finding in further if (finding.family, finding.kind) not in named]
     lead, other = instruments.signals.lead, tracks.other_name
-    blamed = any(
-        f.kind in ("slow", "late", "drift") and _LEADS[other] in f.family and f.treatment != "put in step"
-        for f in findings
-    )
     disagreements = []
-    if not blamed:
+    if not other_is_blamed(findings, other):
         for method, name in (("eav", "EAV"), ("crt", "CRT")):
             if f"{method}_{other}" in series:
                 own, others = series[method], series[f"{method}_{other}"]
@@ -142,5 +139,13 @@ def verdict_of(
     if said is not None:
         disagreements.append(said)
         findings.append(words.not_housner(said))
-    verdict = judge(estimates["eav"], estimates["crt_exact"], _LEADS[lead], findings, disagreements)
+    verdict = judge(estimates["eav"], estimates["crt_exact"], LEADS[lead], findings, disagreements)
     return verdict, tuple(findings)
+
+
+def other_is_blamed(findings: Sequence[FamilyFinding], other: str) -> bool:
+    """Whether the family that does not lead, ``wires`` or ``lvdts``, is known to follow the wall badly."""
+    return any(
+        f.kind in ("slow", "late", "drift") and LEADS[other] in f.family and f.treatment != "put in step"
+        for f in findings
+    )

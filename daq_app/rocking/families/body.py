@@ -12,7 +12,7 @@ from daq_app.rocking.theory.housner import exact_quarter_period
 
 Floats = NDArray[np.float64]
 
-_ROUNDS = 8
+_ROUNDS = 20
 _STEP = 1e-5
 _FEWEST = 4
 _MODEL_SHARE = 2e-4
@@ -21,12 +21,19 @@ _MODEL_SHARE = 2e-4
 
 @dataclass(frozen=True, slots=True)
 class BodyEstimate:
-    """α and p with their standard uncertainties; the gain of the family is not in them."""
+    """α and p with their standard uncertainties; the gain of the family is not in them.
+
+    All four are NaN where no block comes near the durations.
+    """
 
     alpha_rad: float
     sigma_alpha_rad: float
     p_rad_s: float
     sigma_p_rad_s: float
+    misfit: float
+    """χ² per degree of freedom of the durations about those of the fitted block."""
+    half_cycles: int
+    """How many the fit is through."""
 
 
 def body_of_half_cycles(
@@ -39,20 +46,22 @@ def body_of_half_cycles(
 ) -> BodyEstimate | None:
     """Least squares of T/2 = 2 K(peak; α, p) over whole half-cycles, arrays (n,); starts at nominal values.
 
-    None with fewer than four half-cycles, or where they do not settle on a wall that exists.
+    α may be another one at either side, for a base that tilts and a zero that is off; their mean is given.
+    None with fewer than four half-cycles, or where they lead to a wall that does not exist.
     """
-    peaks = np.abs(peaks_rad)
+    peaks, side = np.abs(peaks_rad), np.sign(peaks_rad)
     good = np.isfinite(peaks) & np.isfinite(durations_s) & (durations_s > 0.0) & (peaks > 0.02 * alpha_rad)
     good &= np.isfinite(sigma_peaks_rad) & np.isfinite(sigma_durations_s)
-    peaks, durations = peaks[good], durations_s[good]
+    peaks, durations, side = peaks[good], durations_s[good], side[good]
     if peaks.size < _FEWEST:
         return None
-    x = np.log([alpha_rad, p_rad_s])
-    normal = np.eye(2)
-    excess = 1.0
+    # ln α, ln p, and ln of α at + over α at −.
+    x = np.array([math.log(alpha_rad), math.log(p_rad_s), 0.0])
+    normal = np.eye(x.size)
+    misfit = 1.0
     for _ in range(_ROUNDS):
-        alpha, p = float(np.exp(x[0])), float(np.exp(x[1]))
-        if not (1.02 * float(peaks.max()) < alpha < 1.5 and 0.1 < p < 50.0):
+        alpha, p = np.exp(x[0] + 0.5 * side * x[2]), math.exp(x[1])
+        if not (np.all(1.02 * peaks < alpha) and alpha.max() < 1.5 and 0.1 < p < 50.0):
             return None
         model = 2.0 * exact_quarter_period(peaks, p, alpha)
         by_alpha = 2.0 * exact_quarter_period(peaks, p, alpha * math.exp(_STEP)) / _STEP - model / _STEP
@@ -62,14 +71,18 @@ def body_of_half_cycles(
             + (by_peak * sigma_peaks_rad[good]) ** 2
             + (_MODEL_SHARE * durations) ** 2
         )
-        table = np.column_stack([by_alpha, -model]) / sigma[:, None]
+        table = np.column_stack([by_alpha, -model, 0.5 * side * by_alpha]) / sigma[:, None]
         left = (durations - model) / sigma
         normal = table.T @ table
         change = np.linalg.solve(normal, table.T @ left)
         x = x + np.clip(change, -0.2, 0.2)
-        excess = max(1.0, float(left @ left) / max(peaks.size - 2, 1))
+        misfit = float(left @ left) / (peaks.size - x.size)
         if float(np.abs(change).max()) < 1e-7:
             break
-    deviations = np.sqrt(np.diag(np.linalg.inv(normal)) * excess)
-    alpha, p = float(np.exp(x[0])), float(np.exp(x[1]))
-    return BodyEstimate(alpha, alpha * float(deviations[0]), p, p * float(deviations[1]))
+    else:
+        return BodyEstimate(math.nan, math.nan, math.nan, math.nan, misfit, peaks.size)
+    deviations = np.sqrt(np.diag(np.linalg.inv(normal)) * max(1.0, misfit))
+    middle, p = math.exp(x[0]), math.exp(x[1])
+    return BodyEstimate(
+        middle, middle * float(deviations[0]), p, p * float(deviations[1]), misfit, peaks.size
+    )

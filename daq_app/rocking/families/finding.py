@@ -5,14 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Family = Literal["wires", "LVDTs", "tiltmeters", "accelerometers", "survey"]
-Kind = Literal["slow", "late", "gain", "zero", "hum", "reversed", "unit", "drift", "motion"]
+Family = Literal["wires", "LVDTs", "tiltmeters", "accelerometers", "survey", "wall"]
+Kind = Literal[
+    "slow", "late", "gain", "zero", "hum", "reversed", "unit", "drift", "motion",
+    "speed", "side", "loss", "pause", "duration", "pivot",
+]  # fmt: skip
 Treatment = Literal["none", "left out", "put in step", "put right", "removed"]
 
 
 @dataclass(frozen=True, slots=True)
 class FamilyFinding:
-    """One instrument, or a whole family, that disagrees with the rest."""
+    """One instrument, or a whole family, that disagrees with the rest; or the wall, with a rigid block."""
 
     family: str
     """A `Family`, or several joined by "or" where nothing says which of them it is."""
@@ -20,7 +23,8 @@ class FamilyFinding:
     """The channels concerned; none where it is the whole family."""
     kind: Kind
     size: float
-    """SI; a share for gain, the factor for unit."""
+    """SI; a share for gain, loss and pause, the factor for unit, a change of r for speed and side, standard
+    errors for duration."""
     unit: str
     treatment: Treatment
     severity: Literal["info", "warning"]

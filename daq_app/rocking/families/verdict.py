@@ -152,6 +152,7 @@ def judge(
     error = math.hypot(math.sqrt(float(weights @ covariance @ weights)), _MODEL_R)
     if disagreements and values.size > 1:
         error = math.hypot(error, 0.5 * float(np.ptp(values)))
+    error = math.hypot(error, *(_share_of_r(finding, r) for finding in open_findings))
     freedom = min(e.degrees_of_freedom for e in known)
     reach = float(stdtrit(freedom, 0.975)) * error
     return RVerdict(r, error, (r - reach, r + reach), trust, (lead,), left_out, reasons)
@@ -160,3 +161,10 @@ def judge(
 def _touches_r(finding: FamilyFinding) -> bool:
     """Whether r may be off by it: a gain cancels in EAV and moves CRT by 0.0001 for 1 %; no time is in r."""
     return finding.kind not in ("gain", "late") and finding.family not in ("tiltmeters", "accelerometers")
+
+
+def _share_of_r(finding: FamilyFinding, r: float) -> float:
+    """What the r of single impacts may be off the one of the whole test by what the wall does."""
+    if finding.kind in ("speed", "side"):
+        return 0.5 * abs(finding.size)
+    return r * abs(finding.size) if finding.kind in ("loss", "pause") else 0.0

@@ -132,6 +132,60 @@ def not_housner(text: str) -> FamilyFinding:
     return FamilyFinding("wires or LVDTs", (), "motion", 0.0, "1", "none", "warning", text)
 
 
+def r_by_speed(r_fast: float, r_slow: float) -> FamilyFinding:
+    """r changes with the size of the motion."""
+    text = (
+        f"r changes from {r_fast:.3f} at the fastest impacts to {r_slow:.3f} at the slowest, beyond its "
+        "scatter: the wall bounces, twists or rolls on its edges, and no one r holds for its impacts"
+    )
+    return FamilyFinding("wall", (), "speed", r_slow - r_fast, "1", "none", "warning", text)
+
+
+def r_by_side(r_right: float, r_left: float) -> FamilyFinding:
+    """r differs between the edges."""
+    text = (
+        f"r is {r_right:.3f} where a lean to +x ends and {r_left:.3f} where one to −x ends, beyond its "
+        "scatter: the edges differ, and the r of the decay is the mean of two"
+    )
+    return FamilyFinding("wall", (), "side", r_right - r_left, "1", "none", "warning", text)
+
+
+def lost_between(share: float) -> FamilyFinding:
+    """Speed is lost where a block on its edge loses none."""
+    text = (
+        f"half-cycles end {share:.1%} slower than they begin: friction or drag acts between the impacts, "
+        "and r from the decay holds it as well"
+    )
+    return FamilyFinding("wall", (), "loss", -share, "1", "none", "warning", text)
+
+
+def pause_at_impacts(pause_s: float, share: float) -> FamilyFinding:
+    """The wall is longer at its base than an impact takes."""
+    text = (
+        f"impacts take {pause_s * 1e3:.2f} ms: the wall bounces or its joint yields, and r is of all that "
+        f"happens meanwhile ({share:.1%} of the speed), not of an impact"
+    )
+    return FamilyFinding("wall", (), "pause", share, "1", "none", "warning", text)
+
+
+def not_housner_durations(family: str, sigmas: float) -> FamilyFinding:
+    """Durations of half-cycles do not follow from their peaks."""
+    text = (
+        f"half-cycles by {family} last longer or shorter than those of any rigid block with their peaks "
+        f"({sigmas:.0f} σ rms): the wall yields, bounces or twists, or an instrument bends its motion"
+    )
+    return FamilyFinding(family, (), "duration", sigmas, "1", "none", "warning", text)
+
+
+def pivots_inside(left_m: float, right_m: float, r_max: float, r_max_edges: float) -> FamilyFinding:
+    """The wall turns about points inside its edges: r stands, its largest value is another one."""
+    text = (
+        f"the wall turns about points {left_m * 1e3:.1f} mm (−x) and {right_m * 1e3:.1f} mm (+x) inside its "
+        f"edges: the largest r of a rigid block on them is {r_max:.4f}, on its edges {r_max_edges:.4f}"
+    )
+    return FamilyFinding("wall", (), "pivot", 0.5 * (left_m + right_m), "m", "none", "info", text)
+
+
 def level(family: str, by_rad: float, share: float) -> FamilyFinding:
     """θ0 of one family is off while the others agree."""
     text = (

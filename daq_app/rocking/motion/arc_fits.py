@@ -23,6 +23,7 @@ POWERS: Final[tuple[tuple[int, ...], ...]] = ((), (4,), (3,), (3, 4), ALL_POWERS
 _COLUMNS: Final = STIFF + len(ALL_POWERS)
 _NESTED: Final = (0, 2, 3, 4)
 """Candidates that are the first columns of the freest: one decomposition serves all of them."""
+_ODD: Final = POWERS.index((3,))
 _CLEARLY: Final = 10.0
 """How much better in BIC a freer basis must be: noise alone must not choose it."""
 _MODEL_SHARE: Final = 1e-4
@@ -43,6 +44,10 @@ class ArcFits:
     """(arcs,) index into `POWERS`"""
     residual: Floats
     """(arcs,) rms of what the fit leaves"""
+    odd_coefficients: Floats
+    """(arcs, 7) of the basis with the third power, which lets an arc end at another speed than it begins."""
+    odd_covariance: Floats
+    """(arcs, 7, 7)"""
 
     def rows(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         """Value, first and second derivative by x of every column at one place of each arc: (arcs, 7)."""
@@ -119,9 +124,17 @@ def fit_stack(x: Floats, y: Floats, present: Bools, kappa: Floats, noise_rad: Fl
         coefficients[np.ix_(own, columns)] = alone[0][among]
         covariance[np.ix_(own, columns, columns)] = alone[1][among]
     square = squares[arcs, best]
-    widths = np.array([STIFF + len(powers) for powers in POWERS])[best]
-    covariance *= np.maximum(square / (count - widths), noise_rad**2)[:, None, None]
-    return ArcFits(kappa, coefficients, covariance, best, np.sqrt(square / count))
+    widths = np.array([STIFF + len(powers) for powers in POWERS])
+    covariance *= np.maximum(square / (count - widths[best]), noise_rad**2)[:, None, None]
+    odd_coefficients, odd_covariance = np.zeros_like(coefficients), np.zeros_like(covariance)
+    wide = widths[_ODD]
+    part = inverse[:, :wide, :wide]
+    odd_coefficients[:, :wide] = np.einsum("ajk,ak->aj", part, projected[:, :wide])
+    variance = np.maximum(squares[:, _ODD] / (count - wide), noise_rad**2)
+    odd_covariance[:, :wide, :wide] = part @ np.swapaxes(part, 1, 2) * variance[:, None, None]
+    return ArcFits(
+        kappa, coefficients, covariance, best, np.sqrt(square / count), odd_coefficients, odd_covariance
+    )
 
 
 def _separate(table: Floats, y: Floats) -> tuple[Floats, Floats]:
@@ -187,6 +200,27 @@ def crossings(fits: ArcFits, guess: float, half_s: Floats, zero_sigma: float) ->
         own = np.maximum(_square(gradient, fits.covariance), 0.0)
         sigma = np.sqrt(own + (curvature / speed * zero_sigma) ** 2 + (_MODEL_SHARE * speed) ** 2)
     found = np.stack([x, shift, speed / half_s, sigma / half_s])
+    found[:, ~np.isfinite(found).all(axis=0)] = np.nan
+    return found
+
+
+def speed_kept(fits: ArcFits, ends: Floats) -> Floats:
+    """(2, arcs): ln of the speed at the end over that at the start, by the odd basis, and its sigma.
+
+    `ends` (2, arcs): x of both zeros. They are those of the chosen basis: the rotation there is what the odd
+    one says, so that the speed is read at its own zero to first order.
+    """
+    log_speed, gradient = [], []
+    with np.errstate(all="ignore"):
+        for x in ends:
+            value, slope, curve = fits.rows(x)
+            speed, curvature = _dot(slope, fits.odd_coefficients), _dot(curve, fits.odd_coefficients)
+            own = slope - (curvature / speed)[:, None] * value
+            log_speed.append(np.log(np.abs(_dot(own, fits.odd_coefficients))))
+            gradient.append(own / speed[:, None])
+        kept = log_speed[1] - log_speed[0]
+        sigma = np.sqrt(np.maximum(_square(gradient[1] - gradient[0], fits.odd_covariance), 0.0))
+    found = np.stack([kept, sigma])
     found[:, ~np.isfinite(found).all(axis=0)] = np.nan
     return found
 

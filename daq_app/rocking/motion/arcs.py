@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.motion.arc_fits import POWERS, crossings, extrema, fit_stack
+from daq_app.rocking.motion.arc_fits import POWERS, crossings, extrema, fit_stack, speed_kept
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -55,6 +55,10 @@ class Arc:
     speed_end_rad_s: float
     """θ̇⁻ just before the impact that ends it."""
     sigma_speed_end_rad_s: float
+    kept: float
+    """ln of the speed at its end over that at its start by a basis that is free to lose speed; NaN for the
+    fall."""
+    sigma_kept: float
     powers: tuple[int, ...]
     """Powers that were added to the basis."""
     residual_rad: float
@@ -162,6 +166,7 @@ class _Stack:
         # The fall has neither a crossing at its start nor a peak of its own: its peak is the hold.
         starting[:, fall], peak[:, fall] = np.nan, np.nan
         good = np.isfinite(ending[0]) & (fall | (np.isfinite(starting[0]) & np.isfinite(peak[0])))
+        kept = speed_kept(fits, np.stack([starting[0], ending[0]]))
         begins = np.where(fall, self.start_s, self.centre_s + self.half_s * starting[0])
         peak_s = np.where(fall, self.start_s, self.centre_s + self.half_s * peak[0])
         columns = {
@@ -176,6 +181,8 @@ class _Stack:
             "sigma_speed_start_rad_s": starting[3],
             "speed_end_rad_s": ending[2],
             "sigma_speed_end_rad_s": ending[3],
+            "kept": kept[0],
+            "sigma_kept": kept[1],
             "residual_rad": fits.residual,
         }
         rows = np.stack(list(columns.values()), axis=1).tolist()

@@ -112,22 +112,25 @@ class RigidBlock:
         if not (mortar_strength_pa > 0 and length_m > 0):
             raise ValueError("the mortar's strength and the wall's length must be positive")
         a_f = self.weight_n / (2.0 * mortar_strength_pa * length_m)
-        half_width = self.base_width_m / 2.0 - 2.0 * a_f
-        if half_width <= 0:
+        if 2.0 * a_f >= self.base_width_m / 2.0:
             raise ValueError(
                 f"the joint would crush over {2 * a_f * 1e3:.0f} mm, more than half the base width "
                 f"({self.base_width_m / 2 * 1e3:.0f} mm): the wall cannot stand on it"
             )
-        height = self.centroid_height_m
-        radius = math.hypot(height, half_width)
-        alpha = math.atan2(half_width, height)
-        inertia = self.centroid_inertia_kg_m2 + self.mass_kg * radius**2
+        block = self.with_pivots_inside(2.0 * a_f)
         return SemiRigid(
             a_f_m=a_f,
             a_m=2.0 * a_f,
-            r0_m=radius,
-            alpha0_rad=alpha,
-            inertia_kg_m2=inertia,
-            p_rad_s=float(theory.frequency_parameter(self.weight_n, radius, inertia)),
-            r_max=float(theory.r_max_block(self.mass_kg, radius, inertia, alpha)),
+            r0_m=block.r0_m,
+            alpha0_rad=block.alpha0_rad,
+            inertia_kg_m2=block.inertia_kg_m2,
+            p_rad_s=block.p_rad_s,
+            r_max=block.r_max,
         )
+
+    def with_pivots_inside(self, inset_m: float) -> RigidBlock:
+        """The same body on a base that is narrower by `inset_m` at either edge, less than half its width."""
+        half_width = self.base_width_m / 2.0 - inset_m
+        radius = math.hypot(self.centroid_height_m, half_width)
+        inertia = self.centroid_inertia_kg_m2 + self.mass_kg * radius**2
+        return RigidBlock(self.weight_n, radius, inertia, math.atan2(half_width, self.centroid_height_m))

@@ -1,0 +1,37 @@
+"""The checks of the motion against a rigid block, on the families that followed a test."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from daq_app.rocking.analysis.families_table import LEADS, body_of, other_is_blamed
+from daq_app.rocking.analysis.instruments import Instruments
+from daq_app.rocking.analysis.results import JointSummary
+from daq_app.rocking.analysis.tracks import FamilyTracks
+from daq_app.rocking.families.block_checks import duration_findings, pattern_findings, pivot_findings
+from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.motion.impact_pattern import impact_pattern
+from daq_app.rocking.theory.block import RigidBlock
+
+
+def wall_findings(
+    instruments: Instruments,
+    tracks: FamilyTracks,
+    joint: JointSummary | None,
+    level_findings: Sequence[FamilyFinding],
+) -> list[FamilyFinding]:
+    """What the wall does that a rigid block on its edges does not.
+
+    A family whose instruments are to blame already (`level_findings` are those of θ0) is not asked.
+    """
+    lead, other = instruments.signals.lead, tracks.other_name
+    families = {LEADS[lead]: tracks.lead}
+    findings = [*instruments.findings, *level_findings]
+    if tracks.other is not None and not other_is_blamed(findings, other):
+        families[LEADS[other]] = tracks.other
+    bodies = {name: body_of(track, 0.0) for name, track in families.items()}
+    found = [*pattern_findings(impact_pattern(tracks.lead)), *duration_findings(bodies)]
+    if joint is not None:
+        block = RigidBlock.from_specimen(instruments.record.rig.specimen)
+        found += pivot_findings(block, joint.inset_left_m, joint.inset_right_m)
+    return found

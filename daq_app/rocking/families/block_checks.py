@@ -1,0 +1,76 @@
+"""What in the motion itself speaks against a rigid block that turns about its edges with one r.
+
+Instruments may all agree while the wall twists, bounces, rubs or yields: r by the decay is then no property
+of its impacts. Each check compares the motion with what Housner's block does, by the errors of the
+half-cycles and the scatter of r that the test itself shows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+from daq_app.rocking.families import words
+from daq_app.rocking.families.body import BodyEstimate
+from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.motion.impact_pattern import Coefficient, ImpactPattern
+from daq_app.rocking.theory.block import RigidBlock
+
+R_TOLERANCE: Final = 0.002
+"""What r may be off by with nothing said. Changes of r within a test count from twice this on, for the r of
+the whole lies between its ends."""
+_CHANCE: Final = 0.001
+"""Probability by which scatter alone may name a change: four are looked for, and of sound tests fewer than
+2 % shall be doubted for whatever reason. Raising it names walls whose r scatters."""
+_DURATION_SIGMAS: Final = 4.0
+"""rms by which durations deviate from the block's, in their own errors, that is named; sound ones reach 2."""
+_FEWEST_DURATIONS: Final = 6
+"""Half-cycles below which α and p take up what deviates."""
+
+
+def pattern_findings(pattern: ImpactPattern) -> list[FamilyFinding]:
+    """r that changes with speed or with side, speed that is lost between impacts, impacts that take time."""
+    findings = []
+    change = pattern.r_slow - pattern.r_fast
+    if _named(pattern.by_speed) and abs(change) > 2.0 * R_TOLERANCE:
+        findings.append(words.r_by_speed(pattern.r_fast, pattern.r_slow))
+    side = pattern.by_side
+    middle = 0.5 * (pattern.r_fast + pattern.r_slow)
+    if side is not None and _named(side) and middle * abs(side.value) > 2.0 * R_TOLERANCE:
+        findings.append(words.r_by_side(*(middle * math.exp(sign * side.value / 2.0) for sign in (1, -1))))
+    kept = pattern.between
+    # No half-cycle gains speed by itself: only one side counts.
+    if kept is not None and kept.value < -R_TOLERANCE and kept.chance / 2.0 < _CHANCE:
+        findings.append(words.lost_between(1.0 - math.exp(kept.value)))
+    pause = pattern.pause
+    if pause is not None and pause.value > 0.0 and _named(pause) and pattern.pause_share > R_TOLERANCE:
+        findings.append(words.pause_at_impacts(pause.value, pattern.pause_share))
+    return findings
+
+
+def _named(coefficient: Coefficient | None) -> bool:
+    return coefficient is not None and coefficient.chance < _CHANCE
+
+
+def duration_findings(bodies: Mapping[str, BodyEstimate | None]) -> list[FamilyFinding]:
+    """Families, by name, in which the durations of half-cycles do not follow from their peaks."""
+    findings = []
+    for family, body in bodies.items():
+        if body is None or body.half_cycles < _FEWEST_DURATIONS:
+            continue
+        sigmas = math.sqrt(body.misfit)
+        if sigmas > _DURATION_SIGMAS:
+            findings.append(words.not_housner_durations(family, sigmas))
+    return findings
+
+
+def pivot_findings(block: RigidBlock, inset_left_m: float, inset_right_m: float) -> list[FamilyFinding]:
+    """Pivots so far inside the edges that the largest r of a rigid block is another one; NaN: not known."""
+    inset = 0.5 * (inset_left_m + inset_right_m)
+    if not 0.0 < inset < block.base_width_m / 2.0:
+        return []
+    r_max = block.with_pivots_inside(inset).r_max
+    if abs(r_max - block.r_max) <= R_TOLERANCE:
+        return []
+    return [words.pivots_inside(inset_left_m, inset_right_m, r_max, block.r_max)]

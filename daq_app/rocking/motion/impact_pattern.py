@@ -1,0 +1,181 @@
+"""Whether one r holds for a test: how single impacts differ, and what is lost between them.
+
+Housner's block multiplies its speed by the same r at every impact and loses nothing in between. Each impact
+shows its own ratio by the speeds just before and after it, fitted apart in the two half-cycles beside it:
+
+    ln(|θ̇⁺_n| / |θ̇⁻_n|) = ln r + b ln(v_n / v_mean) + d s_n / 2 + scatter
+
+with v_n the speed before it and s_n = ± 1 the side that it ends on. b is not zero where r depends on the
+size of the motion (bouncing, twist, a rounded edge), d where the edges differ. Half-cycles fitted with a
+basis that is free to lose speed show ln(|θ̇ at the end| / |θ̇ at the start|), which is not zero where
+friction or drag acts. The half-cycles beside an impact cross zero at one instant; where the second begins
+later, the wall bounces or yields meanwhile.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtr
+
+from daq_app.rocking.motion.swings import MotionTrack
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_USABLE_SIGMA: Final = 0.05
+"""ln-ratios of single impacts or half-cycles known worse than this are not used."""
+_FEWEST_IMPACTS: Final = 8
+"""Impacts below which the three coefficients are not told from scatter."""
+_FEWEST_HALF_CYCLES: Final = 4
+"""Half-cycles below which a loss between impacts is not told from scatter."""
+_ODD_POWER: Final = 3
+"""A basis with it may end slower than it begins; one without cannot."""
+_ZERO_KEPT: Final = 0.1
+"""Share of the zero's error that crossings keep at least: noise alone may seem smaller than it is."""
+_ROUNDS: Final = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Coefficient:
+    """A change of ln r with its standard uncertainty and what chance alone makes of it."""
+
+    value: float
+    sigma: float
+    chance: float
+    """Probability that scatter alone gives a value so far from zero, on either side."""
+
+
+@dataclass(frozen=True, slots=True)
+class ImpactPattern:
+    """How impacts differ within a test; None where too few are known."""
+
+    by_speed: Coefficient | None
+    """Change of ln r from the fastest to the slowest impact used."""
+    by_side: Coefficient | None
+    """ln r of impacts that end a lean to +x less that of the others."""
+    between: Coefficient | None
+    """Mean of ln of the speed that a half-cycle keeps from one impact to the next."""
+    pause: Coefficient | None
+    """Mean time from the zero crossing before an impact to the one after it, s."""
+    pause_share: float
+    """What gravity changes the speed by meanwhile, as a share of the mean speed; NaN where not known."""
+    r_fast: float
+    """r by the regression at the fastest impact used; NaN where there is none."""
+    r_slow: float
+
+
+def impact_pattern(track: MotionTrack) -> ImpactPattern:
+    """Compare the impacts and half-cycles of a track."""
+    by_speed, by_side, r_fast, r_slow = _impacts(track)
+    pause, share = _pause(track)
+    return ImpactPattern(by_speed, by_side, _between(track), pause, share, r_fast, r_slow)
+
+
+def _impacts(track: MotionTrack) -> tuple[Coefficient | None, Coefficient | None, float, float]:
+    before, after = np.array(track.speeds_before_rad_s), np.array(track.speeds_after_rad_s)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.log(np.abs(after) / np.abs(before))
+        own_before = np.array(track.sigma_speeds_before_rad_s) / np.abs(before)
+        own_after = np.array(track.sigma_speeds_after_rad_s) / np.abs(after)
+    usable = np.isfinite(ratio) & (np.hypot(own_before, own_after) < _USABLE_SIGMA)
+    if np.count_nonzero(usable) < _FEWEST_IMPACTS:
+        return None, None, math.nan, math.nan
+    zero = _zero_error(track, before, after)
+    covariance = np.diag(own_before**2 + own_after**2) + np.outer(zero, zero)
+    for n, arc in enumerate(track.arcs[1:]):
+        # A half-cycle that cannot lose speed has one error of speed for the impacts at both of its ends.
+        if arc is not None and _ODD_POWER not in arc.powers and n + 1 < ratio.size:
+            covariance[n, n + 1] -= own_after[n] * own_before[n + 1]
+            covariance[n + 1, n] = covariance[n, n + 1]
+    log_speed = np.log(np.abs(before[usable]))
+    centred = log_speed - log_speed.mean()
+    side = np.sign(-before[usable])
+    design = np.column_stack([np.ones(centred.size), centred, side / 2.0])
+    solution, errors = _regress(ratio[usable], design, covariance[np.ix_(usable, usable)])
+    fall = float(centred.min() - centred.max())
+    freedom = centred.size - design.shape[1]
+    by_speed = _coefficient(float(solution[1]) * fall, float(errors[1]) * abs(fall), freedom)
+    by_side = _coefficient(float(solution[2]), float(errors[2]), freedom)
+    r_fast, r_slow = np.exp(solution[0] + solution[1] * np.array([centred.max(), centred.min()]))
+    return by_speed, by_side, float(r_fast), float(r_slow)
+
+
+def _zero_error(track: MotionTrack, before: Floats, after: Floats) -> Floats:
+    """(impacts,) what the standard uncertainty of the zero makes of each ln-ratio: by turns up and down."""
+    pull = _pull(track) * track.settings.zero_sigma_rad
+    return np.asarray(np.sign(before) * pull * (1.0 / after**2 + 1.0 / before**2))
+
+
+def _pull(track: MotionTrack) -> float:
+    """Angular acceleration of the block near upright, rad/s²."""
+    return track.settings.p_rad_s**2 * math.sin(track.settings.alpha_rad)
+
+
+def _between(track: MotionTrack) -> Coefficient | None:
+    known = [(arc.kept, arc.sigma_kept) for arc in track.arcs[1:] if arc is not None]
+    kept, sigma = np.array(known, dtype=np.float64).reshape(-1, 2).T
+    usable = np.isfinite(kept) & (sigma < _USABLE_SIGMA)
+    if np.count_nonzero(usable) < _FEWEST_HALF_CYCLES:
+        return None
+    kept, sigma = kept[usable], sigma[usable]
+    solution, errors = _regress(kept, np.ones((kept.size, 1)), np.diag(sigma**2))
+    return _coefficient(float(solution[0]), float(errors[0]), kept.size - 1)
+
+
+def _pause(track: MotionTrack) -> tuple[Coefficient | None, float]:
+    pauses, sigmas, speeds = [], [], []
+    for before, after in pairwise(track.arcs):
+        if before is None or after is None:
+            continue
+        speed = abs(before.speed_end_rad_s)
+        pauses.append(after.start_s - before.end_s)
+        # The zero moves both crossings alike and does not count.
+        zero = track.settings.zero_sigma_rad / speed
+        noise = before.sigma_end_s**2 + after.sigma_start_s**2 - 2.0 * zero**2
+        sigmas.append(math.sqrt(max(noise, (_ZERO_KEPT * zero) ** 2)))
+        speeds.append(speed)
+    if len(pauses) < _FEWEST_IMPACTS:
+        return None, math.nan
+    solution, errors = _regress(np.array(pauses), np.ones((len(pauses), 1)), np.diag(np.square(sigmas)))
+    weights = 1.0 / np.square(sigmas)
+    mean_speed = float(weights @ speeds / weights.sum())
+    pause = _coefficient(float(solution[0]), float(errors[0]), len(pauses) - 1)
+    return pause, _pull(track) * abs(pause.value) / mean_speed
+
+
+def _coefficient(value: float, sigma: float, freedom: int) -> Coefficient:
+    return Coefficient(value, sigma, 2.0 * float(stdtr(freedom, -abs(value) / sigma)))
+
+
+def _regress(values: Floats, design: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+    """Generalised least squares: solution and standard uncertainties, (columns,) each.
+
+    A scatter that is alike for all values comes to their own errors, just so large that the weighted
+    residuals are as many as the degrees of freedom (Paule and Mandel, 1982); none where they are fewer.
+    """
+    freedom = values.size - design.shape[1]
+    low, high = 0.0, 4.0 * float(values.var()) + 1e-8
+    solution, normal, misfit = _solve(values, design, covariance)
+    if misfit > freedom:
+        for _ in range(_ROUNDS):
+            scatter = 0.5 * (low + high)
+            solution, normal, misfit = _solve(values, design, covariance + scatter * np.eye(values.size))
+            low, high = (scatter, high) if misfit > freedom else (low, scatter)
+            if high - low < 1e-4 * high:
+                break
+    return solution, np.sqrt(np.diag(np.linalg.inv(normal)))
+
+
+def _solve(values: Floats, design: Floats, covariance: Floats) -> tuple[Floats, Floats, float]:
+    weighted = np.linalg.solve(covariance, design)
+    normal = design.T @ weighted
+    solution = np.linalg.solve(normal, weighted.T @ values)
+    left = values - design @ solution
+    misfit = float(left @ np.linalg.solve(covariance, left))
+    return np.asarray(solution, dtype=np.float64), np.asarray(normal, dtype=np.float64), misfit

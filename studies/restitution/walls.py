@@ -1,0 +1,49 @@
+"""What real walls do that a rigid block with one r does not: effects of the simulator in two sizes each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from daq_app.config import Rig
+from studies.restitution.laboratory import LaboratoryTest, draw_test
+
+
+@dataclass(frozen=True, slots=True)
+class Wall:
+    """One effect of the simulator; the size is that of its first parameter, in its unit."""
+
+    effect: str
+    parameters: Mapping[str, float]
+
+    def test(self, rig: Rig, seed: int) -> LaboratoryTest:
+        """The laboratory of `seed` with this wall."""
+        return draw_test(rig, seed, effects={self.effect: self.parameters} if self.effect else {})
+
+    @property
+    def name(self) -> str:
+        """For a table."""
+        told = ", ".join(f"{key} {value:g}" for key, value in self.parameters.items())
+        return f"{self.effect} {told}" if self.effect else "rigid block"
+
+
+WALLS = (
+    Wall("", {}),
+    *(Wall("coulomb", {"mu": size}) for size in (0.005, 0.02)),
+    *(Wall("viscous", {"zeta": size}) for size in (0.005, 0.02)),
+    *(Wall("restitution_slope", {"k": size}) for size in (0.02, 0.05)),
+    *(Wall("restitution_asymmetry", {"d": size}) for size in (0.01, 0.02)),
+    *(Wall("restitution_wear", {"loss": size}) for size in (0.002, 0.01)),
+    *(Wall("restitution_scatter", {"sigma": size}) for size in (0.01, 0.02)),
+    *(Wall("winkler", {"theta_c": size}) for size in (2e-4, 9e-4)),
+    *(Wall("rounded_edge", {"rho": size}) for size in (0.02, 0.1)),
+    *(Wall("pivot_shift", {"a": size}) for size in (0.01, 0.033)),
+    *(Wall("base_tilt", {"beta": size}) for size in (0.001, 0.004)),
+    *(Wall("bounce", {"tau": size}) for size in (0.002, 0.008)),
+    *(Wall("dwell", {"tau": size}) for size in (0.002, 0.008)),
+    *(Wall("compliance", {"phi": size}) for size in (0.0005, 0.002)),
+    *(Wall("flexible_wall", {"gain": size}) for size in (0.001, 0.005)),
+    *(Wall("twist", {"kick": size}) for size in (0.01, 0.05)),
+    *(Wall("residual_cable", {"k": size}) for size in (0.01, 0.05)),
+    *(Wall("slow_release", {"tau": size}) for size in (0.02, 0.1)),
+)

@@ -1,0 +1,104 @@
+"""Walls that are no rigid block with one r: what is said of them, and that sound ones are left alone."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from daq_app.config import load_rig, plan_tasks
+from daq_app.rocking import AnalysisOptions, LiveAnalyser, TestAnalysis, analyse_record
+from daq_app.rocking.theory.block import RigidBlock
+from sim_hardware.direct import synthesise_test
+from studies.restitution.laboratory import LaboratoryTest, draw_test
+
+ROOT = Path(__file__).parents[2]
+RIG = load_rig(ROOT / "configs" / "fr1.toml")
+SEED = 6101
+
+
+def drawn(effects: dict[str, dict[str, float]], seed: int = SEED) -> tuple[LaboratoryTest, TestAnalysis]:
+    return _drawn(json.dumps(effects), seed)
+
+
+@cache
+def _drawn(effects: str, seed: int) -> tuple[LaboratoryTest, TestAnalysis]:
+    test = draw_test(RIG, seed, effects=json.loads(effects))
+    return test, analyse_record(test.record(), AnalysisOptions(fit=False, bias_runs=0, keep_series=False))
+
+
+def kinds(analysis: TestAnalysis) -> set[str]:
+    return {finding.kind for finding in analysis.findings}
+
+
+@pytest.mark.parametrize("seed", [SEED, SEED + 1, SEED + 2])
+def test_a_rigid_block_in_an_ordinary_laboratory_is_not_doubted(seed: int):
+    _, analysis = drawn({}, seed)
+
+    assert analysis.verdict.trust == "good", analysis.verdict.reasons
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameters", "kind", "word"),
+    [
+        ("coulomb", {"mu": 0.02}, "loss", "friction"),
+        ("viscous", {"zeta": 0.02}, "loss", "drag"),
+        ("restitution_asymmetry", {"d": 0.02}, "side", "edges differ"),
+        ("restitution_slope", {"k": 0.3}, "speed", "from"),
+        ("dwell", {"tau": 0.002}, "pause", "impacts take"),
+        ("winkler", {"theta_c": 2e-4}, "duration", "yields"),
+    ],
+)
+def test_what_no_rigid_block_does_is_named_and_r_doubted(effect, parameters, kind, word):
+    _, analysis = drawn({effect: parameters})
+
+    assert kind in kinds(analysis)
+    assert analysis.verdict.trust == "doubtful"
+    assert any(word in reason for reason in analysis.verdict.reasons)
+
+
+@pytest.mark.parametrize(("effect", "parameters"), [("coulomb", {"mu": 0.02}), ("viscous", {"zeta": 0.02})])
+def test_the_interval_of_an_r_with_friction_reaches_to_the_r_of_the_impacts(effect, parameters):
+    test, analysis = drawn({effect: parameters})
+    low, high = analysis.verdict.interval95
+    r = test.truth["restitution"]
+
+    assert abs(analysis.verdict.r - r) > 0.005
+    assert low <= r <= high
+
+
+def test_pivots_inside_the_edges_change_the_largest_r_and_not_the_trust_in_r():
+    test, analysis = drawn({"pivot_shift": {"a": 0.02}})
+    pivot = next(finding for finding in analysis.findings if finding.kind == "pivot")
+    r_max = RigidBlock.from_specimen(RIG.specimen).with_pivots_inside(pivot.size).r_max
+
+    assert analysis.verdict.trust == "good"
+    assert analysis.verdict.r == pytest.approx(test.truth["restitution"], abs=0.003)
+    # The edges are those of the survey, whose wall is drawn 1 % off.
+    assert pivot.size == pytest.approx(0.02, abs=0.006)
+    assert f"{r_max:.4f}" in pivot.text
+
+
+def test_a_tilted_base_leaves_r_alone_and_the_mean_of_alpha_where_it_is():
+    test, analysis = drawn({"base_tilt": {"beta": 0.004}})
+    wires = next(view for view in analysis.families if view.family == "wires")
+
+    assert "duration" not in kinds(analysis)
+    assert wires.alpha_rad == pytest.approx(test.truth["alpha_rad"], rel=0.01)
+
+
+def test_friction_is_said_while_the_wall_still_rocks():
+    plan = plan_tasks(RIG)
+    test = synthesise_test(RIG, plan, 0.35, 3, restitution=0.9, effects={"coulomb": {"mu": 0.02}})
+    upright = test.readings[:, : test.upright_samples].mean(axis=1)
+    tare = {c.id: float(mean - c.offset) for c, mean in zip(RIG.channels, upright, strict=True)}
+    analyser = LiveAnalyser(RIG, test.rate_hz, tare)
+    results = [
+        analyser.process(start, test.readings[:, start : start + 400])
+        for start in range(0, test.readings.shape[1], 400)
+    ]
+    estimates = [result.estimate for result in results if result.estimate is not None]
+
+    assert any("friction" in doubt for doubt in estimates[-1].doubts), estimates[-1].doubts
