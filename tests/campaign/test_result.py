@@ -10,11 +10,13 @@ import pytest
 
 from daq_app.campaign.names import TestName
 from daq_app.campaign.report.summary import MethodResult, TestSummary
+from daq_app.campaign.result.family_rows import family_rows
 from daq_app.campaign.result.figures import measured_periods, theory_motion
 from daq_app.campaign.result.report import period_deviation, repetition_rows, verdict_sentence, write_result
 from daq_app.campaign.result.result import judged, load_summary, save_summary
 from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.rocking import free_rocking
+from daq_app.rocking.families.verdict import FamilyView, RVerdict
 
 ALPHA, P = 0.215, 2.20
 
@@ -50,6 +52,15 @@ def summary(name: str, r: float = 0.9, phi0: float = 0.35, **changes: object) ->
     return dataclasses.replace(made, **changes)  # type: ignore[arg-type]
 
 
+FAMILIES = (
+    FamilyView("wires", 0.07525, 5e-5, 0.9, 0.001, 0.901, 0.0012, interval95_eav=(0.898, 0.902), used=True),
+    FamilyView("LVDTs", 0.0753, 6e-5, 0.8, 0.001, interval95_eav=(0.798, 0.802), remarks=("slow",)),
+    FamilyView("tiltmeters", 0.0752, 4e-5, used=True),
+    FamilyView("survey", alpha_rad=ALPHA, p_rad_s=P),
+)
+VERDICT = RVerdict(0.9, 0.001, (0.898, 0.902), "doubtful", ("wires",), (), ("wires and LVDTs differ",))
+
+
 def test_exact_motion_agrees_with_its_own_theory() -> None:
     test = summary("FR1-L3-2")
     found = theory_motion(test)
@@ -74,6 +85,28 @@ def test_the_verdict_is_a_sentence() -> None:
     assert "offered again" in verdict_sentence(
         summary("FR1-L3-2", good=False, reasons=("400 samples are missing",))
     )
+
+
+def test_a_doubtful_r_is_not_called_good() -> None:
+    doubtful = summary("FR1-L3-2", trust="doubtful", reasons=("half-cycles end slower than they begin",))
+
+    assert verdict_sentence(doubtful) == (
+        "Well recorded, but r is doubtful: half-cycles end slower than they begin."
+    )
+
+
+def test_the_page_shows_what_each_family_says_with_intervals(tmp_path: Path) -> None:
+    test = summary("FR1-L3-2", families=FAMILIES, verdict=VERDICT)
+
+    html, _ = write_result(tmp_path / "FR1-L3-2_x.h5", test)
+    text = html.read_text(encoding="utf-8")
+
+    assert family_rows(test)[:2] == [
+        ("wires *", "75.25 ± 0.10", "0.9000 ± 0.0020", "0.9010", "–", "–", ""),
+        ("LVDTs", "75.30 ± 0.12", "0.8000 ± 0.0020", "–", "–", "–", "slow"),
+    ]
+    assert all(cell in text for row in family_rows(test) for cell in row)
+    assert "0.8980 … 0.9020" in text and "DOUBTFUL" in text
 
 
 def test_the_comparison_ends_with_the_test_itself() -> None:
@@ -103,14 +136,15 @@ def test_page_and_pdf_are_written_beside_the_run(tmp_path: Path) -> None:
 def test_a_summary_survives_the_disk_and_belongs_to_its_file_only(tmp_path: Path) -> None:
     run = tmp_path / "run.h5"
     run.write_bytes(b"x" * 100)
-    test = summary("FR1-L3-2", reasons=("noted",))
-    save_summary(run, test)
+    test = summary("FR1-L3-2", reasons=("noted",), verdict=VERDICT)
+    save_summary(run, dataclasses.replace(test, families=FAMILIES))
     back = load_summary(run)
     assert back is not None
     np.testing.assert_allclose(back.rotation_rad, test.rotation_rad, atol=1e-9)
-    same = dataclasses.replace(
-        back, time_s=test.time_s, rotation_rad=test.rotation_rad, velocity_rad_s=test.velocity_rad_s
-    )
+    # Numbers that are not known are NaN, which equals nothing.
+    assert list(map(repr, back.families)) == list(map(repr, FAMILIES))
+    arrays = {name: getattr(test, name) for name in ("time_s", "rotation_rad", "velocity_rad_s")}
+    same = dataclasses.replace(back, families=(), **arrays)
     assert {f.name: getattr(same, f.name) for f in dataclasses.fields(same)} == {
         f.name: getattr(test, f.name) for f in dataclasses.fields(test)
     }

@@ -139,6 +139,7 @@ def summarise(test: RecordedTest, rig: Rig, analysis: TestAnalysis) -> TestSumma
     peaks = [abs(cycle.peak_rad) for cycle in cycles]
     last = next((n for n, peak in enumerate(peaks) if not math.isfinite(peak)), len(peaks))
     warnings = [note.text for note in analysis.notes if note.severity == "warning"]
+    warnings = list(dict.fromkeys([*analysis.verdict.reasons, *warnings]))
     good = test.verdict is not TestVerdict.BAD
     reasons = tuple(filter(None, [test.reason])) if not good else tuple(warnings)
     return TestSummary(
@@ -157,6 +158,8 @@ def summarise(test: RecordedTest, rig: Rig, analysis: TestAnalysis) -> TestSumma
         methods=_methods(analysis),
         good=good,
         trust=analysis.verdict.trust,
+        verdict=analysis.verdict,
+        families=analysis.families,
         reasons=reasons,
         **_history(analysis.series, analysis),
     )

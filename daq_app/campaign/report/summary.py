@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.rocking.families.verdict import FamilyView, RVerdict
+
 Floats = NDArray[np.float64]
 
 
@@ -64,6 +66,10 @@ class TestSummary:
     good: bool
     trust: str = ""
     """How far r is to be believed by everything that was recorded: good, remarks or doubtful."""
+    verdict: RVerdict | None = None
+    """r from all families; None in summaries made by hand."""
+    families: tuple[FamilyView, ...] = ()
+    """What each family says of the test."""
     reasons: tuple[str, ...] = ()
     """Why the test is left out of the means, or what the reader should know."""
 

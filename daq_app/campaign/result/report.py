@@ -16,11 +16,13 @@ from matplotlib.figure import Figure
 from daq_app.campaign.pages import page_environment
 from daq_app.campaign.report.captioned import PLAIN_TEXT, CaptionedFigure
 from daq_app.campaign.report.summary import TestSummary
+from daq_app.campaign.result.family_rows import CAPTION, HEADINGS, family_rows
 from daq_app.campaign.result.figures import measured_periods, result_figure
 from daq_app.campaign.status import NO_FACTS, TestFacts
 from daq_app.config.shown_text import one_line
 from daq_app.config.wording import plus_minus
 from daq_app.rocking import period
+from daq_app.rocking.families.verdict_words import verdict_sentence as restitution_sentence
 from daq_app.runfile.durable import write_whole
 
 METHODS: Final = ("EAV", "CRT")
@@ -60,6 +62,8 @@ def repetition_rows(
 def verdict_sentence(test: TestSummary) -> str:
     """The quality verdict in words, on one line."""
     reasons = one_line("; ".join(test.reasons))
+    if test.good and test.trust == "doubtful":
+        return f"Well recorded, but r is doubtful: {reasons}."
     if test.good:
         return "Good." + (f" To note: {reasons}." if reasons else "")
     return f"Not good: {reasons or 'rejected'}. The test is offered again."
@@ -98,6 +102,10 @@ def _write(run: Path, test: TestSummary, earlier: Sequence[TestSummary], facts: 
             rows=rows,
             names=METHODS,
             deviation=period_deviation(test),
+            restitution=None if test.verdict is None else restitution_sentence(test.verdict),
+            families=family_rows(test),
+            family_headings=HEADINGS,
+            family_caption=CAPTION,
             plus_minus=plus_minus,
             bias=_bias,
         )
@@ -113,6 +121,8 @@ def _pdf(test: TestSummary, figure: Figure, rows: Sequence[RepetitionRow]) -> by
     with PdfPages(buffer, metadata={"Title": test.test}) as pages:
         pages.savefig(figure, bbox_inches="tight", pad_inches=0.4)
         pages.savefig(_table_page(test, rows))
+        if test.families:
+            pages.savefig(_family_page(test))
     return buffer.getvalue()
 
 
@@ -158,6 +168,18 @@ def _table_page(test: TestSummary, rows: Sequence[RepetitionRow]) -> Figure:
     page.text(0.05, 0.58, "Tests of this level", fontsize=12, fontweight="bold")
     header = ["Test", "θ0/α", "Impacts", *(f"r {name}" for name in METHODS), "Verdict"]
     _table(page, (0.05, 0.05, 0.9, 0.5), header, cells)
+    return page
+
+
+def _family_page(test: TestSummary) -> Figure:
+    """What each sensor family says, as on the HTML page."""
+    page = Figure(figsize=(11.0, 7.2))
+    page.text(0.05, 0.93, f"{test.test}: what each sensor family says", fontsize=15, fontweight="bold")
+    if test.verdict is not None:
+        sentence = textwrap.fill(restitution_sentence(test.verdict), _WIDTH, max_lines=3)
+        page.text(0.05, 0.9, sentence, fontsize=11, va="top")
+    _table(page, (0.05, 0.3, 0.9, 0.5), list(HEADINGS), [list(row) for row in family_rows(test)])
+    page.text(0.05, 0.25, CAPTION, fontsize=10)
     return page
 
 

@@ -7,9 +7,10 @@ leaves ``RUN.result.json`` (the summary, also the cache for later comparisons), 
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,11 +22,13 @@ from daq_app.campaign.report.summary import MethodResult, TestSummary
 from daq_app.campaign.status import NO_FACTS, RecordedTest, TestFacts, TestVerdict
 from daq_app.config import ConfigError
 from daq_app.extras import missing_extra
+from daq_app.rocking.analysis.results import plain
+from daq_app.rocking.families.verdict import FamilyView, RVerdict
 from daq_app.runfile import RunFileError
 from daq_app.runfile.durable import write_whole
 
 SUFFIX: Final = ".result.json"
-_FORMAT: Final = 1
+_FORMAT: Final = 2
 _ARRAYS: Final = ("time_s", "rotation_rad", "velocity_rad_s")
 
 
@@ -54,6 +57,7 @@ def save_summary(run: Path, summary: TestSummary) -> Path:
     content = asdict(summary)
     for name in _ARRAYS:
         content[name] = np.round(np.asarray(content[name], dtype=np.float64), 9).tolist()
+    content |= {"families": plain(summary.families), "verdict": plain(summary.verdict)}
     path = run.with_suffix(SUFFIX)
     document = {"format": _FORMAT, "run_bytes": run.stat().st_size, "summary": content}
     return write_whole(path, json.dumps(document))
@@ -77,7 +81,27 @@ def _summary(content: dict[str, Any]) -> TestSummary:
     }
     arrays = {name: np.asarray(content[name], dtype=np.float64) for name in _ARRAYS}
     tuples = {name: tuple(content[name]) for name in ("impacts_s", "peaks_rad", "periods_s", "reasons")}
-    return TestSummary(**{**content, **arrays, **tuples, "methods": methods})
+    views = {"families": tuple(map(_view, content["families"])), "verdict": _verdict(content["verdict"])}
+    return TestSummary(**{**content, **arrays, **tuples, **views, "methods": methods})
+
+
+def _view(content: dict[str, Any]) -> FamilyView:
+    """JSON knows no NaN: a number that is not known is None there."""
+    numbers = {f.name: content[f.name] for f in fields(FamilyView) if f.type == "float"}
+    known = {name: math.nan if value is None else float(value) for name, value in numbers.items()}
+    intervals = {name: _pair(content[name]) for name in ("interval95_eav", "interval95_crt")}
+    return FamilyView(**{**content, **known, **intervals, "remarks": tuple(content["remarks"])})
+
+
+def _verdict(content: dict[str, Any] | None) -> RVerdict | None:
+    if content is None:
+        return None
+    tuples = {name: tuple(content[name]) for name in ("used", "left_out", "reasons")}
+    return RVerdict(**{**content, **tuples, "interval95": _pair(content["interval95"])})
+
+
+def _pair(values: Sequence[float] | None) -> tuple[float, float] | None:
+    return None if values is None else (float(values[0]), float(values[1]))
 
 
 def judged(summary: TestSummary, test: RecordedTest) -> TestSummary:

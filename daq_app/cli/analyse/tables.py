@@ -11,21 +11,16 @@ from rich.table import Table
 from rich.text import Text
 
 from daq_app.config.wording import plus_minus
+from daq_app.rocking.families.verdict_words import verdict_sentence
 
 if TYPE_CHECKING:
     from daq_app.rocking.analysis.results import Bias, TestAnalysis, ValueWithSigma
     from daq_app.rocking.estimators import RestitutionEstimate
-    from daq_app.rocking.families.verdict import RVerdict
 
 _ZERO_WORDS = {
     "tare": "the tare before the test",
     "rest": "the rest after the test",
     "certificates": "the offsets of the certificates (no tare, and no other zero was taken)",
-}
-_TRUST_WORDS = {
-    "good": "good, everything that was recorded agrees",
-    "remarks": "with remarks, see the warnings",
-    "doubtful": "DOUBTFUL, what it rests on disagrees",
 }
 _TRUST_STYLES = {"good": "bold green", "remarks": "bold yellow", "doubtful": "bold red"}
 _METHODS = {
@@ -61,18 +56,6 @@ def analysis_tables(analysis: TestAnalysis) -> Iterator[RenderableType]:
     for note in analysis.notes:
         style = "bold yellow" if note.severity == "warning" else "dim"
         yield Text(f"{note.severity}: {note.text}", style=style)
-
-
-def verdict_sentence(verdict: RVerdict) -> str:
-    """r, its interval, what it rests on and how far it is to be believed."""
-    if verdict.r is None or verdict.interval95 is None:
-        return "r: not known, no two half-cycles could be compared"
-    low, high = verdict.interval95
-    left_out = f", left out: {', '.join(verdict.left_out)}" if verdict.left_out else ""
-    return (
-        f"r = {verdict.r:.4f} (95 %: {low:.4f} … {high:.4f}) from {', '.join(verdict.used)}{left_out}: "
-        f"{_TRUST_WORDS[verdict.trust]}"
-    )
 
 
 def _families_table(analysis: TestAnalysis) -> Table:

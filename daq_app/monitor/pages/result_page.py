@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtCore import QDateTime, Signal
+from PySide6.QtCore import QDateTime, Qt, Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from daq_app.campaign.recorded import read_recorded
@@ -21,6 +21,7 @@ from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.child import said_by
 from daq_app.monitor.plots.result_plots import ResultPlots
 from daq_app.monitor.widgets.banner import Banner, keyed_button, open_outside
+from daq_app.monitor.widgets.family_table import FamilyTable
 from daq_app.monitor.widgets.labels import DASH, Tile, number, set_role
 from daq_app.monitor.widgets.level_table import LevelTable
 from daq_app.monitor.widgets.theme import DARK, Colours
@@ -96,6 +97,7 @@ class ResultPage(QWidget):
             "periods": Tile("Periods against (4.1)", 19),
         }
         self.plots = ResultPlots()
+        self.families = FamilyTable()
         self.table = LevelTable()
         self.table.ticked.connect(self._lay_over)
         self.table.opened.connect(self._open_sibling)
@@ -128,12 +130,17 @@ class ResultPage(QWidget):
         layout.addWidget(self.banner)
         layout.addLayout(tiles)
         layout.addWidget(self.plots, 1)
-        layout.addWidget(self.table)
+        tables = QHBoxLayout()
+        tables.setSpacing(6)
+        for table in (self.table, self.families):
+            tables.addWidget(table, 1, Qt.AlignmentFlag.AlignTop)
+        layout.addLayout(tables)
 
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""
         self._colours = colours
         self.table.restyle(colours)
+        self.families.restyle(colours)
         self.plots.restyle(colours)
         self._show_verdict()
 
@@ -150,6 +157,7 @@ class ResultPage(QWidget):
         self._sign.show_shape("ring", self._colours.muted)
         self.plots.show_result(None)
         self.table.clear_rows()
+        self.families.show_test(None)
         if self.chooser.findData(str(run)) < 0:
             self.list_tests(run.parent)
         self._mark_chosen()
@@ -195,6 +203,7 @@ class ResultPage(QWidget):
         self.tiles["periods"].show_value(shown, "mean deviation from theory")
         self.plots.show_result(result)
         self.table.show_result(result)
+        self.families.show_test(test)
         self._show_verdict()
         self._show_buttons()
         self.shown.emit()

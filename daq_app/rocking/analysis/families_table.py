@@ -87,6 +87,8 @@ def _rotation_view(
         sigma_p_rad_s=math.nan if body is None else body.sigma_p_rad_s,
         impacts=sum(arc is not None for arc in track.arcs),
         late_s=float(np.median(apart)) if track is not lead else 0.0,
+        interval95_eav=eav.interval95(),
+        interval95_crt=crt.interval95(),
         used=track is lead,
     )
 

@@ -202,7 +202,7 @@ class TestAnalysis:
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-able: no series, NaN and infinity as None, intervals added to the estimates."""
-        result = {f.name: _plain(getattr(self, f.name)) for f in fields(self) if f.name != "series"}
+        result = {f.name: plain(getattr(self, f.name)) for f in fields(self) if f.name != "series"}
         for name, estimate in self.estimates.items():
             interval = estimate.interval95()
             result["estimates"][name]["interval95"] = None if interval is None else list(interval)
@@ -212,13 +212,14 @@ class TestAnalysis:
         return result
 
 
-def _plain(value: object) -> Any:
+def plain(value: object) -> Any:
+    """JSON-able: dataclasses and mappings as dictionaries, NaN and infinity as None."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+        return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):

@@ -45,6 +45,8 @@ class FamilyView:
     """Half-cycles that could be fitted, or shocks that were seen."""
     late_s: float = math.nan
     """How late its impacts are against those that r was found with, after what was put in step."""
+    interval95_eav: tuple[float, float] | None = None
+    interval95_crt: tuple[float, float] | None = None
     used: bool = False
     """Whether r or θ0 rests on it."""
     remarks: tuple[str, ...] = ()

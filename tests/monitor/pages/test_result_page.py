@@ -6,6 +6,7 @@ import pyqtgraph as pg
 import pytest
 from PySide6.QtGui import QDesktopServices
 
+from daq_app.campaign.result.family_rows import family_rows
 from daq_app.campaign.result.figures import result_figure
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.pages.result_page import ResultPage
@@ -45,3 +46,14 @@ def test_a_page_that_nothing_here_opens_is_told_with_its_place(qtbot, page, monk
     assert told == [
         ("warning", f"No program on this computer opens pages: {page.run.with_suffix('.result.html')}")
     ]
+
+
+def test_the_page_shows_every_family_as_its_saved_page_does(page):
+    shown = [
+        tuple(page.families.item(row, column).text() for column in range(page.families.columnCount()))
+        for row in range(page.families.rowCount())
+    ]
+
+    assert shown == family_rows(page.result.test)
+    assert [row[0] for row in shown] == ["wires *", "LVDTs", "tiltmeters *", "accelerometers"]
+    assert all(row[1] in page.run.with_suffix(".result.html").read_text(encoding="utf-8") for row in shown)
