@@ -13,7 +13,7 @@ _HEADER_PX, _ROW_PX, _ROWS = 38, 23, 4
 
 
 class FamilyTable(QTableWidget):
-    """One row per family; as high as four of them need."""
+    """One row per family; as high as four of them need where the page has room."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(0, len(HEADINGS), parent)
@@ -31,7 +31,8 @@ class FamilyTable(QTableWidget):
     def restyle(self, colours: Colours) -> None:
         """Take over a theme: rows are as high as its type needs."""
         self.verticalHeader().setDefaultSectionSize(colours.px(_ROW_PX))
-        self.setFixedHeight(colours.px(_HEADER_PX + _ROW_PX * _ROWS))
+        self.setMinimumHeight(colours.px(_HEADER_PX))
+        self.setMaximumHeight(colours.px(_HEADER_PX + _ROW_PX * _ROWS))
 
     def show_test(self, test: TestSummary | None) -> None:
         """Show the families of a test; none where there is no result."""
