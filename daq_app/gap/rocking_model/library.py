@@ -73,9 +73,15 @@ _ONE_CHANNEL: dict[str, tuple[str, ...]] = {
 _INERTIA_STARTS = {"frequency": (8.0, 14.0, 24.0), "zeta": (0.1, 0.3)}
 SMALLEST = {("residual_cable", "slack"): 4e-3}
 """Lower end of a range that the simulator lets begin at zero."""
-_FREQUENCIES_HZ = {"flexible_wall": (2.0, 42.0), "yaw": (1.5, 14.0), "twist": (1.5, 14.0)}
-"""Frequencies at which ring-downs are looked for (`rings`): slender walls on soft beds ring below 5 Hz, squat
-ones above 30 Hz, which the simulator's usual ranges leave out."""
+_RANGES = {
+    ("flexible_wall", "frequency"): (2.0, 42.0),
+    ("yaw", "frequency"): (1.5, 14.0),
+    ("twist", "frequency"): (1.5, 14.0),
+    ("slow_release", "tau"): (0.005, 1.0),
+}
+"""Where walls and releases go beyond the simulator's usual ranges: slender walls on soft beds ring below
+5 Hz, squat ones above 30 Hz (`rings` looks for them there), and a winch or a leaking jack lets go within a
+second."""
 _WIDER = {("yaw", "kick"): 0.4, ("twist", "kick"): 0.4, ("flexible_wall", "gain"): 0.2}
 """Reach of strengths that have no usual size: how hard an impact kicks depends on its very form, and how far
 the wall bends goes with one over its frequency."""
@@ -110,7 +116,7 @@ def _parameter(spec: EffectSpec, parameter: SpecParameter) -> Parameter:
     per_run = (spec.name, parameter.name) in _PER_RUN
     if (spec.name, parameter.name) in _LOGARITHMIC:
         low = max(parameter.low, SMALLEST.get((spec.name, parameter.name), 1e-6))
-        ends = _FREQUENCIES_HZ.get(spec.name, ()) if parameter.name == "frequency" else ()
+        ends = _RANGES.get((spec.name, parameter.name), ())
         found = between(parameter.name, *(ends or (low, parameter.high)), parameter.unit, parameter.text)
         return replace(found, per_run=per_run)
     reach = _WIDER.get((spec.name, parameter.name), parameter.high)

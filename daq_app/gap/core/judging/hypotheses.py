@@ -23,6 +23,8 @@ REFITTED = 6
 LEADS = 2
 LEAD_SHARE = 0.5
 """A second cause is sought to the two best single ones, to the second of them if it explains half as much."""
+IMPROVED_NATS = 1.0
+"""What a cause must take off the misfit of a group of features for that group to be one that it improves."""
 POLISHED = 3
 POLISH_REACH = 12.0
 """The best three hypotheses within 12 in log evidence are fitted to the end with exact Jacobians."""
@@ -209,7 +211,7 @@ class Hypotheses:
         if before is None or after is None:
             return False
         misfits = [misfit_nats(self.experiment, fit.sizes, self.policy) for fit in (before, after)]
-        improved = misfits[1] < misfits[0]
+        improved = misfits[0] - misfits[1] > IMPROVED_NATS
         left, had = float(misfits[1][improved].sum()), float(misfits[0][improved].sum())
         return had > 0.0 and left <= self.policy.further_leaves * had
 

@@ -57,6 +57,8 @@ class RockingRun:
     vibration: Vibration | None = None
     wires: tuple[Wire, ...] = ()
     """All wires whose geometry is known."""
+    leaked: FloatArray = field(default_factory=lambda: np.zeros(0))
+    """What a full crosstalk adds to a reference rotation that is read from wires, (m,), rad; else empty."""
     wiring: Wiring = field(default_factory=Wiring)
     """What was put right in all runs before anything was read from them."""
     marks: tuple[Mark, ...] = ()

@@ -11,6 +11,7 @@ from daq_app.gap.core import FeatureSet, Label
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import scalar_block
 from daq_app.gap.rocking_model.features.families import sensor_families
+from daq_app.gap.rocking_model.features.families.wires import leaked_turn
 from daq_app.gap.rocking_model.features.family import Scene
 from daq_app.gap.rocking_model.features.oscillations.floor_vibration import quiet
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
@@ -92,6 +93,7 @@ def examine(run: GapRun, reference: str = "") -> Examined:
         np.zeros((len(values), 0)),
         notes,
         wires=wires_of(run),
+        leaked=leaked_turn(run) if reference == "wire" else np.zeros(0),
     )
     return Examined(run, joint, features.with_blocks(blocks), wanted)
 

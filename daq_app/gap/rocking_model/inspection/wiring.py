@@ -14,6 +14,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.response import first_order
+from daq_app.gap.rocking_model.motion.late_joint import lateness
 from daq_app.gap.rocking_model.motion.rotation import zeroed
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Wiring
 from daq_app.gap.rocking_model.tolerances import (
@@ -46,12 +47,15 @@ def mend(runs: list[GapRun]) -> tuple[list[GapRun], Wiring]:
 
 def _mended(run: GapRun, wiring: Wiring) -> GapRun:
     place = {sensor.id: i for i, sensor in enumerate(run.sensors)}
-    channels = run.channels.copy()
+    channels, sensors = run.channels.copy(), list(run.sensors)
     for name in wiring.reversed_ids:
-        channels[place[name]] *= -1.0
+        at = place[name]
+        channels[at] *= -1.0
+        # The next channel that is scanned still sees the voltage that was there.
+        sensors[at] = replace(sensors[at], si_per_reading=-sensors[at].si_per_reading)
     for terminal, sensor in wiring.exchanged:
         channels[place[sensor]] = run.channels[place[terminal]]
-    return replace(run, channels=channels)
+    return replace(run, channels=channels, sensors=tuple(sensors))
 
 
 def _check(run: GapRun) -> Wiring:
@@ -66,7 +70,8 @@ def _check(run: GapRun) -> Wiring:
     places = 0
     for group in _groups(run, ids):
         at = [ids.index(name) for name in group]
-        order, turn = _order(np.array([[_misfit(measured[i], expected[j]) for j in at] for i in at]))
+        due = _as_late_as(measured[at], expected[at])
+        order, turn = _order(np.array([[_misfit(measured[i], e) for e in due] for i in at]))
         exchanged += [(group[i], group[j]) for i, j in enumerate(order) if i != j]
         places = max(places, turn)
     involved = {name for pair in exchanged for name in pair}
@@ -100,6 +105,18 @@ def _groups(run: GapRun, ids: list[str]) -> list[list[str]]:
         if sensor.id in ids:
             kinds.setdefault((sensor.family, sensor.axis), []).append(sensor.id)
     return list(kinds.values())
+
+
+def _as_late_as(measured: FloatArray, expected: FloatArray) -> FloatArray:
+    """What channels of one kind should show, (k, n), as late as they show it together.
+
+    Exchanged plugs move no corner in time: a family that is late is late at whatever terminal.
+    """
+    late = [lateness(y, e, WORK_HZ) for y, e in zip(measured, expected, strict=True) if y.any() and e.any()]
+    if not late:
+        return expected
+    at = np.arange(expected.shape[1])
+    return np.array([np.interp(at - float(np.median(late)), at, row) for row in expected])
 
 
 def _order(misfit: FloatArray) -> tuple[list[int], int]:

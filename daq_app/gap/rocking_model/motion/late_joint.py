@@ -30,12 +30,12 @@ class InStep:
     """By how much it was put sooner."""
 
 
-def lateness(mine: FloatArray, other: FloatArray) -> float:
-    """Samples of the grid by which `mine` comes later than `other`, both (m,).
+def lateness(mine: FloatArray, other: FloatArray, rate_hz: float = GRID_HZ) -> float:
+    """Samples by which `mine` comes later than `other`, both (m,) at `rate_hz`.
 
     It is where the correlation of the rates is largest, to which flat tops add nothing.
     """
-    most = round(MOST_LATE_S * GRID_HZ)
+    most = round(MOST_LATE_S * rate_hz)
     rates = np.gradient(mine), np.gradient(other)
     shifts = np.arange(-most, most + 1)
     inner = slice(most, mine.size - most)

@@ -19,6 +19,8 @@ FRACTIONS = (0.85, 0.5, 0.15)
 """Rotations at which half-cycles are timed, as shares of the peak."""
 RELEASE_FRACTIONS = (0.99, 0.96, 0.85, 0.5, 0.15)
 """The same for the quarter-cycle after the release, which is watched closer at its start."""
+TOP_DEGREE = 4
+"""Degree of the polynomial over the top of a half-cycle from which its peak is read."""
 SMALLEST_RAD = 2e-3
 """Half-cycles with smaller peaks are not used."""
 MOST = 30
@@ -204,12 +206,12 @@ def _peaks(
         inside = np.arange(inside[0], inside[-1] + 1)
         t = (inside - at) / rate_hz
         scale = max(float(np.abs(t).max()), 1e-6)
-        design = np.vander(t / scale, 5, increasing=True)
+        design = np.vander(t / scale, TOP_DEGREE + 1, increasing=True)
         coefficients, *_ = np.linalg.lstsq(design, side * theta[inside], rcond=None)
         slope = np.polynomial.Polynomial(coefficients).deriv()
         roots = [float(r.real) for r in slope.roots() if abs(r.imag) < 1e-9 and abs(r.real) < 0.7]
         top = min(roots, key=abs, default=0.0)
-        row = np.vander([top], 5, increasing=True)[0]
+        row = np.vander([top], TOP_DEGREE + 1, increasing=True)[0]
         covariance = np.linalg.inv(design.T @ design)
         sd = noise * float(np.sqrt(row @ covariance @ row))
         found.append((at / rate_hz + top * scale, side * float(row @ coefficients), sd, at))

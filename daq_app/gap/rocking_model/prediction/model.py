@@ -20,6 +20,7 @@ from daq_app.gap.rocking_model.prediction.vector import (
     kernel_vector,
     restitution_of,
 )
+from daq_app.gap.rocking_model.prediction.wires_alone import times_carry
 from daq_app.gap.rocking_model.records import Survey
 from daq_app.gap.rocking_model.tolerances import PUSH_RAD_S
 from sim_hardware.dynamics import shooting
@@ -141,6 +142,7 @@ class RockingModel:
         across = run.across
         k = places[across, 0]
         times[across] += table[k, shooting.FALL_S] + pause[k] + table[k + 1, shooting.RISE_S]
+        times = times + times_carry(run, values)
         times = times / (1.0 + values.get("clock.error", 0.0)) + free_times(run, values)
         if run.reference == "lvdt":
             # Before an impact one face opens, after it the other.

@@ -10,6 +10,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.differences import face_gain
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.rotation import anchors_turn
+from daq_app.gap.rocking_model.prediction.wires_alone import peaks_carry
 
 
 def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
@@ -25,7 +26,7 @@ def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
         gain = gain * (1.0 + values["cal_wire"])
     rest = run.swings.rest_s - run.swings.release_s
     drift = values.get("drift@wire.rate", 0.0) / run.wire_height_m if name == "wire" else 0.0
-    offset = values["zero"] + drift * (run.swings.peak_s - rest)
+    offset = values["zero"] + drift * (run.swings.peak_s - rest) + peaks_carry(run, values)
     levels = side[:, None] * run.swings.levels
     # A delay moves peaks and crossings alike; what a response rounds beyond it goes with the acceleration.
     slow = _second_order(values, name) * values["p"] ** 2
@@ -39,7 +40,7 @@ def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
 
 def _bent(run: RockingRun, values: Mapping[str, float], theta: FloatArray) -> FloatArray | float:
     """What wires out of line add to a rotation that is read from them."""
-    found: FloatArray | float = 0.0
+    found: FloatArray | float = values["wire_even"] * theta**2 if run.reference == "wire" else 0.0
     if bend := values.get(f"wire_cosine@{run.reference}.kappa", 0.0):
         found = bend * run.wire_bend_m * theta**2
     if higher := values.get(f"wire_anchor@{run.reference}.height", 0.0):

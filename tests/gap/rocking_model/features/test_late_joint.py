@@ -11,6 +11,7 @@ from daq_app.gap.rocking_model.features.coefficients import block_coefficients
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.late_joint import lateness
 from daq_app.gap.rocking_model.prediction.model import RockingModel
+from daq_app.gap.rocking_model.prediction.true_motion import true_rotations
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare
 from tests.support.simulated_wall import simulate
 
@@ -40,14 +41,60 @@ def test_what_a_late_joint_shows_of_itself_is_what_it_shows_in_time(effect: str,
 
 def _predicted(run: RockingRun, family: str, effect: dict[str, float]) -> np.ndarray:
     """What the model makes of the coefficients of a family under an effect."""
-    model = RockingModel(run.survey)
-    usual = {p.name: p.mean for p in (*model.nuisance, *model.local_nuisance(run))}
     first = 0
     for block in run.blocks:
         if block.family == family:
             break
         first += len(block.names)
-    return block_coefficients(run, usual | effect)[0][first : first + len(_block(run, family).names)]
+    return block_coefficients(run, _usual(run, effect))[0][first : first + len(_block(run, family).names)]
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        {"sliding": {"c": 0.006}},
+        {"flexible_wall": {"gain": 0.008, "frequency": 11.0, "zeta": 0.015}},
+        {"wire_cosine@wire": {"kappa": 0.05}},
+    ],
+    ids=lambda effect: next(iter(effect)),
+)
+def test_what_moves_the_wires_alone_is_predicted_where_the_motion_is_read_from_them(
+    effect: dict[str, dict[str, float]],
+) -> None:
+    """The wall moves as it does without: behind the wires are the same peaks, and as much is left of
+    times."""
+    late = {"lag@lvdt": {"tau": 0.02}}
+    (run,), (plain,) = (prepare(simulate(late | more, (0.35,)))[0] for more in (effect, {}))
+    assert run.reference == plain.reference == "wire"
+    known = {f"{name}.{key}": value for name, values in effect.items() for key, value in values.items()}
+    behind = _peaks(plain, {})
+    seen, told = (
+        _peaks(run, values)[: behind.size] - behind[: run.swings.peak_rad.size] for values in ({}, known)
+    )
+    # How far the wires are off at rest each run finds for itself.
+    assert np.std(told) < 0.2 * np.std(seen)
+    left, ignored, before = _left_of_times(run, known), _left_of_times(run, {}), _left_of_times(plain, {})
+    shared = sorted(set(left) & set(before))
+    told = np.array([left[k] - before[k] for k in shared])
+    seen = np.array([ignored[k] - before[k] for k in shared])
+    assert np.std(told) < max(0.2 * np.std(seen), 5e-5)
+
+
+def _usual(run: RockingRun, effect: dict[str, float]) -> dict[str, float]:
+    model = RockingModel(run.survey)
+    return {p.name: p.mean for p in (*model.nuisance, *model.local_nuisance(run))} | effect
+
+
+def _peaks(run: RockingRun, effect: dict[str, float]) -> np.ndarray:
+    """The wall's peaks as the model sees them behind those of the reference."""
+    return true_rotations(run, _usual(run, effect))[0]
+
+
+def _left_of_times(run: RockingRun, effect: dict[str, float]) -> dict[tuple[int, ...], float]:
+    """What the model leaves of each time feature, s, by its crossings."""
+    predicted = RockingModel(run.survey).predict(run, _usual(run, effect)).features
+    left = run.features.values - predicted
+    return dict(zip(map(tuple, run.places.tolist()), left.tolist(), strict=False))
 
 
 def test_joints_that_reach_their_limit_or_go_in_steps_say_nothing() -> None:

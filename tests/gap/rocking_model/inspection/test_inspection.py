@@ -15,6 +15,7 @@ from daq_app.gap.rocking_model.findings import findings_of
 from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels, found_marks
 from daq_app.gap.rocking_model.inspection.saturation import saturated
 from daq_app.gap.rocking_model.inspection.wiring import mend
+from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.run_cache import RunCache
@@ -109,6 +110,26 @@ def test_exchanged_plugs_are_put_back() -> None:
     assert set(found_marks(crossed)) == {"swap@wire"}
     assert abs(_value(crossed[0], "wire", "gain")) < 5e-3
     assert "WP-1 and WP-4 exchanged" in _words(crossed)
+
+
+def test_exchanged_plugs_of_wires_that_are_late_are_put_back() -> None:
+    """What is left of a signal that comes 30 ms late is as much as an exchange leaves of it."""
+    runs = simulate({"lag@wire": {"tau": 0.03}}, ONE)
+    for run in runs:
+        _exchange(run, "WP-2", "WP-3")
+    crossed, _ = prepare(runs)
+    assert "WP-2 and WP-3 exchanged" in _words(crossed)
+
+
+def test_a_reversed_wire_leaves_the_next_one_its_voltage_as_it_was() -> None:
+    """Crosstalk is of volts: turning the readings round again does not turn what the next channel saw."""
+    (run,) = simulate({}, ONE)
+    place = {sensor.id: i for i, sensor in enumerate(run.sensors)}["WP-4"]
+    run.channels[place] *= -1.0
+    before = crosstalk(run, [place + 1])
+    (mended,), wiring = mend([run])
+    assert wiring.reversed_ids == ("WP-4",)
+    np.testing.assert_allclose(crosstalk(mended, [place + 1]), before)
 
 
 def test_accelerometers_along_z_that_are_exchanged_are_put_back() -> None:

@@ -19,7 +19,7 @@ from daq_app.gap.rocking_model.features.differences import (
     unit_coefficients,
 )
 from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size, with_crosstalk
-from daq_app.gap.rocking_model.features.oscillations.ring_response import bent_form, bent_wall
+from daq_app.gap.rocking_model.features.oscillations.ring_response import bent_form, bent_share, bent_wall
 from daq_app.gap.rocking_model.features.pivots import travel
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape, turn_shape
@@ -45,7 +45,7 @@ _TURNS = 8
 
 def _wire_block(scene: Scene) -> Block | None:
     run, joint, grid, reference = scene.run, scene.joint, scene.grid, scene.reference
-    rows, heights, names = wall_rotation(run)
+    rows, heights, _ = wall_rotation(run)
     if len(rows) == 0:
         return None
     theta = np.average(rows, axis=0, weights=heights**2)
@@ -58,7 +58,13 @@ def _wire_block(scene: Scene) -> Block | None:
     if found is not None and some:
         # Other wires than in the other runs: their mean has another calibration.
         found.covariance[found.names.index("gain"), found.names.index("gain")] += _OTHER_WIRES**2
-    return with_crosstalk(found, heights @ _leaked(run, names) / (heights @ heights))
+    return with_crosstalk(found, leaked_turn(run))
+
+
+def leaked_turn(run: GapRun) -> FloatArray:
+    """What a full crosstalk would add to the wires' mean rotation, (m,), rad."""
+    _, heights, names = wall_rotation(run)
+    return np.asarray(heights @ _leaked(run, names) / (heights @ heights))
 
 
 def _leaked(run: GapRun, names: tuple[str, ...]) -> FloatArray:
@@ -165,16 +171,10 @@ def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) ->
 
 
 def _bent(run: RockingRun, block: Block, values: Mapping[str, float], of_base: bool) -> FloatArray | float:
-    """What a wall that bends adds to the wires' mean rotation (weights z²) or to the base."""
+    """What a wall that bends adds to the wires' mean rotation or to the base."""
+    share = bent_share(run, of_base=of_base)
     found: FloatArray | float = 0.0
     for form, size in bent_wall(run, values).items():
-        z = np.array([wire.sensor.position_m[2] for wire in run.wires])
-        shape = (z / run.survey.height_m) ** 2
-        share = (
-            float(np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0] @ shape)
-            if of_base
-            else float(z @ shape / (z @ z))
-        )
         found = found + size * share * unit_coefficients(run, block, form, partial(bent_form, run, form))
     return found
 

@@ -110,6 +110,15 @@ def bent_form(run: RockingRun, name: str) -> FloatArray:
     return forced_column(run.grid, frequency, zeta, accelerations=False)
 
 
+def bent_share(run: RockingRun, *, of_base: bool) -> float:
+    """What a top that bends by 1 m makes of the wires' mean rotation (weights z²), rad, or of the base, m."""
+    z = np.array([wire.sensor.position_m[2] for wire in run.wires])
+    shape = (z / run.survey.height_m) ** 2
+    if of_base:
+        return float(np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0] @ shape)
+    return float(z @ shape / (z @ z))
+
+
 def bending(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     """Ring-down of a cantilever mode, and what effects on the wires look like in the same columns."""
     # Bending is told against the rotation of the reference; wires as the reference show none of it.
