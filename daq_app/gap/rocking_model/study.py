@@ -164,5 +164,12 @@ def _doubt_the_survey(result: Diagnosis) -> Diagnosis:
     verdict: Verdict = "none_of_these" if old.verdict == "none_of_these" else "cannot_tell"
     decision = Decision(verdict, old.effects, old.family, sentence, 0.0)
     advice = "Check that the rig file is that of this specimen, and survey its weight, height and base again."
-    rest = replace(result.rest, unknown=max(result.rest.unknown, EITHER))
-    return replace(result, decision=decision, next_measurement=advice, rest=rest)
+    unknown = max(result.rest.unknown, EITHER)
+    less = (1.0 - unknown) / max(1.0 - result.rest.unknown, 1e-9)
+    return replace(
+        result,
+        which=tuple(replace(entry, probability=less * entry.probability) for entry in result.which),
+        decision=decision,
+        next_measurement=advice,
+        rest=replace(result.rest, unknown=unknown),
+    )

@@ -84,6 +84,7 @@ def test_the_rig_file_of_another_wall_is_doubted_and_no_effect_blamed() -> None:
     assert "alpha" in result.decision.sentence
     assert "rig file" in result.next_measurement
     assert result.rest.unknown >= 0.5
+    assert sum(hypothesis.probability for hypothesis in result.which) <= 1.0 - result.rest.unknown + 1e-9
 
 
 def test_one_run_says_what_one_run_cannot(wall: GapRun) -> None:
