@@ -272,7 +272,7 @@ class Storm:
         status = session.recorder.status
         safe = status.acknowledged_sample if status.recording else 0
         copy = self.folder.with_name(f"{self.folder.name}-kill{number}")
-        shutil.copytree(self.folder, copy, ignore=shutil.ignore_patterns("*.h5*"))
+        _copy_as_it_stands(self.folder, copy)
         self.log.append(f"{sample}: killed (copy {number}), safe up to {safe}")
         return copy, safe, sample
 
@@ -372,6 +372,15 @@ class Storm:
                 self.broken.append(
                     f"{copy.name}: killed at {sample}, the release at {release} is lost: {spans}"
                 )
+
+
+def _copy_as_it_stands(folder: Path, copy: Path) -> None:
+    """All but the run files; what the recorder removes meanwhile, a kill would not leave a moment later."""
+    try:
+        shutil.copytree(folder, copy, ignore=shutil.ignore_patterns("*.h5*"))
+    except shutil.Error as problem:
+        if any(Path(source).exists() for source, _, _ in problem.args[0]):
+            raise
 
 
 def storm_once(rig_file: Path, folder: Path, seed: int) -> tuple[list[str], list[str]]:
