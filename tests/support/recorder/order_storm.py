@@ -223,7 +223,7 @@ class Storm:
             spare_folder=self._spare,
             patience=Patience(read_timeout_s=0.02, silence_limit_s=600.0),
         )
-        kills: list[tuple[Path, int, int]] = []
+        kills: list[_Kill] = []
         with disk.in_place():
             session = Session(settings, listener, QuickFinaliser())  # type: ignore[arg-type]
             session.start()
@@ -235,13 +235,13 @@ class Storm:
                 listener.until(lambda: session.analyst.voice.sample >= driver.allowed - 400)
                 session.tick()
                 if self.rng.random() < 0.03 and not disk.trouble:
-                    kills.append(self._kill(session, listener, driver.allowed, len(kills)))
+                    kills.append(self._kill(session, driver.allowed, len(kills)))
             disk.trouble = 0
             self._end(session, listener)
         self._check_runs(wall, [*self._runs_in(self.folder), *self._runs_in(self._spare)])
         self._check_words(listener.states)
-        for copy, safe, sample in kills:
-            self._check_kill(wall, copy, safe, sample)
+        for kill in kills:
+            self._check_kill(wall, kill)
         return self.broken
 
     # -- what happens ----------------------------------------------------------------------------
@@ -267,14 +267,15 @@ class Storm:
             disk.trouble = 0
             self.log.append("disk: well")
 
-    def _kill(self, session: Session, listener: Listener, sample: int, number: int) -> tuple[Path, int, int]:
+    def _kill(self, session: Session, sample: int, number: int) -> _Kill:
         """The folder as kill −9 would leave it now, what had been called safe, and the newest sample."""
         status = session.recorder.status
         safe = status.acknowledged_sample if status.recording else 0
         copy = self.folder.with_name(f"{self.folder.name}-kill{number}")
+        finished = tuple(find_runs(self.folder))
         _copy_as_it_stands(self.folder, copy)
         self.log.append(f"{sample}: killed (copy {number}), safe up to {safe}")
-        return copy, safe, sample
+        return _Kill(copy, finished, safe, sample)
 
     @staticmethod
     def _end(session: Session, listener: Listener) -> None:
@@ -334,12 +335,15 @@ class Storm:
             self.broken.append(f"{path.name}: readings differ from what was measured")
 
     def _check_words(self, states: list[StateMessage]) -> None:
-        armed_plan = None
+        armed_plan, before = None, State.IDLE
         for message in states:
             judgement = message.judgement
             said = f"{judgement.word} {judgement.do} {judgement.gauge} {judgement.alarm}".lower()
             if message.judgement.target != message.plan.theta0_over_alpha:
                 self.broken.append(f"target {judgement.target} is not the plan's: {message}")
+            if before is State.AT_REST and message.state is State.ARMED:
+                armed_plan = None  # one test ended and the next was armed between two messages
+            before = message.state
             if message.armed:
                 armed_plan = armed_plan or message.plan
                 if message.plan != armed_plan:
@@ -353,12 +357,13 @@ class Storm:
             if "stop:" in said and re.search(r"\b(pull|on target)\b", said):
                 self.broken.append(f"contradicting words: {said}")
 
-    def _check_kill(self, wall: Wall, copy: Path, safe: int, sample: int) -> None:
+    def _check_kill(self, wall: Wall, kill: _Kill) -> None:
+        copy, safe, sample = kill.copy, kill.safe, kill.sample
         recover_rings(copy)
         recover(copy)
         ends = [0]
         spans = []
-        for path in find_runs(copy):
+        for path in (*find_runs(copy), *kill.finished):
             with open_run(path) as run:
                 self._check_samples(wall, run, path)
                 ends.append(run.first_sample + run.n_samples)
@@ -372,6 +377,19 @@ class Storm:
                 self.broken.append(
                     f"{copy.name}: killed at {sample}, the release at {release} is lost: {spans}"
                 )
+
+
+@dataclass(frozen=True)
+class _Kill:
+    """A moment at which the recorder might have been killed, and what was on disk then."""
+
+    copy: Path
+    """All but the run files, which the rest of the sequence leaves as they are."""
+    finished: tuple[Path, ...]
+    safe: int
+    """Samples that had been called safe."""
+    sample: int
+    """The newest one that had been read."""
 
 
 def _copy_as_it_stands(folder: Path, copy: Path) -> None:
