@@ -14,9 +14,9 @@ from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.response import first_order
-from daq_app.gap.rocking_model.motion.late_joint import lateness
+from daq_app.gap.rocking_model.motion.late_joint import common_lateness
 from daq_app.gap.rocking_model.motion.rotation import zeroed
-from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Wiring
+from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Sensor, Wiring
 from daq_app.gap.rocking_model.tolerances import (
     EXCHANGE_EACH,
     EXCHANGE_GAIN,
@@ -67,10 +67,12 @@ def _check(run: GapRun) -> Wiring:
     # A channel that should show next to nothing cannot be judged by its slope.
     lively = size > 0.05 * np.median(size)
     exchanged: list[tuple[str, str]] = []
+    parted = {sensor.id for sensor in run.sensors if _away_from_impacts(sensor)}
     places = 0
     for group in _groups(run, ids):
         at = [ids.index(name) for name in group]
-        due = _as_late_as(measured[at], expected[at])
+        # What is read away from impacts only has the edges of that choice, which are late with nothing.
+        due = expected[at] if group[0] in parted else _as_late_as(measured[at], expected[at])
         order, turn = _order(np.array([[_misfit(measured[i], e) for e in due] for i in at]))
         exchanged += [(group[i], group[j]) for i, j in enumerate(order) if i != j]
         places = max(places, turn)
@@ -112,11 +114,9 @@ def _as_late_as(measured: FloatArray, expected: FloatArray) -> FloatArray:
 
     Exchanged plugs move no corner in time: a family that is late is late at whatever terminal.
     """
-    late = [lateness(y, e, WORK_HZ) for y, e in zip(measured, expected, strict=True) if y.any() and e.any()]
-    if not late:
-        return expected
+    late = common_lateness(measured, expected, WORK_HZ)
     at = np.arange(expected.shape[1])
-    return np.array([np.interp(at - float(np.median(late)), at, row) for row in expected])
+    return np.array([np.interp(at - late, at, row) for row in expected])
 
 
 def _order(misfit: FloatArray) -> tuple[list[int], int]:
@@ -172,13 +172,16 @@ def _compare(run: GapRun) -> tuple[FloatArray, FloatArray, list[str]]:
     for i, values in smooth.items():
         shape = _expected(run, i, theta, acceleration)
         if shape is not None:
-            upright = run.sensors[i].family == "accelerometer" and run.sensors[i].axis == "z"
-            # An accelerometer along z shows more of an impact than of all rocking between impacts.
-            seen = away if upright else 1.0
+            seen = away if _away_from_impacts(run.sensors[i]) else 1.0
             measured.append(values * seen)
             expected.append(shape * seen)
             ids.append(run.sensors[i].id)
     return np.array(measured), np.array(expected), ids
+
+
+def _away_from_impacts(sensor: Sensor) -> bool:
+    """An accelerometer along z shows more of an impact than of all rocking between impacts."""
+    return sensor.family == "accelerometer" and sensor.axis == "z"
 
 
 def _thin(values: FloatArray, step: int) -> FloatArray:

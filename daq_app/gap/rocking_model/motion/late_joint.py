@@ -30,19 +30,42 @@ class InStep:
     """By how much it was put sooner."""
 
 
-def lateness(mine: FloatArray, other: FloatArray, rate_hz: float = GRID_HZ) -> float:
-    """Samples by which `mine` comes later than `other`, both (m,) at `rate_hz`.
+def lateness(mine: FloatArray, other: FloatArray) -> float:
+    """Samples of the grid by which `mine` comes later than `other`, both (m,).
 
     It is where the correlation of the rates is largest, to which flat tops add nothing.
     """
+    most = round(MOST_LATE_S * GRID_HZ)
+    return _largest(_alike(mine, other, most))
+
+
+def common_lateness(mine: FloatArray, other: FloatArray, rate_hz: float) -> float:
+    """Samples by which all of `mine` come later than `other`, both (k, m), whatever their signs and sizes."""
     most = round(MOST_LATE_S * rate_hz)
+    pairs = [(y, e) for y, e in zip(mine, other, strict=True) if np.ptp(y) > 0.0 and np.ptp(e) > 0.0]
+    if not pairs:
+        return 0.0
+    power = [
+        float(np.gradient(y) @ np.gradient(y)) * float(np.gradient(e) @ np.gradient(e)) for y, e in pairs
+    ]
+    return _largest(
+        np.sum([_alike(y, e, most) ** 2 / own for (y, e), own in zip(pairs, power, strict=True)], axis=0)
+    )
+
+
+def _alike(mine: FloatArray, other: FloatArray, most: int) -> FloatArray:
+    """Correlation of the rates for delays of −`most` to `most` samples."""
     rates = np.gradient(mine), np.gradient(other)
-    shifts = np.arange(-most, most + 1)
     inner = slice(most, mine.size - most)
-    alike = [float(rates[0][inner] @ np.roll(rates[1], k)[inner]) for k in shifts]
-    k = min(max(int(np.argmax(alike)), 1), shifts.size - 2)
-    bend = alike[k - 1] - 2.0 * alike[k] + alike[k + 1]
-    return float(shifts[k]) + (0.5 * (alike[k - 1] - alike[k + 1]) / bend if bend < 0.0 else 0.0)
+    return np.array([float(rates[0][inner] @ np.roll(rates[1], k)[inner]) for k in range(-most, most + 1)])
+
+
+def _largest(alike: FloatArray) -> float:
+    """Place of the maximum from the middle, by a parabola through it and its neighbours."""
+    k = min(max(int(np.argmax(alike)), 1), alike.size - 2)
+    bend = float(alike[k - 1] - 2.0 * alike[k] + alike[k + 1])
+    between = 0.5 * float(alike[k - 1] - alike[k + 1]) / bend if bend < 0.0 else 0.0
+    return k - alike.size // 2 + between
 
 
 def in_step(joint: Rotation, grid: Grid, rate_hz: float) -> InStep:
