@@ -15,8 +15,10 @@ from daq_app.rocking.geometry.joint import BaseJoint
 
 Floats = NDArray[np.float64]
 
-_GEOMETRY_SHARE = 0.0005
-"""Standard uncertainty of a family's gain from the places of its ends, common to all its sensors."""
+_DATUM_SHARE = 0.0005
+"""Standard uncertainty of the wires' gain from the datum of their heights, common to all: 1 mm of 2 m,
+assumed. The LVDTs have none: the distance of their faces is the mean of single places, whose errors the
+plane's misfit shows."""
 HOLD_S = (0.5, 0.02)
 """Levels of the hold are read over this span before the release: slow tiltmeters have settled."""
 _PLANE = 3
@@ -50,8 +52,8 @@ def gains_of(signals: Signals, times: TestTimes, wires: SingleWires | None) -> F
     if wires is not None:
         own = wires.family_gain_sigma(signals.geometry.weights()[0])
     return FamilyGains(
-        wires=math.hypot(own, _GEOMETRY_SHARE),
-        lvdts=math.hypot(_lvdts(signals, hold), _GEOMETRY_SHARE),
+        wires=math.hypot(own, _DATUM_SHARE),
+        lvdts=_lvdts(signals, hold),
         tiltmeters=_tiltmeters(signals, hold, times.hold_rad),
     )
 
