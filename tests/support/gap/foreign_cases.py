@@ -1,7 +1,8 @@
 """The independently simulated recordings as runs of the diagnosis.
 
 ``python -m tests.support.gap.foreign_cases case_001 …`` prints what is said about them (all effects), with
-``--only EFFECT,EFFECT`` what is said when only these are considered.
+``--only EFFECT,EFFECT`` what is said when only these are considered, with ``--folder`` those of another
+folder.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ _KINDS: dict[str, tuple[Any, float]] = {
 }
 
 
-def load_case(name: str) -> list[GapRun]:
-    """All runs of one case, in SI."""
-    folder = FOLDER / name
+def load_case(name: str, cases: Path = FOLDER) -> list[GapRun]:
+    """All runs of one case of a folder of cases, in SI."""
+    folder = cases / name
     case = json.loads((folder / "case.json").read_text(encoding="utf-8"))
     body = case["specimen"]
     p = math.sqrt(body["weight_N"] * body["R0_m"] / body["inertia_about_base_corner_kgm2"])
@@ -65,9 +66,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("cases", nargs="+")
     parser.add_argument("--only", default="")
+    parser.add_argument("--folder", type=Path, default=FOLDER)
     given = parser.parse_args()
     for case in given.cases:
-        result = diagnose_runs(load_case(case), only=tuple(filter(None, given.only.split(","))))
+        result = diagnose_runs(load_case(case, given.folder), only=tuple(filter(None, given.only.split(","))))
         first = ", ".join(
             f"{' + '.join(r.effects) or 'nothing'} {r.probability:.3f}" for r in result.which[:3]
         )
