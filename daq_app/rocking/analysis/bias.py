@@ -20,7 +20,7 @@ from daq_app.rocking.motion.filtered_peaks import corrected_peaks, filtered_peak
 from daq_app.rocking.motion.motion_fit import MotionFit, fit_motion
 from daq_app.rocking.motion.swings import MotionSettings, MotionTrack
 from daq_app.rocking.motion.velocity import VelocityFilter
-from daq_app.rocking.theory.housner import free_rocking
+from daq_app.rocking.theory.housner import FreeRocking, free_rocking
 
 Floats = NDArray[np.float64]
 
@@ -86,15 +86,36 @@ class _Simulated:
     """Peaks of the filtered velocity."""
 
 
-def _simulated(wanted: BiasSettings, rng: np.random.Generator) -> _Simulated:
-    settings = wanted.settings
-    p, alpha, rate = settings.p_rad_s, settings.alpha_rad, settings.rate_hz
-    theta0 = math.copysign(min(abs(wanted.theta0_rad), 0.95 * alpha), wanted.theta0_rad)
-    motion = free_rocking(theta0, wanted.r, p, alpha, release_s=0.6, max_impacts=max(wanted.impacts, 2))
-    time = np.arange(round((motion.impacts_s[-1] + 0.1) * rate)) / rate
-    rotation = motion.rotation(time) + rng.normal(0.0, wanted.noise_rad, time.size)
+@dataclass(frozen=True, slots=True)
+class _Exact:
+    """The motion that all simulated tests share before noise comes to it."""
+
+    motion: FreeRocking
+    time_s: Floats
+    rotation_rad: Floats
+
+    @classmethod
+    def of(cls, wanted: BiasSettings) -> _Exact:
+        settings = wanted.settings
+        p, alpha = settings.p_rad_s, settings.alpha_rad
+        theta0 = math.copysign(min(abs(wanted.theta0_rad), 0.95 * alpha), wanted.theta0_rad)
+        motion = free_rocking(theta0, wanted.r, p, alpha, release_s=0.6, max_impacts=max(wanted.impacts, 2))
+        time = np.arange(round((motion.impacts_s[-1] + 0.1) * settings.rate_hz)) / settings.rate_hz
+        return cls(motion, time, motion.rotation(time))
+
+    @property
+    def theta0_rad(self) -> float:
+        """Signed release rotation."""
+        return self.motion.side * float(self.motion.peaks_rad[0])
+
+
+def _simulated(wanted: BiasSettings, exact: _Exact, rng: np.random.Generator) -> _Simulated:
+    motion, time = exact.motion, exact.time_s
+    rotation = exact.rotation_rad + rng.normal(0.0, wanted.noise_rad, time.size)
     first = int(np.searchsorted(time, motion.impacts_s[0] + 1e-3))
-    track = MotionTrack.begin(settings, time[:first], rotation[:first], motion.release_s, theta0)
+    track = MotionTrack.begin(
+        wanted.settings, time[:first], rotation[:first], motion.release_s, exact.theta0_rad
+    )
     # The detector finds a crossing from some 80 samples around it.
     jitter = wanted.noise_rad / np.maximum(motion.speeds_before_rad_s, 1e-3) / 6.0
     track.add_impacts((motion.impacts_s + rng.normal(0.0, jitter)).tolist(), time, rotation)
@@ -105,7 +126,8 @@ def _simulated(wanted: BiasSettings, rng: np.random.Generator) -> _Simulated:
 def _estimates(wanted: BiasSettings) -> list[dict[str, float]]:
     """r by every method on each simulated motion; the slopes of all of them are found together."""
     rng = np.random.default_rng(wanted.seed)
-    runs = [_simulated(wanted, rng) for _ in range(wanted.runs)]
+    exact = _Exact.of(wanted)
+    runs = [_simulated(wanted, exact, rng) for _ in range(wanted.runs)]
     p, alpha = wanted.settings.p_rad_s, wanted.settings.alpha_rad
     filtered = np.array([run.filtered_rad_s for run in runs])
     corrected = corrected_peaks(filtered, wanted.velocity_filter, p, alpha)
