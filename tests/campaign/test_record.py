@@ -105,6 +105,8 @@ def test_it_says_plan_check_zero_course_and_result(record: Path) -> None:
         "21 °C, Riß über der 3. Lage; α, θ",
         "AC-3 was overloaded",
         "CRT, rotation peaks (4.5)",
+        "from wires: good, everything that was recorded agrees",
+        "± is half of the 95 % interval",
         "good, every byte proven",
         "simulated: no wall was tested",
         "Operator", "Test leader", "Checked by", "Signature",

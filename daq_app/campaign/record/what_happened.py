@@ -9,7 +9,9 @@ from daq_app.campaign.record.parts import Grid, Pairs, Part, Section, Tone, Word
 from daq_app.campaign.record.picture import record_picture
 from daq_app.campaign.record.source import RecordSource, planned_level
 from daq_app.campaign.report.summary import TestSummary
+from daq_app.campaign.result.family_rows import CAPTION, HEADINGS, family_rows
 from daq_app.config.wording import plus_minus
+from daq_app.rocking.families.verdict_words import verdict_sentence
 
 _METHODS = {
     "CRT": "CRT, rotation peaks (4.5)",
@@ -153,6 +155,8 @@ def results_section(source: RecordSource) -> Section:
         ("θ0", f"{figure(1e3 * test.theta0_rad, 2)} mrad, θ0/α = {test.phi0:.4f}"),
         ("θ0 by instruments", _theta0_by_family(analysis)),
         ("Impacts", str(len(test.impacts_s))),
+        ("r by all instruments", MISSING if test.verdict is None else verdict_sentence(test.verdict)),
+        *(("Doubt about r", reason) for reason in _doubts(test)),
         (
             "Specimen",
             f"α = {test.alpha_rad:.4f} rad, p = {test.p_rad_s:.3f} rad/s, r_max = {test.r_max:.4f} (1.2)",
@@ -167,6 +171,7 @@ def results_section(source: RecordSource) -> Section:
                 tuple(_estimate_rows(test)) or ((("too few impacts for r",) + ("",) * 5),),
                 (3.2, 1.0, 1.4, 1.0, 1.0, 1.5),
             ),
+            *_families(test),
             record_picture(test),
             Grid(
                 ("n", "s after release", "Peak, mrad", "Peak θ/α", "T, s"),
@@ -176,6 +181,21 @@ def results_section(source: RecordSource) -> Section:
             ),
         ],
     )
+
+
+def _families(test: TestSummary) -> list[Part]:
+    """What each sensor family says of θ0 and r."""
+    rows = tuple(family_rows(test))
+    if not rows:
+        return []
+    return [Grid(HEADINGS, rows, (2.0, 2.0, 2.2, 2.2, 1.0, 1.0, 1.6), small=True), Words(CAPTION)]
+
+
+def _doubts(test: TestSummary) -> tuple[str, ...]:
+    """Why r is not to be believed; none where it is."""
+    if test.verdict is None or test.verdict.trust != "doubtful":
+        return ()
+    return test.verdict.reasons
 
 
 def _theta0_by_family(analysis: object) -> str:
