@@ -10,7 +10,7 @@ from daq_app.config.wording import plus_minus
 from daq_app.rocking.families.verdict import FamilyView
 
 HEADINGS: Final = ("Family", "θ0, mrad", "r EAV", "r CRT", "Impacts", "Late, ms", "Remarks")
-CAPTION: Final = "± is half of the 95 % interval; r rests on the family with a star."
+CAPTION: Final = "± is half of the 95 % interval; r and θ0 rest on the families with a star."
 _DASH: Final = "–"
 _NORMAL95: Final = 1.96
 
@@ -41,4 +41,7 @@ def _with_interval(r: float, interval95: tuple[float, float] | None) -> str:
 
 
 def _number(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}".replace("-", "−") if math.isfinite(value) else _DASH
+    if not math.isfinite(value):
+        return _DASH
+    # A sum with zero has no negative zero.
+    return f"{round(value, digits) + 0.0:.{digits}f}".replace("-", "−")
