@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 
 from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_HARDWARE, print_paragraph, reported
+from daq_app.extras import absent
 from daq_app.guarded import program
 
 
@@ -41,6 +42,14 @@ def demo(
     from daq_app.config.shipped import shipped_configs
 
     console = Console(highlight=False, markup=False, soft_wrap=True)
+    # Said before a day of tests is played, not after it.
+    for extra in ("sim",) if headless else ("sim", "window"):
+        if needed := absent(extra):
+            print_paragraph("Error", needed)
+            raise typer.Exit(EXIT_BAD_INPUT)
+    no_report = absent("report")
+    if no_report:
+        console.print(f"No report will be made of the day: {no_report}")
     campaign_file = shipped_configs() / "campaigns" / "costa.toml"
     rig_file = shipped_configs() / "fr1.toml"
     runs = folder / "runs"
@@ -73,7 +82,8 @@ def demo(
         except DayEnded as error:
             print_paragraph("Incomplete", str(error))
             raise typer.Exit(EXIT_FAILED) from None
-    report(runs, campaign_file, folder / "report", None, "", 0, False)
+    if not no_report:
+        report(runs, campaign_file, folder / "report", None, "", 0, False)
     console.print(f"Look at the last run: daq-app view {taken[-1].run}")
     console.print("Your own wall: daq-app rig new")
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from daq_app import extras
+from daq_app.cli import main
 from daq_app.runfile import open_run
 
 
@@ -27,3 +29,21 @@ def test_a_test_day_plays_in_an_empty_folder_and_ends_with_a_report(tmp_path: Pa
     assert tests == ["FR1-L1-1", "FR1-L1-2"]
     assert (tmp_path / "day" / "report" / "report.html").is_file()
     assert "daq-app view" in done.stdout
+
+
+@pytest.mark.parametrize(("package", "extra"), [("numba", "sim"), ("PySide6", "window")])
+def test_a_day_that_lacks_a_package_says_so_before_it_begins(
+    package: str,
+    extra: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(extras, "find_spec", lambda name: None if name == package else object())
+    monkeypatch.setattr(sys, "argv", ["daq-app", "demo", str(tmp_path / "day")])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    said = " ".join("".join(capsys.readouterr()).split())
+    assert f"needs the package {package}" in said and f"rocking-test-recorder[{extra}]" in said
+    assert not (tmp_path / "day").exists()
