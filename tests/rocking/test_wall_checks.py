@@ -12,6 +12,7 @@ from daq_app.config import load_rig, plan_tasks
 from daq_app.rocking import AnalysisOptions, LiveAnalyser, TestAnalysis, analyse_record
 from daq_app.rocking.theory.block import RigidBlock
 from sim_hardware.direct import synthesise_test
+from studies.restitution.faults import Fault
 from studies.restitution.laboratory import LaboratoryTest, draw_test
 
 ROOT = Path(__file__).parents[2]
@@ -87,6 +88,17 @@ def test_a_tilted_base_leaves_r_alone_and_the_mean_of_alpha_where_it_is():
 
     assert "duration" not in kinds(analysis)
     assert wires.alpha_rad == pytest.approx(test.truth["alpha_rad"], rel=0.01)
+
+
+def test_wires_that_drift_are_blamed_for_sides_that_differ_and_not_the_wall():
+    test, _ = drawn({})
+    drifting = Fault("wire", "drift", 3e-4).record(test)
+
+    analysis = analyse_record(drifting, AnalysisOptions(fit=False, bias_runs=0, keep_series=False))
+
+    assert ("wires", "drift") in {(finding.family, finding.kind) for finding in analysis.findings}
+    assert "side" not in kinds(analysis)
+    assert analysis.verdict.trust == "doubtful"
 
 
 def test_friction_is_said_while_the_wall_still_rocks():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 from daq_app.rocking.analysis.families_table import LEADS, body_of, other_is_blamed
 from daq_app.rocking.analysis.instruments import Instruments
@@ -12,6 +13,9 @@ from daq_app.rocking.families.block_checks import duration_findings, pattern_fin
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.motion.impact_pattern import impact_pattern
 from daq_app.rocking.theory.block import RigidBlock
+
+_MADE_BY_A_DRIFT: Final = ("side", "duration", "pause")
+"""A zero that moves makes leans to one side longer and faster than those to the other."""
 
 
 def wall_findings(
@@ -31,6 +35,8 @@ def wall_findings(
         families[LEADS[other]] = tracks.other
     bodies = {name: body_of(track, 0.0) for name, track in families.items()}
     found = [*pattern_findings(impact_pattern(tracks.lead)), *duration_findings(bodies)]
+    if any(f.kind == "drift" and f.treatment == "none" and LEADS[lead] in f.family for f in findings):
+        found = [finding for finding in found if finding.kind not in _MADE_BY_A_DRIFT]
     if joint is not None:
         block = RigidBlock.from_specimen(instruments.record.rig.specimen)
         found += pivot_findings(block, joint.inset_left_m, joint.inset_right_m)
