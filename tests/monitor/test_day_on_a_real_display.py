@@ -73,6 +73,7 @@ class Day:
             pass
         pictures = os.environ.get("DAQ_APP_PICTURES")
         if pictures:
+            Path(pictures).mkdir(parents=True, exist_ok=True)
             for picture in self.shots.glob("*.png"):
                 shutil.copy(picture, pictures)
 
