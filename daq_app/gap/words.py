@@ -24,6 +24,7 @@ _UNITS: Final = {
     "m/s²": 1.0,
     "1/m": 1.0,
     "mm per rad/s": 1e3,
+    "mrad per rad/s": 1e3,
     "per 100 mrad/s": 0.1,
     "": 1.0,
 }
@@ -45,6 +46,7 @@ _PHRASES: Final = {
     "dwell": "the wall dwells upright for {tau|ms} after each impact",
     "bounce": "the wall bounces for {tau|ms} at each impact",
     "sliding": "the base slides at impacts, by {c|mm per rad/s}",
+    "corner_twist": "the wall turns about a corner at impacts, by {c|mrad per rad/s}",
     "flexible_wall": "the wall rings at {frequency|Hz}",
     "compliance": "rig or base gives way by {phi|mrad} under the full moment",
     "twist": "the wall twists about its vertical at {frequency|Hz}",

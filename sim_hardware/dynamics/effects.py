@@ -201,6 +201,27 @@ MOTION_EFFECTS: Final[tuple[EffectSpec, ...]] = (
         "wires step together, LVDTs do not",
     ),
     EffectSpec(
+        "corner_twist",
+        "contact",
+        "the wall turns about a corner at each impact, and stays turned",
+        "Δψ = c (cos φ + sin φ sgn θ̇⁻) |θ̇⁻|",
+        "block on four corners with friction",
+        (
+            Parameter("c", "s", -6e-3, 6e-3, "turn per approach speed", index=par.TURN),
+            Parameter(
+                "alternation",
+                "rad",
+                -1.5708,
+                1.5708,
+                "0 turns on and on, ±π/2 back and forth",
+                0.0,
+                par.TURN_ALTERNATION,
+            ),
+        ),
+        ("drift", "yaw"),
+        "wires at the two ends step apart at impacts and stay there; LVDTs do not",
+    ),
+    EffectSpec(
         "flexible_wall",
         "structure",
         "the wall bends: a mode rings after each impact",

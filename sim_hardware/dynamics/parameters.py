@@ -69,7 +69,9 @@ YAW_KICK: Final = 42  # rad per rad: yaw rate per velocity jump
 COMPLIANCE: Final = 43  # rad: rotation of the base under the moment m g R sin α
 SLIDE: Final = 44  # m per (rad/s): base slip at an impact
 RELEASE_EVEN: Final = 45  # 0: the holding force dies away as exp(−t/τ); 1: it falls evenly to nothing
-N_PARAMETERS: Final = 46
+TURN: Final = 46  # rad per (rad/s): turn about the vertical that stays after an impact
+TURN_ALTERNATION: Final = 47  # rad: 0 turns on and on, ±π/2 back and forth, ±π/4 on one side alone
+N_PARAMETERS: Final = 48
 
 ODD_IN_TIME: Final = (ZETA, COULOMB, QUADRATIC, AMBIENT_HZ)
 """Parameters that change their sign where time runs backwards: losses become gains."""

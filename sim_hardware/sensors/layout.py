@@ -16,7 +16,9 @@ EV_MODE: Final = 7  # state just after the event: value, rate
 EV_TWIST: Final = 9
 EV_YAW: Final = 11
 EV_SLID: Final = 13  # m, slip so far
-N_EVENT: Final = 14
+EV_TURN: Final = 14  # rad, turn about the vertical at this event
+EV_TURNED: Final = 15  # rad, turned so far
+N_EVENT: Final = 16
 
 # scene epochs: what holds from a time on
 EP_TIME: Final = 0

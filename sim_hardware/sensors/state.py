@@ -162,6 +162,7 @@ def fill_states(
         if event >= 0:
             _oscillate(t, epochs, e, events, event, states, k)
             states[la.ST_UX, k] += events[event, la.EV_SLID]
+            states[la.ST_YAW, k] += events[event, la.EV_TURNED]
         if epochs[e, la.EP_AMBIENT] != 0.0:
             phase = epochs[e, la.EP_AMBIENT_W] * t + epochs[e, la.EP_AMBIENT_PHASE]
             states[la.ST_GROUND, k] = epochs[e, la.EP_AMBIENT] * math.sin(phase)
@@ -169,11 +170,11 @@ def fill_states(
 
 @kernel
 def march(events: NDArray[np.float64], epochs: NDArray[np.float64]) -> None:
-    """Fill the oscillators' states and the slip so far of the events, in order of time."""
+    """Fill the oscillators' states, and the slip and turn so far, of the events, in order of time."""
     e = -1
     for i in range(events.shape[0]):
         e = max(last_at(epochs, events[i, la.EV_TIME], e), 0)
-        mode = twist = yaw = mode_rate = twist_rate = yaw_rate = slid = 0.0
+        mode = twist = yaw = mode_rate = twist_rate = yaw_rate = slid = turned = 0.0
         if i > 0:
             old = events[i - 1]
             dt = events[i, la.EV_TIME] - old[la.EV_TIME]
@@ -182,7 +183,7 @@ def march(events: NDArray[np.float64], epochs: NDArray[np.float64]) -> None:
             w, z = epochs[e, la.EP_TWIST_W], epochs[e, la.EP_TWIST_ZETA]
             twist, twist_rate = oscillator(old[la.EV_TWIST], old[la.EV_TWIST + 1], w, z, dt)
             yaw, yaw_rate = oscillator(old[la.EV_YAW], old[la.EV_YAW + 1], w, z, dt)
-            slid = old[la.EV_SLID]
+            slid, turned = old[la.EV_SLID], old[la.EV_TURNED]
         row = events[i]
         jump = row[la.EV_JUMP]
         row[la.EV_MODE] = mode
@@ -190,3 +191,4 @@ def march(events: NDArray[np.float64], epochs: NDArray[np.float64]) -> None:
         row[la.EV_TWIST], row[la.EV_TWIST + 1] = twist, twist_rate + epochs[e, la.EP_TWIST_KICK] * jump
         row[la.EV_YAW], row[la.EV_YAW + 1] = yaw, yaw_rate + epochs[e, la.EP_YAW_KICK] * jump
         row[la.EV_SLID] = slid + row[la.EV_SLIP]
+        row[la.EV_TURNED] = turned + row[la.EV_TURN]

@@ -6,6 +6,7 @@ may carry a target (``gain@WP-1``): the part before the ``@`` is compared here.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Final
 
@@ -53,6 +54,7 @@ COMPARABLE: Final[dict[str, str]] = {
     "base_tilt": "beta",
     "eccentric_mass": "e",
     "sliding": "c",
+    "corner_twist": "c",
     "dwell": "tau",
     "bounce": "tau",
     "residual_cable": "k",
@@ -73,11 +75,14 @@ def comparable(effect: str, label_value: float) -> float:
 
     The world's force of a slow release falls evenly until τ; a result's τ is the mean time of the force,
     whatever its form, and that of an even one is half. The world's clock runs at a rate that is wrong by its
-    error; a result's t' = (1 + ε) t (design) is of the time that passes between two samples.
+    error; a result's t' = (1 + ε) t (design) is of the time that passes between two samples. The world's wall
+    turns about a corner of one edge alone; a result's turn c (cos φ ± sin φ) is that at φ = ±45°.
     """
     match effect:
         case "slow_release":
             return 0.5 * label_value
+        case "corner_twist":
+            return label_value / math.sqrt(2.0)
         case "clock":
             return 1.0 / (1.0 + label_value) - 1.0
     return label_value

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
@@ -29,6 +30,7 @@ _MOTION = (
     "dwell",
     "bounce",
     "sliding",
+    "corner_twist",
     "compliance",
     "flexible_wall",
     "yaw",
@@ -45,6 +47,7 @@ _FREE = {
     "twist": ("kick", "frequency", "zeta"),
     "ambient": ("amplitude", "frequency"),
     "slow_release": ("tau",),
+    "corner_twist": ("c",),
 }
 """Which parameters are fitted where not all are; the others keep the simulator's defaults."""
 _LOGARITHMIC = {("winkler", "theta_c"), ("slow_release", "tau"), ("residual_cable", "slack")} | {
@@ -96,6 +99,7 @@ _WEAKEST_SIGNED = {
     "eccentric_mass": 3e-4,
     "gain": 0.01,
     "wire_anchor": 0.03,
+    "corner_twist": 3e-4,
 }
 """Where the design's ranges begin for strengths of either sign, which the simulator's do not say. A mass off
 centre begins where it turns gravity as a tilt of 0.2 mrad does, the slope of r at a tenth of its range."""
@@ -133,6 +137,10 @@ _FORMS = {
     "flexible_wall": (
         Parameter("forced", 0.5, 0.4, "1", 0.0, 1.0, meaning="share of its own inertia in its bending"),
     ),
+    # On and on, back and forth, or at one edge alone.
+    "corner_twist": (
+        Parameter("alternation", 0.0, 0.8, "rad", -math.pi / 2, math.pi / 2, meaning="how it turns back"),
+    ),
     # Nobody knows how a hand or a winch lets go: from a force that dies away to one paid out evenly.
     "slow_release": (Parameter("even", 0.5, 0.4, "1", 0.0, 1.0, meaning="how evenly the force falls"),),
     # Read from the run itself while the wall stands still, and carried on over its motion.
@@ -142,7 +150,7 @@ _FORMS = {
         ),
     ),
 }
-"""Parameters of the form of an effect, beyond those of the simulator, which has one form only."""
+"""Parameters of the form of an effect, within the bounds of what it can be."""
 
 
 def _motion_effect(spec: EffectSpec, known: set[str]) -> Effect:

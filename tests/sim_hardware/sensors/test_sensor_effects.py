@@ -172,6 +172,15 @@ def test_structure_effects_show_where_they_should(rig: Rig) -> None:
     np.testing.assert_allclose(np.abs(step[early]), abs(first), rtol=0.02)
     assert np.array_equal(sliding["LV-A01"], plain["LV-A01"])
 
+    turning = quantities(rig, {"corner_twist": {"c": 2e-3, "alternation": math.pi / 4}})
+    truth = wall_with(rig).truth()
+    so_far = zip(truth["impact_time_s"], truth["velocity_before_rad_s"], strict=True)
+    turned = 2e-3 * math.sqrt(2.0) * sum(speed for at, speed in so_far if speed > 0.0 and at < clock_s[-1])
+    for channel in (left, right):
+        stays = (turning[channel.id] - plain[channel.id])[-100:]
+        np.testing.assert_allclose(stays, -channel.position_m[1] * turned, rtol=0.02)
+    assert np.array_equal(turning["LV-A01"], plain["LV-A01"])
+
 
 @pytest.mark.parametrize("spec", SENSOR_EFFECTS, ids=lambda spec: spec.name)
 def test_each_effect_acts_within_its_range_and_only_on_its_target(rig: Rig, spec) -> None:  # type: ignore[no-untyped-def]

@@ -27,10 +27,8 @@ from daq_app.gap.blind.world.effects.contact_catalogue import (
 from daq_app.gap.blind.world.effects.wide_catalogue import (
     WIDE_CONTACT_ENTRIES,
     WIDE_CONTACT_LIBRARY,
-    WIDE_CONTACT_OUTSIDE,
     WIDE_ENTRIES,
     WIDE_LIBRARY,
-    WIDE_OUTSIDE,
 )
 from daq_app.gap.blind.world.laboratories.numerics import Engine
 
@@ -61,12 +59,12 @@ class _Decks:
 _DECKS: Final[dict[tuple[Engine, bool], _Decks]] = {
     ("events", False): _Decks(ENTRIES, LIBRARY, LIBRARY, OUTSIDE),
     ("contact", False): _Decks(CONTACT_ENTRIES, CONTACT_LIBRARY, BESIDE_CONTACT, CONTACT_OUTSIDE),
-    ("events", True): _Decks(WIDE_ENTRIES, WIDE_LIBRARY, WIDE_LIBRARY, WIDE_OUTSIDE, _WIDE_BLOCK),
+    ("events", True): _Decks(WIDE_ENTRIES, WIDE_LIBRARY, WIDE_LIBRARY, OUTSIDE, _WIDE_BLOCK),
     ("contact", True): _Decks(
         WIDE_CONTACT_ENTRIES,
         WIDE_CONTACT_LIBRARY,
         (*CONTACT_LIBRARY, *BESIDE_CONTACT),
-        WIDE_CONTACT_OUTSIDE,
+        CONTACT_OUTSIDE,
         _WIDE_BLOCK,
     ),
 }

@@ -13,6 +13,7 @@ from daq_app.gap.rocking_model.features.oscillations.ring_response import bent_f
 from daq_app.gap.rocking_model.features.oscillations.rings import ring_columns
 from daq_app.gap.rocking_model.features.response import responded
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.turns import turned, turns
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, TAIL_S, Wire
 from daq_app.gap.rocking_model.records import Sensor
 
@@ -41,14 +42,14 @@ def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
             series = responded(true, effect, given) - true
         total = series if total is None else total + series
     found = np.zeros(len(block.names))
-    ringing = _ringing(run, block, values)
-    if total is not None or ringing is not None:
+    apart = _moved_apart(run, block, values)
+    if total is not None or apart is not None:
         total = np.zeros_like(true) if total is None else total
         if block.wire is not None:
             # The zero of every channel is its rest at the end of the record.
             total = total - total[-round(TAIL_S * GRID_HZ) :].mean()
             total = block.wire.sensor.position_m[2] * block.wire.rotation(true + total) - block.expected
-        total = total if ringing is None else total + ringing
+        total = total if apart is None else total + apart
         seen = total[block.pick]
         found[:-1] = block.projection @ seen
         left = seen - block.design @ (block.design.T @ seen)
@@ -61,8 +62,8 @@ def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
 _TURNS = ("yaw.kick", "twist.kick")
 
 
-def _ringing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray | None:
-    """What a wall that rings moves one wire by, beyond what the others make of it, m; None for nothing.
+def _moved_apart(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray | None:
+    """By what a wall that rings or turns moves a wire beyond what the others make of it, m; None: nothing.
 
     They stand at other heights and on other sides, so it does not cancel as a rotation does.
     """
@@ -71,27 +72,30 @@ def _ringing(run: RockingRun, block: Block, values: Mapping[str, float]) -> Floa
     sizes = dict(bent_wall(run, values))
     if any(b.kind == "turning" for b in run.blocks):
         sizes |= {key: values.get(key, 0.0) for key in _TURNS}
+    sizes |= turns(values)
     parts = []
     for form, size in sizes.items():
         if size == 0.0:
             continue
-        make = partial(_ringing_of_one, run, block.wire, form)
+        make = partial(_form_of_one, run, block.wire, form)
         parts.append(size * run.cache.constant((block.family, form), make))
     return np.asarray(np.sum(parts, axis=0)) if parts else None
 
 
-def _ringing_of_one(run: RockingRun, wire: Wire, form: str) -> FloatArray:
+def _form_of_one(run: RockingRun, wire: Wire, form: str) -> FloatArray:
     """The same of one form, for a strength of one, at the frequency and damping that the runs show."""
     if form in _TURNS:
         frequency, zeta, rate = next(b.ring for b in run.blocks if b.kind == "turning")
         natural = 2.0 * np.pi * frequency
         wave = np.sinc(frequency / rate) * ring_columns(run.grid, frequency, zeta)[:, 0] / natural
+    elif form.startswith("corner_twist"):
+        wave = turned(run, form)
     else:
         wave = bent_form(run, form)
 
     def moved(sensor: Sensor) -> float:
         _, y, z = sensor.position_m
-        if form not in _TURNS:
+        if "." not in form:
             return float((z / run.survey.height_m) ** 2)
         return float(y * z if form.startswith("twist") else -y)
 

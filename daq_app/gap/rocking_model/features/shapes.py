@@ -44,6 +44,13 @@ def slip_shape(grid: Grid) -> FloatArray:
     return shape
 
 
+def turned_shape(grid: Grid, *, alternating: bool) -> FloatArray:
+    """Sum of the approach speeds of the impacts so far, less its last value; with their signs or without."""
+    speeds = grid.approach if alternating else np.abs(grid.approach)
+    shape: FloatArray = _after(grid) @ speeds - float(np.sum(speeds))
+    return shape
+
+
 def turn_shape(grid: Grid, impact: int) -> FloatArray:
     """The approach speed of one impact, without sign, from that impact on; 0 before."""
     shape: FloatArray = _after(grid)[:, impact] * abs(float(grid.approach[impact]))

@@ -18,6 +18,7 @@ from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE
 from daq_app.gap.rocking_model.features.oscillations.ring_response import bent_form, bent_share, bent_wall
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import slip_shape
+from daq_app.gap.rocking_model.features.turns import turn_share, turned, turns
 from daq_app.gap.rocking_model.motion.swings import TOP_DEGREE
 
 
@@ -55,6 +56,8 @@ def _forms(run: RockingRun, values: Mapping[str, float]) -> Iterator[tuple[float
         yield share, _carried(run, "crosstalk")
     if slip := values.get("sliding.c", 0.0):
         yield slip / run.wire_height_m, _carried(run, "slip")
+    for form, size in turns(values).items():
+        yield size * turn_share(run, of_base=False), _carried(run, form)
     for form, size in bent_wall(run, values).items():
         yield size * bent_share(run, of_base=False), _carried(run, form)
 
@@ -70,6 +73,8 @@ def _work_out(run: RockingRun, form: str) -> _Carried:
             series = run.leaked
         case "slip":
             series = slip_shape(grid)
+        case "corner_twist.on" | "corner_twist.back":
+            series = turned(run, form)
         case _:
             series = bent_form(run, form)
     crossings = np.hstack([swings.fall_s, swings.rise_s])

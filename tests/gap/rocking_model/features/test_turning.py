@@ -7,8 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from daq_app.gap.core import Options
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import extract
+from daq_app.gap.rocking_model.features.turns import turn_share, turned_coefficients
 from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.study import diagnose_runs
 from tests.support.simulated_wall import simulate
 
 TURN_S = 2e-3
@@ -61,3 +65,49 @@ def test_play_of_a_wire_and_a_zero_that_walks_are_no_turning(plain: GapRun) -> N
 def test_a_wall_with_wires_in_one_plane_says_nothing_of_its_turning(plain: GapRun) -> None:
     ends = tuple(s.id for s in plain.sensors if s.family == "wire" and s.position_m[1])
     assert not [block for block in extract(plain.excluding(ends)).blocks if block.family == "turn"]
+
+
+@pytest.mark.parametrize(
+    "alternation", [0.0, np.pi / 4, -np.pi / 2], ids=["on and on", "one edge", "back and forth"]
+)
+def test_a_simulated_wall_that_turns_about_its_corners_is_predicted(alternation: float) -> None:
+    given = {"c": TURN_S, "alternation": alternation}
+    (run,) = simulate({"corner_twist": given}, (0.35,))
+    seen = extract(run)
+    (block,) = [block for block in seen.blocks if block.family == "turn"]
+    told = turned_coefficients(seen, block, {f"corner_twist.{key}": value for key, value in given.items()})
+    assert np.max(np.abs(told)) > 0.3 * TURN_S
+    np.testing.assert_allclose(block.values, told, atol=0.03 * TURN_S)
+
+
+@pytest.mark.parametrize(("family", "coefficient"), [("wire", "drift"), ("base", "slip per speed")])
+def test_a_turn_that_wires_of_one_end_take_for_something_else_is_predicted(
+    plain: GapRun, family: str, coefficient: str
+) -> None:
+    given = {"c": 5.0 * TURN_S, "alternation": np.pi / 4}
+    still, turning = (_of_one_end(run) for run in (plain, *simulate({"corner_twist": given}, (0.35,))))
+    before, after = (next(b for b in run.blocks if b.family == family) for run in (still, turning))
+    values = {f"corner_twist.{key}": value for key, value in given.items()}
+    told = turn_share(turning, of_base=family == "base") * turned_coefficients(turning, after, values)
+    sd = np.sqrt(np.diag(after.covariance))
+    where = after.names.index(coefficient)
+    assert abs(told[where]) > 3.0 * sd[where]
+    np.testing.assert_array_less(np.abs(after.values - before.values - told), 0.6 * sd)
+
+
+def _of_one_end(run: GapRun) -> RockingRun:
+    """The run without the wires at the other end of the wall."""
+    kept = [i for i, s in enumerate(run.sensors) if not (s.family == "wire" and s.position_m[1] > 0.0)]
+    return extract(replace(run, channels=run.channels[kept], sensors=tuple(run.sensors[i] for i in kept)))
+
+
+def test_a_wall_that_turns_at_the_impacts_of_one_edge_is_diagnosed() -> None:
+    runs = simulate({"corner_twist": {"c": 1.5e-3, "alternation": -np.pi / 4}}, (0.25, -0.35))
+    found = diagnose_runs(runs, Options(workers=1))
+    assert found.decision.effects == ("corner_twist",) and found.decision.verdict == "effect"
+    size, alternation = (
+        next(p for p in found.effect_parameters if p.name == f"corner_twist.{name}")
+        for name in ("c", "alternation")
+    )
+    assert size.low < 1.5e-3 < size.high
+    assert alternation.low < -np.pi / 4 < alternation.high

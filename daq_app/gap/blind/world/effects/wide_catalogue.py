@@ -9,19 +9,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from daq_app.gap.blind.world.effects.catalogue import ENTRIES, LIBRARY, OUTSIDE, Entry, uniform
-from daq_app.gap.blind.world.effects.contact_catalogue import (
-    CONTACT_ENTRIES,
-    CONTACT_LIBRARY,
-    CONTACT_OUTSIDE,
-)
+from daq_app.gap.blind.world.effects.catalogue import ENTRIES, LIBRARY, Entry, uniform
+from daq_app.gap.blind.world.effects.contact_catalogue import CONTACT_ENTRIES, CONTACT_LIBRARY
 
 _RING: Final = ENTRIES["flexible_wall"]
 _FAST_RING: Final = replace(_RING, others=uniform(frequency_hz=(7.0, 42.0), zeta=(0.005, 0.05)))
 _SLOW_RING: Final = replace(
     _RING, low=0.03, high=0.3, others=uniform(frequency_hz=(2.0, 7.0), zeta=(0.005, 0.05))
 )
-_CORNER_TWIST: Final = Entry("corner_twist", "structure", "near", "turn_s", 3e-4, 6e-3, True)
+_CORNER_TWIST: Final = Entry("corner_twist", "contact", "library", "turn_s", 3e-4, 6e-3, True)
 
 WIDE_ENTRIES: Final[Mapping[str, Entry]] = {
     **ENTRIES,
@@ -29,8 +25,7 @@ WIDE_ENTRIES: Final[Mapping[str, Entry]] = {
     "slow_flexible_wall": _SLOW_RING,
     "corner_twist": _CORNER_TWIST,
 }
-WIDE_LIBRARY: Final = (*LIBRARY, "slow_flexible_wall")
-WIDE_OUTSIDE: Final = (*OUTSIDE, "corner_twist")
+WIDE_LIBRARY: Final = (*LIBRARY, "slow_flexible_wall", "corner_twist")
 
 WIDE_CONTACT_ENTRIES: Final[Mapping[str, Entry]] = {**CONTACT_ENTRIES, "corner_twist": _CORNER_TWIST}
 WIDE_CONTACT_LIBRARY: Final = (
@@ -41,5 +36,5 @@ WIDE_CONTACT_LIBRARY: Final = (
     "drift",
     "wire_inertia",
     "quantisation",
+    "corner_twist",
 )
-WIDE_CONTACT_OUTSIDE: Final = (*CONTACT_OUTSIDE, "corner_twist")

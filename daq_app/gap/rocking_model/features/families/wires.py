@@ -23,6 +23,7 @@ from daq_app.gap.rocking_model.features.oscillations.ring_response import bent_f
 from daq_app.gap.rocking_model.features.pivots import travel
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape, turn_shape
+from daq_app.gap.rocking_model.features.turns import turn_share, turned_coefficients
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import (
@@ -129,7 +130,6 @@ def _turn_block(scene: Scene) -> Block | None:
     turned = -np.linalg.pinv(design)[2] @ shift
     theta, count = grid.theta, min(_TURNS, grid.impact_s.size - 1)
     absorbed = {
-        "zero": (np.ones_like(theta), "rad"),
         "gain": (theta, "1"),
         "lag": (-grid.omega, "s"),
         "even": (theta**2, "1/rad"),
@@ -138,15 +138,12 @@ def _turn_block(scene: Scene) -> Block | None:
     }
     turns = {f"impact {k + 1}": (turn_shape(grid, k), "s") for k in range(count)}
     pick = scene.rocking & grid.settled & (grid.time_s < grid.impact_s[count])
-    found = regress("turn", turned, absorbed | turns, pick, tuple(absorbed))
+    # A zero is no part of the shapes: least norm would give some of it to the turns, of which play is a sum.
+    columns = {name: (shape - shape[pick].mean(), unit) for name, (shape, unit) in (absorbed | turns).items()}
+    found = regress("turn", turned - turned[pick].mean(), columns, pick, tuple(absorbed))
     sides = {name: "+" if grid.approach[k] > 0.0 else "−" for k, name in enumerate(turns)}
     said = {name: ("turn", f"turn per speed at impacts to {side}") for name, side in sides.items()}
     return found and replace(found, said=said)
-
-
-def _predict_turn(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
-    """A rigid wall on its two edges does not turn about the vertical, and no effect makes it stay turned."""
-    return np.zeros(len(block.names))
 
 
 def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
@@ -166,6 +163,7 @@ def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) ->
             run, block, "slip", partial(slip_shape, run.grid)
         )
     found = found + travel(run, block, values, of_base=False) + _bent(run, block, values, of_base=False)
+    found = found + turn_share(run, of_base=False) * turned_coefficients(run, block, values)
     series = difference_of(run, "wire", "lvdt", values)
     return found if series is None else found + block.coefficients(series)
 
@@ -186,6 +184,7 @@ def _predict_base(run: RockingRun, block: Block, values: Mapping[str, float]) ->
         run, block, "slip", partial(slip_shape, run.grid)
     )
     total = total + travel(run, block, values, of_base=True) + _bent(run, block, values, of_base=True)
+    total = total + turn_share(run, of_base=True) * turned_coefficients(run, block, values)
     if "wire_cosine@wire.kappa" in values:
         bend = values["wire_cosine@wire.kappa"] * run.base_bend_m2
         total = total + bend * unit_coefficients(run, block, "square", lambda: run.grid.theta**2)
@@ -210,7 +209,7 @@ def _priors(survey: Survey) -> tuple[Parameter, ...]:
 
 FAMILY = SensorFamily(
     _observe,
-    {"wire": _predict_wire, "base": _predict_base, "turn": _predict_turn},
+    {"wire": _predict_wire, "base": _predict_base, "turn": turned_coefficients},
     {
         ("wire", "gain"): Size(1e-4),
         ("wire", "lag"): Size(2e-5, 2e-4, "s"),

@@ -1,0 +1,49 @@
+"""A wall that turns about its corners at impacts, and stays turned, as wires along its length show it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.differences import unit_coefficients
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.shapes import turned_shape
+
+_FORMS = {"corner_twist.on": False, "corner_twist.back": True}
+"""Form of the turns → whether they change sign with the side."""
+
+
+def turns(values: Mapping[str, float]) -> dict[str, float]:
+    """Form → how much of it there is, s; empty for a wall that does not turn."""
+    size, alternation = values.get("corner_twist.c", 0.0), values.get("corner_twist.alternation", 0.0)
+    sizes = (size * math.cos(alternation), size * math.sin(alternation))
+    return {form: part for form, part in zip(_FORMS, sizes, strict=True) if part != 0.0}
+
+
+def turned(run: RockingRun, form: str) -> FloatArray:
+    """Rotation about the vertical of one form for a turn of 1 rad per rad/s, (m,), rad; 0 at rest."""
+    return np.asarray(
+        run.cache.constant(("turned", form), lambda: turned_shape(run.grid, alternating=_FORMS[form]))
+    )
+
+
+def turn_share(run: RockingRun, *, of_base: bool) -> float:
+    """What a turn of 1 rad makes of the wires' mean rotation (weights z²), rad, or of the base, m."""
+    y = np.array([wire.sensor.position_m[1] for wire in run.wires])
+    z = np.array([wire.sensor.position_m[2] for wire in run.wires])
+    if of_base:
+        return -float(np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0] @ y)
+    return -float(z @ y / (z @ z))
+
+
+def turned_coefficients(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """Coefficients of the rotation about the vertical itself, (k,)."""
+    found = np.zeros(len(block.names))
+    for form, size in turns(values).items():
+        found = found + size * unit_coefficients(run, block, form, partial(turned, run, form))
+    return found
