@@ -99,6 +99,48 @@ def _first_guess(q: float, v: float, c: NDArray[np.float64]) -> float:
 
 
 @part
+def _accepted_step(
+    t: float,
+    q: float,
+    v: float,
+    h: float,
+    tolerance: float,
+    c: NDArray[np.float64],
+    kq: NDArray[np.float64],
+    kv: NDArray[np.float64],
+    scale_q: float,
+    scale_v: float,
+) -> tuple[float, float, float, float]:
+    """(h, q, v, error) of the step of `h` or less whose error is within the tolerance; fills kq and kv."""
+    kq[0] = v
+    kv[0] = terms.acceleration(q, v, t, c)
+    q1, v1, error = take_step(t, q, v, h, c, kq, kv, scale_q, scale_v)
+    while error > tolerance and h > 1e-10:
+        h *= max(0.2, 0.9 * _eighth_root(tolerance / error))
+        q1, v1, error = take_step(t, q, v, h, c, kq, kv, scale_q, scale_v)
+    return h, q1, v1, error
+
+
+@part
+def _first_kink(
+    row: NDArray[np.float64], c: NDArray[np.float64], q: float, q1: float, x_turn: float, q_turn: float
+) -> tuple[float, float]:
+    """(x, q) of the first rotation in a step from q to q1 at which the moment has a kink; (1, −1) for none.
+
+    The step turns back at `x_turn` and `q_turn`; it is looked through on either side of that.
+    """
+    x_end, on_kink = 1.0, -1.0
+    for at in (c[terms.C_WINKLER], c[terms.C_SLACK] if c[terms.C_CABLE] > 0.0 else 0.0):
+        for leg in range(2):
+            low, high = (0.0, x_turn) if leg == 0 else (x_turn, 1.0)
+            q_low, q_high = (q, q_turn) if leg == 0 else (q_turn, q1)
+            x = _threshold(row, at, q if leg == 0 else -1.0, low, high, q_low, q_high)
+            if x < x_end:
+                x_end, on_kink = x, at
+    return x_end, on_kink
+
+
+@part
 def _swing(
     t: float,
     q: float,
@@ -126,30 +168,16 @@ def _swing(
         if n >= pieces.shape[0]:
             return _FULL, n
         terms.set_region(c, q, rising)
-        kq[0] = v
-        kv[0] = terms.acceleration(q, v, t, c)
-        q1, v1, error = take_step(t, q, v, h, c, kq, kv, scale_q, scale_v)
-        while error > tolerance and h > 1e-10:
-            h *= max(0.2, 0.9 * _eighth_root(tolerance / error))
-            q1, v1, error = take_step(t, q, v, h, c, kq, kv, scale_q, scale_v)
+        h, q1, v1, error = _accepted_step(t, q, v, h, tolerance, c, kq, kv, scale_q, scale_v)
         row = pieces[n]
         n += 1
         interpolant(t, q, v, q1, v1, h, c, kq, kv, row, pc.ROTATION, pc.VELOCITY)
         row[pc.START], row[pc.SCALE], row[pc.SIDE] = t, h, side
-        x_end = 1.0
-        x_turn, ended, on_kink = 0.0, -1, -1.0
-        q_turn = q
+        x_turn, q_turn, ended = 0.0, q, -1
         if rising and v1 <= 0.0:
             x_turn = _root(row, pc.VELOCITY, 0.0, 0.0, 1.0)
             q_turn = pc.horner(row, pc.ROTATION, x_turn)
-        if kinked:
-            for at in (c[terms.C_WINKLER], c[terms.C_SLACK] if c[terms.C_CABLE] > 0.0 else 0.0):
-                for part in range(2):
-                    low, high = (0.0, x_turn) if part == 0 else (x_turn, 1.0)
-                    q_low, q_high = (q, q_turn) if part == 0 else (q_turn, q1)
-                    x = _threshold(row, at, q if part == 0 else -1.0, low, high, q_low, q_high)
-                    if x < x_end:
-                        x_end, on_kink = x, at
+        x_end, on_kink = _first_kink(row, c, q, q1, x_turn, q_turn) if kinked else (1.0, -1.0)
         if x_turn > 0.0 and x_turn <= x_end:
             rising = False
             out[3], out[4] = t + h * x_turn, q_turn
@@ -196,6 +224,14 @@ def _fill_flat(pieces: NDArray[np.float64], n: int, t: float, q: float, v: float
     return n + 1
 
 
+@part
+def _note_impact(
+    row: NDArray[np.float64], t: float, before: float, after: float, side: float, kind: float
+) -> None:
+    row[I_TIME], row[I_BEFORE], row[I_AFTER] = t, before, after
+    row[I_SIDE], row[I_KIND] = side, kind
+
+
 @kernel
 def integrate(
     vector: NDArray[np.float64],
@@ -240,8 +276,7 @@ def integrate(
         deviate = deviates[n_peaks - 1] if n_peaks <= deviates.size else 0.0
         r = terms.restitution(vector, speed, side, n_peaks - 1, deviate)
         row = impacts[n_impacts]
-        row[I_TIME], row[I_BEFORE], row[I_AFTER] = t, -side * speed, -side * r * speed
-        row[I_SIDE], row[I_KIND] = side, 0.0
+        _note_impact(row, t, -side * speed, -side * r * speed, side, 0.0)
         n_impacts += 1
         q, v = 0.0, r * speed
         side = -side
@@ -257,7 +292,5 @@ def integrate(
             n = _fill_flat(pieces, n, t, 0.0, first, side)
             t += flight
             q = first * flight
-            row = impacts[n_impacts]
-            row[I_TIME], row[I_BEFORE], row[I_AFTER] = t, side * first, side * v
-            row[I_SIDE], row[I_KIND] = side, 1.0
+            _note_impact(impacts[n_impacts], t, side * first, side * v, side, 1.0)
             n_impacts += 1
