@@ -186,13 +186,19 @@ def _frozen(
     edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
     starts, stops = edges[::2], edges[1::2]
     long = stops - starts > FROZEN_S * rate_hz
-    if step > 0.0:
-        # Stairs stand still too, but then the reading goes on by one step.
-        after = np.minimum(stops + 1, values.size - 1)
-        jumps = np.abs(values[after] - values[starts])
-        long &= jumps > 2.5 * step
+    # Between two steps of its converter, or of its stairs, a sound reading stands still too, but then it goes
+    # on by one of them.
+    after = np.minimum(stops + 1, values.size - 1)
+    long &= np.abs(values[after] - values[starts]) > 2.5 * max(step, _resolution(values))
     lengths = (stops - starts)[long] / values.size
     return float(lengths.sum()), 1e-3
+
+
+def _resolution(values: FloatArray) -> float:
+    """Step of the converter behind a reading: the least that it changes by; 0 for one that never changes."""
+    change = np.abs(np.diff(values))
+    change = change[change > 0.0]
+    return _quantile(change, 0.01) if change.size > 1 else 0.0
 
 
 def _spikes(values: FloatArray, noise: float, rate_hz: float) -> float:

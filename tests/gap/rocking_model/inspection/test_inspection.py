@@ -91,6 +91,15 @@ def test_electronics_are_named_by_channel_with_their_size(healthy: list[RockingR
         assert run.swings.peak_rad[1] == pytest.approx(clean.swings.peak_rad[1], rel=1e-3)
 
 
+def test_a_wall_that_dwells_upright_under_a_coarse_converter_is_no_wire_that_freezes() -> None:
+    """At rest between two steps of the converter one reading repeats, and then goes on by one step."""
+    runs = simulate({"dwell": {"tau": 0.03}}, LEVELS)
+    for run in runs:
+        for i in run.indices("wire"):
+            run.channels[i] = np.round(run.channels[i] / 5.9e-4) * 5.9e-4
+    assert not any("dropout" in mark for mark in found_marks(prepare(runs)[0]))
+
+
 def test_a_channel_with_far_more_pick_up_than_its_family_stands_for_itself() -> None:
     runs = _prepared({"hum@wire": {"amplitude": 2e-4}, "hum@WP-2": {"amplitude": 8e-4}})
     assert set(found_marks(runs)) == {"hum@wire", "hum@WP-2"}
