@@ -9,8 +9,12 @@ import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
-from daq_app.gap.rocking_model.features.oscillations.ring_response import bent_form, bent_wall
-from daq_app.gap.rocking_model.features.oscillations.rings import ring_columns
+from daq_app.gap.rocking_model.features.oscillations.ring_response import (
+    bent_form,
+    bent_wall,
+    kicks_that_turn,
+    turning_wave,
+)
 from daq_app.gap.rocking_model.features.response import responded
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.turns import turned, turns
@@ -59,9 +63,6 @@ def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
     return found
 
 
-_TURNS = ("yaw.kick", "twist.kick")
-
-
 def _moved_apart(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray | None:
     """By what a wall that rings or turns moves a wire beyond what the others make of it, m; None: nothing.
 
@@ -70,9 +71,7 @@ def _moved_apart(run: RockingRun, block: Block, values: Mapping[str, float]) -> 
     if block.wire is None:
         return None
     sizes = dict(bent_wall(run, values))
-    if any(b.kind == "turning" for b in run.blocks):
-        sizes |= {key: values.get(key, 0.0) for key in _TURNS}
-    sizes |= turns(values)
+    sizes |= kicks_that_turn(run, values) | turns(values)
     parts = []
     for form, size in sizes.items():
         if size == 0.0:
@@ -84,10 +83,8 @@ def _moved_apart(run: RockingRun, block: Block, values: Mapping[str, float]) -> 
 
 def _form_of_one(run: RockingRun, wire: Wire, form: str) -> FloatArray:
     """The same of one form, for a strength of one, at the frequency and damping that the runs show."""
-    if form in _TURNS:
-        frequency, zeta, rate = next(b.ring for b in run.blocks if b.kind == "turning")
-        natural = 2.0 * np.pi * frequency
-        wave = np.sinc(frequency / rate) * ring_columns(run.grid, frequency, zeta)[:, 0] / natural
+    if form in ("yaw.kick", "twist.kick"):
+        wave = turning_wave(run)
     elif form.startswith("corner_twist"):
         wave = turned(run, form)
     else:

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from daq_app.gap.core import Options
+from daq_app.gap.rocking_model.features.coefficients import block_coefficients
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import extract
 from daq_app.gap.rocking_model.features.turns import turn_share, turned_coefficients
+from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.study import diagnose_runs
+from daq_app.gap.rocking_model.study import diagnose_runs, prepare
 from tests.support.simulated_wall import simulate
 
 TURN_S = 2e-3
@@ -111,3 +113,31 @@ def test_a_wall_that_turns_at_the_impacts_of_one_edge_is_diagnosed() -> None:
     )
     assert size.low < 1.5e-3 < size.high
     assert alternation.low < -np.pi / 4 < alternation.high
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        {"yaw": {"kick": 0.13, "frequency": 4.0, "zeta": 0.04}},
+        {"twist": {"kick": 0.1, "frequency": 6.0, "zeta": 0.02}},
+    ],
+    ids=lambda effect: next(iter(effect)),
+)
+def test_a_wall_that_rings_slowly_about_the_vertical_is_no_turn_that_stays(
+    plain: GapRun, effect: dict[str, dict[str, float]]
+) -> None:
+    (ringing,) = simulate(effect, (0.35,))
+    values = {f"{name}.{key}": value for name, given in effect.items() for key, value in given.items()}
+    (run,), (still,) = (prepare([each])[0] for each in (ringing, plain))
+    block, before = (next(b for b in each.blocks if b.family == "turn") for each in (run, still))
+    told = block_coefficients(run, _usual(run) | values)[0] - block_coefficients(run, _usual(run))[0]
+    first = sum(len(b.names) for b in run.blocks[: run.blocks.index(block)])
+    told = told[first : first + len(block.names)]
+    sd = np.sqrt(np.diag(block.covariance))
+    assert np.max(np.abs(told) / sd) > 0.8
+    np.testing.assert_array_less(np.abs(block.values - before.values - told), 0.2 * sd)
+
+
+def _usual(run: RockingRun) -> dict[str, float]:
+    model = RockingModel(run.survey)
+    return {p.name: p.mean for p in (*model.nuisance, *model.local_nuisance(run))}

@@ -19,7 +19,13 @@ from daq_app.gap.rocking_model.features.differences import (
     unit_coefficients,
 )
 from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size, with_crosstalk
-from daq_app.gap.rocking_model.features.oscillations.ring_response import bent_form, bent_share, bent_wall
+from daq_app.gap.rocking_model.features.oscillations.ring_response import (
+    bent_form,
+    bent_share,
+    bent_wall,
+    kicks_that_turn,
+    turning_wave,
+)
 from daq_app.gap.rocking_model.features.pivots import travel
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape, turn_shape
@@ -193,6 +199,24 @@ def _predict_base(run: RockingRun, block: Block, values: Mapping[str, float]) ->
     return total
 
 
+def _predict_turn(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """Turns that stay, and what a wall that rings about the vertical or twists shows beside them."""
+    found = turned_coefficients(run, block, values)
+    for key, kick in kicks_that_turn(run, values).items():
+        found = found + kick * unit_coefficients(run, block, key, partial(_rung, run, key))
+    return found
+
+
+def _rung(run: RockingRun, key: str) -> FloatArray:
+    """Rotation about the vertical that all wires together show of a kick of one to yaw or twist."""
+    wave = turning_wave(run)
+    if key == "yaw.kick":
+        return wave
+    places = np.array([wire.sensor.position_m[1:] for wire in run.wires])
+    design = np.column_stack([np.ones(len(places)), places[:, 1], places[:, 0]])
+    return np.asarray(-np.linalg.pinv(design)[2] @ (places[:, 0] * places[:, 1]) * wave)
+
+
 def _observe(scene: Scene) -> Iterator[Block | None]:
     yield _wire_block(scene)
     yield _translation_block(scene)
@@ -209,7 +233,7 @@ def _priors(survey: Survey) -> tuple[Parameter, ...]:
 
 FAMILY = SensorFamily(
     _observe,
-    {"wire": _predict_wire, "base": _predict_base, "turn": turned_coefficients},
+    {"wire": _predict_wire, "base": _predict_base, "turn": _predict_turn},
     {
         ("wire", "gain"): Size(1e-4),
         ("wire", "lag"): Size(2e-5, 2e-4, "s"),

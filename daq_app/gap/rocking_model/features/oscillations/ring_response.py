@@ -110,6 +110,20 @@ def bent_form(run: RockingRun, name: str) -> FloatArray:
     return forced_column(run.grid, frequency, zeta, accelerations=False)
 
 
+def kicks_that_turn(run: RockingRun, values: Mapping[str, float]) -> dict[str, float]:
+    """Parameter → kick to yaw and twist, for runs that show a ring-down of either; empty for none."""
+    kicks = {key: values.get(key, 0.0) for key in ("yaw.kick", "twist.kick")}
+    shown = any(kicks.values()) and any(block.kind == "turning" for block in run.blocks)
+    return {key: kick for key, kick in kicks.items() if kick != 0.0} if shown else {}
+
+
+def turning_wave(run: RockingRun) -> FloatArray:
+    """The ring-down of yaw or twist for a kick of one, on the grid, at the ring that is shown."""
+    frequency, zeta, rate = next(block.ring for block in run.blocks if block.kind == "turning")
+    wave = np.sinc(frequency / rate) * ring_columns(run.grid, frequency, zeta)[:, 0]
+    return np.asarray(wave / (2.0 * np.pi * frequency))
+
+
 def bent_share(run: RockingRun, *, of_base: bool) -> float:
     """What a top that bends by 1 m makes of the wires' mean rotation (weights z²), rad, or of the base, m."""
     z = np.array([wire.sensor.position_m[2] for wire in run.wires])
