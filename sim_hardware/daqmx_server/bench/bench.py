@@ -21,7 +21,7 @@ from sim_hardware.daqmx_server.inventory.devices import Device, Inventory, modul
 from sim_hardware.daqmx_server.inventory.terminals import plain
 from sim_hardware.faults.board import FaultBoard
 from sim_hardware.faults.model import Fault
-from sim_hardware.signals import SignalSource
+from sim_hardware.signals import NothingWired, SignalSource
 
 _SKEW_MARGIN_S = 1e-3
 """Multiplexers look at their last channel this long after the sample clock at most."""
@@ -41,6 +41,10 @@ class BenchTask(Protocol):
 
     def edges_at(self, terminal: str) -> list[float]:
         """Instants of the task's edges at a (plain) terminal, as far as they have happened."""
+        ...
+
+    def drives(self, terminal: str) -> bool:
+        """Whether the task is set to give edges at a (plain) terminal."""
         ...
 
     def disturbed(self) -> None: ...
@@ -249,6 +253,30 @@ class Bench:
             for task in self.tasks.values():
                 seen += [t for t in task.edges_at(end) if t >= after_s - 1e-12]
         return min(seen, default=None)
+
+    def trigger_edge(self, terminal: str, after_s: float, rising: bool = True) -> float | None:
+        """The edge that a trigger at a terminal waits for: at once where nothing can ever give one."""
+        edge_s = self.first_edge(terminal, after_s, rising)
+        return after_s if edge_s is None and self.fires_at_once(terminal) else edge_s
+
+    def fires_at_once(self, terminal: str) -> bool:
+        """Whether a trigger here is simulated, as on NI's own simulated devices.
+
+        So it is at an outer terminal of a simulated device on a bench where nothing is wired, until an
+        edge is commanded or another task is set to drive the terminal.
+        """
+        name = plain(terminal)
+        outer = name.rpartition("/")[2].startswith(("pfi", "apfi", "pxi_trig", "rtsi"))
+        if not outer or not isinstance(self.source, NothingWired) or self._is_real_terminal(name):
+            return False
+        ends = self.inventory.joined(name)
+        return not any(
+            self._edges.get(end) or any(t.drives(end) for t in self.tasks.values()) for end in ends
+        )
+
+    def _is_real_terminal(self, name: str) -> bool:
+        owner = name.rpartition("/")[0]
+        return any(plain(d.name) == owner and not d.simulated for d in self.inventory.devices.values())
 
     def reset(self) -> None:
         """Abort and forget every task (ResetServer)."""

@@ -72,8 +72,6 @@ def _single(
         _choose_shunt(kind, attributes)
         _, number = inventory.physical_channel(physical)
         channel = AnalogInput(name, physical, device, number, kind, attributes, scale)
-        if "AI_MIN" in attributes and float(attributes["AI_MIN"]) >= float(attributes["AI_MAX"]):
-            raise DaqmxError(Code.MIN_NOT_BELOW_MAX, f"Channel Name: {name}")
         out.append(channel)
     return out
 

@@ -94,6 +94,16 @@ class VirtualChannel:
 
     def verify(self) -> None:
         """Raise what NI-DAQmx raises for values that the device cannot do."""
+        if self.io == "AO" and self.measurement == "VOLTAGE" and self.scale is None:
+            self._verify_output_range()
+
+    def _verify_output_range(self) -> None:
+        low, high = float(self.attributes["AO_MIN"]), float(self.attributes["AO_MAX"])
+        if low >= high:
+            raise DaqmxError(Code.MIN_NOT_BELOW_MAX, f"Channel Name: {self.name}")
+        ranges = self.product.outputs.ranges_v
+        if ranges and not any(bottom <= low and high <= top for bottom, top in ranges):
+            raise self.refuse("DAQmx_AO_Max", high, [top for _, top in ranges])
 
     def refuse(self, attribute: str, asked: object, possible: list[Any]) -> DaqmxError:
         """−200077 with the values that are possible."""

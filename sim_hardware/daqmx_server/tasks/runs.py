@@ -53,7 +53,8 @@ def _plan(task: StartedTask) -> RunPlan:
         total=_total(task.timing) if finite else None,
         pretrigger=int(task.trigger["REF_TRIG_PRETRIG_SAMPLES"]) if ref else None,
         buffer=task.buffer_size,
-        overwrite=task.reading.get("OVERWRITE") == OverwriteMode.OVERWRITE_UNREAD_SAMPLES.value,
+        overwrite=task.io in ("AO", "DO", "CO")  # nothing is read from it
+        or task.reading.get("OVERWRITE") == OverwriteMode.OVERWRITE_UNREAD_SAMPLES.value,
         instant=finite and task.bench.finite == "instant",
     )
 
@@ -75,7 +76,7 @@ def _reference_search(task: StartedTask, pretrigger: int) -> ReferenceSearch:
     source = triggers.source_of(task.trigger, "REF")
     if task.trigger["REF_TRIG_TYPE"] == triggers.DIGITAL:
         rising = triggers.is_rising(task.trigger, "REF")
-        return ReferenceSearch(pretrigger, edge=lambda after: task.bench.first_edge(source, after, rising))
+        return ReferenceSearch(pretrigger, edge=lambda after: task.bench.trigger_edge(source, after, rising))
     condition = triggers.Condition.of(task.trigger, "REF")
 
     def readings(run: Run, start: int, stop: int) -> NDArray[np.float64]:

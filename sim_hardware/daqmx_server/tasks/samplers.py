@@ -52,6 +52,10 @@ class ChannelTask(Protocol):
     def scan(self) -> Scan: ...
 
 
+_ON_DEMAND_CHUNK: Final = 16
+"""Samples made at a time for a program that takes them one by one."""
+
+
 class NoSamples:
     """An output task has nothing to read."""
 
@@ -81,6 +85,10 @@ def on_demand_sampler(task: ChannelTask, now_s: float) -> BlockSource:
     times = SampleTimes(now_s, max(task.timing.max_rate_hz, 1.0))
     if task.io in ("DI", "DO"):  # lines that are put out can be read back
         return DigitalSampler(task.channels, times, task.bench.loopback, task.taken_on_demand)
+    if task.io == "AI":
+        bench, taken = task.bench, task.taken_on_demand
+        inputs = task.scan.inputs
+        return Sampler(bench.wiring, bench.faults, inputs, times, None, taken, _ON_DEMAND_CHUNK)
     return sampler_of(task, times)
 
 

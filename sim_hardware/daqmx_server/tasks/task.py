@@ -27,7 +27,7 @@ from sim_hardware.daqmx_server.tasks.samplers import (
 from sim_hardware.daqmx_server.tasks.tdms_log import TdmsLog
 from sim_hardware.daqmx_server.timing import triggers
 from sim_hardware.daqmx_server.timing.acquisition import Run
-from sim_hardware.daqmx_server.timing.routing import edges_of
+from sim_hardware.daqmx_server.timing.routing import drives, edges_of
 from sim_hardware.daqmx_server.timing.sample_times import SampleTimes
 from sim_hardware.daqmx_server.timing.sampling import BlockSource
 from sim_hardware.daqmx_server.timing.scan import Scan
@@ -327,6 +327,10 @@ class Task:
     def edges_at(self, terminal: str) -> list[float]:
         """Instants of the task's edges at a (plain) terminal, as far as they have happened."""
         return edges_of(self, terminal)
+
+    def drives(self, terminal: str) -> bool:
+        """Whether the task is set to give edges at a (plain) terminal."""
+        return drives(self, terminal)
 
     def disturbed(self) -> None:
         """The world or its faults have changed: samples ahead of now are made afresh."""

@@ -73,7 +73,7 @@ PulsesAt = Callable[[VirtualChannel], Pulses | None]
 
 
 class CounterSampler:
-    """Readings of counter-input channels; a terminal without pulses reads the middle of the range, or 0."""
+    """Readings of counter-input channels; a terminal without pulses reads 0, as NI's simulated devices do."""
 
     def __init__(
         self,
@@ -106,8 +106,7 @@ class CounterSampler:
             counted = pulses.edges_before(instants) - pulses.edges_before(np.array([self._armed_s]))
             return np.asarray(initial + counted)
         if pulses is None:
-            middle = 0.5 * (float(attributes.get("CI_MIN", 0.0)) + float(attributes.get("CI_MAX", 0.0)))
-            return np.full(len(instants), middle)
+            return np.zeros(len(instants))
         low_s, high_s = pulses.measured(index, instants, self._armed_s, self._implicit)
         values = {
             "FREQUENCY": 1.0 / (low_s + high_s),

@@ -70,6 +70,11 @@ def counter_output(channel: VirtualChannel) -> str:
     return f"PFI{12 + channel.number}"
 
 
+def drives(task: SignalTask, terminal: str) -> bool:
+    """Whether the task is set to give edges at a (plain) terminal, now or once it runs."""
+    return bool(task.channels) and any(terminal in terminals_of(task, signal) for signal in _EXPORTS)
+
+
 def edges_of(task: SignalTask, terminal: str) -> list[float]:
     """Instants of the task's edges at a (plain) terminal, as far as they have happened.
 

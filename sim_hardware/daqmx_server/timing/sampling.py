@@ -19,6 +19,9 @@ from sim_hardware.daqmx_server.channels.converter import Converter
 from sim_hardware.daqmx_server.timing.sample_times import SampleTimes
 
 _SINE_SAMPLES: Final = 100
+_SINE_SHIFT_RAD: Final = np.deg2rad(5.0)
+"""Each further channel of a task is ahead of the one before (NI-DAQmx User Manual, "Reading and Writing Data
+with NI-DAQmx Simulated Devices": five degrees)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +72,14 @@ class Sampler:
         inputs: Sequence[Input],
         times: SampleTimes,
         helper: Executor | None = None,
+        taken_before: int = 0,
+        chunk: int | None = None,
     ) -> None:
-        """`helper` makes the next chunk while this one is read."""
+        """`helper` makes the next chunk while this one is read; NI's sine goes on from `taken_before` samples.
+
+        `chunk`: samples made at a time; by default half a second of them.
+        """
+        self._taken_before = taken_before
         self._source = source
         self._helper = helper
         self._ahead: tuple[int, Future[NDArray[np.int32]]] | None = None
@@ -90,7 +99,7 @@ class Sampler:
         self._scale = (1.0 / steps)[:, None]
         self._middle = middles[:, None]
         self._low, self._high = limits[:, :1], limits[:, 1:]
-        self._chunk = int(np.clip(times.rate_hz * 0.5, 1000, 65536))
+        self._chunk = chunk or int(np.clip(times.rate_hz * 0.5, 1000, 65536))
         self._cache: tuple[int, NDArray[np.int32]] | None = None
 
     def codes(self, start: int, stop: int) -> NDArray[np.int32]:
@@ -119,12 +128,14 @@ class Sampler:
             self._ahead = (number + 1, self._helper.submit(self._make, number + 1))
         return codes
 
-    def _sines(self, inputs: Sequence[Input], start: int, count: int) -> NDArray[np.float64]:
-        """NI's sine between the channel's minimum and maximum, one period in `_SINE_SAMPLES` samples.
+    def _sines(self, rows: NDArray[np.int64], start: int, count: int) -> NDArray[np.float64]:
+        """NI's sine between each channel's minimum and maximum, one period in `_SINE_SAMPLES` samples.
 
         It keeps one code away from both ends, so that no rounded reading lies beyond them.
         """
-        phase = 2.0 * np.pi * np.arange(start, start + count) / _SINE_SAMPLES
+        inputs = [self._inputs[row] for row in rows]
+        index = self._taken_before + np.arange(start, start + count)
+        phase = 2.0 * np.pi * index / _SINE_SAMPLES + _SINE_SHIFT_RAD * rows[:, None]
         ends = np.array([entry.shown for entry in inputs])
         steps = np.array([entry.converter.step for entry in inputs])
         middle, half = ends.mean(axis=1), np.maximum(0.5 * (ends[:, 1] - ends[:, 0]) - steps, 0.0)
@@ -143,7 +154,7 @@ class Sampler:
             ideal = self._source.volts(terminals, times)
             open_rows = np.flatnonzero(np.isnan(ideal[:, :1]).any(axis=1))
             if len(open_rows):
-                ideal[open_rows] = self._sines([self._inputs[rows[row]] for row in open_rows], start, taken)
+                ideal[open_rows] = self._sines(rows[open_rows], start, taken)
             volts[rows, :taken] = self._distortion.distort(terminals, times, ideal)
         np.subtract(volts, self._middle, out=volts)
         np.multiply(volts, self._scale, out=volts)

@@ -25,7 +25,7 @@ def _start_edge(task: TimedTask, after_s: float) -> float | None:
     """The edge that a digital start trigger waits for, if it has come."""
     which = triggers.digital_start(task.trigger) or "START"
     source = triggers.source_of(task.trigger, which)
-    return task.bench.first_edge(source, after_s, triggers.is_rising(task.trigger, which))
+    return task.bench.trigger_edge(source, after_s, triggers.is_rising(task.trigger, which))
 
 
 class _OwnClock:

@@ -158,7 +158,10 @@ class TaskTiming:
     @property
     def waits_for_others(self) -> bool:
         """Whether the first sample needs something that this task does not make itself."""
-        return self.source_is_foreign or triggers.digital_start(self._task.trigger) is not None
+        which = triggers.digital_start(self._task.trigger)
+        if self.source_is_foreign or which is None:
+            return self.source_is_foreign
+        return not self._task.bench.fires_at_once(triggers.source_of(self._task.trigger, which))
 
     def verify(self) -> None:
         """Raise what NI-DAQmx raises for a clock that these channels cannot have."""
