@@ -270,9 +270,8 @@ class Bench:
         if not outer or not isinstance(self.source, NothingWired) or self._is_real_terminal(name):
             return False
         ends = self.inventory.joined(name)
-        return not any(
-            self._edges.get(end) or any(t.drives(end) for t in self.tasks.values()) for end in ends
-        )
+        driven = any(task.drives(end) for task in self.tasks.values() for end in ends)
+        return not driven and not any(self._edges.get(end) for end in ends)
 
     def _is_real_terminal(self, name: str) -> bool:
         owner = name.rpartition("/")[0]

@@ -75,9 +75,10 @@ class Sampler:
         taken_before: int = 0,
         chunk: int | None = None,
     ) -> None:
-        """`helper` makes the next chunk while this one is read; NI's sine goes on from `taken_before` samples.
+        """`helper` makes the next chunk while this one is read.
 
-        `chunk`: samples made at a time; by default half a second of them.
+        NI's sine goes on from `taken_before` samples. `chunk`: samples made at a time; by default half a
+        second of them.
         """
         self._taken_before = taken_before
         self._source = source
