@@ -1,4 +1,4 @@
-"""Runs one program of a stranger as it is: its tasks come from a simulated server, nothing else changes.
+"""Runs one program of a stranger as it is: its hardware is a simulated server's, nothing else changes.
 
 ``python -m studies.ni_examples.stranger ADDRESS SECONDS PROGRAM``. After SECONDS somebody presses Enter where
 the program asks for it, and Ctrl-C where it runs without end; plots are drawn to nowhere.
@@ -17,7 +17,7 @@ from typing import Any
 
 import grpc
 import nidaqmx
-from nidaqmx.system import System
+from nidaqmx import utils
 
 from sim_hardware.control import SimControl, SimControlError
 
@@ -28,19 +28,18 @@ _PATIENCE = 4.0
 """Ctrl-C comes after so many times the wait before Enter, from the program's first task on."""
 
 
-def _bring_tasks(address: str, on_first_task: Callable[[], None]) -> None:
-    """Every task and the local system of the program come from the server at the address."""
+def _bring_hardware(address: str, on_first_task: Callable[[], None]) -> None:
+    """Tasks, devices, scales and whatever else the program asks of its own machine come from the server."""
     channel = grpc.insecure_channel(address, options=[("grpc.max_receive_message_length", -1)])
-    make = nidaqmx.Task.__init__
+    remote = nidaqmx.GrpcSessionOptions(channel, "")
+    make, choose = nidaqmx.Task.__init__, utils._select_interpreter
 
-    def make_remote(self: Any, new_task_name: str = "", **given: Any) -> None:
+    def make_task(self: Any, *given: Any, **named: Any) -> None:
         on_first_task()
-        given.setdefault("grpc_options", nidaqmx.GrpcSessionOptions(channel, new_task_name))
-        make(self, new_task_name, **given)
+        make(self, *given, **named)
 
-    nidaqmx.Task.__init__ = make_remote
-    remote = System.remote(nidaqmx.GrpcSessionOptions(channel, ""))
-    System.local = staticmethod(lambda: remote)
+    nidaqmx.Task.__init__ = make_task
+    utils._select_interpreter = lambda options=None, interpreter=None: choose(options or remote, interpreter)
 
 
 def _give_edges(address: str, over: threading.Event) -> None:
@@ -67,7 +66,7 @@ def main(address: str, seconds: float, program: str) -> None:
         if first.acquire(blocking=False):
             ctrl_c.start()
 
-    _bring_tasks(address, begin)
+    _bring_hardware(address, begin)
     try:
         runpy.run_path(program, run_name="__main__")
     except KeyboardInterrupt:

@@ -18,7 +18,7 @@ from sim_hardware.daqmx_server.channels.scale import CustomScale
 from sim_hardware.daqmx_server.channels.teds import DataSheet
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory.devices import Device, Inventory, module_device
-from sim_hardware.daqmx_server.inventory.terminals import plain
+from sim_hardware.daqmx_server.inventory.terminals import full_name, plain
 from sim_hardware.faults.board import FaultBoard
 from sim_hardware.faults.model import Fault
 from sim_hardware.signals import NothingWired, SignalSource
@@ -254,18 +254,22 @@ class Bench:
                 seen += [t for t in task.edges_at(end) if t >= after_s - 1e-12]
         return min(seen, default=None)
 
-    def trigger_edge(self, terminal: str, after_s: float, rising: bool = True) -> float | None:
-        """The edge that a trigger at a terminal waits for: at once where nothing can ever give one."""
-        edge_s = self.first_edge(terminal, after_s, rising)
-        return after_s if edge_s is None and self.fires_at_once(terminal) else edge_s
+    def trigger_edge(self, host: str, terminal: str, after_s: float, rising: bool) -> float | None:
+        """The edge that a trigger at a terminal of a host waits for: at once where nothing ever gives one."""
+        edge_s = self.first_edge(self._full_name(host, terminal), after_s, rising)
+        return after_s if edge_s is None and self.fires_at_once(host, terminal) else edge_s
 
-    def fires_at_once(self, terminal: str) -> bool:
+    def _full_name(self, host: str, terminal: str) -> str:
+        device = self.inventory.device(host)
+        return full_name(self.inventory, device, terminal, Code.SOURCE_TERMINAL_UNKNOWN)
+
+    def fires_at_once(self, host: str, terminal: str) -> bool:
         """Whether a trigger here is simulated, as on NI's own simulated devices.
 
         So it is at an outer terminal of a simulated device on a bench where nothing is wired, until an
         edge is commanded or another task is set to drive the terminal.
         """
-        name = plain(terminal)
+        name = plain(self._full_name(host, terminal))
         outer = name.rpartition("/")[2].startswith(("pfi", "apfi", "pxi_trig", "rtsi"))
         if not outer or not isinstance(self.source, NothingWired) or self._is_real_terminal(name):
             return False

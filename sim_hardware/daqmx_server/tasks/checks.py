@@ -16,7 +16,7 @@ from sim_hardware.daqmx_server.tasks.tdms_log import TdmsLog
 from sim_hardware.daqmx_server.timing import triggers
 from sim_hardware.daqmx_server.timing.task_timing import TaskTiming
 
-_TRIGGERS: Final = ("START", "REF")
+_TRIGGERS: Final[tuple[triggers.Which, ...]] = ("START", "REF")
 
 
 class ConfiguredTask(Protocol):
@@ -108,7 +108,7 @@ def _check_terminals(task: ConfiguredTask) -> None:
     if task.timing.source_is_foreign:
         full_name(inventory, host, task.timing.source, Code.SOURCE_TERMINAL_UNKNOWN)
     for which in _TRIGGERS:
-        if task.trigger[f"{which}_TRIG_TYPE"] == triggers.DIGITAL:
+        if triggers.waits_for_edge(task.trigger, which):
             source = triggers.source_of(task.trigger, which)
             full_name(inventory, host, source, Code.SOURCE_TERMINAL_UNKNOWN)
     for name, terminals in task.exported.items():
@@ -127,7 +127,9 @@ def _check_triggers(task: ConfiguredTask) -> None:
     if triggers.holds_by_analog(task.trigger) and task.io == "AI":
         trigger_channel(task, triggers.source_of(task.trigger, "PAUSE"))
     for which in _TRIGGERS:
-        if task.trigger[f"{which}_TRIG_TYPE"] in (triggers.ANALOG, triggers.WINDOW):
+        by_level = task.trigger[f"{which}_TRIG_TYPE"] in (triggers.ANALOG, triggers.WINDOW)
+        has_apfi = task.host is not None and not task.host.is_chassis
+        if by_level and not (has_apfi and triggers.waits_for_edge(task.trigger, which)):
             trigger_channel(task, triggers.source_of(task.trigger, which))
 
 

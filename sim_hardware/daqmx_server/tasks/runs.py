@@ -74,9 +74,10 @@ def trigger_readings(
 
 def _reference_search(task: StartedTask, pretrigger: int) -> ReferenceSearch:
     source = triggers.source_of(task.trigger, "REF")
-    if task.trigger["REF_TRIG_TYPE"] == triggers.DIGITAL:
+    if triggers.waits_for_edge(task.trigger, "REF"):
         rising = triggers.is_rising(task.trigger, "REF")
-        return ReferenceSearch(pretrigger, edge=lambda after: task.bench.trigger_edge(source, after, rising))
+        host = task.hosts[0]
+        return ReferenceSearch(pretrigger, lambda after: task.bench.trigger_edge(host, source, after, rising))
     condition = triggers.Condition.of(task.trigger, "REF")
 
     def readings(run: Run, start: int, stop: int) -> NDArray[np.float64]:

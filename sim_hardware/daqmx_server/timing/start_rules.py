@@ -25,7 +25,8 @@ def _start_edge(task: TimedTask, after_s: float) -> float | None:
     """The edge that a digital start trigger waits for, if it has come."""
     which = triggers.digital_start(task.trigger) or "START"
     source = triggers.source_of(task.trigger, which)
-    return task.bench.trigger_edge(source, after_s, triggers.is_rising(task.trigger, which))
+    rising = triggers.is_rising(task.trigger, which)
+    return task.bench.trigger_edge(task.hosts[0], source, after_s, rising)
 
 
 class _OwnClock:
@@ -37,7 +38,8 @@ class _OwnClock:
         self._kind = int(task.trigger["START_TRIG_TYPE"])
         self._search: CrossingSearch | None = None
         self._held: HeldClock | None = None
-        if self._kind in (triggers.ANALOG, triggers.WINDOW):
+        by_channel = not triggers.waits_for_edge(task.trigger, "START")
+        if self._kind in (triggers.ANALOG, triggers.WINDOW) and by_channel:
             self._search = CrossingSearch(triggers.Condition.of(task.trigger, "START"), 0)
             self._listen()
 

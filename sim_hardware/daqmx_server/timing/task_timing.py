@@ -161,7 +161,8 @@ class TaskTiming:
         which = triggers.digital_start(self._task.trigger)
         if self.source_is_foreign or which is None:
             return self.source_is_foreign
-        return not self._task.bench.fires_at_once(triggers.source_of(self._task.trigger, which))
+        source = triggers.source_of(self._task.trigger, which)
+        return not self._task.bench.fires_at_once(self._task.hosts[0], source)
 
     def verify(self) -> None:
         """Raise what NI-DAQmx raises for a clock that these channels cannot have."""

@@ -125,8 +125,17 @@ class CrossingSearch:
         return None
 
 
+def waits_for_edge(settings: Mapping[str, Any], which: Which) -> bool:
+    """Whether a trigger listens to a terminal: a digital one, or an analogue one at an ``APFI`` terminal."""
+    kind = settings.get(f"{which}_TRIG_TYPE", NONE)
+    outer = "apfi" in source_of(settings, which).lower() if kind in (ANALOG, WINDOW) else False
+    return outer or kind == DIGITAL
+
+
 def is_rising(settings: Mapping[str, Any], which: Which) -> bool:
-    """Which edge of a digital trigger counts."""
+    """Which edge of a trigger at a terminal counts."""
+    if settings.get(f"{which}_TRIG_TYPE") == ANALOG:
+        return bool(settings.get(f"ANLG_EDGE_{which}_TRIG_SLOPE") != Slope.FALLING.value)
     return bool(settings.get(f"DIG_EDGE_{which}_TRIG_EDGE", Edge.RISING.value) == Edge.RISING.value)
 
 
@@ -136,8 +145,8 @@ def holds_by_analog(settings: Mapping[str, Any]) -> bool:
 
 
 def digital_start(settings: Mapping[str, Any]) -> Which | None:
-    """Which digital edge a task waits for: the start trigger's, or a counter's arm start trigger's."""
-    if settings["START_TRIG_TYPE"] == DIGITAL:
+    """Which edge at a terminal a task waits for: the start trigger's, or a counter's arm start trigger's."""
+    if waits_for_edge(settings, "START"):
         return "START"
     return "ARM_START" if settings.get("ARM_START_TRIG_TYPE") == DIGITAL else None
 

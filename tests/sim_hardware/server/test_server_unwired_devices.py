@@ -56,10 +56,20 @@ def test_a_digital_reference_trigger_on_a_simulated_device_fires_once_the_pretri
         assert len(task.read(50, timeout=5.0)) == 50
 
 
-def test_a_device_that_is_not_simulated_waits_for_its_edge(options: nidaqmx.GrpcSessionOptions) -> None:
+def test_an_analogue_trigger_listens_at_the_terminals_for_it(options: nidaqmx.GrpcSessionOptions) -> None:
+    with nidaqmx.Task(grpc_options=options) as task:
+        _finite(task, "Dev1")
+        task.triggers.start_trigger.cfg_anlg_edge_start_trig("APFI0", trigger_level=0.5)
+        assert len(task.read(50, timeout=5.0)) == 50
+
+
+@pytest.mark.parametrize("source", ["/Dev2/PFI0", "PFI0"])
+def test_a_device_that_is_not_simulated_waits_for_its_edge(
+    options: nidaqmx.GrpcSessionOptions, source: str
+) -> None:
     with nidaqmx.Task(grpc_options=options) as task:
         _finite(task, "Dev2")
-        task.triggers.start_trigger.cfg_dig_edge_start_trig("/Dev2/PFI0")
+        task.triggers.start_trigger.cfg_dig_edge_start_trig(source)
         with pytest.raises(DaqError) as refused:
             task.read(50, timeout=0.2)
     assert refused.value.error_code == -200284
