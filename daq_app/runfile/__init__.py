@@ -13,6 +13,7 @@ from daq_app.runfile.hdf5.read import Run, open_run
 from daq_app.runfile.integrity.recovery import Recovery, recover
 from daq_app.runfile.integrity.saving import finalise
 from daq_app.runfile.integrity.verification import VerifyReport, verify
+from daq_app.runfile.journal.flusher import Flusher, idle_flusher
 from daq_app.runfile.journal.locks import FolderLock
 from daq_app.runfile.journal.read import JournalContents, read_journal
 from daq_app.runfile.journal.writer import JournalWriter
@@ -38,6 +39,7 @@ __all__ = [
     "DerivedData",
     "DerivedSignal",
     "Event",
+    "Flusher",
     "FolderLock",
     "Gap",
     "JournalContents",
@@ -54,6 +56,7 @@ __all__ = [
     "VerifyReport",
     "finalise",
     "host_name",
+    "idle_flusher",
     "open_run",
     "plan_to_dict",
     "read_journal",

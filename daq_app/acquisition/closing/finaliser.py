@@ -11,12 +11,11 @@ import json
 import queue
 import subprocess
 import threading
-from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 from daq_app.guarded import end_guarded, start_guarded
 from daq_app.waiting import WorkWatch
@@ -27,6 +26,9 @@ _LEAST_LIMIT_S: Final = 120.0
 counts as hung, s. A slow machine stretches neither."""
 _SLOWEST_BYTES_PER_S: Final = 1e6
 _LOOK_EVERY_S: Final = 0.1
+_ATTEMPTS: Final = 3
+_AGAIN_AFTER_S: Final = 1.0
+"""Pause before the next attempt, s: the system may refuse memory or file handles for a while."""
 _CLOSING_S: Final = 10.0
 
 
@@ -84,42 +86,64 @@ class Finaliser(threading.Thread):
 
 
 class _Recovery:
-    """Journals of earlier sessions, on a thread and with a worker that last while there are any."""
+    """Journals of earlier sessions, on a thread of their own; its worker lasts while there are any."""
 
     def __init__(self) -> None:
-        self._jobs: deque[tuple[dict[str, str], Future[Finished]]] = deque()
-        self._lock = threading.Lock()
-        self._thread: threading.Thread | None = None
+        self._jobs: queue.SimpleQueue[tuple[dict[str, str], Future[Finished]] | None] = queue.SimpleQueue()
         self._worker = _Worker()
         self._closing = False
+        self._thread = threading.Thread(target=self._run, name="recovery", daemon=True)
+        self._thread.start()
 
     def submit(self, job: dict[str, str], done: Future[Finished]) -> None:
-        with self._lock:
-            self._jobs.append((job, done))
-            if self._thread is None:
-                self._thread = threading.Thread(target=self._run, name="recovery", daemon=True)
-                self._thread.start()
+        self._jobs.put((job, done))
 
     def _run(self) -> None:
-        while True:
-            with self._lock:
-                if not self._jobs:
-                    self._thread = None
-                    break
-                job, done = self._jobs.popleft()
+        while (entry := self._jobs.get()) is not None:
+            job, done = entry
             # What is not recovered before the session ends waits for the next start.
             done.set_result(Finished(True, "") if self._closing else self._worker.do(job))
-        self._worker.end()
+            if self._jobs.empty():
+                self._worker.end()
 
     def close(self) -> None:
         """Let the job that is being done end, but not for long: its journal is untouched all the same."""
-        with self._lock:
-            self._closing = True
-            thread = self._thread
-        if thread is not None:
-            thread.join(_CLOSING_S)
-            self._worker.stop()
-            thread.join()
+        self._closing = True
+        self._jobs.put(None)
+        self._thread.join(_CLOSING_S)
+        self._worker.stop()
+        self._thread.join()
+
+
+class _Reader(threading.Thread):
+    """Reads the answers of whichever worker there is.
+
+    Made while there is memory: a thread that begins without any never says that it has begun, and who
+    starts it waits for ever.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(name="answers", daemon=True)
+        self._pipes: queue.SimpleQueue[IO[str] | None] = queue.SimpleQueue()
+        self._lines: queue.SimpleQueue[tuple[IO[str], str]] = queue.SimpleQueue()
+        self.start()
+
+    def run(self) -> None:
+        while (pipe := self._pipes.get()) is not None:
+            line = ""
+            with contextlib.suppress(OSError, ValueError, MemoryError):  # the worker is gone, or was ended
+                line = pipe.readline()
+            self._lines.put((pipe, line))
+
+    def ask(self, pipe: IO[str]) -> None:
+        """Read one line."""
+        self._pipes.put(pipe)
+
+    def line(self, pipe: IO[str], timeout_s: float) -> str:
+        """The line of `pipe`, empty if it has ended; raises `queue.Empty` where there is none yet."""
+        while (found := self._lines.get(timeout=timeout_s))[0] is not pipe:
+            pass  # of a worker that was given up
+        return found[1]
 
 
 class _Worker:
@@ -127,6 +151,7 @@ class _Worker:
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[str] | None = None
+        self._reader = _Reader()
         self._stopped = threading.Event()
 
     def start(self) -> None:
@@ -137,14 +162,18 @@ class _Worker:
 
     def do(self, job: dict[str, str]) -> Finished:
         """The answer to a job; in words, and with the journal untouched, if there is none."""
-        for _ in range(2):  # a worker that died (memory short, killed) gets one successor
-            self.start()
-            assert self._process is not None
+        why = "ended too early"
+        for attempt in range(_ATTEMPTS):  # a worker that died (memory short, killed) gets a successor
+            if attempt:
+                self._stopped.wait(_AGAIN_AFTER_S)
             try:
-                answer = _exchange(self._process, job, _time_limit_s(job), self._stopped)
+                answer = self._done(job)
             except TimeoutError:  # another would hang as well
                 self._kill()
+                why = "did not end"
                 break
+            except (OSError, MemoryError) as error:
+                why, answer = f"could not be started ({error or 'no memory'})", None
             if answer is not None:
                 return answer
             self._kill()
@@ -152,9 +181,36 @@ class _Worker:
                 return Finished(True, "")
         return Finished(
             False,
-            f"The process that makes run files ended twice, or did not end. {job['journal']} is untouched: "
-            "run `daq-app recover` on its folder",
+            f"The process that makes run files {why}. {job['journal']} is untouched: close other programs, "
+            "then run `daq-app recover` on its folder",
         )
+
+    def _done(self, job: dict[str, str]) -> Finished | None:
+        """One job and its answer; None if the worker died over it or is to be stopped.
+
+        Raises `TimeoutError` if it uses more processor time than such a job can take, or none for that long,
+        and `OSError` or `MemoryError` if no worker can be started.
+        """
+        self.start()
+        worker = self._process
+        assert worker is not None and worker.stdin is not None and worker.stdout is not None
+        self._reader.ask(worker.stdout)
+        limit_s = _time_limit_s(job)
+        try:
+            worker.stdin.write(json.dumps(job) + "\n")
+            worker.stdin.flush()
+            watch = WorkWatch(worker.pid, limit_s)
+            while not self._stopped.is_set():
+                if watch.worked_s > limit_s or not watch.works():
+                    raise TimeoutError
+                with contextlib.suppress(queue.Empty):
+                    line = self._reader.line(worker.stdout, _LOOK_EVERY_S)
+                    return Finished(**json.loads(line)) if line else None
+        except TimeoutError:
+            raise
+        except (OSError, ValueError, TypeError):
+            pass
+        return None
 
     def stop(self) -> None:
         """Give up the job that is being done, from another thread."""
@@ -179,31 +235,3 @@ def _time_limit_s(job: dict[str, str]) -> float:
     except OSError:
         n_bytes = 0
     return _LEAST_LIMIT_S + n_bytes / _SLOWEST_BYTES_PER_S
-
-
-def _exchange(
-    worker: subprocess.Popen[str], job: dict[str, str], limit_s: float, stopped: threading.Event
-) -> Finished | None:
-    """One job and its answer; None if the worker died over it or is to be stopped.
-
-    Raises `TimeoutError` if it uses more processor time than `limit_s`, or none for that long.
-    """
-    assert worker.stdin is not None and worker.stdout is not None
-    answers: queue.SimpleQueue[str] = queue.SimpleQueue()
-    try:
-        worker.stdin.write(json.dumps(job) + "\n")
-        worker.stdin.flush()
-        output = worker.stdout
-        threading.Thread(target=lambda: answers.put(output.readline()), daemon=True).start()
-        watch = WorkWatch(worker.pid, limit_s)
-        while not stopped.is_set():
-            if watch.worked_s > limit_s or not watch.works():
-                raise TimeoutError
-            with contextlib.suppress(queue.Empty):
-                line = answers.get(timeout=_LOOK_EVERY_S)
-                return Finished(**json.loads(line)) if line else None
-    except TimeoutError:
-        raise
-    except (OSError, ValueError, TypeError):
-        pass
-    return None

@@ -61,8 +61,11 @@ class ResultMaker(threading.Thread):
     def _made(self, run: Path) -> tuple[bool, str]:
         try:
             self._process = process = start_guarded(_MODULE, [str(run)], quiet=True)
-        except OSError as error:
-            return False, f"The result of {run.name} could not be made ({error})"
+        except (OSError, MemoryError) as error:
+            return False, (
+                f"The result of {run.name} could not be made ({error or 'no memory'}). The run is safe. "
+                "Close other programs, then open it on the Result page or run `daq-app recover` on its folder"
+            )
         # Samples and pictures on the screen come first.
         with contextlib.suppress(psutil.Error, OSError, AttributeError):
             slow = psutil.BELOW_NORMAL_PRIORITY_CLASS if sys.platform == "win32" else 10

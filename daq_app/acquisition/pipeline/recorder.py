@@ -34,7 +34,7 @@ from daq_app.acquisition.pipeline.latency import Latency
 from daq_app.acquisition.pipeline.recent import Recent
 from daq_app.acquisition.pipeline.ring import Ring
 from daq_app.acquisition.pipeline.run_recording import Recorded, RecorderStatus, RunRecording
-from daq_app.runfile import RunFileError
+from daq_app.runfile import Flusher, RunFileError, idle_flusher
 
 _GROUP_S: Final = 0.05
 """Longest wait of a written block for its flush while more blocks keep coming."""
@@ -70,6 +70,7 @@ class Recorder(threading.Thread):
         self._spares = tuple(spares)
         self._ring = ring
         self._recent = recent or Recent(0)
+        self._flusher = Flusher()
         self._run: RunRecording | None = None
         """The run that is being recorded."""
         self._ended: list[RunRecording] = []
@@ -94,6 +95,7 @@ class Recorder(threading.Thread):
                 if overdue or self.inbox.empty():
                     self._guarded(self._commit)
         self._guarded(self._shut)
+        self._flusher.end()
 
     @property
     def _pending(self) -> bool:
@@ -197,7 +199,10 @@ class Recorder(threading.Thread):
         status = RecorderStatus(recording=True, sample=self.status.sample)
         order = replace(begin, header=header)
         try:
-            run = RunRecording(order, self._spares, status, self.latency, self._say, self._make_room)
+            self._flusher = idle_flusher(self._flusher)
+            run = RunRecording(
+                order, self._spares, status, self.latency, self._say, self._make_room, self._flusher
+            )
         except RunFileError as error:
             for piece in before:
                 self._recent.add(piece)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from daq_app.runfile import JournalError, JournalWriter, RunFileError, RunHeader
+from daq_app.runfile import Flusher, JournalError, JournalWriter, RunFileError, RunHeader
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,9 @@ def find_refuge(journal: JournalWriter, spares: Sequence[Path], why: str) -> Mov
     return "; ".join(refusals)
 
 
-def open_journal(path: Path, header: RunHeader, spares: Sequence[Path]) -> JournalWriter:
+def open_journal(
+    path: Path, header: RunHeader, spares: Sequence[Path], flusher: Flusher | None = None
+) -> JournalWriter:
     """A new journal at `path`, or in the first other place that takes it. Raises what its own place said."""
     first: RunFileError | None = None
     for place in [path.parent, *spares]:
@@ -55,7 +57,7 @@ def open_journal(path: Path, header: RunHeader, spares: Sequence[Path]) -> Journ
         try:
             if spares:
                 place.mkdir(parents=True, exist_ok=True)
-            return JournalWriter(target, header)
+            return JournalWriter(target, header, flusher)
         except OSError as error:
             first = first or RunFileError(f"{place}: {_words(error)}")
         except JournalError as error:

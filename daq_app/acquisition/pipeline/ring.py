@@ -19,7 +19,15 @@ from pathlib import Path
 from typing import Final
 
 from daq_app.acquisition.messages.items import Arrived, Lost, Noted
-from daq_app.runfile import JOURNAL_SUFFIX, JournalSlowDisk, JournalWriter, RunFileError, RunHeader
+from daq_app.runfile import (
+    JOURNAL_SUFFIX,
+    Flusher,
+    JournalSlowDisk,
+    JournalWriter,
+    RunFileError,
+    RunHeader,
+    idle_flusher,
+)
 
 FOLDER: Final = ".ring"
 """Inside the folder of the runs; one folder a session of the ring below it."""
@@ -51,6 +59,7 @@ class Ring(threading.Thread):
         self._inbox: queue.SimpleQueue[Piece | str] = queue.SimpleQueue()
         self._waiting_bytes = 0
         self._journal: JournalWriter | None = None
+        self._flusher = Flusher()
         self._began_at = 0
         self._number = 0
         self._segments: deque[Path] = deque()
@@ -89,6 +98,7 @@ class Ring(threading.Thread):
                 if piece != "keep":
                     self._remove_all()
                 if piece != "clear":
+                    self._flusher.end()
                     return
                 continue
             if isinstance(piece, Arrived):
@@ -130,7 +140,8 @@ class Ring(threading.Thread):
             self.place.mkdir(parents=True, exist_ok=True)
             run_id = f"{self.session}-{self._number:06d}"
             path = self.place / f"{run_id}{JOURNAL_SUFFIX}"
-            self._journal = JournalWriter(path, self._header_of(run_id))
+            self._flusher = idle_flusher(self._flusher)
+            self._journal = JournalWriter(path, self._header_of(run_id), self._flusher)
             self._number += 1
             self._began_at = first_sample
             self._segments.append(path)

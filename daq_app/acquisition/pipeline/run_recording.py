@@ -14,6 +14,7 @@ from daq_app.acquisition.pipeline.latency import Latency
 from daq_app.acquisition.pipeline.refuge import find_refuge, open_journal
 from daq_app.acquisition.pipeline.unwritten import Unwritten
 from daq_app.runfile import (
+    Flusher,
     JournalDeviceError,
     JournalDiskFull,
     JournalSlowDisk,
@@ -72,6 +73,7 @@ class RunRecording:
         latency: Latency,
         say: Say,
         make_room: Callable[[], None],
+        flusher: Flusher,
     ) -> None:
         """Open the journal. A run that was armed raises `RunFileError` where its own disk does not take it;
 
@@ -97,7 +99,8 @@ class RunRecording:
         self._alarm = ""
         try:
             # A release that nobody armed cannot wait for another disk: any place will do.
-            self._journal = open_journal(begin.journal, begin.header, self._spares if begin.kept else ())
+            spares = self._spares if begin.kept else ()
+            self._journal = open_journal(begin.journal, begin.header, spares, flusher)
         except RunFileError as error:
             if not begin.kept:
                 raise

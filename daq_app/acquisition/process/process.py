@@ -108,7 +108,9 @@ class Process:
             self.session.tick()
         except Exception as error:
             # Whatever is wrong with watching, it must not end what is being watched.
-            self.session.tell_fault(f"Watching failed ({type(error).__name__}: {error}); recording goes on")
+            self.session.tell_fault(
+                f"Watching failed ({type(error).__name__}: {error}). Recording goes on; close other programs"
+            )
         if self._unattended is not None and not self._interrupted:
             self._unattended.advance()
             self._leaving = self._leaving or self._unattended.exit_code is not None

@@ -20,7 +20,7 @@ class MachineNews:
     """Something that has just happened to the machine."""
 
     name: str
-    """asleep, wall_clock or memory"""
+    """asleep, wall_clock, memory or handles"""
     severity: Literal["info", "warning", "error"]
     text: str
     value: float
@@ -42,7 +42,7 @@ class MachineWatch:
     ) -> None:
         self._monotonic, self._wall, self._memory = monotonic, wall, memory
         self._last: tuple[float, float] | None = None
-        self._short = False
+        self._short = self._refused = False
 
     def look(self) -> list[MachineNews]:
         """What has happened since the last look."""
@@ -76,7 +76,13 @@ class MachineWatch:
         return news + self._look_at_memory()
 
     def _look_at_memory(self) -> list[MachineNews]:
-        free = self._memory()
+        try:
+            free = self._memory()
+        except OSError as error:
+            return self._tell_refusal(error)
+        if self._refused:
+            self._refused = False
+            return [MachineNews("handles", "info", "This computer opens files again", 0.0)]
         if free < LOW_MEMORY_BYTES and not self._short:
             self._short = True
             text = (
@@ -87,3 +93,14 @@ class MachineWatch:
             self._short = False
             return [MachineNews("memory", "info", "There is memory enough again", float(free))]
         return []
+
+    def _tell_refusal(self, error: OSError) -> list[MachineNews]:
+        """The system opens no file for us, not even its own account of the memory: out of handles, mostly."""
+        if self._refused:
+            return []
+        self._refused = True
+        text = (
+            f"This computer refuses to open files ({error.strerror or error}). Close other programs now; "
+            "samples of the test that runs are safe"
+        )
+        return [MachineNews("handles", "error", text, float(error.errno or 0))]

@@ -258,6 +258,7 @@ class Session:
             kind="result",
             sample=self.recorder.status.sample,
             text=text,
+            severity="info" if ok else "warning",
             data={"run": str(run), "ok": float(ok)},
         )
         if text:

@@ -10,7 +10,7 @@ import errno
 import os
 import threading
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, wait
 from concurrent.futures import TimeoutError as FutureTimeout
 from pathlib import Path
 from types import TracebackType
@@ -27,6 +27,7 @@ from daq_app.runfile.errors import (
     JournalSlowDisk,
     RunFileError,
 )
+from daq_app.runfile.journal.flusher import Flusher
 from daq_app.runfile.journal.frames import MAX_PAYLOAD_BYTES, MAX_TEXT_BYTES, TAG_BYTES, FrameType, pack_frame
 from daq_app.runfile.journal.locks import lock_file
 from daq_app.runfile.journal.scan import scan_frames
@@ -45,9 +46,10 @@ class JournalWriter:
     in another thread while blocks are appended.
     """
 
-    def __init__(self, path: Path, header: RunHeader) -> None:
+    def __init__(self, path: Path, header: RunHeader, flusher: Flusher | None = None) -> None:
         """Create `path` (never overwrites), lock it, and flush the header.
 
+        `flusher` does what `sync` may not wait for; without one the journal makes its own when it needs it.
         Raises `RunFileError` if it exists or cannot be created, `JournalError` if the disk fails.
         """
         self.path = path
@@ -64,7 +66,7 @@ class JournalWriter:
         self._header_copied = False
         self._append_lock = threading.Lock()
         self._sync_lock = threading.Lock()
-        self._sync_pool: ThreadPoolExecutor | None = None
+        self._flusher, self._owns_flusher = flusher, False
         self._pending_sync: Future[int] | None = None
         self._header_payload = header.model_dump_json().encode()
         if len(self._header_payload) > MAX_TEXT_BYTES:
@@ -166,10 +168,10 @@ class JournalWriter:
         """
         if timeout_s is None:
             return self._flush()
-        if self._sync_pool is None:
-            self._sync_pool = ThreadPoolExecutor(1, thread_name_prefix="journal-sync")
+        if self._flusher is None:
+            self._flusher, self._owns_flusher = Flusher(), True
         if self._pending_sync is None:
-            self._pending_sync = self._sync_pool.submit(self._flush)
+            self._pending_sync = self._flusher.submit(self._flush)
         try:
             acknowledged = self._pending_sync.result(timeout_s)
         except FutureTimeout:
@@ -215,18 +217,18 @@ class JournalWriter:
             os.close(fd)
             path.unlink(missing_ok=True)
             raise
-        old_pool, old_fd = self._sync_pool, self._fd
+        hangs, old_fd = self._pending_sync is not None, self._fd
         with self._append_lock:
             # A flush of the old file may hang for ever: it is left to itself, with a lock of its own.
-            self._sync_lock, self._sync_pool, self._pending_sync = threading.Lock(), None, None
+            self._sync_lock, self._pending_sync = threading.Lock(), None
             self._fd, self.path = fd, path
             self._bytes, self._sequence = n_bytes, n_frames
             self._next_sample = max(
                 (f.end_sample for f in frames if f.type in (FrameType.DATA, FrameType.GAP)), default=None
             )
             self._failed = None
-        if old_pool is not None:
-            old_pool.shutdown(wait=False)
+        if hangs:
+            self._leave_flusher()
         with contextlib.suppress(OSError):
             os.close(old_fd)
 
@@ -272,10 +274,16 @@ class JournalWriter:
 
     def _release(self) -> None:
         self._closed = True
-        if self._sync_pool is not None:
-            self._sync_pool.shutdown(wait=True)
+        if self._pending_sync is not None:
+            wait([self._pending_sync])
+        self._leave_flusher()
         with self._sync_lock:
             os.close(self._fd)
+
+    def _leave_flusher(self) -> None:
+        if self._flusher is not None and self._owns_flusher:
+            self._flusher.end()
+        self._flusher = None
 
     def _append(
         self,
