@@ -137,7 +137,9 @@ class Recorder:
     def wait(self, right: Callable[[], bool], what: str) -> None:
         deadline = time.monotonic() + _LIMIT_S
         while not right():
-            if self.process.exitcode is not None or time.monotonic() > deadline:
+            if self.process.exitcode is not None:
+                raise RuntimeError(f"{what}: the recorder ended ({self.process.exitcode}); last {self.state}")
+            if time.monotonic() > deadline:
                 raise RuntimeError(f"{what}: not within {_LIMIT_S:g} s; last {self.state}")
             time.sleep(0.05)
 

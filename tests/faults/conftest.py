@@ -13,7 +13,7 @@ import pytest
 from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.config import Rig, load_rig
 from sim_hardware.control import SimControl
-from tests.support.recorder.fault_bench import SPEED, Acquisition, Row, RunFacts, Start, Told
+from tests.support.recorder.fault_bench import SPEED, Acquisition, Row, RunFacts, Standing, Start, Told
 from tests.support.recorder.processes import free_the_hardware
 
 _KEY = "fault row"
@@ -57,12 +57,16 @@ def bench(server: SimulatedServer) -> Iterator[SimControl]:
 
 
 @pytest.fixture
-def start(rig_file: Path, rig: Rig, server: SimulatedServer, tmp_path: Path) -> Iterator[Start]:
-    """Start an acquisition of the test's own on the module's server."""
+def start(
+    rig_file: Path, rig: Rig, server: SimulatedServer, standing: Standing, tmp_path: Path
+) -> Iterator[Start]:
+    """Start an acquisition of the test's own on the module's server, in the place of the standing one."""
     made: list[Acquisition] = []
 
     def make(*options: str, out: str = "runs", connection: str = "") -> Acquisition:
         where = connection or server.connection
+        if where == server.connection:
+            standing.end()
         made.append(Acquisition(rig_file, rig, tmp_path / out, where, "--speed", str(SPEED), *options))
         return made[-1]
 
@@ -74,16 +78,25 @@ def start(rig_file: Path, rig: Rig, server: SimulatedServer, tmp_path: Path) -> 
 
 
 @pytest.fixture(scope="module")
-def shared(
+def standing(
     rig_file: Path, rig: Rig, server: SimulatedServer, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Acquisition]:
-    """One acquisition for all tests of a module: each arms a run of its own."""
-    out = tmp_path_factory.mktemp("shared") / "runs"
-    options = ("--speed", str(SPEED), "--reconnect-within", "20")
-    made = Acquisition(rig_file, rig, out, server.connection, *options)
+) -> Iterator[Standing]:
+    """One acquisition for the tests of a module: each arms a run of its own."""
+
+    def make() -> Acquisition:
+        out = tmp_path_factory.mktemp("shared") / "runs"
+        options = ("--speed", str(SPEED), "--reconnect-within", "20")
+        return Acquisition(rig_file, rig, out, server.connection, *options)
+
+    made = Standing(make)
     yield made
-    if made.process.exitcode is None:
-        assert made.end() == 0
+    made.end()
+
+
+@pytest.fixture
+def shared(standing: Standing) -> Acquisition:
+    """The standing acquisition."""
+    return standing.living()
 
 
 @pytest.fixture

@@ -159,10 +159,7 @@ def test_memory_that_runs_short(shared: Acquisition, rig: Rig, row: Row) -> None
 # -- with processes of their own -----------------------------------------------------------------------
 
 
-def test_the_acquisition_is_killed(
-    shared: Acquisition, start: Start, bench: SimControl, rig: Rig, row: Row
-) -> None:
-    shared.end()  # the chassis is needed for other recorders
+def test_the_acquisition_is_killed(start: Start, bench: SimControl, rig: Rig, row: Row) -> None:
     first = start()
     journal = first.arm()
     safe = first.record(6000)

@@ -236,6 +236,25 @@ class Acquisition:
 
 
 @dataclass
+class Standing:
+    """One acquisition for many tests in any order, begun again where one of them needed its chassis."""
+
+    make: Callable[[], Acquisition]
+    _now: Acquisition | None = None
+
+    def living(self) -> Acquisition:
+        if self._now is None or self._now.process.exitcode is not None:
+            self._now = self.make()
+        return self._now
+
+    def end(self) -> None:
+        """Free its chassis."""
+        if self._now is not None and self._now.process.exitcode is None:
+            assert self._now.end() == 0
+        self._now = None
+
+
+@dataclass
 class RunFacts:
     """What a run says of itself, and what its samples say."""
 
