@@ -124,7 +124,9 @@ def test_a_folder_that_takes_no_file_before_arming(shared: Acquisition, rig: Rig
     shared.arm()
     shared.stop()
     shared.strike()
-    shared.sabotage(read_only=str(shared.out))
+    # What is told of the clock shows that the folder, too, is read-only by now.
+    shared.sabotage(read_only=str(shared.out), clock_s=3600.0)
+    shared.told("This computer's clock was set forward")
     refused = shared.client.request("arm", timeout_s=LIMIT_S, test="FR1-L3-3")
     assert not refused.ok and str(shared.out) in refused.text, refused.text
     shared.sabotage()
