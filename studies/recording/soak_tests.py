@@ -14,13 +14,14 @@ import errno
 import itertools
 import os
 import random
+import re
 import signal
 import sys
 import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -31,12 +32,12 @@ from rich.console import Console
 from daq_app.acquisition import AcquisitionClient, read_session_file
 from daq_app.acquisition.messages.published import HealthMessage, Message, State, StateMessage
 from daq_app.config import load_rig
-from daq_app.runfile import open_run, recover, verify
+from daq_app.runfile import Gap, open_run, recover, verify
 from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX, find_journals, find_runs
 from sim_hardware.control import SimControl
 from studies.recording.injecting import Injected, choose_fault, unexplained_gaps
 from studies.recording.marked_recording import RIG, command_line, console, marked_server, write_report
-from tests.support.recorder.marked_check import check_marked
+from tests.support.recorder.marked_check import Leap, check_marked
 from tests.support.recorder.processes import free_the_hardware, quick_context
 from tests.support.recorder.relay import Relay
 from tests.support.recorder.saboteur import run_sabotaged
@@ -48,6 +49,8 @@ _QUIET_S: Final = 5.0
 _MACHINE_FAULTS: Final = ("network cut", "full disk", "EIO", "clock step", "device", "device")
 _KILL_SHARE: Final = 0.25
 """Share of the tests that end with a kill of the recorder."""
+_LONGEST_BUFFER_S: Final = 120.0
+"""That a rig file may ask for."""
 _GROWTH_MB: Final = 25.0
 """Largest growth of a recorder's memory between its second and its last test that counts as flat."""
 _GROWTH_HANDLES: Final = 8
@@ -91,10 +94,10 @@ class TestOutcome:
 class Recorder:
     """One sabotaged acquisition process with an ear on it."""
 
-    def __init__(self, folder: Path, connection: str, speed: float) -> None:
+    def __init__(self, rig: Path, folder: Path, connection: str, speed: float) -> None:
         heard, self._orders = quick_context().Pipe(duplex=False)
         arguments = [
-            *("--rig", str(RIG), "--out", str(folder), "--spare", str(folder.with_name("spare"))),
+            *("--rig", str(rig), "--out", str(folder), "--spare", str(folder.with_name("spare"))),
             *("--connection", connection, "--speed", str(speed), "--no-results", "--release-within", "36000"),
         ]
         self.process = quick_context().Process(target=run_sabotaged, args=(arguments, heard))
@@ -169,6 +172,21 @@ class Recorder:
         self.client.close()
 
 
+def _rig_with_room(folder: Path, speed: float) -> Path:
+    """The rig with a device buffer of as many seconds of this computer as at real time, or the longest."""
+    buffer_s = min(load_rig(RIG).acquisition.buffer_s * speed, _LONGEST_BUFFER_S)
+    text = re.sub(r"(?m)^buffer_s = .*$", f"buffer_s = {buffer_s:g}", RIG.read_text(encoding="utf-8"))
+    path = folder / RIG.name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def _tell_leap(leap: Leap, gaps: Sequence[Gap]) -> str:
+    before = next((gap for gap in reversed(gaps) if gap.end <= leap.sample), None)
+    gap = f"{before.n_samples} samples ended at {before.end}: {before.reason}" if before else "none"
+    return f"the marks leap by {leap.by} samples at {leap.sample}, the gap before it: {gap}"
+
+
 class SoakOfTests:
     """Recorders one after the other; `run` answers the report."""
 
@@ -178,7 +196,8 @@ class SoakOfTests:
         self._rng = random.Random(seed)
         self._runs, self._spare = folder / "runs", folder / "spare"
         self._runs.mkdir()
-        self._rig = load_rig(RIG)
+        self._rig_file = _rig_with_room(folder, speed)
+        self._rig = load_rig(self._rig_file)
         self._recorder: Recorder | None = None
         self._outcomes: list[TestOutcome] = []
         self._sizes: list[list[tuple[float, int]]] = []
@@ -204,7 +223,8 @@ class SoakOfTests:
         self._outcomes.append(outcome)
         if self._recorder is None:
             free_the_hardware(connection)
-            self._recorder = Recorder(self._runs, f"grpc://127.0.0.1:{relay.port}", self._speed)
+            address = f"grpc://127.0.0.1:{relay.port}"
+            self._recorder = Recorder(self._rig_file, self._runs, address, self._speed)
         recorder = self._recorder
         recorder.arm(outcome.name)
         faults: list[Injected] = []
@@ -309,13 +329,14 @@ class SoakOfTests:
             asleep = [event.sample for event in run.events if event.data.get("alarm") == "asleep"]
             strange = unexplained_gaps(faults, run.gaps, asleep)
             ends = run.first_sample, run.first_sample + run.n_samples
-        leaps = sum(not leap.explained for leap in marks.leaps)
-        if strange or leaps:
-            outcome.problems.append(f"{strange} gaps and {leaps} leaps of time have no fault")
+            leaps = [_tell_leap(leap, run.gaps) for leap in marks.leaps if not leap.explained]
+        outcome.problems += leaps
+        if strange:
+            outcome.problems.append(f"{strange} gaps have no fault")
         outcome.runs += 1
         outcome.samples += marks.n_samples
         outcome.lost += marks.missing
-        outcome.unexplained += marks.unexplained + strange + leaps
+        outcome.unexplained += marks.unexplained + strange + len(leaps)
         if not outcome.problems:
             path.unlink()
             path.with_suffix(JOURNAL_SUFFIX).unlink(missing_ok=True)
