@@ -7,6 +7,7 @@ import dataclasses
 import html.parser
 import io
 import json
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -166,3 +167,30 @@ def test_reasons_add_no_tag_to_a_page_and_stop_no_pdf(tmp_path: Path) -> None:
     tables = write_csv(tmp_path, [], [dataclasses.replace(plain, reasons=ALL_KNOWN)], [], [])
     for table in tables:
         assert formulas(table.read_text(encoding="utf-8"), ",") == []
+
+
+@given(hostile())
+@settings(max_examples=12, deadline=None)
+def test_words_of_a_foreign_file_are_words_after_its_import(
+    tmp_path_factory: pytest.TempPathFactory, configs: Path, text: str
+) -> None:
+    """A column's name and a comment of somebody else's CSV, through proposal, import, terminal and export."""
+    folder = tmp_path_factory.mktemp("import")
+    heading = text.replace("\r", " ").replace("\n", " ").replace("\0", " ")
+    table, times = io.StringIO(), np.arange(200) / 100.0
+    writer = csv.writer(table)
+    writer.writerow(["time_s", f"{heading} (mm)", "WP-1 (mm)"])
+    writer.writerows((f"{t:.2f}", f"{np.sin(t):.4f}", f"{np.cos(5 * t):.4f}") for t in times)
+    (folder / "old.csv").write_text(f"# {heading}\n{table.getvalue()}", encoding="utf-8")
+    rig, out = configs / "fr1.toml", folder / "runs"
+    source = folder / "old.csv"
+    proposed = run_command("import", source, "--rig", rig, "--propose-map")
+    imported = run_command("import", source, "--rig", rig, "--out", out)
+    for answer in (proposed, imported):
+        assert not hidden_characters(answer.output), answer.output
+        assert answer.exit_code in (0, 1, 2), answer.output
+    if proposed.exit_code == 0:
+        tomllib.loads(proposed.stdout)
+    for run in out.glob("*.h5"):
+        written = export_run(run, folder / "out.csv", "csv", units="raw").read_text(encoding="utf-8")
+        assert formulas(written, ",") == [] and not hidden_characters(written)

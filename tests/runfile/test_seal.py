@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import random
 import subprocess
 import sys
@@ -18,6 +20,7 @@ from daq_app.runfile import DerivedData, DerivedSignal, RunFileError, finalise, 
 from daq_app.runfile.hdf5.probe import Prober
 from daq_app.runfile.seal.format import MAGIC
 from daq_app.runfile.seal.proven_file import seal_of
+from daq_app.runfile.seal.signing import own_public_key
 
 
 @pytest.fixture
@@ -33,6 +36,28 @@ def test_a_new_run_is_sealed_and_signed_by_this_machine(run: Path) -> None:
     assert report.notes == ("150 samples per channel are missing, in 1 gaps",)
     seal = seal_of(run)
     assert seal is not None and seal.file_bytes == run.stat().st_size and len(seal.signature) == 64
+
+
+def test_a_file_system_without_hard_links_keeps_one_key(
+    tmp_path: Path, make_journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """exFAT and many shares have none: the key is made once and stays, and no part of it lies beside."""
+
+    def refused(*_: object, **__: object) -> None:
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(os, "link", refused)
+    monkeypatch.setattr("platformdirs.user_config_path", lambda *_, **__: tmp_path / "keys")
+    keys = []
+    for name in ("one", "two"):
+        make_journal(tmp_path / f"{name}.journal", n_blocks=2)
+        run = finalise(tmp_path / f"{name}.journal", tmp_path / f"{name}.h5", None, keep_journal=False)
+        assert verify(run).ok
+        seal = seal_of(run)
+        assert seal is not None
+        keys.append(seal.public_key)
+    assert keys[0] == keys[1] == own_public_key() != bytes(32)
+    assert [path.name for path in (tmp_path / "keys").iterdir()] == ["seal.key"]
 
 
 def test_a_changed_bit_anywhere_is_found(run: Path) -> None:

@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
     QApplication,
     QGridLayout,
     QHBoxLayout,
-    QLabel,
     QPushButton,
     QVBoxLayout,
     QWidget,
@@ -27,7 +26,7 @@ from daq_app.config.shown_units import shown_unit
 from daq_app.monitor.data.channel_look import ChannelLook, expected_density_si, look_at, neighbours
 from daq_app.monitor.data.session import Session
 from daq_app.monitor.plots.plot_base import Plot, envelope, line_pen
-from daq_app.monitor.widgets.labels import DASH, number, role_label, set_role
+from daq_app.monitor.widgets.labels import DASH, PlainLabel, number, role_label, set_role
 from daq_app.monitor.widgets.theme import Colours, apply_theme
 
 EVERY_MS: Final = 400
@@ -72,7 +71,7 @@ class ChannelWindow(QWidget):
         self._line, self._density = self.signal.curve(), self.spectrum.curve()
         self._expected = self.spectrum.curve(dashed=True)
         self._limits: list[tuple[pg.InfiniteLine, str]] = []
-        self._facts = {name: QLabel(DASH) for name in _FACTS}
+        self._facts = {name: PlainLabel(DASH) for name in _FACTS}
         self._neighbours = QVBoxLayout()
         self._build()
         QShortcut(QKeySequence("Esc"), self).activated.connect(self.close)

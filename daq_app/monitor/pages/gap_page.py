@@ -30,7 +30,7 @@ from daq_app.monitor.data.gap_runner import GapRunner
 from daq_app.monitor.plots.gap_traces import GapTraces
 from daq_app.monitor.plots.gap_views import BarRows, GapMapView, closure_bars, evidence_bars, map_cells
 from daq_app.monitor.widgets.banner import Banner, keyed_button, open_outside
-from daq_app.monitor.widgets.labels import number, role_label, set_role
+from daq_app.monitor.widgets.labels import number, role_label, set_role, tip_text
 from daq_app.monitor.widgets.theme import DARK, Colours
 from daq_app.runfile import RunFileError
 
@@ -178,7 +178,7 @@ class GapPage(QWidget):
             item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
             if not good:
                 item.setFlags(item.flags() & ~Qt.ItemFlag.ItemIsEnabled)
-                item.setToolTip(shortened(test.reason, 200))
+                item.setToolTip(tip_text(shortened(test.reason, 200)))
             # A test that was rejected since it was ticked leaves the diagnosis.
             wanted = good and (test.path in chosen if test.path in known else True)
             item.setCheckState(Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)

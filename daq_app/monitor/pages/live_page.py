@@ -15,7 +15,7 @@ from daq_app.monitor.plots.estimate_plots import PeriodPlot, PhasePlane, Restitu
 from daq_app.monitor.plots.motion_plots import MotionPlots
 from daq_app.monitor.plots.strip_panel import StripPanel
 from daq_app.monitor.widgets.counters import Counters
-from daq_app.monitor.widgets.labels import role_label, set_role
+from daq_app.monitor.widgets.labels import role_label, set_role, tip_text
 from daq_app.monitor.widgets.theme import Colours
 
 
@@ -113,7 +113,7 @@ class LivePage(QWidget):
         text = "  ".join(part for part in (*parts, self.motion.theory_caption()) if part)
         if self._caption.text() != text:
             self._caption.setText(text)
-            self._caption.setToolTip(text if doubtful else "")
+            self._caption.setToolTip(tip_text(text) if doubtful else "")
         set_role(self._caption, "warning" if doubtful else "muted")
 
     def show_estimate(self) -> None:

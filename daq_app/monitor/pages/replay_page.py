@@ -29,7 +29,7 @@ from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.replay_data import ROTATION, VELOCITY, ReplayRun
 from daq_app.monitor.plots.replay_plots import ReplayPlots, shade
 from daq_app.monitor.plots.strip_panel import FAMILY_TITLES
-from daq_app.monitor.widgets.labels import PlainLabel, number, role_label
+from daq_app.monitor.widgets.labels import PlainLabel, number, role_label, tip_text
 from daq_app.monitor.widgets.theme import DARK, Colours
 from daq_app.runfile import RunFileError
 from daq_app.runfile.durable import written_whole
@@ -171,7 +171,7 @@ class ReplayPage(QWidget):
         gaps = f" · {missing} samples missing in {len(run.gaps)} gaps" if run.gaps else " · no gap"
         size = f"{stop - start:.1f} s at {run.rate_hz:g} Hz · {len(header.channel_ids)} channels"
         self._facts.setText(f"{run.path.name} · {size}{gaps}")
-        self._facts.setToolTip(self._facts.text())
+        self._facts.setToolTip(tip_text(self._facts.text()))
         self._fill_tree()
         self._fill_events()
         self.plots.show_run(run, self.chosen)
@@ -214,7 +214,7 @@ class ReplayPage(QWidget):
             time = self.run.time_of(event.sample - self.run.first_sample)
             item = QListWidgetItem(f"{number(time, 3)} s  {event.kind}")
             item.setData(_NAME, time)
-            item.setToolTip(event.text)
+            item.setToolTip(tip_text(event.text))
             self.events.addItem(item)
 
     # -- choosing --------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,14 +14,14 @@ from daq_app.campaign.result.report import METHODS, period_deviation, verdict_se
 from daq_app.campaign.result.result import NoResult, Result, load_result
 from daq_app.campaign.status import NO_FACTS, RecordedTest, TestFacts
 from daq_app.config import ConfigError
-from daq_app.config.shown_text import shortened, visible
+from daq_app.config.shown_text import shortened
 from daq_app.config.wording import plus_minus
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.child import said_by
 from daq_app.monitor.plots.result_plots import ResultPlots
 from daq_app.monitor.widgets.banner import Banner, keyed_button, open_outside
 from daq_app.monitor.widgets.family_table import FamilyTable
-from daq_app.monitor.widgets.labels import DASH, Tile, number, set_role
+from daq_app.monitor.widgets.labels import DASH, Tile, number, set_role, tip_text
 from daq_app.monitor.widgets.level_table import LevelTable
 from daq_app.monitor.widgets.theme import DARK, Colours
 from daq_app.runfile import RunFileError
@@ -273,7 +272,7 @@ class ResultPage(QWidget):
         """Operator and notes: in short on the page, whole when pointed at."""
         said = [facts.operator, *facts.notes]
         self.notes.setText(shortened(" · ".join(filter(None, said)), _NOTES_SHOWN))
-        self.notes.setToolTip(html.escape(visible("\n".join(said).strip())).replace("\n", "<br>"))
+        self.notes.setToolTip(tip_text("\n".join(said)))
         self.notes.setVisible(bool(self.notes.text()))
 
     def _show_buttons(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from typing import Any
 
 from PySide6.QtCore import QAbstractTableModel, QDateTime, QObject, QRectF, QSize, Qt
@@ -12,7 +11,7 @@ from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem
 from daq_app.campaign.status import CampaignStatus, Place, PlaceState, RecordedTest, TestVerdict
 from daq_app.config.shown_text import shortened, visible
 from daq_app.monitor.widgets.check_table import Index
-from daq_app.monitor.widgets.labels import number
+from daq_app.monitor.widgets.labels import number, tip_text
 from daq_app.monitor.widgets.shapes import draw_shape
 from daq_app.monitor.widgets.theme import DARK
 
@@ -69,7 +68,7 @@ class CampaignModel(QAbstractTableModel):
             bold.setBold(True)
             return bold
         if role == Qt.ItemDataRole.ToolTipRole:
-            return html.escape(release_text(place)).replace("\n", "<br>") or None
+            return tip_text(release_text(place)) or None
         if role != Qt.ItemDataRole.DisplayRole:
             return None
         heading = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import math
 
 from PySide6.QtCore import QEvent, Qt
@@ -26,6 +27,12 @@ class PlainLabel(QLabel):
     def setText(self, text: str) -> None:
         """Show a text, whoever wrote it."""
         super().setText(visible(text))
+
+
+def tip_text(text: str) -> str:
+    """A text for a tool tip, in which Qt would take some words for tags; long lines are folded."""
+    shown = html.escape(visible(text).strip())
+    return "<qt>" + shown.replace("\n", "<br>") + "</qt>" if shown else ""
 
 
 def role_label(text: str, role: str, parent: QWidget | None = None) -> QLabel:

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLay
 from daq_app.acquisition.messages.published import State, StateMessage
 from daq_app.monitor.course.recording_light import recording_light
 from daq_app.monitor.data.session import Session
-from daq_app.monitor.widgets.labels import PlainLabel, role_label, set_role
+from daq_app.monitor.widgets.labels import PlainLabel, role_label, set_role, tip_text
 from daq_app.monitor.widgets.shapes import Sign
 from daq_app.monitor.widgets.state_look import look_of
 from daq_app.monitor.widgets.theme import Colours
@@ -68,7 +68,7 @@ class Header(QFrame):
         if session.data_missing:
             sentence = "No data for more than half a second: what is shown is not live."
         self._sentence.setText(sentence)
-        self._sentence.setToolTip(sentence)
+        self._sentence.setToolTip(tip_text(sentence))
         wrong = session.data_missing or state is None or bool(judgement.alarm)
         set_role(self._sentence, "bad" if wrong else "muted")
         light = recording_light(session)

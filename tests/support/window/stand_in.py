@@ -224,8 +224,10 @@ class StandIn:
         )
 
 
-def write_run(stand_in: StandIn, rig_file: Path, folder: Path, test: str, when_s: int = 0) -> Path:
-    """A finished run file of the stand-in's test."""
+def write_run(
+    stand_in: StandIn, rig_file: Path, folder: Path, test: str, when_s: int = 0, end_text: str = "at rest"
+) -> Path:
+    """A finished run file of the stand-in's test; `end_text`: what its last event says."""
     rig = stand_in.rig
     header = RunHeader(
         run_id=f"{test}_{when_s}",
@@ -254,5 +256,5 @@ def write_run(stand_in: StandIn, rig_file: Path, folder: Path, test: str, when_s
             writer.append_block(first, scaling.to_readings(stand_in.block_readings(first).astype(np.float64)))
         for kind, time_s in times.items():
             writer.append_event(kind, round(time_s * stand_in.rate_hz), kind, {})
-        writer.append_event("end", end, "at rest", {"outcome": "complete"})
+        writer.append_event("end", end, end_text, {"outcome": "complete"})
     return finalise(journal, journal.with_suffix(".h5"))
