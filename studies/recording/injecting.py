@@ -17,6 +17,8 @@ _LOSING: Final = (
     *("process stopped", "network cut", "server_frozen"),
 )
 """Faults after which samples may be missing: the device overwrites what nobody reads in time."""
+_SHORTEST_STALL_S: Final = 0.08
+"""Of this computer: what lasts less than the 0.05 s of the recorder's clock watch is told as drift."""
 
 
 @dataclass(slots=True)
@@ -42,7 +44,7 @@ def choose_fault(rng: random.Random, speed: float) -> tuple[str, dict[str, float
     )
     bench_s = {
         "chassis_offline": rng.choice((0.2, 0.2, 2.0, 2.0, 20.0)),
-        "stalled": rng.uniform(0.3, 3.0),
+        "stalled": rng.uniform(0.3, 3.0) * max(1.0, speed * _SHORTEST_STALL_S / 0.3),
         "module_removed": rng.uniform(1.0, 3.0),
     }.get(kind, 0.0)
     ours_s = {
