@@ -53,14 +53,16 @@ class TaskStream:
         missing = n_samples - self.n_pending
         if missing <= 0:
             return
-        # NaN shows what a truncated reply left unwritten: it must never pass as a reading.
-        data = np.full((len(self.rows), missing), np.nan)
+        data = np.empty((len(self.rows), missing))
+        # A reply fills the array from its beginning, so many values for each sample. NaN where the last value
+        # of each number of samples belongs shows a reply cut short: it must never pass as a reading.
+        data.reshape(-1)[len(self.rows) - 1 :: len(self.rows)] = np.nan
         try:
             got = self._reader.read_many_sample(data, missing, timeout_s)
         except ni_errors.DaqReadError as error:
             got = int(error.samps_per_chan_read)
             # Over gRPC some errors tell how much was read but bring none of it.
-            if not np.isnan(self._packed(data, got)).any():
+            if got > 0 and not _has_nan(self._packed(data, got)):
                 self._keep(data, got)
             raise
         self._keep(data, int(got))
@@ -77,7 +79,7 @@ class TaskStream:
                 recoverable=True,
             )
         packed = self._packed(data, got)
-        if np.isnan(packed).any():
+        if _has_nan(packed):
             raise DriverError(
                 "A reply of the device was cut short",
                 advice="It is asked for again; if it happens often, restart the device server",
@@ -96,8 +98,8 @@ class TaskStream:
 
     def take(self, n_samples: int) -> NDArray[np.float64]:
         """The oldest `n_samples` waiting samples, (channels of this task, n_samples)."""
-        if len(self._pending) == 1 and self.n_pending == n_samples:
-            taken = self._pending.pop()
+        if self._pending and self._pending[0].shape[1] == n_samples:
+            taken = self._pending.pop(0)
         else:
             joined = np.concatenate(self._pending, axis=1)
             taken = np.ascontiguousarray(joined[:, :n_samples])
@@ -180,3 +182,8 @@ class TaskStream:
         self.task.in_stream.relative_to = ReadRelativeTo.CURRENT_READ_POSITION
         self.task.in_stream.offset = 0
         self._sought = False
+
+
+def _has_nan(readings: NDArray[np.float64]) -> bool:
+    """Whether any is NaN: the smallest of them is then, and no second array is made to find it."""
+    return bool(np.isnan(readings.min()))

@@ -23,6 +23,8 @@ from drivers import Block, Driver, DriverError
 
 _OVERDUE_S: Final = 0.4
 """Several read periods: from then on a read that has found nothing is told."""
+_READ_TIMEOUT_S: Final = 0.5
+_PERIODS_IN_VAIN: Final = 5
 _QUICK_READ_S: Final = 0.032
 """Read period while the wall moves: r must not wait for the end of a long block."""
 _STUCK_RECOVERIES: Final = 20
@@ -33,8 +35,8 @@ _STUCK_RECOVERIES: Final = 20
 class Patience:
     """How long the reader waits before it gives a test up."""
 
-    read_timeout_s: float = 0.5
-    """Limit of one read: several read periods, and short enough that a stop is obeyed at once."""
+    read_timeout_s: float | None = None
+    """Limit of one read; None: five read periods, half a second at least. A stop is obeyed after it."""
     silence_limit_s: float = 30.0
     """Limit without any sample, though the device answers."""
     reconnect_limit_s: float = 30.0
@@ -62,6 +64,9 @@ class Reader(threading.Thread):
         self._plan = plan
         self._sink = sink
         self._patience = patience or Patience()
+        self._read_timeout_s = self._patience.read_timeout_s or max(
+            _READ_TIMEOUT_S, _PERIODS_IN_VAIN * plan.read_samples / plan.rate_hz
+        )
         self._stop_asked = threading.Event()
         self._requests: queue.SimpleQueue[tuple[Callable[[Driver], Any], Future[Any]]] = queue.SimpleQueue()
         self._quick_samples = plan.read_samples
@@ -132,7 +137,7 @@ class Reader(threading.Thread):
         while not self._stop_asked.is_set():
             self._serve_requests(driver)
             try:
-                block = driver.read(self._patience.read_timeout_s, self._at_once)
+                block = driver.read(self._read_timeout_s, self._at_once)
             except DriverError as error:
                 self._after(error, driver)
             else:

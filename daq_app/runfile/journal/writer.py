@@ -9,7 +9,6 @@ import contextlib
 import errno
 import os
 import threading
-import time
 from concurrent.futures import Future, wait
 from concurrent.futures import TimeoutError as FutureTimeout
 from pathlib import Path
@@ -355,7 +354,6 @@ class JournalWriter:
             fd = self._fd
             with self._append_lock:
                 written, safe = self._next_sample or 0, (self._bytes, self._sequence)
-            time.perf_counter()
             try:
                 fsync_data(fd)
             except OSError as error:
