@@ -41,19 +41,25 @@ class ClockLine:
         """Until the rate is known: where the first half of the readings so far ends."""
         self._other: ClockReading | None = None
         """Where another line may have begun."""
+        self._sure: ClockReading | None = None
+        """The newest count that was not held up on its way."""
+        self._behind: ClockReading | None = None
+        """Since when counts stay behind that one, by less than makes another line."""
 
     def add(self, reading: ClockReading) -> None:
         """Readings come in order of time."""
         if self._first is None or self._last is None:
-            self._first = self._last = reading
+            self._first = self._last = self._sure = reading
         elif self._rate_hz is None or self._is_on(self._last, reading):
             self._other = None
             self._last = reading
             self._look_at_rate()
+            self._look_for_delay(reading)
         elif self._other is None or not self._is_on(self._other, reading):
             self._other = reading
         elif _age(self._other, reading) >= _ADOPT_S:
             self._first, self._last, self._other = self._other, reading, None
+            self._sure, self._behind = reading, None
 
     @property
     def rate_hz(self) -> float:
@@ -62,12 +68,29 @@ class ClockLine:
 
     def sample_at(self, before_s: float, after_s: float) -> tuple[int, float] | None:
         """The sample of an instant between the two, and the uncertainty in seconds; None without readings."""
-        last = self._last
-        if last is None:
+        sure = self._sure
+        if sure is None:
             return None
-        passed_s = 0.5 * (before_s + after_s) - 0.5 * (last.before_s + last.after_s)
-        uncertain_s = 0.5 * (after_s - before_s) + 0.5 * _width(last) + self._rate_error * passed_s
-        return round(last.samples + passed_s * self.rate_hz), uncertain_s
+        passed_s = 0.5 * (before_s + after_s) - 0.5 * (sure.before_s + sure.after_s)
+        uncertain_s = 0.5 * (after_s - before_s) + 0.5 * _width(sure) + self._rate_error * passed_s
+        if self._behind is not None:  # held up, or the clock has just stood still: nobody knows yet
+            uncertain_s += self._lag_s(sure, self._behind)
+        return round(sure.samples + passed_s * self.rate_hz), uncertain_s
+
+    def _look_for_delay(self, reading: ClockReading) -> None:
+        """A count comes late from a chassis that is about to go; one that stays behind is the clock's."""
+        assert self._sure is not None
+        if self._lag_s(self._sure, reading) <= 0.0:
+            self._sure, self._behind = reading, None
+        elif self._behind is None or self._lag_s(self._behind, reading) > 0.0:
+            self._behind = reading
+        elif _age(self._behind, reading) >= _ADOPT_S:
+            self._sure, self._behind = reading, None
+
+    def _lag_s(self, earlier: ClockReading, reading: ClockReading) -> float:
+        """Seconds by which a count is certainly behind the line through an earlier one."""
+        taken_s = (reading.samples - earlier.samples) / self.rate_hz
+        return reading.before_s - earlier.after_s - taken_s - self._rate_error * _age(earlier, reading)
 
     def _look_at_rate(self) -> None:
         assert self._first is not None and self._last is not None

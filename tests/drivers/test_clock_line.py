@@ -67,3 +67,30 @@ def test_a_leap_in_the_first_second_is_taken_for_no_rate(speed: float) -> None:
 
 def test_without_readings_nothing_is_claimed() -> None:
     assert ClockLine(RATE_HZ).sample_at(1.0, 1.1) is None
+
+
+@pytest.mark.parametrize("late_s", [0.002, 0.010, 0.026, 0.2])
+def test_a_last_count_that_was_held_up_makes_no_gap_too_short(late_s: float) -> None:
+    """What a chassis says last before it goes away may be old; it says nothing of the time that passed."""
+    line = ClockLine(4000.0)
+    for tenth in range(100):
+        now = 0.1 * tenth
+        line.add(ClockReading(now, now + 0.001, round(4000 * (now + 0.0005))))
+    line.add(ClockReading(10.0, 10.001, round(4000 * (10.0005 - late_s))))
+    estimate = line.sample_at(10.2, 10.2006)
+    assert estimate is not None
+    sample, uncertain_s = estimate
+    assert abs(sample - 4000 * 10.2003) <= 4000 * uncertain_s
+    assert abs(sample - 4000 * 10.2003) <= 4000 * 0.002
+
+
+def test_a_clock_that_stood_still_for_a_moment_is_followed_and_the_doubt_before_is_said() -> None:
+    line = ClockLine(4000.0)
+    for tenth in range(150):
+        now = 0.1 * tenth
+        true = now + 0.0005 - (0.02 if now > 10.0 else 0.0)
+        line.add(ClockReading(now, now + 0.001, round(4000 * true)))
+        estimate = line.sample_at(now + 0.05, now + 0.051)
+        assert estimate is not None
+        assert abs(estimate[0] - 4000 * (true + 0.05)) <= 4000 * estimate[1] + 1
+    assert estimate[1] < 0.002
