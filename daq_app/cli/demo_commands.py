@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -13,6 +14,10 @@ from rich.console import Console
 from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_HARDWARE, print_paragraph, reported
 from daq_app.extras import absent
 from daq_app.guarded import program
+
+if TYPE_CHECKING:
+    from daq_app.campaign.plan import PlannedTest
+    from daq_app.config import Rig
 
 
 def register(app: typer.Typer) -> None:
@@ -33,11 +38,8 @@ def demo(
     Needs no rig, no hardware and no configuration. With the window, the tests play before your eyes; at
     the end it stays open on the last result.
     """
-    from daq_app.acquisition.viewers.client import AcquisitionUnreachable
-    from daq_app.acquisition.viewers.launcher import AcquisitionDied, AcquisitionProcess
     from daq_app.campaign.plan import load_campaign
     from daq_app.cli.campaign.report import report
-    from daq_app.cli.record.test_day import DayEnded, TestDay
     from daq_app.config import load_rig
     from daq_app.config.shipped import shipped_configs
 
@@ -61,31 +63,46 @@ def demo(
         if not planned:
             print_paragraph("Error", f"{runs} has every test of the day already. Name another folder")
             raise typer.Exit(EXIT_BAD_INPUT)
-        console.print("Starting the acquisition and the simulated wall")
-        try:
-            options = ["--rig", str(rig_file), "--out", str(runs), "--speed", speed]
-            process = AcquisitionProcess(options, say=console.print)
-            with process.client() as client:
-                window = None if headless else _open_window(process.address, process.token, campaign_file)
-                try:
-                    taken = TestDay(client, rig, console.print).take(planned)
-                    if window is not None:
-                        console.print("The day is over; close the window when you have seen it")
-                        window.wait()
-                finally:
-                    client.request("shutdown", 60.0, force=1.0)
-            console.print("Finishing the results of the tests")
-            process.wait()
-        except (AcquisitionDied, AcquisitionUnreachable) as error:
-            print_paragraph("Error", str(error))
-            raise typer.Exit(EXIT_HARDWARE) from None
-        except DayEnded as error:
-            print_paragraph("Incomplete", str(error))
-            raise typer.Exit(EXIT_FAILED) from None
+        options = ["--rig", str(rig_file), "--out", str(runs), "--speed", speed]
+        last = _play(rig, planned, options, None if headless else campaign_file, console)
     if not no_report:
         report(runs, campaign_file, folder / "report", None, "", 0, False)
-    console.print(f"Look at the last run: daq-app view {taken[-1].run}")
+    console.print(f"Look at the last run: daq-app view {last}")
     console.print("Your own wall: daq-app rig new")
+
+
+def _play(
+    rig: Rig, planned: Sequence[PlannedTest], options: list[str], shown: Path | None, console: Console
+) -> str:
+    """Take all tests, with a window on the campaign file `shown`; the file of the last run.
+
+    Raises `typer.Exit` with what happened said.
+    """
+    from daq_app.acquisition.viewers.client import AcquisitionUnreachable
+    from daq_app.acquisition.viewers.launcher import AcquisitionDied, AcquisitionProcess
+    from daq_app.cli.record.test_day import DayEnded, TestDay
+
+    console.print("Starting the acquisition and the simulated wall")
+    try:
+        process = AcquisitionProcess(options, say=console.print)
+        with process.client() as client:
+            window = _open_window(process.address, process.token, shown) if shown else None
+            try:
+                taken = TestDay(client, rig, console.print).take(planned)
+                if window is not None:
+                    console.print("The day is over; close the window when you have seen it")
+                    window.wait()
+            finally:
+                client.request("shutdown", 60.0, force=1.0)
+        console.print("Finishing the results of the tests")
+        process.wait()
+    except (AcquisitionDied, AcquisitionUnreachable) as error:
+        print_paragraph("Error", str(error))
+        raise typer.Exit(EXIT_HARDWARE) from None
+    except DayEnded as error:
+        print_paragraph("Incomplete", str(error))
+        raise typer.Exit(EXIT_FAILED) from None
+    return str(taken[-1].run)
 
 
 def _open_window(address: str, token: str, campaign_file: Path) -> subprocess.Popen[bytes]:

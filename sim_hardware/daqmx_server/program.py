@@ -50,6 +50,22 @@ def parser() -> argparse.ArgumentParser:
         "python -m sim_hardware.daqmx_server --device Dev1=PCIe-6363 --port 31763",
     )
     options.add_argument("--port", type=int, default=0, help="TCP port; 0 lets the system choose")
+    _add_wall(options)
+    _add_devices(options)
+    options.add_argument("--faults", type=Path, metavar="FILE", help="script of faults (TOML or JSON)")
+    options.add_argument(
+        "--finite", choices=("real", "instant"), default="real", help="clock of finite tasks"
+    )
+    options.add_argument(
+        "--missing",
+        action="store_true",
+        help="print which calls of the service are not simulated",
+    )
+    options.add_argument("--parent-pid", type=int, help="end when this process has ended")
+    return options
+
+
+def _add_wall(options: argparse.ArgumentParser) -> None:
     options.add_argument(
         "--config", type=Path, metavar="RIG.toml", help="rig: hardware and wall; none: no wall"
     )
@@ -65,6 +81,9 @@ def parser() -> argparse.ArgumentParser:
         help="pulled and released by the rig file's times, or by commands of the control service; "
         "marked: no wall, every sample of an LVDT tells its own place",
     )
+
+
+def _add_devices(options: argparse.ArgumentParser) -> None:
     options.add_argument(
         "--max-export",
         type=Path,
@@ -95,17 +114,6 @@ def parser() -> argparse.ArgumentParser:
         metavar="FILE.toml",
         help="product file of your own; may be repeated",
     )
-    options.add_argument("--faults", type=Path, metavar="FILE", help="script of faults (TOML or JSON)")
-    options.add_argument(
-        "--finite", choices=("real", "instant"), default="real", help="clock of finite tasks"
-    )
-    options.add_argument(
-        "--missing",
-        action="store_true",
-        help="print which calls of the service are not simulated",
-    )
-    options.add_argument("--parent-pid", type=int, help="end when this process has ended")
-    return options
 
 
 def build_bench(arguments: argparse.Namespace) -> Bench:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -14,6 +14,9 @@ from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, rep
 from daq_app.cli.record.seal_keys import register_seal_keys
 from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.streams import let_output_fail
+
+if TYPE_CHECKING:
+    from daq_app.cli.record.follow import RunEnd
 
 LEVELS: Final = {"L1": 0.15, "L2": 0.25, "L3": 0.35, "L4": 0.40}
 """Release rotation over alpha of each level of the campaign (Table 3.2)."""
@@ -79,7 +82,6 @@ def run(
     2: bad input; 3: hardware; 130: interrupted.
     """
     from daq_app.cli.record.follow import RunOptions, follow_run
-    from daq_app.cli.record.results import as_document, results_table
 
     if headless:
         with reported():
@@ -103,6 +105,14 @@ def run(
     console = Console(stderr=as_json)
     with reported():
         ended = follow_run(options, console)
+    _tell_end(ended, console, as_json=as_json)
+    raise typer.Exit(ended.exit_code)
+
+
+def _tell_end(ended: RunEnd, console: Console, *, as_json: bool) -> None:
+    """Results of the run if there is one, and what kept it from being a whole test."""
+    from daq_app.cli.record.results import as_document, results_table
+
     if ended.run is not None:
         with reported():
             if as_json:
@@ -111,7 +121,6 @@ def run(
                 console.print(results_table(ended.run))
     if ended.text:
         print_paragraph("Error" if ended.exit_code != EXIT_FAILED else "Incomplete", ended.text)
-    raise typer.Exit(ended.exit_code)
 
 
 def _require_rotation(rig: Path) -> None:
