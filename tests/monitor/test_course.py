@@ -11,6 +11,7 @@ from daq_app.monitor.course.sounds import PATTERNS_MS, Sounds
 from daq_app.monitor.data.session import Published
 from daq_app.monitor.pages.messages_page import MessagesPage
 from daq_app.monitor.widgets.notices import NoticeLine
+from daq_app.runfile import TestPlan
 from tests.support.window.quiet_link import QuietLink
 
 HOLD = Judgement(
@@ -158,6 +159,30 @@ def test_the_full_screen_opens_gives_orders_and_goes_back(qtbot, live_window, cl
     assert window.test.list_displays()[0].startswith("Display 1")
 
 
+@pytest.mark.parametrize("call", [Call.ARM_FIRST, Call.STOP])
+def test_the_record_of_the_last_test_is_no_record_of_the_wall_that_is_pulled_now(live_window, clock, call):
+    plan = TestPlan(test="FR1-L1-2")
+    saved = StateMessage(
+        state=State.SAVED, test="FR1-L1-1", plan=plan, judgement=Judgement(call=Call.LOOK, word="Saved")
+    )
+    live_window.session.feed(Published(saved, clock.now))
+    live_window.header.refresh(live_window.colours)
+    assert (live_window.header.words["recording"], live_window.header.words["test"]) == (
+        "On disk",
+        "FR1-L1-1",
+    )
+    live_window.test.view.resize(900, 560)
+    live_window.test.view.grab()
+    assert "FR1-L1-1   checked and closed" in live_window.test.view.texts
+    pulled = saved.model_copy(update={"judgement": Judgement(call=call, word="Not armed", alarm="Arm first")})
+    live_window.session.feed(Published(pulled, clock.now))
+    live_window.header.refresh(live_window.colours)
+    live_window.test.view.grab()
+    assert live_window.header.words["recording"] == "Not recording"
+    assert live_window.header.words["test"] == "FR1-L1-2"
+    assert "FR1-L1-2" in live_window.test.view.texts and "On disk" not in live_window.test.view.texts
+
+
 def test_a_key_that_makes_no_sense_now_is_answered(qtbot, live_window, clock):
     say(live_window.session, clock, State.ARMED, HOLD)
     live_window._on_slow()
@@ -186,18 +211,16 @@ def test_the_live_page_keeps_the_record_of_the_last_test_until_the_next_arming(w
     play(window.session, window.clock, stand_in, stand_in.release_s + 3.0)
     say(window.session, window.clock, State.SAVED, Judgement(call=Call.LOOK))
     window.live.draw_frame()
-    x, y = (values.copy() for values in window.live.motion._curves[0].getData())
+    x, y = (values.copy() for values in window.live.motion.rotation.line)
     assert x.size > 100 and x[0] >= -1.001
     window.session._forget_data()  # the tasks were started anew, or the trace has gone on without the test
     window.live.draw_frame()
-    again = window.live.motion._curves[0].getData()
+    again = window.live.motion.rotation.line
     assert (again[0] == x).all() and (again[1] == y).all()
     say(window.session, window.clock, State.ARMED, HOLD)
     window.live.draw_frame()
     window.live._draw_estimate()
-    assert window.live.motion._curves[0].getData()[0] is None or not len(
-        window.live.motion._curves[0].getData()[0]
-    )
+    assert not window.live.motion.rotation.line[0].size
     assert window.live.restitution.shown == {"eav": 0, "crt": 0}
     assert all(not len(curve.getData()[0]) for curve in window.live.restitution._means.values())
 

@@ -30,17 +30,25 @@ pytestmark = [
 ]
 
 
+SMALLEST = (1366, 768)
+"""On this screen the window is whole without being maximised."""
+
+
 class Day:
     """The rig, its recorder and the windows of one day."""
 
-    def __init__(self, display: str, folder: Path, rig: Path, look: str, theme: str) -> None:
+    def __init__(
+        self, display: str, folder: Path, rig: Path, look: str, theme: str, *, maximised: bool = False
+    ) -> None:
         self.display, self.rig, self.look, self.theme = display, rig, look, theme
+        self.maximised = maximised
         self.out, self.ini, self.shots = folder / "runs", folder / "window.ini", folder / "pictures"
         self.shots.mkdir(parents=True)
         self.windows: list[RealWindow] = []
 
     def open(self, *, may_command: bool = True) -> RealWindow:
-        window = RealWindow(self.display, self.rig, self.out, self.ini, self.theme, may_command=may_command)
+        look = {"may_command": may_command, "maximised": self.maximised}
+        window = RealWindow(self.display, self.rig, self.out, self.ini, self.theme, **look)
         self.windows.append(window)
         window.until(lambda words: words["state"] not in ("", "No link"))
         return window
@@ -89,8 +97,12 @@ def day_at(tmp_path, configs):
 
     def begin(width: int, height: int, theme: str) -> Day:
         display = stack.enter_context(real_display(width, height))
-        days.append(Day(display, tmp_path / "day", configs / "fr1.toml", f"{theme}-{width}x{height}", theme))
-        return days[-1]
+        look = f"{theme}-{width}x{height}"
+        day = Day(
+            display, tmp_path / "day", configs / "fr1.toml", look, theme, maximised=(width, height) > SMALLEST
+        )
+        days.append(day)
+        return day
 
     yield begin
     for day in days:
@@ -105,7 +117,7 @@ def test_a_whole_day(day_at, width, height, theme):
     day = day_at(width, height, theme)
     window = day.open()
     window.says(state="Live view")
-    window.says(whole=True)  # with its frame, unmaximised
+    window.says(whole=True)  # with its frame
 
     # Choose, zero, check.
     window.press("F6")
@@ -164,7 +176,7 @@ def test_a_whole_day(day_at, width, height, theme):
     window.says(state="Aborted")
     assert window.words["recording"] != "On disk"
     day.wall("pull", theta0_over_alpha=0.15)
-    window.says(state="Not armed")
+    window.says(state="Not armed", recording="Not recording")
     day.shoot(window, "not-armed")
     day.wall("release")
     window.until(lambda words: "not armed" in words["state"] and words["page"] == "Test")

@@ -23,7 +23,7 @@ from daq_app.monitor.plots.plot_base import envelope
 from daq_app.monitor.widgets.counters import TileText, tile_texts
 from daq_app.monitor.widgets.labels import DASH, number
 from daq_app.monitor.widgets.shapes import draw_shape
-from daq_app.monitor.widgets.state_look import look_of
+from daq_app.monitor.widgets.state_look import look_of, name_of_test
 from daq_app.monitor.widgets.theme import DARK, Colours
 
 TRACE_S: Final = 12.0
@@ -130,14 +130,8 @@ class CourseView(QWidget):
         draw_shape(painter, light.shape, sign_box, QColor(tone))
         upper.setRight(sign_box.left() - 0.3 * sign)
         self._text.write(painter, upper, light.word, tone, align=_RIGHT)
-        detail = "   ".join(part for part in (self._test(), light.detail) if part)
+        detail = "   ".join(part for part in (name_of_test(session.state), light.detail) if part)
         self._text.write(painter, lower, detail, colours.muted, bold=False, align=_RIGHT)
-
-    def _test(self) -> str:
-        message = self._session.state
-        if message is None:
-            return ""
-        return (message.test if message.locked else "") or message.plan.test or "No test chosen"
 
     def _paint_order(self, painter: QPainter, box: QRectF) -> None:
         session = self._session

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from daq_app.acquisition.messages.published import RECORDING, HealthMessage, State
+from daq_app.acquisition.messages.published import RECORDING, Call, HealthMessage, State
 from daq_app.monitor.data.session import Session
 
 
@@ -29,6 +29,7 @@ def recording_light(session: Session) -> Light:
         return Light("triangle", "warning", "Not confirmed", "no sample confirmed on disk")
     if state is State.SAVED and session.judgement.word == "Aborted":
         return Light("ring", "muted", "Not recording", "the aborted arming is kept")
-    if state is State.SAVED:
+    # "On disk" beside "Not armed" would be read as if the wall that is pulled now were recorded.
+    if state is State.SAVED and session.judgement.call is Call.LOOK:
         return Light("tick", "good", "On disk", "checked and closed")
     return Light("ring", "muted", "Not recording")

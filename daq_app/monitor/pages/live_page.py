@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QVBoxLayout, QWidget
@@ -20,7 +21,7 @@ from daq_app.monitor.widgets.theme import Colours
 
 
 class LivePage(QWidget):
-    """Everything that moves. The window calls `draw_frame` 40 times and `draw_slow` 6 times a second."""
+    """Everything that moves. The window calls `draw_frame` 60 times and `draw_slow` 6 times a second."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -37,52 +38,53 @@ class LivePage(QWidget):
         """Frames of the large plots drawn so far."""
         self._seen: tuple[int, int] = (-1, -1)
 
-        self.theory_button = QPushButton("Theory  (T)")
-        self.theory_button.setCheckable(True)
-        self.theory_button.setProperty("role", "flat")
-        self.theory_button.toggled.connect(self._on_theory)
-        self.strips_button = QPushButton("Channels  (C)")
-        self.strips_button.setCheckable(True)
-        self.strips_button.setProperty("role", "flat")
-        self.strips_button.setToolTip("Give the whole page to the 41 channels, and back")
-        self.strips_button.toggled.connect(self._on_strips)
+        self.theory_button = _switch("Theory  (T)", self._on_theory)
+        self.strips_button = _switch("Channels  (C)", self._on_strips)
+        self.strips_button.setToolTip("Give the whole page to the channels, and back")
         self._caption: QLabel = role_label("", "muted")
         self._caption.setWordWrap(True)
 
-        tools = QHBoxLayout()
-        tools.setContentsMargins(0, 0, 0, 0)
-        tools.addWidget(self._caption, 1)
-        tools.addWidget(self.theory_button)
-        tools.addWidget(self.strips_button)
-        left = QWidget()
-        left_layout = QVBoxLayout(left)
-        left_layout.setContentsMargins(0, 0, 0, 0)
-        left_layout.addWidget(self.motion)
-        self._right = QSplitter(Qt.Orientation.Vertical)
-        self._right.addWidget(self.restitution)
-        self._right.addWidget(side_by_side(self.phase, self.periods))
-        self._right.setSizes([1000, 1000])
-        self.upper = QSplitter(Qt.Orientation.Horizontal)
-        self.upper.addWidget(left)
-        self.upper.addWidget(self._right)
-        self.upper.setSizes([6200, 3800])
-        self.upper.setStretchFactor(0, 62)
-        self.upper.setStretchFactor(1, 38)
+        self.upper = self._side_by_side()
         self.whole = QSplitter(Qt.Orientation.Vertical)
         self.whole.addWidget(self.upper)
         self.whole.addWidget(self.strips)
         self.whole.setSizes([6800, 3200])
         self.whole.setStretchFactor(0, 7)
         self.whole.setStretchFactor(1, 4)
-        for splitter in (self._right, self.upper, self.whole):
+        for splitter in (self.upper, self.whole):
             splitter.setHandleWidth(6)
             splitter.setChildrenCollapsible(False)
+        tools = QHBoxLayout()
+        tools.setContentsMargins(0, 0, 0, 0)
+        tools.addWidget(self._caption, 1)
+        tools.addWidget(self.theory_button)
+        tools.addWidget(self.strips_button)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(10, 8, 10, 8)
         layout.setSpacing(6)
         layout.addWidget(self.counters)
         layout.addLayout(tools)
         layout.addWidget(self.whole, 1)
+
+    def _side_by_side(self) -> QSplitter:
+        """The motion at the left, what follows from it at the right."""
+        right = QSplitter(Qt.Orientation.Vertical)
+        right.addWidget(self.restitution)
+        right.addWidget(side_by_side(self.phase, self.periods))
+        right.setSizes([1000, 1000])
+        right.setHandleWidth(6)
+        right.setChildrenCollapsible(False)
+        left = QWidget()
+        left_layout = QVBoxLayout(left)
+        left_layout.setContentsMargins(0, 0, 0, 0)
+        left_layout.addWidget(self.motion)
+        upper = QSplitter(Qt.Orientation.Horizontal)
+        upper.addWidget(left)
+        upper.addWidget(right)
+        upper.setSizes([6200, 3800])
+        upper.setStretchFactor(0, 62)
+        upper.setStretchFactor(1, 38)
+        return upper
 
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""
@@ -140,3 +142,12 @@ class LivePage(QWidget):
 
     def _on_strips(self, on: bool) -> None:
         self.upper.setVisible(not on)
+
+
+def _switch(text: str, on_toggled: Callable[[bool], None]) -> QPushButton:
+    """A flat button that stays down."""
+    button = QPushButton(text)
+    button.setCheckable(True)
+    button.setProperty("role", "flat")
+    button.toggled.connect(on_toggled)
+    return button

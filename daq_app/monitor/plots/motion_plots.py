@@ -14,7 +14,8 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from daq_app.acquisition.messages.published import RECORDING, EstimateMessage, MotionMessage
 from daq_app.monitor.data.session import Session
-from daq_app.monitor.plots.plot_base import Array, Axis, Plot, envelope, line_pen
+from daq_app.monitor.plots.live_plot import LivePlot
+from daq_app.monitor.plots.plot_base import Array, Axis, line_pen
 from daq_app.monitor.plots.theory_overlay import current_restitution, housner_motion
 from daq_app.monitor.widgets.theme import Colours
 
@@ -29,8 +30,8 @@ class MotionPlots(QWidget):
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
-        self.rotation = Plot("Rotation θ", "θ  (mrad)", "")
-        self.velocity = Plot("Angular velocity dθ/dt", "dθ/dt  (rad/s)", "time  (s)")
+        self.rotation = LivePlot("Rotation θ", "θ  (mrad)", "")
+        self.velocity = LivePlot("Angular velocity dθ/dt", "dθ/dt  (rad/s)", "time  (s)")
         self.velocity.setXLink(self.rotation)
         right = Axis("right")
         right.enableAutoSIPrefix(False)
@@ -46,15 +47,12 @@ class MotionPlots(QWidget):
         self.rotation.plot_item.getAxis("bottom").setStyle(showValues=False)
         self.rotation.plot_item.getAxis("bottom").setHeight(6)
         self._theory = (self.rotation.curve(dashed=True), self.velocity.curve(dashed=True))
-        self._curves = (self.rotation.curve(), self.velocity.curve())
         self._targets = [pg.InfiniteLine(angle=0, movable=False) for _ in range(2)]
         for line in self._targets:
             line.setVisible(False)
             self.rotation.addItem(line)
         self._impacts = pg.ScatterPlotItem(symbol="t1", size=7)
         self.rotation.addItem(self._impacts)
-        self._notice = pg.TextItem("", anchor=(0.5, 0.5))
-        self.rotation.addItem(self._notice, ignoreBounds=True)
         self._frame = (math.nan, math.nan)
         self._limits = (math.nan, math.nan)
         self._theory_on = False
@@ -71,15 +69,14 @@ class MotionPlots(QWidget):
         self.rotation.restyle(colours)
         self.velocity.restyle(colours)
         self.rotation.plot_item.getAxis("right").setLabel("θ/α", **colours.axis_style)
-        for curve, colour in zip(self._curves, (colours.rotation, colours.velocity), strict=True):
-            curve.setPen(line_pen(colour, width=2))
+        self.rotation.set_line_colour(colours.rotation)
+        self.velocity.set_line_colour(colours.velocity)
         for curve in self._theory:
             curve.setPen(line_pen(colours.theory, dashed=True))
         for line in self._targets:
             line.setPen(line_pen(colours.good, dashed=True))
         self._impacts.setPen(pg.mkPen(colours.text))
         self._impacts.setBrush(pg.mkBrush(colours.text))
-        self._notice.setColor(colours.warning)
 
     def set_theory(self, on: bool) -> None:
         """Show or hide the motion of the classic theory."""
@@ -103,9 +100,9 @@ class MotionPlots(QWidget):
         released = session.estimate.release_sample if session.estimate is not None else None
         kept = session.last_motion if session.current_state not in RECORDING else None
         if rate <= 0 or (kept is None and not math.isfinite(now)):
-            for curve in self._curves:
-                curve.setData([], [])
-            self._show_notice("No motion is measured")
+            for plot in (self.rotation, self.velocity):
+                plot.clear_line()
+            self.rotation.show_notice("No motion is measured")
             return
         if released is not None:
             elapsed = (now if kept is None else kept[0][-1]) / rate - released / rate
@@ -120,19 +117,20 @@ class MotionPlots(QWidget):
             samples, rotation, velocity = (row[shown] for row in kept)
         else:
             samples, rotation, velocity = session.trace.window(origin + start * rate)
-        time = (samples - origin) / rate
-        columns = max(200, self.rotation.width() // 2)  # the pen is two pixels wide
-        for curve, values in zip(self._curves, (rotation * 1e3, velocity), strict=True):
-            x, y = envelope(time, values, columns)
-            curve.setData(x, y, connect="finite" if np.isnan(y).any() else "all")
+        self.rotation.show_line(samples, rotation * 1e3, origin, rate)
+        self.velocity.show_line(samples, velocity, origin, rate)
         self._set_limits(rotation, velocity)
         self._draw_estimate()
-        if kept is not None:
-            self._show_notice("The test has ended: this is its record, not the present")
-        elif not session.fresh(MotionMessage):
-            self._show_notice(f"Not live: the newest value is {session.age_s(MotionMessage):.1f} s old")
-        else:
-            self._show_notice("")
+        self.rotation.show_notice(self._what_is_shown(kept is not None))
+
+    def _what_is_shown(self, kept: bool) -> str:
+        """A sentence where the line is not the present."""
+        session = self._session
+        if kept:
+            return "The test has ended: this is its record, not the present"
+        if not session.fresh(MotionMessage):
+            return f"Not live: the newest value is {session.age_s(MotionMessage):.1f} s old"
+        return ""
 
     def _paged_start(self, elapsed_s: float) -> float:
         """Left end of the frame for a long test: moves on by thirds of the frame, not with every frame."""
@@ -194,11 +192,3 @@ class MotionPlots(QWidget):
         estimate: EstimateMessage | None = self._session.estimate
         chosen = current_restitution(estimate) if estimate is not None and self._theory_on else None
         return f"Housner with r = {chosen[1]:.3f} ({chosen[0]})" if chosen else ""
-
-    def _show_notice(self, text: str) -> None:
-        if self._notice.toPlainText() != text:
-            self._notice.setText(text)
-        if text:
-            (x0, x1), (y0, y1) = self.rotation.viewRange()
-            self._notice.setPos((x0 + x1) / 2, y0 + 0.86 * (y1 - y0))
-        self._notice.setVisible(bool(text))

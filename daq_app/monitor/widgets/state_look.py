@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from daq_app.acquisition.messages.published import Call, Judgement, State, Tone
+from daq_app.acquisition.messages.published import Call, Judgement, State, StateMessage, Tone
 
 Shape = Literal["ring", "eye", "triangle", "square", "diamond", "disc", "bar", "arrow", "tick", "cross"]
 
@@ -34,6 +34,9 @@ class StateLook:
     tone: Tone
 
 
+NO_TEST: Final = "No test chosen"
+_AFTERWARDS: Final = frozenset({State.SAVING, State.SAVED, State.FAILED})
+
 UNLINKED: Final = StateLook(
     "No link",
     "Nothing is heard from the recorder. A test under way goes on without this window: open it again on the "
@@ -51,3 +54,12 @@ def look_of(state: State | None, judgement: Judgement) -> StateLook:
     if state is State.SAVED and judgement.call is not Call.LOOK and not judgement.alarm:
         shape = SHAPES[State.PREVIEWING]  # an arming that was given up is nothing to tick off
     return StateLook(judgement.word, judgement.do, shape, judgement.tone)
+
+
+def name_of_test(message: StateMessage | None) -> str:
+    """The test that the words are about: recorded now, or just recorded, else the one that is chosen."""
+    if message is None:
+        return NO_TEST
+    just_recorded = message.state in _AFTERWARDS and message.judgement.call in (Call.WAIT, Call.LOOK)
+    recorded = message.test if message.locked or just_recorded else ""
+    return recorded or message.plan.test or NO_TEST

@@ -13,6 +13,7 @@ from daq_app.monitor.data.session import Session
 from daq_app.monitor.pages.gap_page import GapPage
 from daq_app.monitor.pages.prepare_page import PreparePage, Zero
 from daq_app.monitor.widgets.notices import NoticeLine
+from daq_app.monitor.window.what_to_tell import trouble_of
 
 
 class Adoption:
@@ -71,5 +72,8 @@ class Adoption:
         past = [EventMessage.model_validate(event) for event in events]
         self._session.adopt_past(past)
         for event in past:
+            trouble = trouble_of(event)
             if event.severity != "info":
-                self._notices.tell(event.severity, event.text)
+                self._notices.tell(event.severity, event.text, trouble)
+            elif trouble:
+                self._notices.settle(trouble)

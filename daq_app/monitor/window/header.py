@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
-from daq_app.acquisition.messages.published import State, StateMessage
 from daq_app.monitor.course.recording_light import recording_light
 from daq_app.monitor.data.session import Session
 from daq_app.monitor.widgets.labels import PlainLabel, role_label, set_role, tip_text
 from daq_app.monitor.widgets.shapes import Sign
-from daq_app.monitor.widgets.state_look import look_of
+from daq_app.monitor.widgets.state_look import look_of, name_of_test
 from daq_app.monitor.widgets.theme import Colours
 
 
@@ -63,7 +62,7 @@ class Header(QFrame):
         self._word.setText(look.word)
         _colour(self._word, colour)
         message = session.state
-        self._test.setText(_test_name(message))
+        self._test.setText(name_of_test(message))
         sentence = look.sentence
         if session.data_missing:
             sentence = "No data for more than half a second: what is shown is not live."
@@ -91,15 +90,6 @@ class Header(QFrame):
             "recording": self._light_word.text(),
             "recording_detail": self._light_detail.text(),
         }
-
-
-def _test_name(message: StateMessage | None) -> str:
-    """The test that is recorded, or was last, or is chosen."""
-    if message is None:
-        return "No test chosen"
-    if message.locked or message.state in (State.SAVING, State.SAVED, State.FAILED):
-        return message.test or message.plan.test or "No test chosen"
-    return message.plan.test or "No test chosen"
 
 
 def _colour(label: QLabel, colour: str) -> None:

@@ -51,7 +51,7 @@ from daq_app.monitor.window.test_display import TestDisplay
 from daq_app.monitor.window.what_to_tell import MAY_BE_REFUSED, is_told, numbers, trouble_of
 from daq_app.monitor.window.window_frame import WindowFrame
 
-FRAME_MS: Final = 25
+FRAME_MS: Final = 16
 SLOW_MS: Final = 160
 
 

@@ -19,8 +19,8 @@ from daq_app.monitor.widgets.settings import WindowSettings
 from daq_app.monitor.widgets.theme import Colours
 from daq_app.monitor.window.window_frame import WindowFrame
 
-_EVERY: Final = 2
-"""The picture is painted with every second frame of the window: 20 times a second."""
+_EVERY: Final = 3
+"""The picture is painted with every third frame of the window: 20 times a second."""
 _TYPED: Final = "note"
 """The order that needs the window's own line."""
 

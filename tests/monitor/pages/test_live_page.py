@@ -41,7 +41,7 @@ def test_the_live_page_draws_what_the_session_knows(window, stand_in, play):
     estimate = window.session.estimate
     assert live.restitution.shown == {"eav": len(estimate.eav), "crt": len(estimate.crt)}
     assert len(live.motion._impacts.data) == len(estimate.impact_samples)
-    x, y = live.motion._curves[0].getData()
+    x, y = live.motion.rotation.line
     expected, _ = stand_in.rotation(np.asarray(x) + stand_in.release_s)
     np.testing.assert_allclose(y, 1e3 * expected, atol=1.0)
     assert live.motion.theory_caption() == f"Housner with r = {estimate.crt_mean:.3f} (CRT)"
@@ -171,7 +171,7 @@ def test_a_silent_acquisition_is_shown_as_not_live(window, stand_in, play):
     window.clock.now += 0.8
     window.live.draw_frame()
     window._on_slow()
-    assert window.live.motion._notice.toPlainText().startswith("Not live")
+    assert window.live.motion.rotation.notice.startswith("Not live")
     assert "not live" in window.header.words["sentence"]
     assert window.header.words["recording"] == "Not confirmed"
     assert all(text == "–" for text in window.health.texts)
@@ -239,3 +239,21 @@ def test_a_window_opened_in_mid_run_dates_the_recording_from_its_arming(window):
     window.live.draw_slow()
     assert window.live.counters.tiles["impacts"].value == "–"
     assert window.live.counters.tiles["elapsed"].detail == "no impact heard yet"
+
+
+def test_a_warning_that_was_over_before_the_window_came_is_not_told_as_if_it_lasted(window):
+    alarm = {"kind": "alarm", "sample": 0, "data": {"alarm": "silence"}}
+    disk = {"kind": "alarm", "sample": 0, "data": {"alarm": "space"}, "severity": "error"}
+    past = [
+        alarm | {"text": "No samples", "severity": "error"},
+        disk | {"text": "No room"},
+        alarm | {"text": "Samples arrive again", "severity": "info"},
+    ]
+    window.adoption.take({"events": past})
+    assert window.notices.current == ("error", "No room")
+    window.notices.dismiss()
+    assert window.notices.current is None
+    assert [(told.text, told.over is not None) for told in window.notices.log] == [
+        ("No samples", True),
+        ("No room", False),
+    ]

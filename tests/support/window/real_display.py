@@ -12,7 +12,6 @@ import shutil
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -31,25 +30,41 @@ from daq_app.monitor.widgets.settings import WindowSettings
 from daq_app.monitor.window.app import application, campaign_beside, open_window, reach
 from tests.support.window.clipped_text import clipped_texts
 
-rig, out, ini, theme, token_wanted = sys.argv[1:6]
+rig, out, ini, theme, token_wanted, size = sys.argv[1:7]
 app = application()
 settings = WindowSettings(Path(ini))
 settings.theme = theme
 address, token, mine = reach(Path(rig), Path(out), ["--speed", "2"])
 token = token if token_wanted == "yes" else ""
 window = open_window(address, token, settings, plan=campaign_beside(Path(rig)))
-window.show()
-asked, said, cut_before, cut_told = [], [None], [set()], [set()]
+window.showMaximized() if size == "maximised" else window.show()
+shape_before, asked, said, cut_before, cut_told = [None], [], [None], [set()], [set()]
 
 def listen():
     for line in sys.stdin:
         asked.append(line.strip())
 
-def look():
+def shape():
+    # What the display is made of now: None until every window of ours is on it.
+    shown = [each for each in app.topLevelWidgets() if each.isVisible()]
+    if any(each.windowHandle() is None or not each.windowHandle().isExposed() for each in shown):
+        return None
+    return window.stack.currentIndex(), [(type(each).__name__, each.geometry().getRect()) for each in shown]
+
+def take_pictures():
+    # The same windows were there twice in a row: they have their size and layout, and are painted now.
+    for each in app.topLevelWidgets():
+        if each.isVisible():
+            each.repaint()
     while asked:
         path = asked.pop(0)
         window.screen().grabWindow(0).save(path)
         print(json.dumps({"picture": path}), flush=True)
+
+def look():
+    if asked and shape() is not None and shape() == shape_before[0]:
+        take_pictures()
+    shape_before[0] = shape()
     page = next(name for name, page in window.pages.items() if page is window.stack.currentWidget())
     card = window.prepare.card.choice
     words = {
@@ -112,11 +127,20 @@ class RealWindow:
     """The operator's window in a process of its own, on a display."""
 
     def __init__(
-        self, display: str, rig: Path, out: Path, ini: Path, theme: str, *, may_command: bool = True
+        self,
+        display: str,
+        rig: Path,
+        out: Path,
+        ini: Path,
+        theme: str,
+        *,
+        may_command: bool = True,
+        maximised: bool = False,
     ) -> None:
         environment = {**os.environ, "DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
         environment["PYTHONPATH"] = str(Path(__file__).parents[3])
         arguments = [str(rig), str(out), str(ini), theme, "yes" if may_command else "no"]
+        arguments.append("maximised" if maximised else "usual")
         self._environment = environment
         self.process = subprocess.Popen(
             [sys.executable, "-c", _WINDOW, *arguments],
@@ -163,8 +187,7 @@ class RealWindow:
         subprocess.run(["xdotool", "key", "--delay", "120", *keys], env=self._environment, check=True)
 
     def picture(self, path: Path) -> None:
-        """Save what the display shows."""
-        time.sleep(0.6)  # a frame has to be painted after the last word: nothing tells of it
+        """Save what the display shows, once its windows have their size and are painted."""
         assert self.process.stdin is not None
         self.process.stdin.write(f"{path}\n")
         self.process.stdin.flush()
