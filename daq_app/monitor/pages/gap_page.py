@@ -164,6 +164,11 @@ class GapPage(QWidget):
             self._on_unlisted,
         )
 
+    def list_again(self) -> None:
+        """A verdict may have changed: what was rejected leaves the diagnosis."""
+        if self.folder is not None:
+            self.set_folder(self.folder)
+
     def _on_listed(self, tests: Sequence[RecordedTest], saved: Path | None) -> None:
         chosen, known = set(self.chosen), {self._path(i) for i in range(self.runs.count())}
         self.runs.blockSignals(True)

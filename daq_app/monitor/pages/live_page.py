@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QVBoxLayout, QWidget
 
 from daq_app.acquisition.course.tare import UNZEROED
@@ -90,6 +91,12 @@ class LivePage(QWidget):
         """Take over a theme."""
         for part in (self.motion, self.restitution, self.phase, self.periods, self.strips):
             part.restyle(colours)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """The page comes to the front as things stand now, not as it was left."""
+        super().showEvent(event)
+        self.draw_slow()
+        self.draw_frame()
 
     def draw_frame(self) -> None:
         """Draw the large plots."""

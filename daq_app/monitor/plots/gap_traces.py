@@ -26,11 +26,12 @@ class GapTraces(QWidget):
         super().__init__(parent)
         self._colours = DARK
         self._trace: Mapping[str, Any] | None = None
+        self._result_shown = False
         self.legend = QLabel()
         self.legend.setTextFormat(Qt.TextFormat.RichText)
         self.legend.setWordWrap(True)
         self.rotation = Plot("", "θ  (mrad)", "")
-        self.left = Plot("", "left  (mrad)", "time from release  (s)")
+        self.left = Plot("", "Δθ  (mrad)", "time from release  (s)")
         self.left.setXLink(self.rotation)
         self.curves = {name: self.rotation.curve() for name, _ in _SHOWN}
         self.rests = {name: self.left.curve() for name, _ in _SHOWN[1:]}
@@ -38,8 +39,10 @@ class GapTraces(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(0)
         layout.addWidget(self.legend)
-        layout.addWidget(self.rotation, 3)
-        layout.addWidget(self.left, 2)
+        layout.addWidget(self.rotation, 1)
+        layout.addWidget(self.left, 1)
+        self.legend.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self._show_legend()
 
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""
@@ -54,6 +57,7 @@ class GapTraces(QWidget):
 
     def show_traces(self, traces: Sequence[Mapping[str, Any]]) -> None:
         """Take over the traces of a result (its notes); none clears."""
+        self._result_shown = True
         self._trace = traces[0] if traces else None
         empty: list[float] = []
         known = {name: (self._trace or {}).get(f"{name}_mrad", empty) for name, _ in _SHOWN}
@@ -66,8 +70,10 @@ class GapTraces(QWidget):
         self._show_legend()
 
     def _show_legend(self) -> None:
+        for plot in (self.rotation, self.left):
+            plot.setVisible(self._trace is not None)
         if self._trace is None:
-            self.legend.setText("This result holds no simulated rotation.")
+            self.legend.setText("This result holds no simulated rotation." if self._result_shown else "")
             return
         colours, rms, shown = self._colours, self._trace["rms_mrad"], self._trace["shown"]
         run = html.escape(shortened(str(self._trace["run"]), 80))

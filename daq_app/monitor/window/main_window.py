@@ -152,16 +152,15 @@ class MainWindow(QMainWindow):
         self.rail.size_wanted.connect(self.change_type_size)
         self.note_entry.noted.connect(self.orders.note)
         self.prepare.tare_wanted.connect(lambda: self.orders.request("tare"))
-        self.prepare.told.connect(self.notices.tell)
+        for page in (self.prepare, self.campaign, self.replay, self.gap, self.result):
+            page.told.connect(self.notices.tell)
+        for verdict_given in (self.campaign.scanned, self.result.shown):
+            verdict_given.connect(self.gap.list_again)
         self.prepare.check_wanted.connect(lambda: self.orders.request("check"))
         self.prepare.pull_wanted.connect(lambda: self.orders.request("pull"))
-        self.campaign.told.connect(self.notices.tell)
         self.campaign.run_chosen.connect(lambda name: self.open_run(Path(name)))
-        self.replay.told.connect(self.notices.tell)
         if self.link is None:
             self.replay.opened.connect(lambda name: self.gap.set_folder(Path(name).parent))
-        self.gap.told.connect(self.notices.tell)
-        self.result.told.connect(self.notices.tell)
         self.result.replay.connect(lambda name: self.open_run(Path(name)))
         for key, button in self.prepare.keys.items() if self.link is not None else ():
             QShortcut(QKeySequence(key), self).activated.connect(lambda b=button: self._prepare_by_key(b))

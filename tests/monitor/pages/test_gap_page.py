@@ -141,12 +141,14 @@ def test_the_views_read_the_documented_result():
 
 def test_the_page_shows_measured_beside_simulated_rotation(page):
     result = made()
+    assert page.traces.legend.text() == "" and page.traces.rotation.isHidden(), "there is no result yet"
     rows = {"measured": [80.0, 0.0, -70.0], "baseline": [80.0, 5.0, -60.0], "augmented": [80.0, 1.0, -69.0]}
     trace = {f"{name}_mrad": values for name, values in rows.items()}
     result.notes["traces"] = [
         {"run": "FR1-L3-1", "shown": "lvdt", "time_s": [0.0, 0.5, 1.0], "rms_mrad": [7.9, 1.0], **trace}
     ]
     page._show(None, json.loads(result.to_json()))
+    assert not page.traces.rotation.isHidden() and not page.traces.left.isHidden()
     assert "FR1-L3-1" in page.traces.legend.text() and "7.90 mrad rms" in page.traces.legend.text()
     assert list(page.traces.curves["augmented"].getData()[1]) == rows["augmented"]
     assert list(page.traces.rests["baseline"].getData()[1]) == [0.0, -5.0, -10.0]

@@ -133,6 +133,17 @@ def test_a_rejected_test_is_offered_again_at_once(qtbot, configs, run_file):
     (run_file.parent / "verdicts.json").unlink()
 
 
+def test_a_rejected_test_leaves_the_diagnosis_at_once(qtbot, page, run_file):
+    window = page.window()
+    qtbot.waitUntil(lambda: window.gap.chosen == [run_file], timeout=120_000)
+    with qtbot.waitSignal(window.result.shown, timeout=120_000):
+        window.result.open(run_file)
+    window.result.buttons["bad"].click()
+    qtbot.waitUntil(lambda: window.gap.runs.item(0).text().endswith("bad"), timeout=120_000)
+    assert not window.gap.chosen
+    (run_file.parent / "verdicts.json").unlink()
+
+
 def test_picking_channels_leaves_the_cursor_and_the_view(page):
     page.plots.set_view(0.0, 3.0)
     page.plots.set_cursor(0.46)
