@@ -74,7 +74,8 @@ def main() -> int:
     options.json.write_text(json.dumps(document, indent=1), encoding="utf-8")
     console.print(f"written to {options.json}")
     if options.page:
-        options.page.write_text(page(document), encoding="utf-8")
+        earlier = options.page.read_text(encoding="utf-8") if options.page.exists() else ""
+        options.page.write_text(page(document, earlier), encoding="utf-8")
         console.print(f"written to {options.page}")
     return 0
 

@@ -206,7 +206,7 @@ def figures() -> list[Figure]:
             rocking,
             "% of a core",
             aim=10.0,
-            note="32 ms instead of 100 ms",
+            note="20 ms instead of 100 ms",
         ),
         Figure(
             "whole process at the real rate",

@@ -31,8 +31,11 @@ def terminal_table(results: Mapping[str, Sequence[Figure]]) -> Table:
     return table
 
 
-def page(document: Mapping[str, Any]) -> str:
-    """A JSON document of figures as a Markdown page, one table a benchmark."""
+def page(document: Mapping[str, Any], earlier: str = "") -> str:
+    """A JSON document of figures as a Markdown page, one table a benchmark.
+
+    `earlier`: the page as it was; tables of benchmarks that the document does not have stay.
+    """
     lines = [
         "# Benchmarks",
         "",
@@ -45,11 +48,18 @@ def page(document: Mapping[str, Any]) -> str:
         "",
         "which replaces the tables of the benchmarks that were run.",
     ]
-    for name, entry in sorted(document["benchmarks"].items()):
-        lines += ["", f"## {name}", "", f"{entry['measured']}, {entry['machine']}.", ""]
-        lines += ["| " + " | ".join(_COLUMNS) + " |"]
-        lines += ["|" + "|".join("---:" if c in _RIGHT else "---" for c in _COLUMNS) + "|"]
-        for figure in entry["figures"]:
-            cells = (cell.replace("|", "\\|") for cell in _row(Figure(**figure)))
-            lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines) + "\n"
+    kept = {part.split("\n", 1)[0]: f"## {part.rstrip()}" for part in earlier.split("\n## ")[1:]}
+    made = {name: _section(name, entry) for name, entry in document["benchmarks"].items()}
+    sections = [section for _, section in sorted((kept | made).items())]
+    return "\n\n".join(["\n".join(lines), *sections]) + "\n"
+
+
+def _section(name: str, entry: Mapping[str, Any]) -> str:
+    """The table of one benchmark with the command that makes it."""
+    when = f"`python -m benchmarks {name}`, {entry['measured']}, {entry['machine']}."
+    lines = [f"## {name}", "", when, "", "| " + " | ".join(_COLUMNS) + " |"]
+    lines += ["|" + "|".join("---:" if c in _RIGHT else "---" for c in _COLUMNS) + "|"]
+    for figure in entry["figures"]:
+        cells = (cell.replace("|", "\\|") for cell in _row(Figure(**figure)))
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)

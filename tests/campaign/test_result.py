@@ -11,9 +11,10 @@ import pytest
 from daq_app.campaign.names import TestName
 from daq_app.campaign.report.summary import MethodResult, TestSummary
 from daq_app.campaign.result.family_rows import family_rows
-from daq_app.campaign.result.figures import measured_periods, theory_motion
-from daq_app.campaign.result.report import period_deviation, repetition_rows, verdict_sentence, write_result
+from daq_app.campaign.result.motions import measured_periods, period_deviation, theory_motion
+from daq_app.campaign.result.report import write_result
 from daq_app.campaign.result.result import judged, load_summary, save_summary
+from daq_app.campaign.result.words import repetition_rows, verdict_sentence
 from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.rocking import free_rocking
 from daq_app.rocking.families.verdict import FamilyView, RVerdict

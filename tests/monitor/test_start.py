@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 from typer.testing import CliRunner
 
@@ -94,3 +97,10 @@ def test_a_rig_file_that_was_changed_since_is_told_from_another_rig(configs, tmp
     changed.write_text(text.replace("post_rest_s = 2.0", "post_rest_s = 3.0"), encoding="utf-8")
     with pytest.raises(ConfigError, match="changed since"):
         refuse_other_rig(changed, tmp_path, {"rig_text": text, "rig_name": "fr1"})
+
+
+def test_the_window_opens_without_loading_what_analyses_and_draws_reports():
+    asked = "import sys, daq_app.monitor.window.app; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout
+    slow = {"matplotlib", "scipy.signal", "scipy.optimize", "scipy.stats", "jinja2", "nidaqmx", "pandas"}
+    assert "pyqtgraph" in loaded.split() and not slow & set(loaded.split())

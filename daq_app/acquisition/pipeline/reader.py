@@ -25,7 +25,7 @@ _OVERDUE_S: Final = 0.4
 """Several read periods: from then on a read that has found nothing is told."""
 _READ_TIMEOUT_S: Final = 0.5
 _PERIODS_IN_VAIN: Final = 5
-_QUICK_READ_S: Final = 0.032
+_QUICK_READ_S: Final = 0.02
 """Read period while the wall moves: r must not wait for the end of a long block."""
 _STUCK_RECOVERIES: Final = 20
 """So many recoveries in a row without one sample between them will not help any more."""

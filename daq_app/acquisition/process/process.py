@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
 import os
 import secrets
 import signal
@@ -89,6 +90,7 @@ class Process:
             SessionFile(address=address, token=self._token, pid=os.getpid(), rig=self._rig.name),
         )
         self.session.start()
+        _keep_out_of_collection()
         print(f"{READY}{address}", flush=True)
         try:
             self._desk.serve(self._tick, _TICK_S)
@@ -182,6 +184,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     except DriverError as error:
         print(str(error), file=sys.stderr, flush=True)
         return 3
+
+
+def _keep_out_of_collection() -> None:
+    """Take what the process is made of out of Python's cyclic collection.
+
+    It lives as long as the process; a collection that looks through it stops every thread meanwhile: the
+    samples wait in the device, and r on its way to the screen.
+    """
+    gc.collect()
+    gc.freeze()
 
 
 def run_and_exit(argv: Sequence[str]) -> None:

@@ -8,39 +8,16 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from daq_app.campaign.report.figures import METHOD_COLOURS
 from daq_app.campaign.report.summary import TestSummary
+from daq_app.campaign.result.motions import measured_periods, theory_motion
 from daq_app.config.wording import METHOD_MARKS, plus_minus
-from daq_app.rocking import free_rocking, period
-
-Floats = NDArray[np.float64]
+from daq_app.rocking import period
 
 TEST_COLOUR: Final = "#1f5fa8"
 EARLIER_COLOUR: Final = "#b5bdc6"
 THEORY_COLOUR: Final = "#7b4fa3"
-
-
-def theory_motion(test: TestSummary) -> tuple[Floats, Floats, Floats] | None:
-    """(seconds after the release, θ, θ̇) of Housner's block with the test's r by CRT; None without one.
-
-    Set to the measured first impact, whose instant is known better than the release's.
-    """
-    method = test.methods.get("CRT") or test.methods.get("EAV")
-    if method is None or not 0.0 < method.r <= 1.0 or not 0.0 < abs(test.theta0_rad) < test.alpha_rad:
-        return None
-    motion = free_rocking(test.theta0_rad, method.r, test.p_rad_s, test.alpha_rad)
-    shift = test.impacts_s[0] - float(motion.impacts_s[0]) if test.impacts_s else 0.0
-    rotation, velocity = motion.at(test.time_s - shift)
-    return test.time_s, rotation, velocity
-
-
-def measured_periods(test: TestSummary) -> tuple[Floats, Floats]:
-    """(φ, T in s) of each half-cycle between two impacts: its peak over α, and twice its duration."""
-    durations = np.diff(np.asarray(test.impacts_s))
-    peaks = np.abs(test.phi)[1 : durations.size + 1]
-    return peaks, 2.0 * durations[: peaks.size]
 
 
 def result_figure(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -17,65 +16,16 @@ from daq_app.campaign.pages import page_environment
 from daq_app.campaign.report.captioned import PLAIN_TEXT, CaptionedFigure
 from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.result.family_rows import CAPTION, HEADINGS, family_rows
-from daq_app.campaign.result.figures import measured_periods, result_figure
+from daq_app.campaign.result.figures import result_figure
+from daq_app.campaign.result.motions import period_deviation
+from daq_app.campaign.result.words import METHODS, RepetitionRow, repetition_rows, verdict_sentence
 from daq_app.campaign.status import NO_FACTS, TestFacts
-from daq_app.config.shown_text import one_line
 from daq_app.config.wording import plus_minus
-from daq_app.rocking import period
 from daq_app.rocking.families.verdict_words import verdict_sentence as restitution_sentence
 from daq_app.runfile.durable import write_whole
 
-METHODS: Final = ("EAV", "CRT")
 _WIDTH: Final = 110
 """Characters of a sentence on one line of the PDF."""
-
-
-@dataclass(frozen=True, slots=True)
-class RepetitionRow:
-    """One test of the level in the comparison."""
-
-    test: str
-    phi0: float
-    impacts: int
-    r: dict[str, float | None]
-    good: bool
-    this: bool
-
-
-def repetition_rows(
-    test: TestSummary, earlier: Sequence[TestSummary], later: Sequence[TestSummary] = ()
-) -> list[RepetitionRow]:
-    """The test between the others of its level, in the order given."""
-    return [
-        RepetitionRow(
-            test=one.test,
-            phi0=one.phi0,
-            impacts=len(one.impacts_s),
-            r={name: one.methods[name].r if name in one.methods else None for name in METHODS},
-            good=one.good,
-            this=one is test,
-        )
-        for one in [*earlier, test, *later]
-    ]
-
-
-def verdict_sentence(test: TestSummary) -> str:
-    """The quality verdict in words, on one line."""
-    reasons = one_line("; ".join(test.reasons))
-    if test.good and test.trust == "doubtful":
-        return f"Well recorded, but r is doubtful: {reasons}."
-    if test.good:
-        return "Good." + (f" To note: {reasons}." if reasons else "")
-    return f"Not good: {reasons or 'rejected'}. The test is offered again."
-
-
-def period_deviation(test: TestSummary) -> float | None:
-    """Mean relative deviation of the measured periods from Eqn 4.1; None without two impacts."""
-    phi, measured = measured_periods(test)
-    inside = (phi > 0.0) & (phi < 1.0)
-    if not inside.any():
-        return None
-    return float((measured[inside] / period(phi[inside], test.p_rad_s) - 1.0).mean())
 
 
 def write_result(

@@ -22,7 +22,7 @@ from daq_app.campaign.report.summary import MethodResult, TestSummary
 from daq_app.campaign.status import NO_FACTS, RecordedTest, TestFacts, TestVerdict
 from daq_app.config import ConfigError
 from daq_app.extras import missing_extra
-from daq_app.rocking.analysis.results import plain
+from daq_app.rocking.analysis.plain import plain
 from daq_app.rocking.families.verdict import FamilyView, RVerdict
 from daq_app.runfile import RunFileError
 from daq_app.runfile.durable import write_whole

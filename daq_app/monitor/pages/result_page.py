@@ -10,8 +10,9 @@ from PySide6.QtCore import QDateTime, Qt, Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from daq_app.campaign.recorded import read_recorded
-from daq_app.campaign.result.report import METHODS, period_deviation, verdict_sentence
+from daq_app.campaign.result.motions import period_deviation
 from daq_app.campaign.result.result import NoResult, Result, load_result
+from daq_app.campaign.result.words import METHODS, verdict_sentence
 from daq_app.campaign.status import NO_FACTS, RecordedTest, TestFacts
 from daq_app.config import ConfigError
 from daq_app.config.shown_text import shortened

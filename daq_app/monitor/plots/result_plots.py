@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from daq_app.campaign.report.summary import TestSummary
-from daq_app.campaign.result.figures import measured_periods, theory_motion
+from daq_app.campaign.result.motions import measured_periods, theory_motion
 from daq_app.campaign.result.result import Result
 from daq_app.config.wording import METHOD_MARKS
 from daq_app.monitor.plots.plot_base import Plot, line_pen

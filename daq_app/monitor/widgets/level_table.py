@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHeaderView, QTableWidget, QTableWidgetItem, QWidget
 
-from daq_app.campaign.result.report import METHODS, repetition_rows
 from daq_app.campaign.result.result import Result
+from daq_app.campaign.result.words import METHODS, repetition_rows
 from daq_app.monitor.widgets.labels import DASH
 from daq_app.monitor.widgets.theme import DARK, Colours
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.rocking.analysis.plain import plain
 from daq_app.rocking.estimators import RestitutionEstimate
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.verdict import FamilyView, RVerdict
@@ -210,18 +210,3 @@ class TestAnalysis:
             result["fit"]["explains_the_motion"] = self.fit.explains_the_motion
             result["fit"]["interval95"] = list(self.fit.interval95())
         return result
-
-
-def plain(value: object) -> Any:
-    """JSON-able: dataclasses and mappings as dictionaries, NaN and infinity as None."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
