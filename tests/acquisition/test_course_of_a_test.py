@@ -82,7 +82,7 @@ def test_samples_come_in_small_pieces_only_while_the_wall_moves(live: Lives, wal
     moving, resting = wall_test.release_sample + 3200, wall_test.rest_sample + 6400
     assert sizes_up_to(moving, 0) == {400}
     lab.wait_for_state(State.RELEASED)
-    assert sizes_up_to(moving + 4000, moving) == {128}
+    assert sizes_up_to(moving + 4000, moving) == {80}
     lab.driver.let(resting)
     lab.wait_for_state(State.SAVING)
     assert sizes_up_to(wall_test.n_samples, resting) == {400}

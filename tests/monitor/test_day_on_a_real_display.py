@@ -209,3 +209,42 @@ def test_two_windows_and_two_rigs_side_by_side(day_at, configs, tmp_path):
         second.says(state="Aborted")
     finally:
         other.end()
+
+
+def test_wrong_clicks_and_keys_while_armed_change_nothing(day_at):
+    day = day_at(1366, 768, "light")
+    window = day.open()
+    window.says(state="Live view")
+    window.press("F6")
+    window.says(chosen="FR1-L1-1", target=0.15)
+    window.press("ctrl+0")
+    window.says(zeroed=True)
+    window.click("L3")
+    window.says(target=0.35)
+    window.press("F5")
+    window.says(state="Armed", page="Test")
+    armed = {name: window.words[name] for name in ("state", "test", "target", "zeroed", "check")}
+
+    # Another target, another test, zero, check and pull test, with mouse and keys.
+    window.click("Prepare")
+    window.says(page="Prepare")
+    for button in ("L4", "L1", "Zero", "Check sensors", "Pull test", "Next test", "Arm", "Live view"):
+        window.click(button)
+    window.press("ctrl+0", "F2", "F3", "F4", "F5", "F6")
+    window.until(lambda words: "not now" in words["notice"])
+    window.click("Test")
+    window.says(page="Test", **armed)
+    window = day.reopen(window)
+    window.says(**armed)
+
+    # One press of Abort gives nothing up; the wall is held where the test was planned.
+    window.click("Abort")
+    day.wall("pull", theta0_over_alpha=0.4)
+    window.until(lambda words: "ease back" in words["gauge"])
+    day.wall("pull", theta0_over_alpha=0.35)
+    window.says(state="Holding", gauge="Release", test="FR1-L1-1", target=0.35)
+    day.wall("release")
+    window.says(state="Saved", page="Result", result="FR1-L1-1")
+    with open_run(day.run_of("FR1-L1-1_*.h5")) as opened:
+        assert opened.header.test_plan.theta0_over_alpha == 0.35 and not opened.gaps
+    assert not [words for words in window.past if words["state"] == "Armed" and words["target"] != 0.35]

@@ -31,7 +31,7 @@ from daq_app.monitor.widgets.labels import PlainLabel, Tile, role_label
 from daq_app.monitor.widgets.theme import Colours
 from daq_app.runfile import RunFileError, open_run
 
-_WIDTHS_PX = (160, 56, 145, 86, 64, 110, 120, 95)
+_WIDTHS_PX = (142, 52, 140, 84, 60, 80, 112, 84)
 """Widths of the columns before the notes, pixels."""
 _REPORT_LIMIT_S = 3600.0
 

@@ -132,8 +132,8 @@ class ResultPage(QWidget):
         layout.addWidget(self.plots, 1)
         tables = QHBoxLayout()
         tables.setSpacing(6)
-        for table in (self.table, self.families):
-            tables.addWidget(table, 1, Qt.AlignmentFlag.AlignTop)
+        for table, share in ((self.table, 4), (self.families, 5)):
+            tables.addWidget(table, share, Qt.AlignmentFlag.AlignTop)
         layout.addLayout(tables)
 
     def restyle(self, colours: Colours) -> None:

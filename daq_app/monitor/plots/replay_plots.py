@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QTimer, Signal
-from PySide6.QtGui import QColor, QFontMetricsF
+from PySide6.QtGui import QColor, QFontMetricsF, QResizeEvent
 
 from daq_app.monitor.data.replay_data import ROTATION, VELOCITY, ReplayRun
 from daq_app.monitor.plots.plot_base import axes, line_pen
@@ -59,6 +59,12 @@ class ReplayPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self._redraw.setSingleShot(True)
         self._redraw.setInterval(30)
         self._redraw.timeout.connect(self.draw)
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:
+        """A wider screen shows more columns: a run is often drawn before its page has a size."""
+        super().resizeEvent(event)
+        if event is not None and event.size().width() != event.oldSize().width():
+            self._redraw.start()
 
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""

@@ -92,7 +92,7 @@ def _measured(test: RecordedTest | None) -> tuple[str, ...]:
     return (
         number(facts.theta0_over_alpha, 3),
         number(facts.r.get("CRT"), 3),
-        shortened(f"{test.verdict.value}: {test.reason}" if test.reason else test.verdict.value, 60),
+        test.verdict.value,
         _moment(test).toString("dd MMM HH:mm"),
         shortened(facts.operator, 40),
         shortened(" · ".join(facts.notes), 120),

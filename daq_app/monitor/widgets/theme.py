@@ -221,6 +221,7 @@ def _stylesheet(c: Colours, base: float) -> str:
     QLineEdit, QComboBox, QPlainTextEdit, QTextBrowser, QListWidget, QTreeWidget {{ background: {c.surface};
         border: 1px solid {c.line}; border-radius: 5px; padding: 4px 6px; }}
     QLineEdit:focus, QComboBox:focus, QPlainTextEdit:focus {{ border-color: {c.accent}; }}
+    QListWidget::item, QTreeWidget::item {{ min-height: {c.px(20)}px; }}
     QTreeWidget::indicator {{ width: 13px; height: 13px; border: 1px solid {c.muted}; border-radius: 3px; }}
     QTreeWidget::indicator:checked {{ background: {c.accent}; border-color: {c.accent}; }}
     QTreeWidget::indicator:indeterminate {{ background: {c.line}; }}

@@ -144,6 +144,16 @@ def test_a_rejected_test_leaves_the_diagnosis_at_once(qtbot, page, run_file):
     (run_file.parent / "verdicts.json").unlink()
 
 
+def test_a_wider_page_shows_a_finer_line(qtbot, page):
+    def points() -> int:
+        return page.plots._curves[ROTATION].getData()[0].size
+
+    page.plots.resize(300, 500)
+    qtbot.waitUntil(lambda: points() < 500, timeout=60_000)
+    page.plots.resize(1400, 500)
+    qtbot.waitUntil(lambda: points() > 2000, timeout=60_000)
+
+
 def test_picking_channels_leaves_the_cursor_and_the_view(page):
     page.plots.set_view(0.0, 3.0)
     page.plots.set_cursor(0.46)

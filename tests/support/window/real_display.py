@@ -26,6 +26,7 @@ _WINDOW = """
 import json, sys, threading
 from pathlib import Path
 from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QPushButton
 from daq_app.monitor.widgets.settings import WindowSettings
 from daq_app.monitor.window.app import application, campaign_beside, open_window, reach
 from tests.support.window.clipped_text import clipped_texts
@@ -38,11 +39,19 @@ address, token, mine = reach(Path(rig), Path(out), ["--speed", "2"])
 token = token if token_wanted == "yes" else ""
 window = open_window(address, token, settings, plan=campaign_beside(Path(rig)))
 window.showMaximized() if size == "maximised" else window.show()
-shape_before, asked, said, cut_before, cut_told = [None], [], [None], [set()], [set()]
+shape_before, asked, sought, said, cut_before, cut_told = [None], [], [], [None], [set()], [set()]
 
 def listen():
     for line in sys.stdin:
-        asked.append(line.strip())
+        kind, _, what = line.strip().partition(" ")
+        (asked if kind == "picture" else sought).append(what)
+
+def tell_place(text):
+    shown = [b for b in window.findChildren(QPushButton) if b.isVisible() and b.text().startswith(text)]
+    if shown:
+        centre = shown[0].mapToGlobal(shown[0].rect().center())
+        print(json.dumps({"place": [centre.x(), centre.y()], "of": text}), flush=True)
+        sought.remove(text)
 
 def shape():
     # What the display is made of now: None until every window of ours is on it.
@@ -65,6 +74,8 @@ def look():
     if asked and shape() is not None and shape() == shape_before[0]:
         take_pictures()
     shape_before[0] = shape()
+    for text in list(sought):
+        tell_place(text)
     page = next(name for name, page in window.pages.items() if page is window.stack.currentWidget())
     card = window.prepare.card.choice
     words = {
@@ -156,6 +167,8 @@ class RealWindow:
         self.clipped: set[str] = set()
         """Texts that were cut off at any time."""
         self._pictures: set[str] = set()
+        self._places: dict[str, tuple[int, int]] = {}
+        """Where buttons are that were asked for, pixels of the display."""
         self._news = threading.Condition()
         threading.Thread(target=self._listen, daemon=True).start()
 
@@ -166,6 +179,8 @@ class RealWindow:
             with self._news:
                 if "picture" in told:
                     self._pictures.add(told["picture"])
+                elif "place" in told:
+                    self._places[told["of"]] = told["place"]
                 else:
                     self.words = told["words"]
                     self.past.append(self.words)
@@ -188,11 +203,23 @@ class RealWindow:
 
     def picture(self, path: Path) -> None:
         """Save what the display shows, once its windows have their size and are painted."""
-        assert self.process.stdin is not None
-        self.process.stdin.write(f"{path}\n")
-        self.process.stdin.flush()
+        self._ask(f"picture {path}")
         with self._news:
             assert self._news.wait_for(lambda: str(path) in self._pictures, 60)
+
+    def click(self, text: str) -> None:
+        """Click with the mouse on the visible button whose text begins so, as soon as there is one."""
+        self._ask(f"where {text}")
+        with self._news:
+            assert self._news.wait_for(lambda: text in self._places, 60), f"there is no button {text}"
+            x, y = self._places.pop(text)
+        move = ["xdotool", "mousemove", str(x), str(y), "click", "1"]
+        subprocess.run(move, env=self._environment, check=True)
+
+    def _ask(self, line: str) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.write(f"{line}\n")
+        self.process.stdin.flush()
 
     def kill(self) -> None:
         """End it as a crash does."""
