@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperCommand
 
 from daq_app import ni_daqmx
+from daq_app.cli.help_page import WIDTH, PlainGroup
 from daq_app.extras import missing_extra
 from daq_app.streams import use_utf8
 
@@ -90,7 +91,7 @@ _EXIT_HARDWARE: Final = 3
 """As `errors.EXIT_HARDWARE`, whose module loads what a first look at the command line does not need."""
 
 
-class LazyCommands(TyperGroup):
+class LazyCommands(PlainGroup):
     """Knows every command's name and first sentence; loads the command itself when it is called."""
 
     def list_commands(self, ctx: Any) -> list[str]:
@@ -116,7 +117,7 @@ class LazyCommands(TyperGroup):
 
 def load_command(name: str) -> Any:
     """The command of that name. `KeyError` if there is none."""
-    app = typer.Typer(rich_markup_mode="rich")
+    app = typer.Typer(rich_markup_mode=None)
     for module in _COMMANDS[name].modules:
         importlib.import_module(f"daq_app.cli.{module}").register(app)
     return typer.main.get_group(app).commands[name]
@@ -125,7 +126,11 @@ def load_command(name: str) -> Any:
 def build_app() -> typer.Typer:
     """The whole command tree."""
     app = typer.Typer(
-        name="daq-app", cls=LazyCommands, rich_markup_mode="rich", pretty_exceptions_enable=False
+        name="daq-app",
+        cls=LazyCommands,
+        rich_markup_mode=None,
+        context_settings=WIDTH,
+        pretty_exceptions_enable=False,
     )
     app.callback(invoke_without_command=True)(_root)
     return app

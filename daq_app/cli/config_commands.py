@@ -10,6 +10,7 @@ import typer
 from daq_app.cli.config_tables import plan_tables
 from daq_app.cli.devices import devices_of
 from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, print_problems, reported
+from daq_app.cli.help_page import command_group
 from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.config import ConfigError, load_rig, plan_tasks
 from daq_app.config.hardware.comparison import differences
@@ -19,7 +20,7 @@ from daq_app.config.shipped import copy_shipped
 
 def register(app: typer.Typer) -> None:
     """Add the group ``config``."""
-    group = typer.Typer(no_args_is_help=True, help="Check, show and copy rig files.")
+    group = command_group("Check, show and copy rig files.")
     group.command("check", epilog="Example: daq-app config check configs/fr1.toml configs/fr2.toml")(check)
     group.command("show", epilog="Example: daq-app config show configs/fr1-iepe.toml")(show)
     group.command("templates", epilog="Example: daq-app config templates configs")(templates)

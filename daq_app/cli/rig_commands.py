@@ -9,6 +9,7 @@ import typer
 
 from daq_app.cli.devices import devices_at, reserve_at
 from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, reported
+from daq_app.cli.help_page import command_group
 from daq_app.cli.terminal import echo
 from daq_app.config.authoring import Block, read_sensor_table, spread_sensors, write_rig_text
 from daq_app.config.authoring.hardware_text import hardware_text
@@ -31,7 +32,7 @@ _RESERVED_BY_OTHER = -201420
 
 def register(app: typer.Typer) -> None:
     """Add the group ``rig``."""
-    group = typer.Typer(no_args_is_help=True, help="Write rig files for walls of one's own.")
+    group = command_group("Write rig files for walls of one's own.")
 
     @group.callback()
     def _rig() -> None:

@@ -33,8 +33,8 @@ def test_the_list_of_commands_is_true_and_each_shows_an_example(name: str) -> No
         assert f"Example: {path} " in leaf.epilog, path
 
 
-def test_help_loads_no_numerical_library() -> None:
-    heavy = ("numpy", "scipy", "h5py", "pydantic", "matplotlib", "nidaqmx", "PySide6")
+def test_help_loads_no_numerical_library_and_no_rich_text() -> None:
+    heavy = ("numpy", "scipy", "h5py", "pydantic", "matplotlib", "nidaqmx", "PySide6", "rich")
     code = (
         "import sys; from typer.testing import CliRunner; from daq_app.cli.app import build_app\n"
         "answer = CliRunner().invoke(build_app(), ['--help']); assert answer.exit_code == 0\n"
@@ -42,6 +42,14 @@ def test_help_loads_no_numerical_library() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("group", [[], ["gap"], ["gap", "blind"], ["campaign"]])
+def test_a_group_shows_the_whole_first_sentence_of_each_command(group: list[str]) -> None:
+    page = CliRunner().invoke(build_app(), [*group, "--help"]).stdout
+    listed = page.partition("Commands:")[2]
+    assert listed
+    assert "..." not in listed
 
 
 def test_help_lists_every_command_and_an_unknown_one_is_told() -> None:

@@ -18,6 +18,7 @@ from daq_app.cli.campaign.record import record
 from daq_app.cli.campaign.report import report
 from daq_app.cli.campaign.simulate import simulate
 from daq_app.cli.errors import reported
+from daq_app.cli.help_page import command_group
 from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.config import ConfigError, Problem
 from daq_app.runfile import RunFileError, open_run
@@ -33,7 +34,7 @@ class _Verdict(StrEnum):
 
 def register(app: typer.Typer) -> None:
     """Add the group ``campaign``."""
-    group = typer.Typer(no_args_is_help=True, help="Plan and follow a campaign of tests.")
+    group = command_group("Plan and follow a campaign of tests.")
     group.command("plan", epilog="Example: daq-app campaign plan configs/campaigns/costa.toml")(plan)
     group.command("status", epilog="Example: daq-app campaign status runs --specimen FR1")(status)
     group.command(

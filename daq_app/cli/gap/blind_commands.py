@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, reported
+from daq_app.cli.help_page import command_group
 from daq_app.cli.scheduler_option import SchedulerOption
 from daq_app.cli.terminal import Console, echo
 from daq_app.config import load_rig
@@ -51,7 +52,7 @@ _WorkersOption = Annotated[int, typer.Option(min=0, help="Processes; 0 takes one
 
 def register(app: typer.Typer) -> None:
     """Add the group ``blind`` to the group ``gap``, which is made if nobody made it."""
-    blind = typer.Typer(no_args_is_help=True, help="Check the diagnosis on cases whose cause it is not told.")
+    blind = command_group("Check the diagnosis on cases whose cause it is not told.")
     blind.command(
         "make", epilog="Example: daq-app gap blind make --cases 200 --seed 1 --out check --labels kept/check"
     )(make)
@@ -62,7 +63,7 @@ def register(app: typer.Typer) -> None:
     blind.command("table", epilog="Example: daq-app gap blind table ordinary rough contact")(table)
     group = next((g.typer_instance for g in app.registered_groups if g.name == "gap"), None)
     if group is None:
-        group = typer.Typer(no_args_is_help=True, help="The gap between simulator and recordings.")
+        group = command_group("The gap between simulator and recordings.")
         app.add_typer(group, name="gap")
     group.add_typer(blind, name="blind")
 

@@ -21,6 +21,7 @@ from daq_app.cli.errors import (
     reported,
     say_other_name,
 )
+from daq_app.cli.help_page import command_group
 from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.config import load_rig
 from daq_app.runfile.durable import write_whole
@@ -33,9 +34,8 @@ if TYPE_CHECKING:
 
 def register(app: typer.Typer) -> None:
     """Add the group ``gap``."""
-    group = typer.Typer(
-        no_args_is_help=True,
-        help="Where simulator and recordings differ, which effect explains it, how far it shrinks.",
+    group = command_group(
+        "Where simulator and recordings differ, which effect explains it, how far it shrinks."
     )
     group.command(
         "diagnose",

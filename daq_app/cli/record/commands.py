@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, reported
+from daq_app.cli.help_page import command_group
 from daq_app.cli.record.seal_keys import register_seal_keys
 from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.streams import let_output_fail
@@ -31,10 +32,7 @@ def register(app: typer.Typer) -> None:
     app.command(
         "simulate", epilog="Example: daq-app simulate configs/fr1.toml --level L3 --r 0.9 --out run.h5"
     )(simulate)
-    keys = typer.Typer(
-        no_args_is_help=True,
-        help="Keys of viewers elsewhere, and of other recorders to be trusted.",
-    )
+    keys = command_group("Keys of viewers elsewhere, and of other recorders to be trusted.")
     keys.command("recorder", epilog="Example: daq-app keys recorder keys")(recorder_keys)
     keys.command("viewer", epilog="Example: daq-app keys viewer my-keys bench-laptop")(viewer_keys)
     register_seal_keys(keys)
