@@ -21,6 +21,7 @@ from typing import TextIO
 import psutil
 
 from daq_app.acquisition.closing.finaliser import Finished
+from daq_app.acquisition.closing.freed_memory import give_back
 from daq_app.guarded import keep_input
 
 
@@ -118,6 +119,7 @@ def main() -> None:
         answer = _do(json.loads(jobs.get()))
         answers.write(json.dumps(asdict(answer)) + "\n")
         answers.flush()
+        give_back()
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from daq_app.acquisition.closing.finaliser import Finaliser, Finished
+from daq_app.acquisition.closing.freed_memory import give_back
 from daq_app.acquisition.closing.result_maker import ResultMaker
 from daq_app.acquisition.course.analyst import Analyst
 from daq_app.acquisition.course.header import make_header
@@ -247,6 +248,7 @@ class Session:
             )
         )
         self.analyst.inbox.put(Saved(ok, text, finished.path))
+        give_back()
         released = recorded.end.outcome in ("complete", "timeout", "stopped")
         if self._settings.make_results and ok and finished.path and released and recorded.header.kept is None:
             self.results.make(Path(finished.path))
