@@ -19,8 +19,8 @@ from typing import Any
 
 from rich.console import Console
 
-from benchmarks.figure import Figure
-from benchmarks.tables import page, terminal_table
+from benchmarks.support.figure import Figure
+from benchmarks.support.tables import page, terminal_table
 
 _DEFAULT_JSON = Path("benchmarks.json")
 _FORMAT = 2

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import psutil
 
-from benchmarks.figure import Figure
+from benchmarks.support.figure import Figure
 from daq_app.acquisition import AcquisitionProcess
 from daq_app.acquisition.messages.items import Begin, End, Item, Lost, SourceEnded, Started
 from daq_app.acquisition.messages.published import HealthMessage, State, StateMessage

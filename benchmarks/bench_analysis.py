@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.figure import Figure
+from benchmarks.support.figure import Figure
 from daq_app.config import Rig, Scaling, TaskPlan, load_rig, plan_tasks
 from daq_app.rocking import AnalysisOptions, LiveAnalyser, TestAnalysis, TestRecord, analyse_record
 from daq_app.rocking.live import Estimate

@@ -14,7 +14,7 @@ import psutil
 
 from benchmarks.bench_acquisition import RIG, sustained
 from benchmarks.bench_daqmx_server import bare_loop
-from benchmarks.figure import Figure
+from benchmarks.support.figure import Figure
 from daq_app.acquisition.process.simulated import SimulatedServer
 
 _BLOCK = 4000

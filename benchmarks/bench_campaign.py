@@ -10,8 +10,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from benchmarks.byte_code import surroundings
-from benchmarks.figure import Figure
+from benchmarks.support.byte_code import surroundings
+from benchmarks.support.figure import Figure
 
 _ROOT = Path(__file__).parents[1]
 _REPORTS = 3

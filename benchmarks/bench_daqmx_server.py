@@ -21,7 +21,7 @@ from nidaqmx.constants import AcquisitionType
 from nidaqmx.grpc_session_options import GrpcSessionOptions
 from nidaqmx.stream_readers import AnalogMultiChannelReader
 
-from benchmarks.figure import Figure
+from benchmarks.support.figure import Figure
 from daq_app.config import load_rig
 
 _RIG = Path(__file__).parents[1] / "configs" / "fr1.toml"

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.bench_simulation import least_s, scipy_run, trajectory_s
-from benchmarks.byte_code import byte_code_of
-from benchmarks.figure import Figure
+from benchmarks.support.byte_code import byte_code_of
+from benchmarks.support.figure import Figure
 from daq_app.config import load_rig, plan_tasks
 from daq_app.config.scaling import Scaling
 from daq_app.gap.core import Options, diagnose, fit

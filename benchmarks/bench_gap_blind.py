@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.figure import Figure
+from benchmarks.support.figure import Figure
 from daq_app.config import parse_rig
 from daq_app.gap.blind.making.case_files import write_case
 from daq_app.gap.blind.world.campaign import draw_world

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from benchmarks.figure import Figure
+from benchmarks.support.figure import Figure
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
@@ -32,7 +32,7 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         from daq_app.acquisition.messages.published import State
         from daq_app.acquisition.viewers.launcher import AcquisitionProcess
-        from daq_app.monitor.widgets.settings import WindowSettings
+        from daq_app.monitor.data.settings import WindowSettings
         from daq_app.monitor.window.app import application, open_window
         from sim_hardware.control import SimControl
 

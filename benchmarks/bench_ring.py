@@ -14,7 +14,7 @@ from pathlib import Path
 import psutil
 
 from benchmarks.bench_acquisition import RIG
-from benchmarks.figure import Figure
+from benchmarks.support.figure import Figure
 from daq_app.acquisition.messages.items import Item, Lost, SourceEnded
 from daq_app.acquisition.pipeline.reader import Reader
 from daq_app.acquisition.pipeline.recorder import Recorder

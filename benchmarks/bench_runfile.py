@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.figure import Figure
+from benchmarks.support.figure import Figure
 from daq_app.config import Rig, load_rig
 from daq_app.runfile import JournalWriter, RunHeader, finalise, verify
 from daq_app.runfile.exporters import FORMATS, export_run

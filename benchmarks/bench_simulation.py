@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from benchmarks.figure import Figure
+from benchmarks.support.figure import Figure
 from daq_app.config import load_rig, plan_tasks
 from daq_app.config.rig import Rig
 from sim_hardware.direct import synthesise_test

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import psutil
 
-from benchmarks.figure import Figure
+from benchmarks.support.figure import Figure
 from daq_app.acquisition.messages.published import State, StateMessage
 from daq_app.acquisition.viewers.launcher import AcquisitionProcess
 
@@ -26,7 +26,7 @@ _WINDOW = """
 import os, sys, time
 from pathlib import Path
 from PySide6.QtCore import QTimer
-from daq_app.monitor.widgets.settings import WindowSettings
+from daq_app.monitor.data.settings import WindowSettings
 from daq_app.monitor.window.app import application, campaign_beside, open_window
 app = application()
 address, token, folder, rig = sys.argv[1:5]

@@ -18,7 +18,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 from daq_app.acquisition.messages.published import State
 from daq_app.acquisition.viewers.launcher import AcquisitionProcess
 from daq_app.cli.record.simulate import simulate_run
-from daq_app.monitor.widgets.settings import WindowSettings
+from daq_app.monitor.data.settings import WindowSettings
 from daq_app.monitor.window.app import application, open_window
 from daq_app.monitor.window.main_window import MainWindow
 from sim_hardware.control import SimControl

@@ -56,7 +56,7 @@ def stand_in(rig: Any) -> Any:
 
 @pytest.fixture
 def settings(tmp_path: Path) -> Any:
-    from daq_app.monitor.widgets.settings import WindowSettings
+    from daq_app.monitor.data.settings import WindowSettings
 
     return WindowSettings(tmp_path / "window.ini")
 

@@ -7,8 +7,8 @@ import pyqtgraph as pg
 import pytest
 from PySide6.QtGui import QColor
 
+from daq_app.monitor.look.theme import DARK, THEMES
 from daq_app.monitor.plots.live_plot import LivePlot, columns_of
-from daq_app.monitor.widgets.theme import DARK, THEMES
 
 RATE_HZ = 500.0
 LINE = QColor("#ff0000")

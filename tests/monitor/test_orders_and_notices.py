@@ -7,9 +7,9 @@ import pytest
 from daq_app.acquisition.checks.check_model import ChannelCheck, Finding, SensorCheck, Verdict
 from daq_app.acquisition.messages.published import CheckMessage, EventMessage, Judgement, Reply, State
 from daq_app.monitor.data.background import Background
+from daq_app.monitor.look.state_look import SHAPES, look_of
 from daq_app.monitor.widgets.actions import ActionBar
 from daq_app.monitor.widgets.notices import NoticeLine
-from daq_app.monitor.widgets.state_look import SHAPES, look_of
 
 
 def test_every_state_has_its_own_shape_so_that_colour_is_not_needed():

@@ -16,8 +16,8 @@ from daq_app.acquisition.messages.published import (
     StateMessage,
 )
 from daq_app.monitor.data.session import Published, Session
+from daq_app.monitor.look.labels import DASH, number, size_text
 from daq_app.monitor.widgets.counters import tile_texts
-from daq_app.monitor.widgets.labels import DASH, number, size_text
 from daq_app.monitor.window.health_bar import health_texts
 
 

@@ -25,7 +25,7 @@ from pathlib import Path
 from PySide6.QtCore import QTimer
 from daq_app.acquisition.messages.published import MotionMessage
 from daq_app.monitor.window.app import application, open_window
-from daq_app.monitor.widgets.settings import WindowSettings
+from daq_app.monitor.data.settings import WindowSettings
 
 app = application()
 window = open_window(sys.argv[1], "", WindowSettings(Path(sys.argv[2])))

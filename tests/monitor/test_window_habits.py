@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from daq_app.monitor.widgets.settings import WindowSettings
+from daq_app.monitor.data.settings import WindowSettings
 from daq_app.monitor.window.main_window import MainWindow
 
 

@@ -15,11 +15,11 @@ from daq_app.campaign.plan import Campaign, Step
 from daq_app.campaign.status import CampaignStatus, RecordedTest, TestFacts, TestVerdict
 from daq_app.config.shown_text import visible
 from daq_app.monitor.data.background import Background
+from daq_app.monitor.look.labels import Tile, role_label, tip_text
 from daq_app.monitor.pages.campaign_page import CampaignPage
 from daq_app.monitor.pages.replay_page import ReplayPage
 from daq_app.monitor.pages.result_page import ResultPage
 from daq_app.monitor.widgets.campaign_table import HEADINGS, CampaignModel
-from daq_app.monitor.widgets.labels import Tile, role_label, tip_text
 from tests.support.files.hostile_words import hidden_characters, hostile
 from tests.support.window.stand_in import StandIn, write_run
 

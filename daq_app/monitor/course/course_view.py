@@ -19,12 +19,12 @@ from daq_app.monitor.course.gauge_words import countdown_s, gauge_words
 from daq_app.monitor.course.recording_light import recording_light
 from daq_app.monitor.course.target_bar import paint_target_bar
 from daq_app.monitor.data.session import Session
+from daq_app.monitor.look.labels import DASH, number
+from daq_app.monitor.look.shapes import draw_shape
+from daq_app.monitor.look.state_look import look_of, name_of_test
+from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.plot_base import envelope
 from daq_app.monitor.widgets.counters import TileText, tile_texts
-from daq_app.monitor.widgets.labels import DASH, number
-from daq_app.monitor.widgets.shapes import draw_shape
-from daq_app.monitor.widgets.state_look import look_of, name_of_test
-from daq_app.monitor.widgets.theme import DARK, Colours
 
 TRACE_S: Final = 12.0
 _MOVED: Final = frozenset({State.RELEASED, State.ROCKING, State.AT_REST})

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from daq_app.monitor.course.course_view import CourseView
 from daq_app.monitor.data.session import Session
-from daq_app.monitor.widgets.theme import Colours
+from daq_app.monitor.look.theme import Colours
 
 
 class FullScreen(QWidget):

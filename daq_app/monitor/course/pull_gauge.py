@@ -11,8 +11,8 @@ from daq_app.monitor.course.fitted_text import FittedText
 from daq_app.monitor.course.gauge_words import countdown_s, gauge_words
 from daq_app.monitor.course.target_bar import paint_target_bar
 from daq_app.monitor.data.session import Session
-from daq_app.monitor.widgets.labels import DASH, number
-from daq_app.monitor.widgets.theme import DARK, Colours
+from daq_app.monitor.look.labels import DASH, number
+from daq_app.monitor.look.theme import DARK, Colours
 
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _TOP = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop

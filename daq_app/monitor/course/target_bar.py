@@ -8,7 +8,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen
 
 from daq_app.acquisition.messages.published import Judgement
-from daq_app.monitor.widgets.theme import Colours
+from daq_app.monitor.look.theme import Colours
 
 
 def paint_target_bar(

@@ -25,10 +25,10 @@ from daq_app.campaign.verdicts import give_verdict
 from daq_app.config import ConfigError
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.child import said_by
+from daq_app.monitor.look.labels import PlainLabel, Tile, role_label
+from daq_app.monitor.look.theme import Colours
 from daq_app.monitor.widgets.banner import keyed_button, open_outside
 from daq_app.monitor.widgets.campaign_table import CampaignModel, StateDelegate, release_text
-from daq_app.monitor.widgets.labels import PlainLabel, Tile, role_label
-from daq_app.monitor.widgets.theme import Colours
 from daq_app.runfile import RunFileError, open_run
 
 _WIDTHS_PX = (142, 52, 140, 84, 60, 80, 112, 84)

@@ -25,9 +25,9 @@ from daq_app.config.rig import Channel
 from daq_app.config.shown_units import shown_unit
 from daq_app.monitor.data.channel_look import ChannelLook, expected_density_si, look_at, neighbours
 from daq_app.monitor.data.session import Session
+from daq_app.monitor.look.labels import DASH, PlainLabel, number, role_label, set_role
+from daq_app.monitor.look.theme import Colours, apply_theme
 from daq_app.monitor.plots.plot_base import Plot, envelope, line_pen
-from daq_app.monitor.widgets.labels import DASH, PlainLabel, number, role_label, set_role
-from daq_app.monitor.widgets.theme import Colours, apply_theme
 
 EVERY_MS: Final = 400
 _FACTS: Final = (

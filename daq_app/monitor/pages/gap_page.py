@@ -27,11 +27,11 @@ from daq_app.gap.files import newest_result
 from daq_app.gap.words import causes_in_words
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.gap_runner import GapRunner
+from daq_app.monitor.look.labels import number, role_label, set_role, tip_text
+from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.gap_traces import GapTraces
 from daq_app.monitor.plots.gap_views import BarRows, GapMapView, closure_bars, evidence_bars, map_cells
 from daq_app.monitor.widgets.banner import Banner, keyed_button, open_outside
-from daq_app.monitor.widgets.labels import number, role_label, set_role, tip_text
-from daq_app.monitor.widgets.theme import DARK, Colours
 from daq_app.runfile import RunFileError
 
 _PATH = Qt.ItemDataRole.UserRole

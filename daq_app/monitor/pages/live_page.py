@@ -13,12 +13,12 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QVBox
 from daq_app.acquisition.course.tare import UNZEROED
 from daq_app.acquisition.messages.published import EstimateMessage, MotionMessage, StateMessage
 from daq_app.monitor.data.session import Session
+from daq_app.monitor.look.labels import role_label, set_role, tip_text
+from daq_app.monitor.look.theme import Colours
 from daq_app.monitor.plots.estimate_plots import PeriodPlot, PhasePlane, RestitutionPlot, side_by_side
 from daq_app.monitor.plots.motion_plots import MotionPlots
 from daq_app.monitor.plots.strip_panel import StripPanel
 from daq_app.monitor.widgets.counters import Counters
-from daq_app.monitor.widgets.labels import role_label, set_role, tip_text
-from daq_app.monitor.widgets.theme import Colours
 
 
 class LivePage(QWidget):

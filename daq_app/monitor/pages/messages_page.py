@@ -9,9 +9,9 @@ from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelInd
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QHeaderView, QTableView, QVBoxLayout, QWidget
 
-from daq_app.monitor.widgets.labels import role_label
+from daq_app.monitor.look.labels import role_label
+from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.widgets.notices import NoticeLine, Told
-from daq_app.monitor.widgets.theme import DARK, Colours
 
 Index = QModelIndex | QPersistentModelIndex
 HEADINGS: Final = ("Told at", "Over at", "Kind", "Message")

@@ -16,12 +16,12 @@ from daq_app.config.rig import Rig
 from daq_app.monitor.course.pull_gauge import PullGauge
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.session import Session
+from daq_app.monitor.look.labels import PlainLabel, role_label, set_role
+from daq_app.monitor.look.shapes import Sign
+from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.widgets.actions import BETWEEN_TESTS
 from daq_app.monitor.widgets.check_table import SHAPES, TONES, CheckTable
-from daq_app.monitor.widgets.labels import PlainLabel, role_label, set_role
-from daq_app.monitor.widgets.shapes import Sign
 from daq_app.monitor.widgets.test_card import TestCard
-from daq_app.monitor.widgets.theme import DARK, Colours
 from daq_app.monitor.widgets.wall_card import WallCard
 
 

@@ -27,10 +27,10 @@ from PySide6.QtWidgets import (
 from daq_app.config.families import AUXILIARY
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.replay_data import ROTATION, VELOCITY, ReplayRun
+from daq_app.monitor.look.labels import PlainLabel, number, role_label, tip_text
+from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.replay_plots import ReplayPlots, shade
 from daq_app.monitor.plots.strip_panel import FAMILY_TITLES
-from daq_app.monitor.widgets.labels import PlainLabel, number, role_label, tip_text
-from daq_app.monitor.widgets.theme import DARK, Colours
 from daq_app.runfile import RunFileError
 from daq_app.runfile.durable import written_whole
 from daq_app.runfile.folder import require_replaceable

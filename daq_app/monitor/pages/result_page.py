@@ -19,12 +19,12 @@ from daq_app.config.shown_text import shortened
 from daq_app.config.wording import plus_minus
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.child import said_by
+from daq_app.monitor.look.labels import DASH, Tile, number, set_role, tip_text
+from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.result_plots import ResultPlots
 from daq_app.monitor.widgets.banner import Banner, keyed_button, open_outside
 from daq_app.monitor.widgets.family_table import FamilyTable
-from daq_app.monitor.widgets.labels import DASH, Tile, number, set_role, tip_text
 from daq_app.monitor.widgets.level_table import LevelTable
-from daq_app.monitor.widgets.theme import DARK, Colours
 from daq_app.runfile import RunFileError
 from daq_app.runfile.folder import RUN_SUFFIX
 

@@ -21,9 +21,9 @@ from daq_app.acquisition.viewers.client import AcquisitionUnreachable
 from daq_app.acquisition.viewers.launcher import AcquisitionDied
 from daq_app.config import ConfigError, load_rig
 from daq_app.config.shipped import shipped_configs
-from daq_app.monitor.widgets.labels import PlainLabel, role_label, set_role
-from daq_app.monitor.widgets.settings import WindowSettings
-from daq_app.monitor.widgets.theme import font
+from daq_app.monitor.data.settings import WindowSettings
+from daq_app.monitor.look.labels import PlainLabel, role_label, set_role
+from daq_app.monitor.look.theme import font
 
 _NO_RIGS = "No rig was opened here before, and this folder has no configs/*.toml: choose a rig file below."
 Start = Callable[[Path, Path], None]

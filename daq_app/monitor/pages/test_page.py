@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QHBoxLayout, QMenu, QPushButton, QVBoxLayout, QWid
 from daq_app.monitor.course.course_view import CourseView
 from daq_app.monitor.course.full_screen import display_name
 from daq_app.monitor.data.session import Session
-from daq_app.monitor.widgets.labels import role_label
-from daq_app.monitor.widgets.theme import Colours
+from daq_app.monitor.look.labels import role_label
+from daq_app.monitor.look.theme import Colours
 
 
 class TestPage(QWidget):

@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 from daq_app.acquisition.messages.published import EstimateMessage
 from daq_app.config.wording import METHOD_MARKS
 from daq_app.monitor.data.session import Session
+from daq_app.monitor.look.theme import Colours
 from daq_app.monitor.plots.plot_base import Plot, line_pen
 from daq_app.monitor.plots.theory_overlay import measured_periods, period_curve
-from daq_app.monitor.widgets.theme import Colours
 
 
 class RestitutionPlot(QWidget):

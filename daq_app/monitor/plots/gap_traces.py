@@ -11,9 +11,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from daq_app.config.shown_text import shortened
+from daq_app.monitor.look.labels import number
+from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.plot_base import Plot, line_pen
-from daq_app.monitor.widgets.labels import number
-from daq_app.monitor.widgets.theme import DARK, Colours
 
 _SHOWN: Final = (("measured", "text"), ("baseline", "warning"), ("augmented", "good"))
 """Trace → theme colour."""

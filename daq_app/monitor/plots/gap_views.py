@@ -11,8 +11,8 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
-from daq_app.monitor.widgets.labels import DASH, number
-from daq_app.monitor.widgets.theme import DARK, Colours
+from daq_app.monitor.look.labels import DASH, number
+from daq_app.monitor.look.theme import DARK, Colours
 
 _PHASES = ("held", "release", "swing", "peak", "impact", "tail", "run", "rest")
 _FULL_GAP = 20.0

@@ -15,8 +15,8 @@ from pyqtgraph.Qt import internals
 from PySide6.QtCore import QRect, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPixmap, QResizeEvent
 
+from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.plot_base import Array, Plot
-from daq_app.monitor.widgets.theme import DARK, Colours
 
 _HALF_PX: Final = 1.0
 """Half the width of the line."""

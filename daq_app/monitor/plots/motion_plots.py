@@ -14,10 +14,10 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from daq_app.acquisition.messages.published import RECORDING, EstimateMessage, MotionMessage
 from daq_app.monitor.data.session import Session
+from daq_app.monitor.look.theme import Colours
 from daq_app.monitor.plots.live_plot import LivePlot
 from daq_app.monitor.plots.plot_base import Array, Axis, line_pen
 from daq_app.monitor.plots.theory_overlay import current_restitution, housner_motion
-from daq_app.monitor.widgets.theme import Colours
 
 WINDOW_S = 12.0
 LEAD_S = 1.0

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPaintEvent
 
-from daq_app.monitor.widgets.theme import Colours
+from daq_app.monitor.look.theme import Colours
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from PySide6.QtCore import QTimer, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QResizeEvent
 
 from daq_app.monitor.data.replay_data import ROTATION, VELOCITY, ReplayRun
+from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.plot_base import axes, line_pen
-from daq_app.monitor.widgets.theme import DARK, Colours
 
 TITLES = {
     ROTATION: "θ  (mrad)",

@@ -13,8 +13,8 @@ from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.result.motions import measured_periods, theory_motion
 from daq_app.campaign.result.result import Result
 from daq_app.config.wording import METHOD_MARKS
+from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.plot_base import Plot, line_pen
-from daq_app.monitor.widgets.theme import DARK, Colours
 from daq_app.rocking.theory import classic as theory
 
 

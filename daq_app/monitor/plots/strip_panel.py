@@ -21,8 +21,8 @@ from daq_app.acquisition.messages.published import BlockMessage
 from daq_app.config.rig import Channel, Rig
 from daq_app.config.shown_units import shown_unit
 from daq_app.monitor.data.session import Session
-from daq_app.monitor.widgets.labels import DASH, number
-from daq_app.monitor.widgets.theme import AUXILIARY_GROUP, DARK, Colours, font
+from daq_app.monitor.look.labels import DASH, number
+from daq_app.monitor.look.theme import AUXILIARY_GROUP, DARK, Colours, font
 
 FAMILY_TITLES: dict[str, str] = {
     "lvdt": "LVDTs · opening of the base joint (mm)",

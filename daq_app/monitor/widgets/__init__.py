@@ -1,1 +1,1 @@
-"""Small pieces of the window: labels, tables, banners, gauges, the theme."""
+"""Small pieces of the window: tables, banners, cards, entries, and what the operator can order."""

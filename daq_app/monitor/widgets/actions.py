@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
 from daq_app.acquisition.messages.published import RECORDING, State
 from daq_app.monitor.data.session import RUNNING
-from daq_app.monitor.widgets.labels import set_role
+from daq_app.monitor.look.labels import set_role
 
 CONFIRM_WITHIN_S: Final = 2.5
 

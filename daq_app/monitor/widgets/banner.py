@@ -17,8 +17,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.monitor.widgets.labels import PlainLabel, role_label
-from daq_app.monitor.widgets.shapes import Sign
+from daq_app.monitor.look.labels import PlainLabel, role_label
+from daq_app.monitor.look.shapes import Sign
 
 _SIGN_PX = 30
 _ONE_ROW_UP_TO_PT = 12.0

@@ -10,10 +10,10 @@ from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem
 
 from daq_app.campaign.status import CampaignStatus, Place, PlaceState, RecordedTest, TestVerdict
 from daq_app.config.shown_text import shortened, visible
+from daq_app.monitor.look.labels import number, tip_text
+from daq_app.monitor.look.shapes import draw_shape
+from daq_app.monitor.look.theme import DARK
 from daq_app.monitor.widgets.check_table import Index
-from daq_app.monitor.widgets.labels import number, tip_text
-from daq_app.monitor.widgets.shapes import draw_shape
-from daq_app.monitor.widgets.theme import DARK
 
 HEADINGS = ("Test", "θ0/α", "State", "Measured", "r CRT", "Verdict", "Released", "Operator", "Notes")
 SHAPES = {PlaceState.DONE: "tick", PlaceState.TO_REPEAT: "triangle", PlaceState.MISSING: "ring"}

@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QHeaderView, QStyledItemDelegate, QStyleOptionView
 from daq_app.acquisition.checks.check_model import ChannelCheck, SensorCheck, Verdict
 from daq_app.config.rig import Rig
 from daq_app.config.shown_units import shown_unit
-from daq_app.monitor.widgets.labels import DASH, number
-from daq_app.monitor.widgets.shapes import draw_shape
-from daq_app.monitor.widgets.theme import DARK, Colours
+from daq_app.monitor.look.labels import DASH, number
+from daq_app.monitor.look.shapes import draw_shape
+from daq_app.monitor.look.theme import DARK, Colours
 
 Index = QModelIndex | QPersistentModelIndex
 HEADINGS = ("Verdict", "Channel", "What to do", "At rest", "Noise", "Hum", "Pull")

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 from daq_app.acquisition.messages.published import RECORDING, MotionMessage, State
 from daq_app.config.wording import plus_minus
 from daq_app.monitor.data.session import Session
-from daq_app.monitor.widgets.labels import DASH, Tile, number, restitution_text
+from daq_app.monitor.look.labels import DASH, Tile, number, restitution_text
 
 
 @dataclass(frozen=True, slots=True)

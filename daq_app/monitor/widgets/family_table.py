@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QHeaderView, QTableWidget, QTableWidgetItem, QWidg
 
 from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.result.family_rows import CAPTION, HEADINGS, family_rows
-from daq_app.monitor.widgets.theme import DARK, Colours
+from daq_app.monitor.look.theme import DARK, Colours
 
 _HEADER_PX, _ROW_PX, _ROWS = 38, 23, 4
 

@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QHeaderView, QTableWidget, QTableWidgetItem, QWidg
 
 from daq_app.campaign.result.result import Result
 from daq_app.campaign.result.words import METHODS, repetition_rows
-from daq_app.monitor.widgets.labels import DASH
-from daq_app.monitor.widgets.theme import DARK, Colours
+from daq_app.monitor.look.labels import DASH
+from daq_app.monitor.look.theme import DARK, Colours
 
 _HEADER_PX, _ROW_PX, _VISIBLE_ROWS = 38, 23, 5
 _HEADINGS = ("Test", "θ0/α", "Impacts", "r EAV", "r CRT", "Verdict")

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLineEdit, QWidget
 
-from daq_app.monitor.widgets.labels import role_label
+from daq_app.monitor.look.labels import role_label
 
 LONGEST = 400
 

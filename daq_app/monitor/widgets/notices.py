@@ -10,9 +10,9 @@ from typing import Final, Literal
 from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
-from daq_app.monitor.widgets.labels import PlainLabel, role_label
-from daq_app.monitor.widgets.shapes import Sign
-from daq_app.monitor.widgets.theme import Colours
+from daq_app.monitor.look.labels import PlainLabel, role_label
+from daq_app.monitor.look.shapes import Sign
+from daq_app.monitor.look.theme import Colours
 
 INFO_MS: Final = 8000
 LOG_MESSAGES: Final = 1000

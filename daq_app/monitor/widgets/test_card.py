@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.monitor.widgets.labels import role_label
+from daq_app.monitor.look.labels import role_label
 from daq_app.runfile import TestPlan
 
 LEVELS = {"L1": 0.15, "L2": 0.25, "L3": 0.35, "L4": 0.40}

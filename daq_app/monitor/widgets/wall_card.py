@@ -9,7 +9,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QWidget
 
 from daq_app.monitor.data.background import Background
-from daq_app.monitor.widgets.labels import role_label
+from daq_app.monitor.look.labels import role_label
 
 
 class WallCard(QFrame):

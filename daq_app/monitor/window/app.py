@@ -19,9 +19,9 @@ from daq_app.acquisition.viewers.session_file import read_session_file
 from daq_app.campaign.plan import load_campaign
 from daq_app.config import ConfigError, Problem, load_rig, plan_tasks
 from daq_app.monitor.data.link import Link
+from daq_app.monitor.data.settings import WindowSettings
+from daq_app.monitor.look.theme import THEMES, apply_theme
 from daq_app.monitor.pages.start_page import StartWindow
-from daq_app.monitor.widgets.settings import WindowSettings
-from daq_app.monitor.widgets.theme import THEMES, apply_theme
 from daq_app.monitor.window.main_window import MainWindow
 
 

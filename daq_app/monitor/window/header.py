@@ -6,10 +6,10 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLay
 
 from daq_app.monitor.course.recording_light import recording_light
 from daq_app.monitor.data.session import Session
-from daq_app.monitor.widgets.labels import PlainLabel, role_label, set_role, tip_text
-from daq_app.monitor.widgets.shapes import Sign
-from daq_app.monitor.widgets.state_look import look_of, name_of_test
-from daq_app.monitor.widgets.theme import Colours
+from daq_app.monitor.look.labels import PlainLabel, role_label, set_role, tip_text
+from daq_app.monitor.look.shapes import Sign
+from daq_app.monitor.look.state_look import look_of, name_of_test
+from daq_app.monitor.look.theme import Colours
 
 
 class Header(QFrame):

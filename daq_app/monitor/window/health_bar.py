@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from daq_app.acquisition.messages.published import HealthMessage
 from daq_app.monitor.data.session import Session
-from daq_app.monitor.widgets.labels import DASH, PlainLabel, role_label, set_role, size_text
+from daq_app.monitor.look.labels import DASH, PlainLabel, role_label, set_role, size_text
 
 BUFFER_WARNING = 0.25
 BUFFER_BAD = 0.7

@@ -32,6 +32,8 @@ from daq_app.campaign.plan import Campaign
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.link import Link
 from daq_app.monitor.data.session import Session
+from daq_app.monitor.data.settings import TYPE_SIZES, WindowSettings
+from daq_app.monitor.look.theme import THEMES, Colours, apply_theme
 from daq_app.monitor.pages.campaign_page import CampaignPage
 from daq_app.monitor.pages.channel_window import ChannelWindow
 from daq_app.monitor.pages.gap_page import GapPage
@@ -42,8 +44,6 @@ from daq_app.monitor.pages.replay_page import ReplayPage
 from daq_app.monitor.pages.result_page import ResultPage
 from daq_app.monitor.pages.test_page import TestPage
 from daq_app.monitor.widgets.notices import NoticeLine
-from daq_app.monitor.widgets.settings import TYPE_SIZES, WindowSettings
-from daq_app.monitor.widgets.theme import THEMES, Colours, apply_theme
 from daq_app.monitor.window.adoption import Adoption
 from daq_app.monitor.window.orders import Orders
 from daq_app.monitor.window.placement import keep_on_screen

@@ -13,10 +13,10 @@ from daq_app.monitor.course.cues import CueWatch
 from daq_app.monitor.course.full_screen import FullScreen, display_beside
 from daq_app.monitor.course.sounds import Sounds
 from daq_app.monitor.data.session import Session
+from daq_app.monitor.data.settings import WindowSettings
+from daq_app.monitor.look.theme import Colours
 from daq_app.monitor.pages.test_page import TestPage
 from daq_app.monitor.widgets.actions import ACTIONS
-from daq_app.monitor.widgets.settings import WindowSettings
-from daq_app.monitor.widgets.theme import Colours
 from daq_app.monitor.window.window_frame import WindowFrame
 
 _EVERY: Final = 3

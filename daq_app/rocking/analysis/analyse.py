@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from daq_app.rocking.analysis.bias import BiasSettings, method_bias
 from daq_app.rocking.analysis.families_table import families_of, verdict_of
-from daq_app.rocking.analysis.fusion import Fused
 from daq_app.rocking.analysis.half_cycles import half_cycles_of
-from daq_app.rocking.analysis.instruments import Instruments, prepare
 from daq_app.rocking.analysis.joint_summary import summarise_joint
+from daq_app.rocking.analysis.preparation.fusion import Fused
+from daq_app.rocking.analysis.preparation.instruments import Instruments, prepare
+from daq_app.rocking.analysis.preparation.signals import Signals
 from daq_app.rocking.analysis.quality import quality_notes
 from daq_app.rocking.analysis.release_rotation import levels_apart, theta0_by_family
 from daq_app.rocking.analysis.residuals import residuals_after
 from daq_app.rocking.analysis.results import Bias, Series, TestAnalysis, Theory
-from daq_app.rocking.analysis.signals import Signals
 from daq_app.rocking.analysis.tracks import decay_series, estimates_of, follow_families
 from daq_app.rocking.analysis.wall_checks import wall_findings
 from daq_app.rocking.estimators import RestitutionEstimate

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from daq_app.rocking.analysis.instruments import Instruments
+from daq_app.rocking.analysis.preparation.instruments import Instruments
 from daq_app.rocking.analysis.results import ValueWithSigma
 from daq_app.rocking.analysis.tracks import FamilyTracks
 from daq_app.rocking.estimators import DecaySeries, RestitutionEstimate

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.rocking.analysis.preparation.signals import Signals
 from daq_app.rocking.analysis.results import JointSummary, ValueWithSigma
-from daq_app.rocking.analysis.signals import Signals
 from daq_app.rocking.geometry.joint import JointMotion
 from daq_app.rocking.motion.swings import MotionTrack
 from daq_app.rocking.record import TestRecord

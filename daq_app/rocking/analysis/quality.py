@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from daq_app.config.rig import Family
+from daq_app.rocking.analysis.preparation.signals import Signals, TestTimes
 from daq_app.rocking.analysis.results import QualityNote, TestAnalysis
-from daq_app.rocking.analysis.signals import Signals, TestTimes
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.motion.swings import MotionTrack
 from daq_app.rocking.motion.transients import Onset

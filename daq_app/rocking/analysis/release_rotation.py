@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from daq_app.rocking.analysis.fusion import best_value
-from daq_app.rocking.analysis.gains import FamilyGains, hold_samples
+from daq_app.rocking.analysis.preparation.fusion import best_value
+from daq_app.rocking.analysis.preparation.gains import FamilyGains, hold_samples
+from daq_app.rocking.analysis.preparation.signals import Signals
 from daq_app.rocking.analysis.results import ValueWithSigma
-from daq_app.rocking.analysis.signals import Signals
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.levels import level_outlier
 from daq_app.rocking.motion.swings import MotionTrack, steady_level

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.rocking.analysis.preparation.signals import TILT_SETTLING_S, Signals
 from daq_app.rocking.analysis.results import Residuals, ValueWithSigma
-from daq_app.rocking.analysis.signals import TILT_SETTLING_S, Signals
 
 Floats = NDArray[np.float64]
 

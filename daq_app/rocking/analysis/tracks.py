@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.analysis.signals import Signals, TestTimes
+from daq_app.rocking.analysis.preparation.signals import Signals, TestTimes
 from daq_app.rocking.estimators import DecaySeries, RestitutionEstimate, eav_series, estimate_all
 from daq_app.rocking.motion.filtered_peaks import corrected_peaks
 from daq_app.rocking.motion.swings import MotionSettings, MotionTrack

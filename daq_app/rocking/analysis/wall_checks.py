@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from daq_app.rocking.analysis.families_table import LEADS, body_of, other_is_blamed
-from daq_app.rocking.analysis.instruments import Instruments
+from daq_app.rocking.analysis.preparation.instruments import Instruments
 from daq_app.rocking.analysis.results import JointSummary
 from daq_app.rocking.analysis.tracks import FamilyTracks
 from daq_app.rocking.families.block_checks import duration_findings, pattern_findings, pivot_findings

@@ -9,8 +9,8 @@ from PySide6.QtGui import QDesktopServices
 from daq_app.campaign.result.family_rows import family_rows
 from daq_app.campaign.result.figures import result_figure
 from daq_app.monitor.data.background import Background
+from daq_app.monitor.look.theme import LIGHT
 from daq_app.monitor.pages.result_page import ResultPage
-from daq_app.monitor.widgets.theme import LIGHT
 
 
 @pytest.fixture

@@ -27,7 +27,7 @@ import json, sys, threading
 from pathlib import Path
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QPushButton
-from daq_app.monitor.widgets.settings import WindowSettings
+from daq_app.monitor.data.settings import WindowSettings
 from daq_app.monitor.window.app import application, campaign_beside, open_window, reach
 from tests.support.window.clipped_text import clipped_texts
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.table import Table
 
-from benchmarks.figure import Figure
+from benchmarks.support.figure import Figure
 
 _COLUMNS = ("figure", "value", "aim", "met", "runs", "note")
 _RIGHT = ("value", "aim", "runs")

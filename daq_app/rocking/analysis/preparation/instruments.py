@@ -13,8 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.analysis.gains import FamilyGains, gains_of
-from daq_app.rocking.analysis.signals import Lead, Signals, TestTimes, find_phases, quiet_end, read_signals
+from daq_app.rocking.analysis.preparation.gains import FamilyGains, gains_of
+from daq_app.rocking.analysis.preparation.signals import (
+    Lead,
+    Signals,
+    TestTimes,
+    find_phases,
+    quiet_end,
+    read_signals,
+)
 from daq_app.rocking.families import words
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.hum import find_hum

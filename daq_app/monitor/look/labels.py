@@ -10,7 +10,7 @@ from PySide6.QtGui import QFontMetricsF, QResizeEvent
 from PySide6.QtWidgets import QApplication, QFrame, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from daq_app.config.shown_text import visible
-from daq_app.monitor.widgets.theme import font
+from daq_app.monitor.look.theme import font
 
 DASH = "–"
 """Stands where no true value is known."""

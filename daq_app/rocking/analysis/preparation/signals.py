@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.analysis.fusion import Fused, fuse
+from daq_app.rocking.analysis.preparation.fusion import Fused, fuse
 from daq_app.rocking.analysis.results import Zero
 from daq_app.rocking.geometry.joint import BaseJoint, JointMotion
 from daq_app.rocking.geometry.kinematics import RotationGeometry

@@ -1,0 +1,1 @@
+"""What benchmarks share: a figure with its aim, tables of figures, byte code for programs that are timed."""

@@ -1,0 +1,1 @@
+"""How the window looks: colours and type, drawn signs, text and numbers as a person reads them."""
