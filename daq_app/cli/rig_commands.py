@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from daq_app.cli.devices import devices_at, reserve_at
+from daq_app.cli.devices import devices_at, devices_of, reserve_at
 from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, reported
 from daq_app.cli.help_page import command_group
 from daq_app.cli.terminal import echo
-from daq_app.config.authoring import Block, read_sensor_table, spread_sensors, write_rig_text
-from daq_app.config.authoring.hardware_text import hardware_text
+from daq_app.config import ConfigError, Problem, parse_rig
+from daq_app.config.authoring import Block, read_sensor_table, spread_sensors, wiring_lines, write_rig_text
+from daq_app.config.authoring.hardware_text import PXI_UNNAMED, chassis_tables, hardware_text
 from daq_app.config.authoring.sensor_table import COLUMNS
 from daq_app.config.authoring.terminals import CHASSIS
+from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.max_file import listed_in_export
 
 _Sensors = Annotated[
     Path | None,
     typer.Option(
         "--sensors",
-        metavar="FILE.csv",
-        help=f"List of sensors, saved by a spreadsheet as CSV. Columns: {', '.join(COLUMNS)}.",
+        metavar="FILE",
+        help=f"List of sensors from a spreadsheet, .xlsx or CSV. Columns: {', '.join(COLUMNS)}.",
         show_default="as many of each as asked, spread over the wall",
     ),
 ]
@@ -77,11 +79,20 @@ def new(
             show_default="as many NI 9205 as needed",
         ),
     ] = None,
+    hardware: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SOURCE",
+            help="Instead of --module: the chassis and modules of an export of NI MAX (.ini), or of a "
+            "connection (local, grpc://HOST:PORT).",
+            show_default=False,
+        ),
+    ] = None,
     rate: Annotated[float, typer.Option(min=1.0, help="Sample rate, Hz.")] = 4000.0,
 ) -> None:
     """Write a commented rig file for a wall of one's own, that `config check` calls good.
 
-    Asks for what is not given. Overwrites nothing.
+    Asks for what is not given. Each sensor gets a module that can read it. Overwrites nothing.
     """
     block = Block(name or file.stem, height, thickness, length, weight)
     with reported():
@@ -90,14 +101,43 @@ def new(
             raise typer.Exit(EXIT_BAD_INPUT)
         counts = {"lvdt": lvdts, "wire": wires, "accelerometer": accelerometers, "tiltmeter": tiltmeters}
         listed = read_sensor_table(sensors) if sensors is not None else spread_sensors(block, counts)
+        tables = _chassis_of(hardware, chassis, module) if hardware else []
         text = write_rig_text(
-            block, listed, chassis=chassis, modules=module or (), rate_hz=rate, file=str(file)
+            block,
+            listed,
+            chassis=chassis,
+            modules=module or (),
+            hardware=tables,
+            rate_hz=rate,
+            file=str(file),
         )
         with file.open("x", encoding="utf-8") as out:
             out.write(text)
     typer.echo(f"{file}: good, {len(listed)} sensors. Replace what it calls `assumed`.")
+    for line in wiring_lines(parse_rig(text, str(file))):
+        typer.echo(line)
     typer.echo(f"See it: daq-app config show {file}")
     typer.echo(f"Try it on a simulated wall: daq-app run {file} --test {block.name}-L3-1 --headless")
+
+
+def _chassis_of(source: str, chassis: str, modules: list[str] | None) -> list[dict[str, Any]]:
+    """The chassis tables of a `source` of hardware. Raises `ConfigError` or `DriverError`."""
+    if modules:
+        wrong, right = "names modules, and so does --module", "Give one of the two"
+        raise ConfigError([Problem("--hardware", source, wrong, right)])
+    tables, remarks = chassis_tables(devices_of(source), source)
+    for table in tables:
+        if table["product"] == PXI_UNNAMED:
+            if catalogue.chassis(chassis).bus != "pxie":
+                right = "Name it with --chassis, for instance --chassis PXIe-1082"
+                raise ConfigError(
+                    [Problem(source, table["name"], "the product of the chassis is unknown", right)]
+                )
+            table["product"] = chassis
+    for remark in remarks:
+        if not remark.startswith(tuple(f"{table['name']}:" for table in tables)):
+            print_paragraph("Left out", remark, style="bold yellow")
+    return tables
 
 
 def from_max(

@@ -11,7 +11,8 @@ from daq_app.config.errors import ConfigError, Problem
 from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.max_file import ListedDevice
 
-_PXI: Final = "the product of the PXI chassis"
+PXI_UNNAMED: Final = "the product of the PXI chassis"
+"""Stands for what no list of devices tells."""
 _HEAD: Final = "# The hardware of {source}: put it in the place of [hardware] in a rig file.\n"
 
 
@@ -20,6 +21,16 @@ def hardware_text(devices: Sequence[ListedDevice], source: str, connection: str 
 
     Modules that the catalogue lacks stand as comments, and so does what no list of devices tells: the product
     of a PXI chassis. Raises `ConfigError` where there is no module in a chassis.
+    """
+    tables, remarks = chassis_tables(devices, source)
+    text = tomli_w.dumps({"hardware": {"connection": connection, "chassis": tables}})
+    return _HEAD.format(source=source) + "".join(f"# {remark}.\n" for remark in remarks) + text
+
+
+def chassis_tables(devices: Sequence[ListedDevice], source: str) -> tuple[list[dict[str, Any]], list[str]]:
+    """(every chassis with its modules as a rig file has them, what no list tells or the catalogue lacks).
+
+    Raises `ConfigError` where there is no module in a chassis.
     """
     modules = [device for device in devices if device.chassis and device.slot]
     owners = list(dict.fromkeys(device.chassis for device in modules))
@@ -31,15 +42,14 @@ def hardware_text(devices: Sequence[ListedDevice], source: str, connection: str 
     tables: list[dict[str, Any]] = []
     for owner in owners:
         mine = sorted((d for d in modules if d.chassis == owner), key=lambda device: device.slot)
-        tables.append(_chassis(owner, products.get(owner, _PXI), mine, remarks))
+        tables.append(_chassis(owner, products.get(owner, PXI_UNNAMED), mine, remarks))
         if owner not in products:
             remarks.append(f"{owner}: NI-DAQmx does not name the product of a PXI chassis; write it")
-    text = tomli_w.dumps({"hardware": {"connection": connection, "chassis": tables}})
-    return _HEAD.format(source=source) + "".join(f"# {remark}.\n" for remark in remarks) + text
+    return tables, remarks
 
 
 def _chassis(name: str, product: str, modules: Sequence[ListedDevice], remarks: list[str]) -> dict[str, Any]:
-    bus = "pxie" if product == _PXI else "cdaq"
+    bus = "pxie" if product == PXI_UNNAMED else "cdaq"
     entries: list[dict[str, Any]] = []
     for device in modules:
         known = catalogue.find(device.product, catalogue.MODULES, catalogue.BUILT_IN.products)

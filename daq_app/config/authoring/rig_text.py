@@ -9,19 +9,17 @@ from typing import Any, Final, get_args
 import tomli_w
 
 from daq_app.config.authoring.block import Block
+from daq_app.config.authoring.channel_keys import certificate_of
+from daq_app.config.authoring.placement import Placed, modules_for, place
 from daq_app.config.authoring.sensor import Sensor
-from daq_app.config.authoring.terminals import CHASSIS, chassis_name, modules_for, terminal_config, wire_up
+from daq_app.config.authoring.terminals import CHASSIS, chassis_table, devices_in
 from daq_app.config.families import Family, is_auxiliary
-from daq_app.config.hardware import catalogue
+from daq_app.config.hardware.inventory import devices_of
+from daq_app.config.hardware.wiring import terminal_of
 from daq_app.config.loader import parse_rig
 from daq_app.config.planning.planner import plan_tasks
-from daq_app.config.shipped import shipped_configs
-from daq_app.config.toml_file import parse_toml, read_text
-from daq_app.config.units import FAMILY_SI_UNIT, sensitivity_units
+from daq_app.config.rig import Rig, names
 
-_REACH_V: Final = 10.0
-_NOISE_SHARE: Final = 1e-4
-"""Expected noise of an auxiliary sensor as a share of its range, where the list gives none. Assumed."""
 _WIRE_M: Final = 3.0
 """Distance of a wire's fixed end from the wall where the list gives none. Assumed."""
 _HEAD: Final = """# {name}: written by `daq-app rig new`; edit it, then check it:  daq-app config check FILE
@@ -46,17 +44,21 @@ def write_rig_text(
     *,
     chassis: str = CHASSIS,
     modules: Sequence[str] = (),
+    hardware: Sequence[Mapping[str, Any]] = (),
     rate_hz: float = 4000.0,
     file: str = "rig",
 ) -> str:
-    """A whole rig file that can be loaded and planned.
+    """A whole rig file that can be loaded and planned, each sensor on a module that can read it.
 
-    Without `modules` there are as many NI 9205 as the sensors need. Raises `ConfigError` with every
-    problem: a product that is not known, too few inputs, what a sensor says that cannot be.
+    The modules are those of `hardware` (tables of chassis, as a rig file has them), else `modules` slot by
+    slot in a `chassis`, else as many usual ones as the sensors need. Raises `ConfigError` with every
+    problem: a product that is not known, a sensor that no module reads, what a sensor says that cannot be.
     """
-    modules = list(modules) or modules_for(sensors)
-    wired = wire_up(sensors, chassis, modules, file)
-    counts = Counter(sensor.family for sensor in wired)
+    if not hardware:
+        modules = list(modules) or modules_for(sensors, chassis, rate_hz, file)
+        hardware = [chassis_table(chassis, modules, file)]
+    wired = place(sensors, devices_in(hardware, file), rate_hz, file)
+    counts = Counter(_family(placed) for placed in wired)
     simulation = {"restitution": 0.9, "seed": 1, "assumed": ["restitution", "seed"]}
     parts = [
         _HEAD.format(name=block.name),
@@ -65,18 +67,37 @@ def write_rig_text(
         ),
         _table("specimen", block.table()),
         _table("hardware", {"connection": "simulated"}),
-        _chassis(chassis, modules),
+        *(_chassis(table) for table in hardware),
         _table("acquisition", {"rate_hz": rate_hz}),
         _table("expected_channels", _expected(counts)),
         '# The wall behind connection = "simulated"; a real test does not read it.\n'
         + _table("simulation", simulation),
     ]
-    defaults = _family_defaults()
-    config = terminal_config(modules[0])
-    parts += [_channel(sensor, defaults, config) for sensor in wired]
+    parts += [_channel(placed) for placed in wired]
     text = "\n".join(parts)
     plan_tasks(parse_rig(text, file), file)
     return text
+
+
+def wiring_lines(rig: Rig) -> Iterator[str]:
+    """A line for each module that sensors are on: which, and how they are read."""
+    devices, _ = devices_of(rig.hardware)
+    for name, device in devices.items():
+        mine = [channel for channel in rig.channels if terminal_of(channel)[0] == name]
+        ways = {
+            way: [c for c in mine if c.measurement == way]
+            for way in dict.fromkeys(c.measurement for c in mine)
+        }
+        for way, channels in ways.items():
+            guessed = ", assumed" if any("measurement" in channel.assumed for channel in channels) else ""
+            product = device.product.name if device else "?"
+            yield f"  {name} ({product}): {names(channels)} as {way}{guessed}"
+
+
+def _family(placed: Placed) -> str:
+    """The family that the rig file counts a sensor under: an LVDT along x or y is a displacement."""
+    sideways = placed.sensor.family == "lvdt" and placed.sensor.keys.get("axis") in ("x", "y")
+    return "displacement" if sideways else placed.sensor.family
 
 
 def _expected(counts: Mapping[str, int]) -> dict[str, int]:
@@ -85,26 +106,17 @@ def _expected(counts: Mapping[str, int]) -> dict[str, int]:
     return {name: counts.get(name, 0) for name in families if name in counts or not is_auxiliary(name)}
 
 
-def _family_defaults() -> Mapping[str, Mapping[str, Any]]:
-    """What the rig files that come with the program say of each family of sensors."""
-    path = shipped_configs() / "fr2.toml"
-    defaults = parse_toml(read_text(path), str(path))["channel_defaults"]
-    return {family: dict(table) for family, table in defaults.items()}
-
-
-def _channel(sensor: Sensor, defaults: Mapping[str, Mapping[str, Any]], config: str) -> str:
-    # A family that does not exist is told by the check of the whole text.
-    base = dict(defaults.get(sensor.family, _auxiliary_base(sensor, defaults)))
-    certificate = {"number": "unknown", **base.pop("certificate", {}), **sensor.keys.get("certificate", {})}
-    base = {key: value for key, value in base.items() if key not in ("assumed", "terminal_config")}
-    keys = dict(_reach(sensor, base))
+def _channel(placed: Placed) -> str:
+    sensor = placed.sensor
+    given = dict(sensor.keys.get("certificate", {}))
+    certificate = {"number": "unknown", **certificate_of(sensor.family), **given}
     anchor = sensor.anchor_m
-    assumed = [key for key in base if key not in sensor.keys and key != "axis"]
+    assumed = list(placed.assumed)
     if sensor.family == "wire" and anchor is None:
         x, y, z = sensor.position_m
         anchor = (x - _WIRE_M if x <= 0 else x + _WIRE_M, y, z)
         assumed.append("anchor_m")
-    if set(sensor.keys.get("certificate", {})) != {"number", "calibrated", "due"}:
+    if set(given) != {"number", "calibrated", "due"}:
         assumed.append("certificate")
     table = {
         "id": sensor.id,
@@ -112,45 +124,17 @@ def _channel(sensor: Sensor, defaults: Mapping[str, Mapping[str, Any]], config: 
         "physical_channel": sensor.physical_channel,
         "position_m": list(sensor.position_m),
         **({"anchor_m": list(anchor)} if anchor else {}),
-        **keys,
-        "terminal_config": config,
+        **placed.keys,
         "certificate": certificate,
         "assumed": assumed,
     }
     return "[[channels]]\n" + _lines(table)
 
 
-def _auxiliary_base(sensor: Sensor, defaults: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Keys that an auxiliary channel has where the list gives none; empty for a family that there is not."""
-    if not is_auxiliary(sensor.family):
-        return {}
-    noise = _NOISE_SHARE * max(map(abs, dict(_reach(sensor, {})).get("range_si", [1.0])))
-    return {"noise_si": noise, "certificate": defaults["lvdt"]["certificate"]}
-
-
-def _reach(sensor: Sensor, base: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Keys of the channel: the list's over the family's; the sensitivity tells a missing range."""
-    given = {key: value for key, value in sensor.keys.items() if key != "certificate"}
-    if "sensitivity" in given and "range_si" not in given:
-        unit = str(given.get("sensitivity_unit", base.get("sensitivity_unit", "")))
-        si_unit = FAMILY_SI_UNIT.get(sensor.family) or str(given.get("unit", ""))
-        per_si = float(given["sensitivity"]) * sensitivity_units("voltage", si_unit).get(unit, 1.0)
-        reach = (_REACH_V - abs(float(given.setdefault("offset", 0.0)))) / per_si if per_si else 0.0
-        given["range_si"] = [round(-0.999 * reach, 6), round(0.999 * reach, 6)]
-    yield from {
-        **{k: v for k, v in base.items() if k not in ("certificate", "terminal_config")},
-        **given,
-    }.items()
-
-
-def _chassis(product: str, modules: Sequence[str]) -> str:
-    first = 2 if catalogue.chassis(product).bus == "pxie" else 1
-    rows = "".join(
-        f"  {{ slot = {slot}, product = {_value(name)} }},\n"
-        for slot, name in enumerate(modules, start=first)
-    )
+def _chassis(table: Mapping[str, Any]) -> str:
+    rows = "".join(f"  {_value(module)},\n" for module in table["modules"])
     return (
-        f"[[hardware.chassis]]\nname = {_value(chassis_name(product))}\nproduct = {_value(product)}\n"
+        f"[[hardware.chassis]]\nname = {_value(table['name'])}\nproduct = {_value(table['product'])}\n"
         f"modules = [\n{rows}]\n"
     )
 

@@ -19,4 +19,5 @@ class Sensor:
     """Empty: the next free terminal."""
     anchor_m: Position | None = None
     keys: dict[str, Any] = field(default_factory=dict)
-    """Further keys of the channel that the list gives: axis, sensitivity, certificate and so on."""
+    """Further keys of the channel that the list gives: axis, sensitivity, certificate and so on;
+    `excitation_value`, volts, becomes the channel's excitation on its module."""

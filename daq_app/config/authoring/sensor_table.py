@@ -1,4 +1,4 @@
-"""A list of sensors from a spreadsheet, saved as CSV: any separator, decimal point or comma, mm or m."""
+"""A list of sensors from a spreadsheet: a workbook, or CSV of any separator; decimal point or comma."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from daq_app.config.authoring.sensor import Position, Sensor
+from daq_app.config.authoring.workbook import first_sheet
 from daq_app.config.errors import ConfigError, Problem
 
 _TO_M: Final = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
@@ -19,11 +20,31 @@ _NEEDED: Final = ("id", "family", "x", "y", "z")
 _DAYS: Final = ("%Y-%m-%d", "%d.%m.%Y", "%d/%m/%Y")
 
 
+_WORKBOOK_ZERO: Final = dt.date(1899, 12, 30)
+"""Day 0 of a workbook's dates (after February 1900, which it takes for a leap year)."""
+_MEASUREMENTS: Final = ("voltage", "iepe", "lvdt_native", "current", "bridge", "thermocouple")
+
+
+def _one_of(*allowed: str) -> tuple[Callable[[str], str], str]:
+    """Reader of a word, and what it should be."""
+
+    def read(text: str) -> str:
+        word = text.strip().casefold().replace(" ", "_")
+        for name in allowed:
+            if word == name.casefold():
+                return name
+        raise ValueError(text)
+
+    return read, f"one of {', '.join(allowed)}"
+
+
 def _number(text: str) -> float:
     return float(text.replace(",", "."))
 
 
 def _day(text: str) -> dt.date:
+    if re.fullmatch(r"\d{5}(\.\d+)?", text):  # as a workbook keeps a day
+        return _WORKBOOK_ZERO + dt.timedelta(days=int(float(text)))
     for form in _DAYS:
         try:
             return dt.datetime.strptime(text, form).date()
@@ -38,6 +59,11 @@ _READ: Final[Mapping[str, tuple[Callable[[str], Any], str]]] = {
     "sensitivity unit": (str, "text"),
     "unit": (str, "text"),
     "offset": (_number, "a number, in volts"),
+    "measurement": _one_of(*_MEASUREMENTS),
+    "thermocouple": _one_of(*"BEJKNRST"),
+    "bridge": _one_of("full", "half", "quarter"),
+    "bridge ohm": (_number, "a number, Ω"),
+    "excitation": (_number, "a number, in volts"),
     "polarity": (int, "1 or -1"),
     "noise": (_number, "a number, SI"),
     "range from": (_number, "a number, SI"),
@@ -47,17 +73,23 @@ _READ: Final[Mapping[str, tuple[Callable[[str], Any], str]]] = {
     "due": (_day, "a day such as 2026-02-16"),
 }
 """Column → how it is read and what it should be."""
+_KEY_OF: Final[Mapping[str, str]] = {
+    **{name: name for name in ("axis", "sensitivity", "offset", "polarity", "unit")},
+    **{name: name for name in ("measurement", "thermocouple", "bridge")},
+    "sensitivity unit": "sensitivity_unit",
+    "noise": "noise_si",
+    "bridge ohm": "bridge_ohm",
+    "excitation": "excitation_value",
+}
+"""Column → key of a sensor."""
 _CHANNEL: Final = "channel"
 COLUMNS: Final = (*_NEEDED, _CHANNEL, "anchor x", "anchor y", "anchor z", *_READ)
 """All columns. ``id, family, x, y, z`` must be there; lengths may carry their unit: ``x [mm]``."""
 
 
 def read_sensor_table(path: Path) -> list[Sensor]:
-    """Sensors of a CSV file, in its order. Raises `ConfigError` with every cell that cannot be read."""
-    text = _text(path)
-    head = text.partition("\n")[0]
-    separator = max(";\t,", key=head.count)
-    rows = list(csv.reader(text.splitlines(), delimiter=separator))
+    """Sensors of a list, in its order. Raises `ConfigError` with every cell that cannot be read."""
+    rows = first_sheet(path) if path.suffix.lower() == ".xlsx" else _csv_rows(path)
     columns = [_column(name) for name in rows[0]] if rows else []
     names = [name for name, _ in columns]
     problems = [
@@ -84,6 +116,13 @@ def read_sensor_table(path: Path) -> list[Sensor]:
     if problems:
         raise ConfigError(problems)
     return sensors
+
+
+def _csv_rows(path: Path) -> list[list[str]]:
+    text = _text(path)
+    head = text.partition("\n")[0]
+    separator = max(";\t,", key=head.count)
+    return list(csv.reader(text.splitlines(), delimiter=separator))
 
 
 def _text(path: Path) -> str:
@@ -151,12 +190,6 @@ def _keys(cells: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         yield "certificate", given
     if cells.get("range from") is not None and cells.get("range to") is not None:
         yield "range_si", [cells["range from"], cells["range to"]]
-    for name in ("axis", "sensitivity", "offset", "polarity"):
+    for name, key in _KEY_OF.items():
         if cells.get(name) is not None:
-            yield name, cells[name]
-    if "unit" in cells:
-        yield "unit", cells["unit"]
-    if "sensitivity unit" in cells:
-        yield "sensitivity_unit", cells["sensitivity unit"]
-    if cells.get("noise") is not None:
-        yield "noise_si", cells["noise"]
+            yield key, cells[name]
