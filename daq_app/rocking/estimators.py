@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its `special` is loaded with the first use: the window starts without it
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from daq_app.rocking.theory import classic as theory
 from daq_app.rocking.theory.housner import exact_energy
@@ -68,7 +68,7 @@ class RestitutionEstimate:
         """95 % interval: Student's, or normal where the error holds what is not known of the scatter."""
         if self.r is None or self.standard_error is None or self.degrees_of_freedom < 1:
             return None
-        reach = float(stdtrit(self.degrees_of_freedom, 0.975)) * self.standard_error
+        reach = float(scipy.special.stdtrit(self.degrees_of_freedom, 0.975)) * self.standard_error
         return self.r - reach, self.r + reach
 
 

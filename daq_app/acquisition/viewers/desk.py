@@ -22,7 +22,8 @@ from pydantic import ValidationError
 from daq_app.acquisition.messages.items import RequestRefused
 from daq_app.acquisition.messages.published import Command, Reply
 from daq_app.acquisition.messages.publisher import INBOX, SEND_QUEUE, Publisher
-from daq_app.acquisition.viewers.curve import KeyFileError, ServerKeys, is_loopback, secure_server
+from daq_app.acquisition.viewers.admission import ServerKeys, secure_server
+from daq_app.acquisition.viewers.curve import KeyFileError, is_loopback
 
 _MAX_REQUEST_BYTES: Final = 64 * 1024
 _KEYS_EVERY_S: Final = 0.5

@@ -16,7 +16,7 @@ from daq_app.acquisition.messages.published import RECORDING, EstimateMessage, M
 from daq_app.monitor.data.session import Session
 from daq_app.monitor.look.theme import Colours
 from daq_app.monitor.plots.live_plot import LivePlot
-from daq_app.monitor.plots.plot_base import Array, Axis, line_pen
+from daq_app.monitor.plots.plot_base import Array, line_pen
 from daq_app.monitor.plots.theory_overlay import current_restitution, housner_motion
 
 WINDOW_S = 12.0
@@ -33,9 +33,6 @@ class MotionPlots(QWidget):
         self.rotation = LivePlot("Rotation θ", "θ  (mrad)", "")
         self.velocity = LivePlot("Angular velocity dθ/dt", "dθ/dt  (rad/s)", "time  (s)")
         self.velocity.setXLink(self.rotation)
-        right = Axis("right")
-        right.enableAutoSIPrefix(False)
-        self.rotation.plot_item.setAxisItems({"right": right})
         self.rotation.plot_item.showAxis("right")
         self.rotation.plot_item.setLabel("right", "θ/α")
         for plot in (self.rotation, self.velocity):

@@ -43,6 +43,8 @@ class Axis(pg.AxisItem):  # type: ignore[misc]
 
     def __init__(self, orientation: str) -> None:
         super().__init__(orientation)
+        # Only here, while no label shows: later, pyqtgraph computes a prefix in this very call.
+        self.enableAutoSIPrefix(False)
         self.text_px = 0.0
         """Height of the figures; 0 until they have a font."""
 
@@ -63,26 +65,22 @@ class Axis(pg.AxisItem):  # type: ignore[misc]
 
 
 def axes() -> dict[str, Axis]:
-    """New axes for a plot: left and below."""
-    return {side: Axis(side) for side in ("left", "bottom")}
+    """New axes for a plot: left, below and right, which shows where it is asked for."""
+    return {side: Axis(side) for side in ("left", "bottom", "right")}
 
 
 class Plot(pg.PlotWidget):  # type: ignore[misc]
     """A plot in the window's colours, without pyqtgraph's menus; call `restyle` on a new theme."""
 
     def __init__(self, title: str, left: str, bottom: str, *, mouse: bool = False) -> None:
-        super().__init__(axisItems=axes())
+        super().__init__(axisItems=axes(), enableMenu=False)
         self._title = title
         self._axis_px: dict[str, int] = {}
         self._labels = {"left": left, "bottom": bottom}
         self.plot_item = self.getPlotItem()
-        self.plot_item.setMenuEnabled(False)
         self.plot_item.hideButtons()
         self.setMouseEnabled(mouse, mouse)
         self.setFrameShape(self.Shape.NoFrame)
-        for name in ("left", "bottom", "right"):
-            # Only now, while no label shows: later, pyqtgraph computes a prefix in this very call.
-            self.plot_item.getAxis(name).enableAutoSIPrefix(False)
         self.setAntialiasing(False)
         self.plot_item.showGrid(x=True, y=True, alpha=0.18)
         self.plot_item.layout.setContentsMargins(2, 2, 10, 2)
@@ -114,8 +112,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]
             axis.setPen(pg.mkPen(colours.line))
             axis.setTextPen(pg.mkPen(colours.muted))
             axis.setTickFont(small)
-            if isinstance(axis, Axis):
-                axis.text_px = QFontMetricsF(small).height()
+            axis.text_px = QFontMetricsF(small).height()
             axis.setStyle(tickLength=-4, hideOverlappingLabels=True)
             # Axes and grid change rarely and cost most of a frame: keep them as a picture.
             axis.setCacheMode(pg.QtWidgets.QGraphicsItem.CacheMode.DeviceCoordinateCache)

@@ -132,7 +132,7 @@ class ReplayPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         groups = self._groups()
         start, stop = run.span_s
         for row, (key, names) in enumerate(groups.items()):
-            plot = self.addPlot(row=row, col=0, axisItems=axes())
+            plot = self.addPlot(row=row, col=0, axisItems=axes(), enableMenu=False)
             self._style(plot, TITLES[key], last=row == len(groups) - 1)
             plot.setLimits(xMin=start - 0.02 * (stop - start), xMax=stop + 0.02 * (stop - start))
             plot.setMouseEnabled(x=True, y=False)
@@ -163,7 +163,6 @@ class ReplayPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
 
     def _style(self, plot: pg.PlotItem, title: str, *, last: bool) -> None:
         colours = self._colours
-        plot.setMenuEnabled(False)
         plot.hideButtons()
         plot.showGrid(x=True, y=True, alpha=0.18)
         for name in ("left", "bottom"):
@@ -172,7 +171,6 @@ class ReplayPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             axis.setTextPen(pg.mkPen(colours.muted))
             axis.setTickFont(colours.font(8.5))
             axis.text_px = QFontMetricsF(colours.font(8.5)).height()
-            axis.enableAutoSIPrefix(False)
         plot.getAxis("left").setWidth(colours.px(64))
         plot.setLabel("left", title, **colours.axis_style)
         if last:

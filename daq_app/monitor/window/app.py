@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import gc
+import importlib
 import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
@@ -23,6 +24,9 @@ from daq_app.monitor.data.settings import WindowSettings
 from daq_app.monitor.look.theme import THEMES, apply_theme
 from daq_app.monitor.pages.start_page import StartWindow
 from daq_app.monitor.window.main_window import MainWindow
+
+_SETTLED_MS: Final = 2000
+"""By then a window that was opened has drawn its first pictures."""
 
 
 def application() -> QApplication:
@@ -95,16 +99,26 @@ def open_window(
         except ConfigError as error:
             window.notices.tell("warning", f"The campaign cannot be followed: {error}")
     keep_out_of_collection()
+    QTimer.singleShot(_SETTLED_MS, window, lambda: _load_what_theory_needs(window))
     return window
 
 
-def keep_out_of_collection() -> None:
-    """Take what a window is made of out of Python's cyclic collection.
+def _load_what_theory_needs(window: MainWindow) -> None:
+    """Load what draws the theory and the first result: the start does not wait for it."""
+    window.background.run(
+        lambda: importlib.import_module("scipy.special"),
+        lambda _module: keep_out_of_collection(),
+        lambda error: window.notices.tell("warning", f"The theory cannot be drawn: {error}"),
+    )
 
-    It lives as long as the process; looking through its 200,000 objects again and again stops
-    the window for 100 to 300 ms each time, more than anything else that it does.
+
+def keep_out_of_collection() -> None:
+    """Take what the process is made of out of Python's cyclic collection.
+
+    It lives as long as the process; looking through its 200,000 objects again and again stops the window
+    for 100 to 300 ms each time, more than anything else that it does. Nothing is collected first: what
+    the start leaves behind has no cycles.
     """
-    gc.collect()
     gc.freeze()
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.special import stdtrit
+import scipy  # its `special` is loaded with the first use: the window starts without it
 
 from daq_app.rocking.estimators import DecaySeries, RestitutionEstimate, estimate_all
 from daq_app.rocking.families.finding import FamilyFinding
@@ -156,7 +156,7 @@ def judge(
         error = math.hypot(error, 0.5 * float(np.ptp(values)))
     error = math.hypot(error, *(_share_of_r(finding, r) for finding in open_findings))
     freedom = min(e.degrees_of_freedom for e in known)
-    reach = float(stdtrit(freedom, 0.975)) * error
+    reach = float(scipy.special.stdtrit(freedom, 0.975)) * error
     return RVerdict(r, error, (r - reach, r + reach), trust, (lead,), left_out, reasons)
 
 

@@ -15,8 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its `special` is loaded with the first use: the window starts without it
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ellipj, ellipkinc
 
 Floats = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def exact_quarter_period(peak_rad: ArrayLike, p_rad_s: float, alpha_rad: float) 
     # sines is written as a product, so that tiny peaks lose no digits.
     difference = np.sin(alpha_rad - peak / 2.0) * np.sin(peak / 2.0)
     sn = np.sqrt(difference / m) / np.sin(alpha_rad / 2.0)
-    return np.asarray(ellipkinc(np.arcsin(np.minimum(sn, 1.0)), m) / p_rad_s)
+    return np.asarray(scipy.special.ellipkinc(np.arcsin(np.minimum(sn, 1.0)), m) / p_rad_s)
 
 
 def exact_period(peak_rad: ArrayLike, p_rad_s: float, alpha_rad: float) -> Floats:
@@ -67,7 +67,7 @@ def half_cycle_rotation(
     )
     sin_peak = np.sin((alpha_rad - peak) / 2.0)
     m = 1.0 - sin_peak**2
-    sn, _, dn, _ = ellipj(p_rad_s * time, m)
+    sn, _, dn, _ = scipy.special.ellipj(p_rad_s * time, m)
     half = np.arcsin(np.minimum(sin_peak / dn, 1.0))
     # cos(u/2) = k·cn/dn from the same identity; its derivative gives the speed without a difference.
     speed = -2.0 * p_rad_s * sin_peak * np.sqrt(m) * sn / dn
