@@ -141,6 +141,31 @@ def _first_kink(
 
 
 @part
+def _scales(q: float, v: float, c: NDArray[np.float64]) -> tuple[float, float]:
+    """(rotation, speed) that errors of a swing are measured against: what its energy at (q, v) can reach."""
+    stiff = c[terms.C_STIFF] * max(math.sin(c[terms.C_ALPHA]), 1e-3)
+    return max(q, v * v / (2.0 * stiff)), math.sqrt(v * v + 2.0 * stiff * q)
+
+
+@part
+def _cut_state(row: NDArray[np.float64], x: float, on_kink: float, stuck: bool) -> tuple[float, float]:
+    """(q, v) where a step is cut: exactly on the kink, or exactly at rest where friction holds the wall."""
+    q, v = pc.horner(row, pc.ROTATION, x), pc.horner(row, pc.VELOCITY, x)
+    if on_kink > 0.0:
+        q = on_kink
+    elif stuck:
+        v = 0.0
+    return q, v
+
+
+@part
+def _next_size(h: float, x_end: float, error: float, tolerance: float) -> float:
+    """Size of the step to try next: by the error of a whole step, or what a cut left of it."""
+    growth = 5.0 if error == 0.0 else min(5.0, 0.9 * _eighth_root(tolerance / error))
+    return h * growth if x_end == 1.0 else max(h * (1.0 - x_end), 0.1 * h) * 1.02
+
+
+@part
 def _swing(
     t: float,
     q: float,
@@ -156,9 +181,7 @@ def _swing(
     """One half-cycle; returns (how it ended, rows used). `out` = t, q, v at the end, t and q of the peak."""
     kq, kv = np.zeros(16), np.zeros(16)
     rising = v > 0.0 or (v == 0.0 and terms.acceleration(q, v, t, c) > 0.0)
-    stiff = c[terms.C_STIFF] * max(math.sin(c[terms.C_ALPHA]), 1e-3)
-    scale_q = max(q, v * v / (2.0 * stiff))
-    scale_v = math.sqrt(v * v + 2.0 * stiff * q)
+    scale_q, scale_v = _scales(q, v, c)
     out[3], out[4] = t, q
     # p h = 0.22 meets a tolerance of 1e-11; the rest of the swing adapts
     h = min(_first_guess(q, v, c), 0.22 * _eighth_root(tolerance / 1e-11) / math.sqrt(c[terms.C_STIFF]))
@@ -190,11 +213,7 @@ def _swing(
         if t + h * x_end >= t_end:
             x_end, ended, on_kink = (t_end - t) / h, _END, -1.0
         if x_end < 1.0 or ended >= 0:
-            q1, v1 = pc.horner(row, pc.ROTATION, x_end), pc.horner(row, pc.VELOCITY, x_end)
-            if on_kink > 0.0:
-                q1 = on_kink
-            elif friction and x_end == x_turn:
-                v1 = 0.0
+            q1, v1 = _cut_state(row, x_end, on_kink, friction and x_end == x_turn)
         for k in range(pc.ROTATION, pc.N_COLUMNS):
             row[k] *= side
         t += h * x_end
@@ -204,8 +223,7 @@ def _swing(
         if ended >= 0:
             out[0], out[1], out[2] = t, q, v
             return ended, n
-        growth = 5.0 if error == 0.0 else min(5.0, 0.9 * _eighth_root(tolerance / error))
-        h = h * growth if x_end == 1.0 else max(h * (1.0 - x_end), 0.1 * h) * 1.02
+        h = _next_size(h, x_end, error, tolerance)
 
 
 @part
@@ -230,6 +248,31 @@ def _note_impact(
 ) -> None:
     row[I_TIME], row[I_BEFORE], row[I_AFTER] = t, before, after
     row[I_SIDE], row[I_KIND] = side, kind
+
+
+@part
+def _bounce(
+    vector: NDArray[np.float64],
+    r: float,
+    speed: float,
+    after: float,
+    side: float,
+    t: float,
+    pieces: NDArray[np.float64],
+    n: int,
+    impacts: NDArray[np.float64],
+) -> tuple[int, float, float]:
+    """(rows used, time, q) at the second impact of a bounce, from whose flight the wall goes on with `after`.
+
+    `impacts` (2, 5): the row of the first impact, whose speed after it is set here, and of the second.
+    """
+    first = speed * r ** vector[par.BOUNCE_SHARE]
+    flight = vector[par.BOUNCE] * speed / par.BOUNCE_SPEED
+    impacts[0, I_AFTER] = side * first
+    n = _fill_flat(pieces, n, t, 0.0, first, side)
+    t += flight
+    _note_impact(impacts[1], t, side * first, side * after, side, 1.0)
+    return n, t, first * flight
 
 
 @kernel
@@ -275,8 +318,7 @@ def integrate(
         speed = max(-v, 0.0)
         deviate = deviates[n_peaks - 1] if n_peaks <= deviates.size else 0.0
         r = terms.restitution(vector, speed, side, n_peaks - 1, deviate)
-        row = impacts[n_impacts]
-        _note_impact(row, t, -side * speed, -side * r * speed, side, 0.0)
+        _note_impact(impacts[n_impacts], t, -side * speed, -side * r * speed, side, 0.0)
         n_impacts += 1
         q, v = 0.0, r * speed
         side = -side
@@ -286,11 +328,5 @@ def integrate(
             n = _fill_flat(pieces, n, t, 0.0, 0.0, side)
             t += vector[par.DWELL]
         if vector[par.BOUNCE] > 0.0 and v > 0.0:
-            first = speed * r ** vector[par.BOUNCE_SHARE]
-            flight = vector[par.BOUNCE] * speed / par.BOUNCE_SPEED
-            row[I_AFTER] = side * first
-            n = _fill_flat(pieces, n, t, 0.0, first, side)
-            t += flight
-            q = first * flight
-            _note_impact(impacts[n_impacts], t, side * first, side * v, side, 1.0)
+            n, t, q = _bounce(vector, r, speed, v, side, t, pieces, n, impacts[n_impacts - 1 : n_impacts + 1])
             n_impacts += 1

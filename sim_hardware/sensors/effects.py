@@ -297,18 +297,25 @@ def _change(
         case "hum":
             row[la.RW_HUM], row[la.RW_HUM_W] = strength, 2.0 * math.pi * values["frequency"]
             row[la.RW_HUM_PHASE] = generator(seed, name, "hum").uniform(-math.pi, math.pi)
-        case "slow_response" if strength > 0.0:
-            _respond(row, spec.name, name, la.LOW_PASS, row[la.RW_FILTER_A] + strength, 0.0)
-        case "filter_delay" if strength > 0.0:
-            zeta = math.sqrt(3.0) / 2.0  # of the second-order Bessel filter; group delay 2ζ/ω
-            _respond(row, spec.name, name, la.RESONANCE, 2.0 * zeta / strength, zeta)
-        case "wire_inertia":
-            _respond(row, spec.name, name, la.RESONANCE, 2.0 * math.pi * strength, values["zeta"])
-        case "slow_response" | "filter_delay":
-            pass  # strength 0: off
+        case "slow_response" | "filter_delay" | "wire_inertia":
+            _change_response(row, spec.name, strength, values, name)
         case _:
             for parameter in spec.parameters:
                 row[parameter.index] = values[parameter.name]
+
+
+def _change_response(
+    row: NDArray[np.float64], effect: str, strength: float, values: Mapping[str, float], name: str
+) -> None:
+    """Effects that make a sensor follow its measurand late; a time of 0 s is none."""
+    match effect:
+        case "wire_inertia":
+            _respond(row, effect, name, la.RESONANCE, 2.0 * math.pi * strength, values["zeta"])
+        case "slow_response" if strength > 0.0:
+            _respond(row, effect, name, la.LOW_PASS, row[la.RW_FILTER_A] + strength, 0.0)
+        case "filter_delay" if strength > 0.0:
+            zeta = math.sqrt(3.0) / 2.0  # of the second-order Bessel filter; group delay 2ζ/ω
+            _respond(row, effect, name, la.RESONANCE, 2.0 * zeta / strength, zeta)
 
 
 def _respond(row: NDArray[np.float64], effect: str, name: str, kind: int, a: float, b: float) -> None:

@@ -138,10 +138,7 @@ class Analyst(threading.Thread):
             case Closed():
                 self._on_closed(item.end)
             case Saved():
-                # The next test may be armed already: then its state is the one that matters.
-                if self._sequence is None:
-                    self.voice.run_path = item.path
-                    self._go(State.SAVED if item.ok else State.FAILED, item.text)
+                self._on_saved(item)
             case Noted(event=event):
                 self._clock.take(event)
 
@@ -209,6 +206,12 @@ class Analyst(threading.Thread):
         self._unclosed += 1
         self._moves_on = self._live is not None and self._live.released
         self._around.post(end)
+
+    def _on_saved(self, saved: Saved) -> None:
+        # The next test may be armed already: then its state is the one that matters.
+        if self._sequence is None:
+            self.voice.run_path = saved.path
+            self._go(State.SAVED if saved.ok else State.FAILED, saved.text)
 
     def _on_closed(self, end: End) -> None:
         """A journal is closed; one that had to wait for a disk may be older than the course of now."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from daq_app.acquisition.messages.published import EventMessage, State, StateMessage
+from daq_app.acquisition.messages.published import EventMessage, Message, State, StateMessage
 from daq_app.acquisition.viewers.client import AcquisitionClient, AcquisitionUnreachable
 from daq_app.acquisition.viewers.launcher import AcquisitionDied, AcquisitionProcess
 from daq_app.cli.errors import EXIT_FAILED, EXIT_HARDWARE, EXIT_INTERRUPTED
@@ -125,55 +125,73 @@ def _open_window(process: AcquisitionProcess) -> subprocess.Popen[bytes]:
     )
 
 
+class _TestCourse:
+    """What a test tells while it goes on: shown, answered by the hand of a simulated wall, its end kept."""
+
+    def __init__(self, client: AcquisitionClient, options: RunOptions, view: RunView) -> None:
+        self._client, self._options, self._view = client, options, view
+        self._rig = parse_rig(str(client.about["rig_text"]), str(options.rig))
+        self._armed: Mapping[str, Any] = {}
+        self._hand: SimulatedHand | None = None
+        self.outcome, self.run = "", ""
+
+    def take(self, message: Message) -> None:
+        self._view.take(message)
+        if self._view.state is State.ARMED and not self._armed:
+            self._on_armed()
+        if self._hand is not None:
+            self._hand.take(message)
+            if self._hand.trouble:
+                self._view.say(self._hand.trouble, "bold red")
+                self._hand.trouble = ""
+        match message:
+            case StateMessage(state=State.SAVED, run_path=path) if path:
+                self.run = path
+            case EventMessage(kind="saved", data=data):
+                self.outcome, self.run = str(data.get("outcome", "")), str(data.get("run", "")) or self.run
+
+    def _on_armed(self) -> None:
+        self._armed = self._client.request("hello").data
+        self._view.zeroed = bool(self._armed.get("tare"))
+        if self._client.about.get("simulated"):
+            connection = str(self._armed["connection"])
+            self._hand = SimulatedHand(connection, self._rig, self._options.theta0_over_alpha)
+
+    def close(self) -> None:
+        if self._hand is not None:
+            self._hand.close()
+
+
 def _follow(
     process: AcquisitionProcess, client: AcquisitionClient, options: RunOptions, console: Console
 ) -> RunEnd:
+    view = RunView(console, options.test, client.about)
+    course = _TestCourse(client, options, view)
     interrupts = _Interrupts(client)
     previous = signal.signal(signal.SIGINT, interrupts)
-    outcome, run, stopping = "", "", False
-    hand: SimulatedHand | None = None
-    armed: Mapping[str, Any] = {}
-    rig = parse_rig(str(client.about["rig_text"]), str(options.rig))
+    stopping = False
     try:
-        with RunView(console, options.test, client.about) as view:
+        with view:
             while process.process.poll() is None:
                 received = client.receive(_QUIET_S)
                 if interrupts.asked and not stopping:
                     stopping = True
                     view.say("Stopping; what was recorded is kept")
                     _ask_to_stop(client)
-                if received is None:
-                    continue
-                view.take(received.message)
-                if view.state is State.ARMED and not armed:
-                    armed = client.request("hello").data
-                    view.zeroed = bool(armed.get("tare"))
-                if hand is None and client.about.get("simulated") and view.state is State.ARMED:
-                    connection = str(armed["connection"])
-                    hand = SimulatedHand(connection, rig, options.theta0_over_alpha)
-                if hand is not None:
-                    hand.take(received.message)
-                    if hand.trouble:
-                        view.say(hand.trouble, "bold red")
-                        hand.trouble = ""
-                match received.message:
-                    case StateMessage(state=State.SAVED, run_path=path) if path:
-                        run = path
-                    case EventMessage(kind="saved", data=data):
-                        outcome, run = str(data.get("outcome", "")), str(data.get("run", "")) or run
+                if received is not None:
+                    course.take(received.message)
     finally:
         signal.signal(signal.SIGINT, previous)
-        if hand is not None:
-            hand.close()
+        course.close()
     code = process.wait()
     if stopping:
         code = EXIT_INTERRUPTED
-    elif code == 0 and outcome != "complete":
+    elif code == 0 and course.outcome != "complete":
         code = EXIT_FAILED
     text = process.said if code not in (0, EXIT_INTERRUPTED) else ""
     if code == EXIT_FAILED and not text:
-        text = f"The run was {outcome or 'not completed'}: {view.last_text}"
-    return RunEnd(code, text, Path(run) if run else None, outcome)
+        text = f"The run was {course.outcome or 'not completed'}: {view.last_text}"
+    return RunEnd(code, text, Path(course.run) if course.run else None, course.outcome)
 
 
 def _ask_to_stop(client: AcquisitionClient) -> None:

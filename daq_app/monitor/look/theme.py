@@ -179,6 +179,11 @@ def apply_theme(app: QApplication, window: QWidget, colours: Colours, base_point
 
 
 def _stylesheet(c: Colours, base: float) -> str:
+    return _text_rules(c, base) + _button_rules(c, base) + _entry_rules(c) + _bar_rules(c)
+
+
+def _text_rules(c: Colours, base: float) -> str:
+    """Frames, and labels by role and scale."""
     return f"""
     QToolTip {{ background: {c.raised}; color: {c.text}; border: 1px solid {c.line}; padding: 4px; }}
     QFrame#card {{ background: {c.surface}; border: 1px solid {c.line}; border-radius: 6px; }}
@@ -192,6 +197,11 @@ def _stylesheet(c: Colours, base: float) -> str:
     QLabel[role="good"] {{ color: {c.good}; font-weight: 600; }}
     QLabel[role="warning"] {{ color: {c.warning}; font-weight: 600; }}
     QLabel[role="bad"] {{ color: {c.bad}; font-weight: 600; }}
+    """
+
+
+def _button_rules(c: Colours, base: float) -> str:
+    return f"""
     QPushButton {{ background: {c.raised}; border: 1px solid {c.line}; border-radius: 5px;
         padding: 6px 12px; min-height: {max(20, round(base * 1.65))}px; }}
     QPushButton:hover {{ border-color: {c.accent}; }}
@@ -212,6 +222,12 @@ def _stylesheet(c: Colours, base: float) -> str:
         border-left: 4px solid {c.accent}; }}
     QPushButton[role="flat"] {{ background: transparent; border: 1px solid {c.line}; padding: 2px 8px; }}
     QPushButton[role="flat"]:checked {{ background: {c.raised}; color: {c.text}; border-color: {c.accent}; }}
+    """
+
+
+def _entry_rules(c: Colours) -> str:
+    """Tables, lists, trees, and fields to type in."""
+    return f"""
     QTableView {{ background: {c.surface}; border: 1px solid {c.line}; border-radius: 6px;
         gridline-color: {c.line}; selection-background-color: {c.raised}; selection-color: {c.text}; }}
     QTableView::item {{ padding: 0 6px; }}
@@ -229,6 +245,12 @@ def _stylesheet(c: Colours, base: float) -> str:
         border-radius: 3px; }}
     QListWidget::indicator:checked, QCheckBox::indicator:checked {{ background: {c.accent};
         border-color: {c.accent}; }}
+    """
+
+
+def _bar_rules(c: Colours) -> str:
+    """Progress, splitters and scroll bars."""
+    return f"""
     QProgressBar {{ background: {c.raised}; border: none; border-radius: 4px; }}
     QProgressBar::chunk {{ background: {c.accent}; border-radius: 4px; }}
     QSplitter::handle {{ background: {c.ground}; }}

@@ -159,26 +159,37 @@ class PhaseDetector:
     def _step(self) -> None:
         now = self._frames.end
         tick = now % _TICK == 0 and now >= self._window
-        if self.phase is Phase.WAITING:
-            if tick and self._steady():
-                self._enter_hold()
-            elif self.side:
-                self._check_crossing(released=False)
-        elif self.phase is Phase.HOLDING:
-            if tick:
-                self._follow_hold()
-            self._check_fall()
-            if self.phase is Phase.HOLDING:
-                self._check_crossing(released=False)
-        elif self.phase is Phase.FALLING:
-            self._check_crossing(released=True)
-            if tick and self.phase is Phase.FALLING and self._caught():
-                self.phase = Phase.WAITING
-                self._say("caught", float(self._sample(now)), "the wall was caught before it reached upright")
-        elif self.phase is Phase.ROCKING:
-            self._check_crossing(released=True)
-            if tick:
-                self._check_rest()
+        match self.phase:
+            case Phase.WAITING:
+                self._step_waiting(tick)
+            case Phase.HOLDING:
+                self._step_holding(tick)
+            case Phase.FALLING:
+                self._step_falling(tick)
+            case Phase.ROCKING:
+                self._check_crossing(released=True)
+                if tick:
+                    self._check_rest()
+
+    def _step_waiting(self, tick: bool) -> None:
+        if tick and self._steady():
+            self._enter_hold()
+        elif self.side:
+            self._check_crossing(released=False)
+
+    def _step_holding(self, tick: bool) -> None:
+        if tick:
+            self._follow_hold()
+        self._check_fall()
+        if self.phase is Phase.HOLDING:
+            self._check_crossing(released=False)
+
+    def _step_falling(self, tick: bool) -> None:
+        self._check_crossing(released=True)
+        if tick and self.phase is Phase.FALLING and self._caught():
+            self.phase = Phase.WAITING
+            sample = float(self._sample(self._frames.end))
+            self._say("caught", sample, "the wall was caught before it reached upright")
 
     def _sample(self, frame: float) -> float:
         """Absolute sample at the start of an absolute frame."""

@@ -36,43 +36,11 @@ def write(path: Path, selection: Selection) -> None:
 
 def _fill(file: Any, selection: Selection, guarded: GuardedFile) -> None:
     chunks = (min(PIECE_SAMPLES // 4, selection.n_samples),)
-    header = selection.run.header
-    if header.start_utc_ns:
-        file.attrs["Conventions"] = CONVENTIONS  # CF wants dates: without a clock it is not CF
-    file.attrs["title"] = f"Rocking test {header.test or header.run_id}"
-    file.attrs["history"] = f"exported from {selection.run.path.name}, run {header.run_id}"
-    for key, value in selection.metadata().items():
-        file.attrs[key] = json.dumps(value) if isinstance(value, list) else value
+    _put_attributes(file, selection)
     file.dimensions = {"time": selection.n_samples}
     time = file.create_variable("time", ("time",), "f8", chunks=chunks, **_COMPRESSION)
-    started_ns = selection.run.header.start_utc_ns
-    if started_ns:
-        zero_ns = started_ns - round(selection.run.first_sample / selection.run.rate_hz * 1e9)
-        zero = np.datetime_as_string(np.datetime64(zero_ns, "ns"), unit="us").replace("T", " ")
-        time.attrs.update(
-            {
-                "standard_name": "time",
-                "units": f"seconds since {zero}Z",
-                "calendar": "standard",
-                "units_metadata": "leap_seconds: utc",  # the run's own clock counts every second
-            }
-        )
-    else:
-        time.attrs["units"] = "s"  # no wall clock is known: an axis of seconds, which CF takes for no date
-    time.attrs["long_name"] = "time on the run's own axis"
-    variables = []
-    for channel_id, unit in zip(selection.ids, selection.channel_units, strict=True):
-        variable = file.create_variable(_cf_name(channel_id), ("time",), "f8", chunks=chunks, **_COMPRESSION)
-        known = selection.channel_metadata(channel_id)
-        if "axis" in known:
-            known["sensor_axis"] = known.pop("axis")  # `axis` is CF's word for coordinates
-        family = known.get("family", "channel")
-        variable.attrs.update(
-            {"long_name": f"{family} {channel_id}", "channel": channel_id, "units": cf_unit(unit)}
-        )
-        for key, value in known.items():
-            variable.attrs[key] = np.array(value) if isinstance(value, list) else value
-        variables.append(variable)
+    time.attrs.update(_time_attributes(selection))
+    variables = _create_channels(file, selection, chunks)
     for column in selection.derived:
         variable = file.create_variable(column.name, ("time",), "f8", chunks=chunks, **_COMPRESSION)
         variable.attrs.update({"long_name": column.long_name, "units": cf_unit(column.unit)})
@@ -87,6 +55,52 @@ def _fill(file: Any, selection: Selection, guarded: GuardedFile) -> None:
             variable[part] = row
         at += times.size
         guarded.raise_failure()
+
+
+def _put_attributes(file: Any, selection: Selection) -> None:
+    """Attributes of the whole file."""
+    header = selection.run.header
+    if header.start_utc_ns:
+        file.attrs["Conventions"] = CONVENTIONS  # CF wants dates: without a clock it is not CF
+    file.attrs["title"] = f"Rocking test {header.test or header.run_id}"
+    file.attrs["history"] = f"exported from {selection.run.path.name}, run {header.run_id}"
+    for key, value in selection.metadata().items():
+        file.attrs[key] = json.dumps(value) if isinstance(value, list) else value
+
+
+def _time_attributes(selection: Selection) -> dict[str, str]:
+    """Attributes of the time axis: dates by CF, or seconds where no wall clock is known."""
+    long_name = {"long_name": "time on the run's own axis"}
+    started_ns = selection.run.header.start_utc_ns
+    if not started_ns:
+        return {"units": "s", **long_name}  # an axis of seconds, which CF takes for no date
+    zero_ns = started_ns - round(selection.run.first_sample / selection.run.rate_hz * 1e9)
+    zero = np.datetime_as_string(np.datetime64(zero_ns, "ns"), unit="us").replace("T", " ")
+    return {
+        "standard_name": "time",
+        "units": f"seconds since {zero}Z",
+        "calendar": "standard",
+        "units_metadata": "leap_seconds: utc",  # the run's own clock counts every second
+        **long_name,
+    }
+
+
+def _create_channels(file: Any, selection: Selection, chunks: tuple[int]) -> list[Any]:
+    """An empty variable for each channel, with what is known of the channel as attributes."""
+    variables = []
+    for channel_id, unit in zip(selection.ids, selection.channel_units, strict=True):
+        variable = file.create_variable(_cf_name(channel_id), ("time",), "f8", chunks=chunks, **_COMPRESSION)
+        known = selection.channel_metadata(channel_id)
+        if "axis" in known:
+            known["sensor_axis"] = known.pop("axis")  # `axis` is CF's word for coordinates
+        family = known.get("family", "channel")
+        variable.attrs.update(
+            {"long_name": f"{family} {channel_id}", "channel": channel_id, "units": cf_unit(unit)}
+        )
+        for key, value in known.items():
+            variable.attrs[key] = np.array(value) if isinstance(value, list) else value
+        variables.append(variable)
+    return variables
 
 
 def _put_results(file: Any, selection: Selection) -> None:

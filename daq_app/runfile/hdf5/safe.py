@@ -118,24 +118,32 @@ def checked_dataset(
     shape = opened.shape if isinstance(opened, h5py.h5d.DatasetID) else None
     if shape is None or len(shape) > 1:
         raise refuse("is not a column of data")
-    dtype, creation = opened.dtype, opened.get_create_plist()
-    kind = creation.get_layout()
-    if kind == h5py.h5d.VIRTUAL or creation.get_external_count():
-        raise refuse("takes its data from another file, which a run never does")
-    filters = [creation.get_filter(index)[0] for index in range(creation.get_nfilters())]
-    if not _FILTERS.issuperset(filters):
-        raise refuse("uses an unknown compression")
-    chunks = creation.get_chunk() if kind == h5py.h5d.CHUNKED else ()
+    dtype = opened.dtype
     if itemsize is not None and (dtype.kind != "f" or dtype.itemsize != itemsize):
         raise refuse(f"holds {dtype}, not {8 * itemsize}-bit floating point numbers")
     if length is not None and shape != (length,):
         raise refuse(f"has shape {shape}, not ({length},)")
-    n_bytes = math.prod(shape) * dtype.itemsize
-    if n_bytes > _MAX_DEFLATE_RATIO * opened.get_storage_size() + 2**16:
-        raise refuse("claims more data than the file holds")
-    if chunks and math.prod(chunks) * dtype.itemsize > _MAX_CHUNK_BYTES:
-        raise refuse("has absurdly large chunks")
+    why = _unsafe_storage(opened)
+    if why:
+        raise refuse(why)
     return h5py.Dataset(opened)
+
+
+def _unsafe_storage(opened: h5py.h5d.DatasetID) -> str:
+    """Why reading a dataset would reach beyond its file or fill the memory; empty where it would not."""
+    creation, itemsize = opened.get_create_plist(), opened.dtype.itemsize
+    kind = creation.get_layout()
+    if kind == h5py.h5d.VIRTUAL or creation.get_external_count():
+        return "takes its data from another file, which a run never does"
+    filters = [creation.get_filter(index)[0] for index in range(creation.get_nfilters())]
+    if not _FILTERS.issuperset(filters):
+        return "uses an unknown compression"
+    if math.prod(opened.shape) * itemsize > _MAX_DEFLATE_RATIO * opened.get_storage_size() + 2**16:
+        return "claims more data than the file holds"
+    chunks = creation.get_chunk() if kind == h5py.h5d.CHUNKED else ()
+    if chunks and math.prod(chunks) * itemsize > _MAX_CHUNK_BYTES:
+        return "has absurdly large chunks"
+    return ""
 
 
 def read_text(path: Path, group: h5py.Group, name: str) -> str:

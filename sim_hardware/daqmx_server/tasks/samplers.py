@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, Protocol, cast
 
 import numpy as np
@@ -147,36 +149,49 @@ def _pulse_sequence_s(task: ChannelTask) -> NDArray[np.float64]:
     return np.array([[time_s] for time_s in pulse_times_s(task.channels[0])])
 
 
+@dataclass(frozen=True, slots=True)
+class _Playing:
+    """Written samples that drive outputs from a run's first clock on."""
+
+    task: ChannelTask
+    run: Run
+
+    def _times(self) -> SampleTimes | None:
+        """When the samples are put out; None before the first one, or where none is written."""
+        self.run.look(self.task.bench.clock.now())
+        return self.run.times if self.task.generation.samples.size else None
+
+    def values(self, row: int, bit: int | None, instants: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Row of the samples, or one bit of its words, at instants in s; NaN before the first sample."""
+        times = self._times()
+        if times is None:
+            return np.full(len(instants), np.nan)
+        out = self.task.generation.at(row, times, instants, self.run.plan.total)
+        if bit is None:
+            return out
+        words = np.nan_to_num(out).astype(np.int64)
+        return np.where(np.isnan(out), np.nan, words >> bit & 1)
+
+    def steps(self, after_s: float, until_s: float) -> NDArray[np.float64]:
+        """Instants after one and up to another at which a sample is put out, s."""
+        times = self._times()
+        if times is None:
+            return np.empty(0)
+        end = times.count(until_s)
+        if self.run.plan.total is not None:
+            end = min(end, self.run.plan.total)
+        return times.at(np.arange(times.count(after_s), end))
+
+
 def play(task: ChannelTask, run: Run) -> None:
     """The written samples drive the outputs from the run's first clock on."""
-
-    def player(row: int, bit: int | None) -> Any:
-        def values(instants: NDArray[np.float64]) -> NDArray[np.float64]:
-            run.look(task.bench.clock.now())
-            if run.times is None or not task.generation.samples.size:
-                return np.full(len(instants), np.nan)
-            out = task.generation.at(row, run.times, instants, run.plan.total)
-            if bit is None:
-                return out
-            words = np.nan_to_num(out).astype(np.int64)
-            return np.where(np.isnan(out), np.nan, words >> bit & 1)
-
-        return values
-
-    def steps(after_s: float, until_s: float) -> NDArray[np.float64]:
-        run.look(task.bench.clock.now())
-        if run.times is None or not task.generation.samples.size:
-            return np.empty(0)
-        end = run.times.count(until_s)
-        if run.plan.total is not None:
-            end = min(end, run.plan.total)
-        return run.times.at(np.arange(run.times.count(after_s), end))
-
+    playing = _Playing(task, run)
     for row, channel in enumerate(task.channels):
         if task.io == "AO":
-            task.bench.loopback.play(channel.physical, Player(player(row, None), steps))
+            player = Player(partial(playing.values, row, None), playing.steps)
+            task.bench.loopback.play(channel.physical, player)
         for bit, line in enumerate(channel.lines):
-            task.bench.loopback.play(line, Player(player(row, bit), steps))
+            task.bench.loopback.play(line, Player(partial(playing.values, row, bit), playing.steps))
     task.bench.world_changed()
 
 

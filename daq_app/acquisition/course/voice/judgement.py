@@ -131,29 +131,26 @@ def _word(call: Call, now: Situation) -> str:
     return _WORDS[now.state]
 
 
+_SENTENCES: Final[dict[Call, str]] = {
+    Call.START: "No sensor is read. Start the live view (F4).",
+    Call.PREPARE: "Nothing is recorded but the ring of the last minutes. Choose, zero, check, then arm (F5).",
+    Call.PULL: "Pull the wall to its target rotation.",
+    Call.EASE_BACK: "Too far: ease the wall back into the band.",
+    Call.STOP: "STOP: near overturning. Ease the wall back.",
+    Call.DO_NOT_RELEASE: "Do not release: nothing reaches the disk now.",
+    Call.RELEASE: "Held still on target. Release.",
+    Call.ARM_FIRST: "Not armed. Do not release: arm first (F5), or lower the wall.",
+}
+"""The calls whose sentence is the same in every situation."""
+
+
 def _sentence(call: Call, now: Situation, settings: Acquisition, held_s: float) -> str:
     match call:
-        case Call.START:
-            return "No sensor is read. Start the live view (F4)."
-        case Call.PREPARE:
-            return "Nothing is recorded but the ring of the last minutes. Choose, zero, check, then arm (F5)."
-        case Call.PULL:
-            return "Pull the wall to its target rotation."
-        case Call.EASE_BACK:
-            return "Too far: ease the wall back into the band."
         case Call.OTHER_SIDE:
             return f"Wrong side: this test is planned towards {now.plan.side}. Lower the wall."
-        case Call.STOP:
-            return "STOP: near overturning. Ease the wall back."
         case Call.HOLD:
             left_s = math.ceil(max(0.0, settings.hold_s - held_s))
             return f"On target: hold still{f', {left_s} s more' if now.steady and left_s else ''}."
-        case Call.DO_NOT_RELEASE:
-            return "Do not release: nothing reaches the disk now."
-        case Call.RELEASE:
-            return "Held still on target. Release."
-        case Call.ARM_FIRST:
-            return "Not armed. Do not release: arm first (F5), or lower the wall."
         case Call.KEEP_CLEAR if not now.armed:
             return "Keep clear. Nobody had armed: this release is kept from the ring."
         case Call.KEEP_CLEAR:
@@ -165,6 +162,7 @@ def _sentence(call: Call, now: Situation, settings: Acquisition, held_s: float) 
             }.get(now.state, "Wait.")
         case Call.LOOK:
             return now.text or "Look at the result, then take the next test (F6)."
+    return _SENTENCES[call]
 
 
 def _tone(call: Call, now: Situation) -> Tone:
@@ -187,6 +185,15 @@ def _tone(call: Call, now: Situation) -> Tone:
     return tones[call]
 
 
+_GAUGE_WORDS: Final[dict[Call, str]] = {
+    Call.OTHER_SIDE: "Wrong side",
+    Call.STOP: "STOP: ease back",
+    Call.DO_NOT_RELEASE: "Hold: do not release",
+    Call.RELEASE: "Release",
+    Call.ARM_FIRST: "Not armed",
+}
+
+
 def _gauge(call: Call, now: Situation, ratio: float) -> str:
     """Beside the gauge's figure: how far, in words that go with the call."""
     band, alpha = now.plan.band, now.alpha_rad
@@ -200,16 +207,6 @@ def _gauge(call: Call, now: Situation, ratio: float) -> str:
             return "No target is planned"
         case Call.EASE_BACK:
             return f"{-missing_mrad:.1f} mrad too far: ease back"
-        case Call.OTHER_SIDE:
-            return "Wrong side"
-        case Call.STOP:
-            return "STOP: ease back"
         case Call.HOLD:
             return "On target: hold" if band else "Hold still"
-        case Call.DO_NOT_RELEASE:
-            return "Hold: do not release"
-        case Call.RELEASE:
-            return "Release"
-        case Call.ARM_FIRST:
-            return "Not armed"
-    return ""
+    return _GAUGE_WORDS.get(call, "")

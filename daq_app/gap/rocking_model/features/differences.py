@@ -15,23 +15,23 @@ from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape
 from daq_app.gap.rocking_model.motion.rotation import anchors_turn
 
-_FAMILY_EFFECTS = (
-    ("gain", "error"),
-    ("lag", "tau"),
-    ("slow_response", "tau"),
-    ("filter_delay", "tau"),
-    ("drift", "rate"),
-    ("wire_cosine", "kappa"),
-    ("wire_anchor", "height"),
-    ("wire_inertia", "frequency"),
-)
+_FAMILY_EFFECTS = {
+    "gain": "error",
+    "lag": "tau",
+    "slow_response": "tau",
+    "filter_delay": "tau",
+    "drift": "rate",
+    "wire_cosine": "kappa",
+    "wire_anchor": "height",
+    "wire_inertia": "frequency",
+}
 """Effects on a whole family, and the parameter that says that they are there."""
 
 
 @cache
 def _family_keys(family: str) -> tuple[str, ...]:
     """Parameters that say which effects there are on a family."""
-    return tuple(f"{name}@{family}.{parameter}" for name, parameter in _FAMILY_EFFECTS)
+    return tuple(f"{name}@{family}.{parameter}" for name, parameter in _FAMILY_EFFECTS.items())
 
 
 def family_difference(run: RockingRun, family: str, values: Mapping[str, float]) -> FloatArray | None:
@@ -55,33 +55,45 @@ def _added(run: RockingRun, family: str, values: Mapping[str, float], theta: Flo
     """What a family's sensor effects add to the rotation `theta`; None for nothing."""
     if not any(key in values for key in _family_keys(family)):
         return None
-    time_s = run.grid.time_s
-    parts: list[FloatArray] = []
-    for name, parameter in _FAMILY_EFFECTS:
-        value = values.get(f"{name}@{family}.{parameter}")
-        if value is None:
-            continue
-        match name:
-            case "gain":
-                parts.append(value * theta)
-            case "lag":
-                parts.append(np.interp(time_s - value, time_s, theta) - theta)
-            case "slow_response":
-                parts.append(first_order(theta, value) - theta)
-            case "filter_delay":
-                parts.append(bessel(theta, value) - theta)
-            case "wire_inertia":
-                zeta = values.get(f"wire_inertia@{family}.zeta", 0.2)
-                parts.append(resonator(theta, 2.0 * np.pi * value, zeta) - theta)
-            case "drift":
-                scale = {"wire": run.wire_height_m, "lvdt": np.inf}.get(family, 1.0)
-                parts.append(value / scale * (time_s - (run.swings.rest_s - run.swings.release_s)))
-            case "wire_anchor":
-                parts.append(anchors_turn(run.wires, theta, value))
-            case "wire_cosine":
-                parts.append(run.wire_bend_m * value * theta**2)
+    parts = [
+        _added_by(name, run, family, values, value, theta)
+        for name, parameter in _FAMILY_EFFECTS.items()
+        if (value := values.get(f"{name}@{family}.{parameter}")) is not None
+    ]
     total: FloatArray = np.sum(parts, axis=0)
     return total
+
+
+def _added_by(
+    effect: str,
+    run: RockingRun,
+    family: str,
+    values: Mapping[str, float],
+    value: float,
+    theta: FloatArray,
+) -> FloatArray:
+    """What one effect of strength `value` adds to the rotation `theta` (n,) of a family, rad."""
+    time_s = run.grid.time_s
+    match effect:
+        case "gain":
+            return value * theta
+        case "lag":
+            return np.interp(time_s - value, time_s, theta) - theta
+        case "slow_response":
+            return first_order(theta, value) - theta
+        case "filter_delay":
+            return bessel(theta, value) - theta
+        case "wire_inertia":
+            zeta = values.get(f"wire_inertia@{family}.zeta", 0.2)
+            return resonator(theta, 2.0 * np.pi * value, zeta) - theta
+        case "drift":
+            scale = {"wire": run.wire_height_m, "lvdt": np.inf}.get(family, 1.0)
+            return value / scale * (time_s - (run.swings.rest_s - run.swings.release_s))
+        case "wire_anchor":
+            return anchors_turn(run.wires, theta, value)
+        case "wire_cosine":
+            return run.wire_bend_m * value * theta**2
+    raise KeyError(effect)
 
 
 def difference_of(run: RockingRun, first: str, second: str, values: Mapping[str, float]) -> FloatArray | None:
