@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -93,13 +93,21 @@ class LiveResult:
 class LiveAnalyser:
     """Online analysis of one test. Use a new one for each test.
 
-    `tare` is what zeroing found beyond each channel's offset, unit of the reading, by id.
+    `tare` is what zeroing found beyond each channel's offset, unit of the reading, by id. `tell` is called
+    with each estimate before the other families are asked about it: that takes up to five times as long as
+    r, and somebody waits for r. It has the doubts that were there before.
     """
 
-    def __init__(self, rig: Rig, rate_hz: float, tare: Mapping[str, float]) -> None:
+    def __init__(
+        self,
+        rig: Rig,
+        rate_hz: float,
+        tare: Mapping[str, float],
+        tell: Callable[[Estimate], None] | None = None,
+    ) -> None:
         if not rate_hz > 0:
             raise ValueError(f"the sampling rate must be positive, not {rate_hz:g} Hz")
-        self._rig, self._rate = rig, rate_hz
+        self._rig, self._rate, self._tell = rig, rate_hz, tell
         settings = PhaseSettings.from_rig(rig, rate_hz, 0.0)
         self._frame = settings.frame_samples
         self.geometry = RotationGeometry.from_rig(rig, frame_samples=self._frame)
@@ -216,8 +224,10 @@ class LiveAnalyser:
                 )
             self._track.add_impact(event.sample / self._rate, time, rotation)
             estimate = self._estimate()
-            doubts = self._families.look(self._track, self._theta0_tilt, estimate.eav, estimate.crt)
-            return replace(estimate, doubts=doubts)
+            if self._tell is not None:
+                self._tell(estimate)
+            self._families.look(self._track, self._theta0_tilt, estimate.eav, estimate.crt)
+            return replace(estimate, doubts=self._families.doubts)
         else:
             return None
         return self._estimate()
@@ -254,6 +264,7 @@ class LiveAnalyser:
             eav=RestitutionEstimate("EAV", ()) if track is None else track.eav(),
             crt=RestitutionEstimate("CRT", ()) if track is None else track.crt(),
             r_max=float(theory.r_max_rectangular(alpha)),
+            doubts=self._families.doubts,
         )
 
 

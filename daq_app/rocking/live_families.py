@@ -71,8 +71,8 @@ class LiveFamilies:
 
     def look(
         self, wires: MotionTrack, tilt_rad: float, eav: RestitutionEstimate, crt: RestitutionEstimate
-    ) -> tuple[str, ...]:
-        """Doubts after the last impact of `wires`, which gives these r.
+    ) -> None:
+        """Look for doubts after the last impact of `wires`, which gives these r.
 
         `tilt_rad`: θ0 of the tiltmeters, NaN without. Families that cannot be compared are told and do not
         stop the test's own analysis.
@@ -81,6 +81,10 @@ class LiveFamilies:
             self._compare(wires, tilt_rad, eav, crt)
         except (ValueError, np.linalg.LinAlgError) as error:
             self._values = (f"the other families could not be compared with the wires ({error})",)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What speaks against r, as far as was looked."""
         return (*self._level, *self._timing, *self._values)
 
     def _compare(

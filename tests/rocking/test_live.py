@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 
 from daq_app.acquisition.messages.published import EstimateMessage
 from daq_app.rocking import LiveAnalyser, Phase
+from daq_app.rocking.live_families import LiveFamilies
 
 
 def run_live(test, cuts=None, readings=None, tare=None):
@@ -189,3 +190,18 @@ def test_a_family_that_disagrees_is_told_while_the_wall_rocks(made, prefix, chan
     estimate = last_estimate(run_live(test, readings=change(test.readings, test.rig, prefix, by)))
     assert any(told in doubt for doubt in estimate.doubts), estimate.doubts
     assert EstimateMessage(**estimate.as_message()).doubts == estimate.doubts
+
+
+def test_r_is_told_before_the_other_families_are_asked_about_it(made, monkeypatch):
+    test = made(phi=0.35, r=0.895, side=-1, seed=8, full=True)
+    readings = shifted(test.readings, test.rig, "LV-", 80)
+    told, asked_after, look = [], [], LiveFamilies.look
+    monkeypatch.setattr(LiveFamilies, "look", lambda *given: (asked_after.append(len(told)), look(*given)))
+    analyser = LiveAnalyser(test.rig, test.rate_hz, {}, told.append)
+    starts = range(0, test.n_samples, 80)
+    results = [analyser.process(start, readings[:, start : start + 80]) for start in starts]
+    whole = [result.estimate for result in results if result.impacts]
+    assert [estimate.crt for estimate in told] == [estimate.crt for estimate in whole]
+    assert asked_after == [*range(1, len(told) + 1)]
+    doubted = next(place for place, estimate in enumerate(whole) if estimate.doubts)
+    assert told[doubted].doubts == () and told[doubted + 1].doubts == whole[doubted].doubts

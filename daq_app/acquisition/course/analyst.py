@@ -146,14 +146,14 @@ class Analyst(threading.Thread):
 
     def _on_block(self, block: Block) -> None:
         self.voice.sample = block.first_sample + block.n_samples
-        if self._preparation is not None:
-            self._preparation.take(block)
-        if self._sensors is not None:
-            self._sensors.look(block, moving=self.state in _MOVING)
-        if self._live is None:
+        if self._live is None or self._preparation is None or self._sensors is None:
             return
+        events = self._live.analyse(block)  # first: somebody waits for r
+        self._preparation.take(block)
+        self._sensors.look(block, moving=self.state in _MOVING)
         # A backlog means that viewers are behind anyway: the newest matters, the test's course always.
-        events = self._live.show(block, self.overloaded, quietly=self.inbox.qsize() > 20)
+        if self.inbox.qsize() <= 20:
+            self._live.publish_block(block, self.overloaded)
         if self._live.trouble:
             self._note("analysis", self._live.trouble, "error")
         if self._sequence is not None:

@@ -29,7 +29,7 @@ class LiveView:
         self._rate_hz = rate_hz
         self._publisher = publisher
         self._scaling = Scaling.of(rig.channels, tare)
-        self._analyser: LiveAnalyser | None = LiveAnalyser(rig, rate_hz, tare)
+        self._analyser: LiveAnalyser | None = LiveAnalyser(rig, rate_hz, tare, self._publish_estimate)
         self._step = max(1, round(rate_hz / _MOTION_RATE_HZ))
         self._unheld = UnheldReleaseWatch(rig, rate_hz)
         self._judged = JudgedRotation(rig)
@@ -38,22 +38,13 @@ class LiveView:
         self.held_since: int | None = None
         """Sample from which on the wall has been held still; None while it is not."""
         self.estimate: Estimate | None = None
-        """The newest whole estimate of this test."""
+        """The newest whole estimate of this test, as it was published."""
         self.trouble = ""
         """A sentence on the analysis after the last `show`; empty when all is well."""
         self._excluded: tuple[str, ...] = ()
 
-    def show(self, block: Block, overloaded: tuple[str, ...], *, quietly: bool) -> tuple[PhaseEvent, ...]:
-        """Analyse and publish a block; answers what happened in it. `quietly`: leave out the raw block.
-
-        What follows from the block goes out before the block itself: somebody waits for r.
-        """
-        events = self._analyse(block)
-        if not quietly:
-            self._publish_block(block, overloaded)
-        return events
-
-    def _analyse(self, block: Block) -> tuple[PhaseEvent, ...]:
+    def analyse(self, block: Block) -> tuple[PhaseEvent, ...]:
+        """Analyse a block and publish what follows from it; answers what happened in it."""
         self.trouble = ""
         if self._analyser is None:
             return ()
@@ -111,7 +102,8 @@ class LiveView:
             self._analyser is not None and self._analyser.phase in (Phase.FALLING, Phase.ROCKING)
         )
 
-    def _publish_block(self, block: Block, overloaded: tuple[str, ...]) -> None:
+    def publish_block(self, block: Block, overloaded: tuple[str, ...]) -> None:
+        """Publish the block itself: after all else, since nobody waits for it."""
         heading = BlockMessage(
             first_sample=block.first_sample,
             n_samples=block.n_samples,
@@ -122,10 +114,13 @@ class LiveView:
         si = np.ascontiguousarray(self._scaling.to_si(block.readings), dtype="<f4")
         self._publisher.send("block", heading, si.tobytes())
 
+    def _publish_estimate(self, estimate: Estimate) -> None:
+        self.estimate = estimate
+        self._publisher.send("estimate", EstimateMessage.model_validate(estimate.as_message()))
+
     def _publish(self, result: LiveResult) -> None:
-        if result.estimate is not None:
-            self.estimate = result.estimate
-            self._publisher.send("estimate", EstimateMessage.model_validate(result.estimate.as_message()))
+        if result.estimate is not None and result.estimate != self.estimate:
+            self._publish_estimate(result.estimate)
         start = -result.first_sample % self._step
         rotation = result.rotation_rad[start :: self._step]
         if rotation.size:

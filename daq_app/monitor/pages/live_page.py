@@ -103,7 +103,8 @@ class LivePage(QWidget):
         if not self.strips_button.isChecked():
             self.motion.draw()
         self.frames += 1
-        self._draw_estimate()
+        if self._draw_r():
+            self._draw_what_follows()
 
     def draw_slow(self) -> None:
         """Draw figures, strips and the phase plane."""
@@ -127,11 +128,12 @@ class LivePage(QWidget):
 
     def show_estimate(self) -> None:
         """Draw and paint r now, between two frames: it is what the operator waits for."""
-        if self._draw_estimate():
+        if self._draw_r():
             self.restitution.plot.viewport().repaint()
+            self._draw_what_follows()
 
-    def _draw_estimate(self) -> bool:
-        """Hand r to its plots; false where it has not changed."""
+    def _draw_r(self) -> bool:
+        """Hand r to its plot; false where it has not changed."""
         revision = self._session.revision
         seen = (revision.get(EstimateMessage, 0), revision.get(StateMessage, 0))
         if seen == self._seen:
@@ -139,9 +141,11 @@ class LivePage(QWidget):
         self._seen = seen
         self.restitution.draw()
         self.estimate_drawn_s = time.monotonic()
+        return True
+
+    def _draw_what_follows(self) -> None:
         self.periods.draw()
         self.counters.refresh()
-        return True
 
     def _on_theory(self, on: bool) -> None:
         self.motion.set_theory(on)
