@@ -120,7 +120,7 @@ SENSOR_EFFECTS: Final[tuple[EffectSpec, ...]] = (
         "digital sensor, wire-wound potentiometer",
         (Parameter("step", "SI", 1e-5, 1e-3, "step", None, la.RW_QUANTUM, 0.0),),
         (),
-        "stairs",
+        "reading steps",
     ),
     EffectSpec(
         "noise",

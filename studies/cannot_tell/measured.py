@@ -37,7 +37,7 @@ class Instrument:
     predicted: Callable[[_Values], float]
     """What it shows at the values of a hypothesis."""
     resolves: tuple[str, ...] = ()
-    """Effects that the library declares alike to all sensors of the rig, which this instrument is none of."""
+    """Effects that no sensor of the rig tells apart by the library, and this instrument does."""
 
 
 LEVEL = Instrument(
@@ -128,6 +128,6 @@ def diagnose_with(
 
 
 def _told(library: Library, instrument: Instrument) -> Library:
-    """The library of a rig that has this instrument: what it tells apart is alike no longer."""
-    alike = [group for group in library.alike if not set(group.names) & set(instrument.resolves)]
-    return Library([library[name] for name in library], alike)
+    """The library of a rig that has this instrument: less the groups that it tells apart."""
+    groups = [group for group in library.groups if not set(group.names) & set(instrument.resolves)]
+    return Library([library[name] for name in library], groups)

@@ -53,7 +53,7 @@ def page(found: list[Found]) -> str:
         "from the seed; restitution scatter 0.2 to 0.8 %). It is diagnosed from little; then the "
         "measurement that the library names for the pair is added, for the same wall with the same "
         "sensors, and it is diagnosed "
-        "again. *Set*: the 95 % set with probabilities, forms that the library declares alike to all sensors "
+        "again. *Set*: the 95 % set with probabilities, forms that the library declares indistinguishable "
         "each by itself. *Resolved*: the set has shrunk to the truth alone. What is read by hand (a level, a "
         f"rule, a knock) is one more feature with its own error. {states_in_words(found)}",
         "",

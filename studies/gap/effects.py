@@ -154,8 +154,8 @@ def _why(found: Found) -> str:
 
 def _same(truth: str, found: list[str]) -> bool:
     """Whether the library says that no sensor of the rig tells the two apart."""
-    alike = rocking_library().alike_to(truth) if truth else None
-    return alike is not None and len(found) == 1 and found[0] in alike.names
+    group = rocking_library().indistinguishable_from(truth) if truth else None
+    return group is not None and len(found) == 1 and found[0] in group.names
 
 
 def _strength(value: float, limit: float | None, estimate: dict[str, Any] | None) -> float | None:

@@ -31,9 +31,9 @@ def test_a_set_counts_as_resolved_only_if_the_truth_alone_is_left(first, second,
 @pytest.mark.parametrize("case", [case for case in CASES.values() if case.other], ids=lambda case: case.name)
 def test_what_is_added_is_what_the_library_names_for_the_pair(case):
     library = rocking_library()
-    alike = library.alike_to(case.name)
+    group = library.indistinguishable_from(case.name)
     words = [library.separating_measurement(case.name, case.other) or ""]
-    words += [alike.measure] if alike is not None and case.other in alike.names else []
+    words += [group.measure] if group is not None and case.other in group.names else []
     assert any(case.named in text for text in words), words
 
 

@@ -7,7 +7,7 @@ small models of `studies/real_gap`.
 """
 
 from daq_app.gap.core.diagnose import diagnose
-from daq_app.gap.core.effects import Alike, Confusion, Effect, Library
+from daq_app.gap.core.effects import Confusion, Effect, Indistinguishable, Library
 from daq_app.gap.core.features import FeatureSet, Label, Run
 from daq_app.gap.core.findings import Finding
 from daq_app.gap.core.fitting.fit import Fit, fit
@@ -17,7 +17,6 @@ from daq_app.gap.core.parameters import Parameter
 from daq_app.gap.core.result import CannotDiagnose, Diagnosis
 
 __all__ = [
-    "Alike",
     "CannotDiagnose",
     "Confusion",
     "Diagnosis",
@@ -25,6 +24,7 @@ __all__ = [
     "FeatureSet",
     "Finding",
     "Fit",
+    "Indistinguishable",
     "Label",
     "Library",
     "Model",

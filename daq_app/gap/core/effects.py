@@ -11,7 +11,7 @@ from daq_app.gap.core.parameters import Parameter
 
 @dataclass(frozen=True, slots=True)
 class Confusion:
-    """Another effect that looks alike, and the measurement that tells the two apart."""
+    """Another effect that looks similar, and the measurement that tells the two apart."""
 
     effect: str
     measure: str
@@ -59,7 +59,7 @@ class Effect:
 
 
 @dataclass(frozen=True, slots=True)
-class Alike:
+class Indistinguishable:
     """Effects that are the same equation in everything that the sensors measure.
 
     Not effects that these runs happen not to separate: those may differ in the next ones.
@@ -74,7 +74,7 @@ class Alike:
 class Library(Mapping[str, Effect]):
     """Effects by name; checks on construction that names are unique and confusions known."""
 
-    def __init__(self, effects: Iterable[Effect], alike: Iterable[Alike] = ()) -> None:
+    def __init__(self, effects: Iterable[Effect], groups: Iterable[Indistinguishable] = ()) -> None:
         self._effects: dict[str, Effect] = {}
         for effect in effects:
             if effect.name in self._effects:
@@ -89,13 +89,15 @@ class Library(Mapping[str, Effect]):
             strangers = [name for name in effect.of if name not in self._effects]
             if strangers or bool(effect.of) != (effect.kind == "departure"):
                 raise ValueError(f"effect {effect.name} ({effect.kind}) departs from {list(effect.of)}")
-        self.alike = tuple(alike)
-        self._alike: dict[str, Alike] = {}
-        for group in self.alike:
+        self.groups = tuple(groups)
+        self._group_of: dict[str, Indistinguishable] = {}
+        for group in self.groups:
             for name in group.names:
-                if name not in self._effects or name in self._alike:
-                    raise ValueError(f"{name} is said to be alike to others, but is unknown or said so twice")
-                self._alike[name] = group
+                if name not in self._effects or name in self._group_of:
+                    raise ValueError(
+                        f"{name} is said to be indistinguishable from others, but is unknown or said so twice"
+                    )
+                self._group_of[name] = group
 
     def __getitem__(self, name: str) -> Effect:
         return self._effects[name]
@@ -134,17 +136,19 @@ class Library(Mapping[str, Effect]):
                 continue
             confusions = tuple(c for c in effect.confusable_with if c.effect not in names)
             kept.append(replace(effect, confusable_with=confusions, of=of))
-        groups = ((group, tuple(n for n in group.names if n not in names)) for group in self.alike)
-        alike = [Alike(left, group.reason, group.measure) for group, left in groups if len(left) > 1]
-        return Library(kept, alike)
+        groups = ((group, tuple(n for n in group.names if n not in names)) for group in self.groups)
+        remaining = [
+            Indistinguishable(left, group.reason, group.measure) for group, left in groups if len(left) > 1
+        ]
+        return Library(kept, remaining)
 
-    def alike_to(self, name: str) -> Alike | None:
+    def indistinguishable_from(self, name: str) -> Indistinguishable | None:
         """The effects that no sensor tells from this one, itself among them; None if there are none."""
-        return self._alike.get(name)
+        return self._group_of.get(name)
 
     def class_of(self, effects: Iterable[str]) -> tuple[str, ...]:
-        """The same for all hypotheses that differ only by effects that are alike: each by its first name."""
-        return tuple(sorted(self._alike[n].names[0] if n in self._alike else n for n in effects))
+        """The effects, each by the first name of its group: equal for hypotheses that nothing tells apart."""
+        return tuple(sorted(self._group_of[n].names[0] if n in self._group_of else n for n in effects))
 
     def separating_measurement(self, first: str, second: str) -> str | None:
         """What to measure to tell two effects apart, if the library knows."""

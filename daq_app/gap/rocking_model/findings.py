@@ -1,4 +1,4 @@
-"""From the marks of all runs to findings about instruments."""
+"""From the findings of single runs to findings about instruments over all runs."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from scipy.stats import norm
 
 from daq_app.gap.core.findings import Finding
 from daq_app.gap.core.policy import POLICY
-from daq_app.gap.rocking_model.features.marks import EFFECT_SIZES, Mark
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.run_findings import EFFECT_SIZES, RunFinding
 
 _IN_NOISE = ("hum", "quantisation")
 """Conditions whose size counts over the noise."""
@@ -32,30 +32,30 @@ _FAMILY_WORDS = {
 
 def findings_of(runs: Sequence[RockingRun]) -> tuple[Finding, ...]:
     """One finding per condition that any run shows, in the order in which the runs show them."""
-    seen: dict[str, list[Mark]] = {}
+    seen: dict[str, list[RunFinding]] = {}
     for run in runs:
-        for mark in run.marks:
-            if mark.value > 0.0:
-                seen.setdefault(mark.key, []).append(mark)
-    return tuple(_finding(key, marks, len(runs)) for key, marks in seen.items())
+        for finding in run.findings:
+            if finding.value > 0.0:
+                seen.setdefault(finding.key, []).append(finding)
+    return tuple(_finding(key, findings, len(runs)) for key, findings in seen.items())
 
 
-def _finding(key: str, marks: Sequence[Mark], runs: int) -> Finding:
+def _finding(key: str, findings: Sequence[RunFinding], runs: int) -> Finding:
     kind, _, target = key.partition("@")
-    size, sd = _median_with_sd(marks)
-    chance = float(np.prod([norm.sf(mark.value / mark.sd) for mark in marks]))
-    unit = marks[0].unit
+    size, sd = _median_with_sd(findings)
+    chance = float(np.prod([norm.sf(finding.value / finding.sd) for finding in findings]))
+    unit = findings[0].unit
     if kind == "saturation":
-        # The mark is the inverse of the limit, so that no limit is 0 ± sd.
+        # The finding is the inverse of the limit, so that no limit is 0 ± sd.
         size, sd, unit = 1.0 / size, sd / size**2, "m"
-    in_noise = size / marks[0].noise if kind in _IN_NOISE and marks[0].noise > 0.0 else math.nan
+    in_noise = size / findings[0].noise if kind in _IN_NOISE and findings[0].noise > 0.0 else math.nan
     limit = _LEAST.get(kind, 0.0)
     parameter = EFFECT_SIZES.get(kind, "")
     matters = POLICY.chance(in_noise if kind in _IN_NOISE else size, limit)
-    where = f"{len(marks)} of {runs} runs"
+    where = f"{len(findings)} of {runs} runs"
     return Finding(
         name=key,
-        words=_words(kind, target, marks[0], size, unit) + f" in {where}",
+        words=_words(kind, target, findings[0], size, unit) + f" in {where}",
         family="sensor",
         probability=1.0 - chance,
         size=size,
@@ -70,15 +70,15 @@ def _finding(key: str, marks: Sequence[Mark], runs: int) -> Finding:
     )
 
 
-def _median_with_sd(marks: Sequence[Mark]) -> tuple[float, float]:
+def _median_with_sd(findings: Sequence[RunFinding]) -> tuple[float, float]:
     """Median over the runs, and its standard deviation by reading error and spread."""
-    values = np.array([mark.value for mark in marks])
-    reading = float(np.median([mark.sd for mark in marks]))
+    values = np.array([finding.value for finding in findings])
+    reading = float(np.median([finding.sd for finding in findings]))
     spread = float(values.std(ddof=1)) if values.size > 1 else 0.0
     return float(np.median(values)), math.hypot(reading, spread) / math.sqrt(values.size)
 
 
-def _words(kind: str, target: str, mark: Mark, size: float, unit: str) -> str:
+def _words(kind: str, target: str, finding: RunFinding, size: float, unit: str) -> str:
     who = _FAMILY_WORDS.get(target, target)
     shown, label = (1e3 * size, "mm") if unit == "m" else (size, unit)
     amount = f"{shown:.3g} {label}"
@@ -94,7 +94,7 @@ def _words(kind: str, target: str, mark: Mark, size: float, unit: str) -> str:
         case "saturation":
             return f"{who} goes no further than {amount}"
         case "polarity" | "swap" | "disagreement":
-            return mark.observable
+            return finding.observable
         case "crossed":
             return f"{who} shows {100 * size:.2g} % of the rotation across its axis"
-    return f"{mark.observable} of {amount} ({who})"
+    return f"{finding.observable} of {amount} ({who})"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
-from daq_app.gap.core import Alike, Confusion, Effect, Library, Parameter
+from daq_app.gap.core import Confusion, Effect, Indistinguishable, Library, Parameter
 from daq_app.gap.core.parameters import between, positive, signed
 from daq_app.gap.rocking_model.probes import departures, probes
 from sim_hardware.dynamics.effects import MOTION_EFFECTS
@@ -40,7 +40,7 @@ _MOTION = (
     "slow_release",
     "ambient",
 )
-"""Effects on the motion that leave a mark on the features used here."""
+"""Effects on the motion that show in the features used here."""
 _FREE = {
     "bounce": ("tau",),
     "restitution_slope": ("k",),
@@ -202,30 +202,30 @@ def _sensor_effects(known: set[str]) -> Iterable[Effect]:
     )
 
 
-_ALIKE = (
+_INDISTINGUISHABLE = (
     # Not dwell and bounce: a hop lasts longer the faster the wall comes, which several levels show.
-    Alike(
+    Indistinguishable(
         ("base_tilt", "eccentric_mass"),
         "Both turn gravity against the wall by the same angle; a mass off centre also changes the p of the "
         "two sides, by 0.1 %, which the calibrations of the two faces of the joint may feign.",
         "a level on the base",
     ),
 )
-_ALIKE_ON_SENSORS = (
+_INDISTINGUISHABLE_ON_SENSORS = (
     ("lag", "filter_delay"),
     "Where the rotation has its energy, below 20 Hz, a Bessel filter of some milliseconds is a delay.",
     "a step or a knock on the sensor: a filter rounds it, a delay does not",
 )
 
 
-def _alike(names: Collection[str]) -> Iterable[Alike]:
+def _indistinguishable(names: Collection[str]) -> Iterable[Indistinguishable]:
     """Effects that no sensor of the rig tells apart, as far as the library has them."""
-    yield from _ALIKE
-    first, *others = _ALIKE_ON_SENSORS[0]
+    yield from _INDISTINGUISHABLE
+    first, *others = _INDISTINGUISHABLE_ON_SENSORS[0]
     for target in sorted({name.partition("@")[2] for name in names if name.startswith(first + "@")}):
         same = tuple(f"{name}@{target}" for name in (first, *others))
         if all(name in names for name in same):
-            yield Alike(same, *_ALIKE_ON_SENSORS[1:])
+            yield Indistinguishable(same, *_INDISTINGUISHABLE_ON_SENSORS[1:])
 
 
 def rocking_library(channels: Mapping[str, str] | None = None) -> Library:
@@ -243,4 +243,4 @@ def rocking_library(channels: Mapping[str, str] | None = None) -> Library:
     ]
     motion = (_motion_effect(spec, known) for spec in specs)
     effects = [*motion, *_sensor_effects(known), *single, *probes(), *departures()]
-    return Library(effects, _alike({effect.name for effect in effects}))
+    return Library(effects, _indistinguishable({effect.name for effect in effects}))

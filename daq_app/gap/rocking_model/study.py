@@ -9,9 +9,9 @@ import numpy as np
 
 from daq_app.gap.core import CannotDiagnose, Diagnosis, Library, Options, diagnose
 from daq_app.gap.core.result import Decision, Verdict
-from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined, examine
+from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.findings import findings_of
 from daq_app.gap.rocking_model.inspection.inspect_runs import (
     calibrations,
@@ -19,7 +19,7 @@ from daq_app.gap.rocking_model.inspection.inspect_runs import (
     completed,
     found_channels,
     inspect,
-    without_suspects,
+    without_outlier_channels,
 )
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.prediction.model import RockingModel, UnscatteredModel
@@ -49,9 +49,9 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
     inspected = inspect(usable)
     reference, known = choose_reference(inspected)
     examined: list[Examined] = []
-    marks: list[Sequence[Mark]] = []
+    findings: list[Sequence[RunFinding]] = []
     impacts = 0.0
-    for place, (run, seen) in enumerate(zip(inspected.runs, inspected.marks, strict=True)):
+    for place, (run, seen) in enumerate(zip(inspected.runs, inspected.findings, strict=True)):
         before = run.impacts_before or impacts
         try:
             found = known.get(place) or examine(run, reference)
@@ -62,11 +62,11 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
             continue
         entry = found.after(before)
         examined.append(entry)
-        marks.append(seen)
+        findings.append(seen)
         impacts = entry.features.impacts_before + entry.features.swings.impacts
     if not examined:
         raise CannotDiagnose("None of the runs can be used.", " ".join(limits))
-    examined, channels, marks_of_all = without_suspects(examined, marks, reference)
+    examined, channels, marks_of_all = without_outlier_channels(examined, findings, reference)
     for entry in examined:
         limits += entry.features.notes
     whole = completed(examined, marks_of_all, channels, inspected.wiring)

@@ -224,7 +224,7 @@ def test_a_slow_release_is_compared_by_the_mean_time_of_its_force(tau_s: float, 
 
 
 def test_what_the_diagnosis_calls_alike_the_scorer_does_too() -> None:
-    for group in rocking_library({"WP-1": "wire"}).alike:
+    for group in rocking_library({"WP-1": "wire"}).groups:
         assert len({class_of([name]) for name in group.names}) == 1
 
 

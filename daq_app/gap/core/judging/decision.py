@@ -88,11 +88,11 @@ def describe(answer: Answer, library: Library) -> str:
         if library[name].kind == "probe":
             words.append(f"another form of {library[name].family}")
             continue
-        alike = library.alike_to(name)
-        if alike is None:
+        group = library.indistinguishable_from(name)
+        if group is None:
             words.append(name)
             continue
-        others = [n for r in answer.alternatives for n in r.effects if n in alike.names and n != name]
+        others = [n for r in answer.alternatives for n in r.effects if n in group.names and n != name]
         names = list(dict.fromkeys([name, *others]))
         words.append(" or ".join(names) + (", which no sensor here tells apart," if others else ""))
     return " + ".join(words).removesuffix(",")
@@ -138,8 +138,8 @@ def _null(evidence: Evidence, policy: Policy) -> tuple[Decision, str]:
 
 def _check_advice(library: Library, best: Answer) -> str:
     if len(best.alternatives) > 1:
-        alike = next(group for group in map(library.alike_to, best.effects) if group is not None)
-        return f"To tell {' from '.join(alike.names)}: {alike.measure}."
+        group = next(g for g in map(library.indistinguishable_from, best.effects) if g is not None)
+        return f"To tell {' from '.join(group.names)}: {group.measure}."
     confusions = [c for name in best.effects for c in library[name].confusable_with]
     if not confusions:
         return "Repeat at another level to confirm the parameter."

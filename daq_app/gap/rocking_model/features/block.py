@@ -72,7 +72,7 @@ class Block:
     systematic: Mapping[str, FloatArray] = field(default_factory=dict)
     """What parameters that all runs share add to the coefficients at a value of one, (k,) each."""
     tags: Mapping[str, str] = field(default_factory=dict)
-    """Sensor family behind a channel or a mark."""
+    """Sensor family behind a channel or a finding."""
     said: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     """(channel, observable) under which a coefficient is spoken of, where not the block's and its name."""
 

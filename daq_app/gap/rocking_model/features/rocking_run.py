@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from daq_app.gap.core import FeatureSet, Label
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
-from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.features.oscillations.floor_vibration import Vibration
+from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Wire
 from daq_app.gap.rocking_model.motion.swings import Swings
@@ -61,7 +61,7 @@ class RockingRun:
     """What a full crosstalk adds to a reference rotation that is read from wires, (m,), rad; else empty."""
     wiring: Wiring = field(default_factory=Wiring)
     """What was put right in all runs before anything was read from them."""
-    marks: tuple[Mark, ...] = ()
+    findings: tuple[RunFinding, ...] = ()
     """What the run shows of conditions of the electronics."""
     cache: RunCache = field(default_factory=RunCache, compare=False)
 

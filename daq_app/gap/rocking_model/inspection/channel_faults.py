@@ -54,7 +54,7 @@ SCREENED = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Suspects:
+class OutlierChannels:
     """Channels that disagree with their family."""
 
     single: dict[Family, str]
@@ -67,7 +67,7 @@ class Suspects:
         """All of them."""
         return (*self.single.values(), *(name for names in self.several.values() for name in names))
 
-    def plus(self, family: Family, name: str | None) -> Suspects:
+    def plus(self, family: Family, name: str | None) -> OutlierChannels:
         """These with one more of a family; two of a family have no one cause."""
         if name is None:
             return self
@@ -75,12 +75,12 @@ class Suspects:
         if not known:
             return replace(self, single={**self.single, family: name})
         left = {f: n for f, n in self.single.items() if f != family}
-        return Suspects(left, {**self.several, family: tuple(sorted({*known, name}))})
+        return OutlierChannels(left, {**self.several, family: tuple(sorted({*known, name}))})
 
 
-def suspects(
+def find_outlier_channels(
     runs: Sequence[GapRun], grids: Sequence[Grid], steps: Mapping[str, float] = MappingProxyType({})
-) -> Suspects:
+) -> OutlierChannels:
     """The channels of each family that disagree with all others, where the others agree.
 
     `steps` are those of the families, m, whose readings go in steps.
@@ -98,16 +98,16 @@ def suspects(
         order = [n for n in sorted(sizes, key=lambda n: -sizes[n]) if sizes[n] > 0.5 * SUSPECT[family]]
         if not order:
             continue
-        together = _together(usable, family)
-        alone = None if together else _alone(usable, family, order[:LOOKED_AT])
+        together = _outlier_set(usable, family)
+        alone = None if together else _single_outlier(usable, family, order[:LOOKED_AT])
         if together:
             several[family] = together
         elif alone is not None:
             single[family] = alone
-    return Suspects(single, several)
+    return OutlierChannels(single, several)
 
 
-def _alone(usable: Sequence[ChannelFamily], family: Family, order: Sequence[str]) -> str | None:
+def _single_outlier(usable: Sequence[ChannelFamily], family: Family, order: Sequence[str]) -> str | None:
     """The one channel without which the others agree, if there is one."""
     bar = SUSPECT[family]
     # A bad channel spoils the prediction of the others: right is one without which all agree. Where
@@ -140,7 +140,7 @@ def _all_bent(usable: Sequence[ChannelFamily], family: Family, name: str, agree:
     return max(_sizes(straight, family, (), "curvature").values()) < max(left.values())
 
 
-def _together(usable: Sequence[ChannelFamily], family: Family) -> tuple[str, ...]:
+def _outlier_set(usable: Sequence[ChannelFamily], family: Family) -> tuple[str, ...]:
     """Two or more channels, of many at most a quarter, without which the others agree.
 
     The worst is taken out, then the worst of the others, and so on. It needs a family in which many
@@ -234,7 +234,7 @@ def _straightened(data: ChannelFamily) -> ChannelFamily:
 
 
 def channel_block(run: GapRun, grid: Grid, family: Family, name: str, step: float = 0.0) -> Block | None:
-    """The coefficients of one channel as a block of features; `step` as for `suspects`."""
+    """The coefficients of one channel as a block of features; `step` as for `find_outlier_channels`."""
     data = channel_family(run, grid, family, step, include=(name,))
     if data is None or name not in data.ids:
         return None

@@ -1,6 +1,6 @@
-"""What the electronics do to a channel, seen in its own samples: hum, stairs, frozen samples, spikes.
+"""What the electronics do to a channel, seen in its own samples: hum, quantisation, frozen samples, spikes.
 
-None of these needs a fit of the wall. Each becomes a mark: a number with its error that is zero on a
+None of these needs a fit of the wall. Each becomes a finding: a number with its error that is zero on a
 healthy channel, and which only the effect of that name predicts to be anything else.
 """
 
@@ -17,7 +17,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.marks import Mark
+from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.rocking.geometry.noise import white_noise
 
@@ -31,7 +31,7 @@ LOUD = 4.0
 AROUND_S = 0.03
 """… and so do those around it."""
 FEWEST_STEPS = 0.004
-"""Share of samples at which a reading in stairs goes on by a step."""
+"""Share of samples at which a quantised reading goes on by a step."""
 SMALLEST_STEP = 5e-4
 """Smallest step that matters, as a share of the span of the reading."""
 USUAL_HUM = 0.45
@@ -80,7 +80,7 @@ def inspect_channel(run: GapRun, index: int) -> Condition:
     if accelerometer:
         return Condition(hum, hum_sd, wave, 0.0, 1.0, 0.0, 1e-3, 0.0, usual)
     clean = values if wave is None else values - wave
-    step, step_sd = _stairs(values, run.sensors[index].noise_si)
+    step, step_sd = _quantisation_step(values, run.sensors[index].noise_si)
     frozen, frozen_sd = _frozen(values, rate, step, run.sensors[index].range_si)
     # A channel that rests at the end of its range shows no noise there.
     spikes = _spikes(clean, usual, rate) if step == 0.0 and frozen == 0.0 else 0.0
@@ -140,7 +140,7 @@ def _wave_columns(t: FloatArray, frequency: float) -> FloatArray:
     )
 
 
-def _stairs(values: FloatArray, noise_si: float) -> tuple[float, float]:
+def _quantisation_step(values: FloatArray, noise_si: float) -> tuple[float, float]:
     """(step, its sd) of a reading that only takes values a step apart; 0 where it does not.
 
     From sample to sample such a reading stays, or goes on by whole steps; noise does neither.
@@ -186,8 +186,8 @@ def _frozen(
     edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
     starts, stops = edges[::2], edges[1::2]
     long = stops - starts > FROZEN_S * rate_hz
-    # Between two steps of its converter, or of its stairs, a sound reading stands still too, but then it goes
-    # on by one of them.
+    # Between two steps of its converter, or of a coarser quantisation, a sound reading stands still too, but
+    # then it goes on by one of them.
     after = np.minimum(stops + 1, values.size - 1)
     long &= np.abs(values[after] - values[starts]) > 2.5 * max(step, _resolution(values))
     lengths = (stops - starts)[long] / values.size
@@ -233,9 +233,11 @@ def without_hum(run: GapRun, conditions: dict[str, Condition]) -> GapRun:
     return replace(run, channels=channels)
 
 
-def marks_of(runs: Sequence[GapRun], conditions: Sequence[dict[str, Condition]]) -> list[list[Mark]]:
-    """Marks of all runs. Each condition carries the same key in every run: a channel, or its family."""
-    marks: list[list[Mark]] = [[] for _ in runs]
+def findings_per_run(
+    runs: Sequence[GapRun], conditions: Sequence[dict[str, Condition]]
+) -> list[list[RunFinding]]:
+    """Findings of all runs. Each condition carries the same key in every run: a channel, or its family."""
+    findings: list[list[RunFinding]] = [[] for _ in runs]
     for family in _FAMILIES:
         ids = [s.id for s in runs[0].sensors if s.family == family and s.id in conditions[0]]
         rows = [[found[name] for name in ids] for found in conditions]
@@ -256,11 +258,13 @@ def marks_of(runs: Sequence[GapRun], conditions: Sequence[dict[str, Condition]])
             if family == "accelerometer" and name != "hum":
                 continue
             rms = noise if name in ("hum", "quantisation") else math.nan
-            for key, chosen in _who(family, ids, cells):
-                for run_marks, row in zip(marks, cells, strict=True):
-                    value, sd = _amount(name, [row[k] for k in chosen] if chosen else row)
-                    run_marks.append(Mark(f"{name}@{key}", *_WORDS[name][family], value, sd, family, rms))
-    return marks
+            for key, chosen in _attribute_condition(family, ids, cells):
+                for run_findings, row in zip(findings, cells, strict=True):
+                    value, sd = _median_with_sd(name, [row[k] for k in chosen] if chosen else row)
+                    run_findings.append(
+                        RunFinding(f"{name}@{key}", *_WORDS[name][family], value, sd, family, rms)
+                    )
+    return findings
 
 
 _WORDS: dict[str, dict[str, tuple[str, str]]] = {
@@ -275,7 +279,7 @@ _WORDS: dict[str, dict[str, tuple[str, str]]] = {
 }
 
 
-def _who(
+def _attribute_condition(
     family: str, ids: Sequence[str], cells: Sequence[Sequence[tuple[float, float, bool]]]
 ) -> list[tuple[str, list[int]]]:
     """(name, places) of who has a condition: one channel, or the family when several or none have it.
@@ -294,7 +298,7 @@ def _who(
     return [(family, having)]
 
 
-def _amount(name: str, cells: Iterable[tuple[float, float, bool]]) -> tuple[float, float]:
+def _median_with_sd(name: str, cells: Iterable[tuple[float, float, bool]]) -> tuple[float, float]:
     """(value, sd) over the channels chosen: their median, or nothing where none has it."""
     values = [(value, sd) for value, sd, seen in cells if seen]
     listed = list(cells) if not isinstance(cells, list) else cells

@@ -15,9 +15,9 @@ import numpy as np
 from scipy.optimize import nnls
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.features.oscillations.ring_signals import accelerations
 from daq_app.gap.rocking_model.features.oscillations.rings import Ring, cleaner, forced_column, ring_columns
+from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
 
@@ -57,8 +57,8 @@ class _HalfCycle:
 
 def floor_bursts(
     runs: Sequence[GapRun], grids: Sequence[Grid], survey: Survey, ring: Ring | None
-) -> list[list[Mark]]:
-    """Marks of the runs in which the floor shook for a while; no effect explains them.
+) -> list[list[RunFinding]]:
+    """Findings of the runs in which the floor shook for a while; no effect explains them.
 
     What is usual is said by all half-cycles of all runs: noise, and what an impact leaves, which grows with
     the jump of the speed. `ring` is the wall's bending after impacts, whose shape over the heights is not
@@ -66,22 +66,22 @@ def floor_bursts(
     """
     seen = [_half_cycles(run, grid, survey, ring) for run, grid in zip(runs, grids, strict=True)]
     known = [cycle for cycles in seen for cycle in cycles]
-    marks: list[list[Mark]] = [[] for _ in runs]
+    findings: list[list[RunFinding]] = [[] for _ in runs]
     if not known:
-        return marks
+        return findings
     together = np.concatenate([cycle.columns for cycle in known])
     rings = np.linalg.lstsq(together[:, 1:], together[:, 0], rcond=None)[0]
     floor, per_jump = _usual(
         np.array([cycle.jump for cycle in known]), np.array([cycle.power(rings) for cycle in known])
     )
-    for row, cycles in zip(marks, seen, strict=True):
+    for row, cycles in zip(findings, seen, strict=True):
         power = np.array([cycle.power(rings) for cycle in cycles])
         usual = floor + per_jump * np.array([cycle.jump for cycle in cycles]) ** 2
         excess, loud = _loudest(cycles, power, usual)
         if loud > LOUD:
             size = float(np.sqrt(max(excess, 0.0)))
-            row.append(Mark("shaking@floor", "burst of shaking", "m/s²", size, _SHARE_SD * size))
-    return marks
+            row.append(RunFinding("shaking@floor", "burst of shaking", "m/s²", size, _SHARE_SD * size))
+    return findings
 
 
 def _loudest(cycles: Sequence[_HalfCycle], power: FloatArray, usual: FloatArray) -> tuple[float, float]:

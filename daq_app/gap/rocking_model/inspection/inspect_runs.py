@@ -1,7 +1,7 @@
 """Before anything is fitted: wiring, electronics, single channels, ring-downs and the floor, over all runs.
 
 What is found is taken out of the families where it would spoil them. Conditions of the electronics become
-marks of the run; what channels, ring-downs and the floor show becomes blocks of features of its own.
+findings of the run; what channels, ring-downs and the floor show becomes blocks of features of its own.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from daq_app.config.rig import Family
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block, scalar_block
-from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.features.oscillations.floor_vibration import (
     Vibration,
     find_vibration,
@@ -25,12 +24,13 @@ from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal,
 from daq_app.gap.rocking_model.features.oscillations.rings import Ring, ring_block, scan, with_repeatability
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined, examine
-from daq_app.gap.rocking_model.inspection.channel_faults import channel_block, suspects
-from daq_app.gap.rocking_model.inspection.conditions import conditions_of, marks_of, without_hum
+from daq_app.gap.rocking_model.features.run_findings import RunFinding
+from daq_app.gap.rocking_model.inspection.channel_faults import channel_block, find_outlier_channels
+from daq_app.gap.rocking_model.inspection.conditions import conditions_of, findings_per_run, without_hum
 from daq_app.gap.rocking_model.inspection.floor_bursts import floor_bursts
+from daq_app.gap.rocking_model.inspection.quantisation import with_quantisation_errors
 from daq_app.gap.rocking_model.inspection.saturation import saturated
 from daq_app.gap.rocking_model.inspection.second_axis import second_axis
-from daq_app.gap.rocking_model.inspection.stairs import beside_stairs
 from daq_app.gap.rocking_model.inspection.vertical import odd_vertical, vertical_block
 from daq_app.gap.rocking_model.inspection.wiring import mend
 from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S
@@ -46,48 +46,48 @@ class Inspected:
     """Runs in which wiring and electronics are put right as far as they can be."""
 
     runs: list[GapRun]
-    marks: list[list[Mark]]
+    findings: list[list[RunFinding]]
     reference: str
     """``wire`` where the LVDTs are not fit to read the motion from, else empty."""
     wiring: Wiring
 
 
 def inspect(runs: Sequence[GapRun]) -> Inspected:
-    """Mend and mark. Raises nothing: what cannot be judged is left as it is."""
+    """Mend the wiring, inspect the electronics. Raises nothing: what cannot be judged is left as it is."""
     mended, wiring = mend(list(runs))
     mended = [run.excluding(wiring.reversed_ids) for run in mended]
     found = conditions_of(mended)
-    marks = marks_of(mended, found)
+    findings = findings_per_run(mended, found)
     # Readings that stand still or go in steps must be seen as they were; all else is put on one clock.
     clean = [without_hum(run, c).at_clock() for run, c in zip(mended, found, strict=True)]
     families: dict[str, Family] = {s.id: s.family for s in runs[0].sensors}
     single = {
-        mark.key.partition("@")[2]
-        for row in marks
-        for mark in row
-        if mark.value > 0 and _spoils(mark, families)
+        finding.key.partition("@")[2]
+        for row in findings
+        for finding in row
+        if finding.value > 0 and _spoils(finding, families)
     }
     clean = [run.excluding(single) for run in clean]
-    clean, limits = saturated(clean, _steps(marks))
-    marks = [[*row, *more] for row, more in zip(marks, limits, strict=True)]
+    clean, limits = saturated(clean, _steps(findings))
+    findings = [[*row, *more] for row, more in zip(findings, limits, strict=True)]
     clipped = {
-        mark.key.partition("@")[2]
+        finding.key.partition("@")[2]
         for row in limits
-        for mark in row
-        if mark.value > 0 and mark.key.partition("@")[2] in families
+        for finding in row
+        if finding.value > 0 and finding.key.partition("@")[2] in families
     }
     clean = [run.excluding(clipped) for run in clean]
-    marks = [[*row, *_wiring_marks(wiring, families)] for row in marks]
-    coarse_lvdts = any(m.key == "quantisation@lvdt" and m.value > 0 for row in marks for m in row)
-    return Inspected(clean, marks, "wire" if coarse_lvdts else "", wiring)
+    findings = [[*row, *_wiring_findings(wiring, families)] for row in findings]
+    coarse_lvdts = any(m.key == "quantisation@lvdt" and m.value > 0 for row in findings for m in row)
+    return Inspected(clean, findings, "wire" if coarse_lvdts else "", wiring)
 
 
-def _spoils(mark: Mark, families: dict[str, Family]) -> bool:
-    name, _, target = mark.key.partition("@")
+def _spoils(finding: RunFinding, families: dict[str, Family]) -> bool:
+    name, _, target = finding.key.partition("@")
     return name in _SPOILING and target in families
 
 
-def _wiring_marks(wiring: Wiring, families: dict[str, Family]) -> list[Mark]:
+def _wiring_findings(wiring: Wiring, families: dict[str, Family]) -> list[RunFinding]:
     """Counts of reversed and exchanged channels; the name says which, where there is one."""
     turned, crossed = wiring.reversed_ids, wiring.exchanged
     first = f"polarity@{turned[0]}" if len(turned) == 1 else "polarity"
@@ -99,8 +99,8 @@ def _wiring_marks(wiring: Wiring, families: dict[str, Family]) -> list[Mark]:
         if shown[b] != a or a < b
     ]
     return [
-        Mark(first, f"{', '.join(turned) or 'channels'} reversed", "1", float(len(turned)), COUNT_SD),
-        Mark(second, ", ".join(words) or "channels exchanged", "1", float(wiring.places), COUNT_SD),
+        RunFinding(first, f"{', '.join(turned) or 'channels'} reversed", "1", float(len(turned)), COUNT_SD),
+        RunFinding(second, ", ".join(words) or "channels exchanged", "1", float(wiring.places), COUNT_SD),
     ]
 
 
@@ -147,10 +147,10 @@ def _late(run: RockingRun) -> float:
     return delay if abs(delay) > LATE_S else 0.0
 
 
-def without_suspects(
-    examined: Sequence[Examined], marks: Sequence[Sequence[Mark]], reference: str
-) -> tuple[list[Examined], dict[str, Family], list[list[Mark]]]:
-    """The runs less the channels that disagree with their family; single ones; marks with the several.
+def without_outlier_channels(
+    examined: Sequence[Examined], findings: Sequence[Sequence[RunFinding]], reference: str
+) -> tuple[list[Examined], dict[str, Family], list[list[RunFinding]]]:
+    """The runs less the channels that disagree with their family; single ones; findings with the several.
 
     What a single one shows, an effect may explain. Several of one family have no one cause that the
     library knows: that they disagree is a finding that nothing explains, and not a reason to forget them.
@@ -158,7 +158,7 @@ def without_suspects(
     grids = [e.features.grid for e in examined]
     runs = [e.run for e in examined]
     along_z = odd_vertical(runs, grids, [_late(e.features) for e in examined])
-    found = suspects(runs, grids, _steps(marks)).plus("accelerometer", along_z)
+    found = find_outlier_channels(runs, grids, _steps(findings)).plus("accelerometer", along_z)
     again = _examined_without(examined, found.ids, reference)
     gross = _left_out(again).difference(found.ids)
     for name in sorted(gross):
@@ -166,11 +166,13 @@ def without_suspects(
     if gross:
         again = _examined_without(examined, found.ids, reference)
     more = [
-        Mark(f"disagreement@{family}", f"disagreement ({', '.join(names)})", "1", float(len(names)), COUNT_SD)
+        RunFinding(
+            f"disagreement@{family}", f"disagreement ({', '.join(names)})", "1", float(len(names)), COUNT_SD
+        )
         for family, names in found.several.items()
     ]
     turned = second_axis([e.run for e in again], [e.features.grid for e in again])
-    rows = [[*row, *more, *own] for row, own in zip(marks, turned, strict=True)]
+    rows = [[*row, *more, *own] for row, own in zip(findings, turned, strict=True)]
     return again, {name: family for family, name in found.single.items()}, rows
 
 
@@ -197,29 +199,29 @@ def _reads(values: FloatArray) -> bool:
     return bool(np.all(np.isfinite(values)))
 
 
-def _steps(marks: Sequence[Sequence[Mark]]) -> dict[str, float]:
+def _steps(findings: Sequence[Sequence[RunFinding]]) -> dict[str, float]:
     """Step of the reading, m, of the families and channels that go in steps."""
     seen: dict[str, list[float]] = {}
-    for mark in (mark for row in marks for mark in row):
-        if mark.key.startswith("quantisation") and mark.value > 0:
-            seen.setdefault(mark.key.partition("@")[2], []).append(mark.value)
+    for finding in (finding for row in findings for finding in row):
+        if finding.key.startswith("quantisation") and finding.value > 0:
+            seen.setdefault(finding.key.partition("@")[2], []).append(finding.value)
     return {target: float(np.median(values)) for target, values in seen.items()}
 
 
 def completed(
     examined: Sequence[Examined],
-    marks: Sequence[Sequence[Mark]],
+    findings: Sequence[Sequence[RunFinding]],
     channels: dict[str, Family],
     wiring: Wiring,
 ) -> list[RockingRun]:
-    """Features of all runs with the blocks and marks of what was inspected over all of them.
+    """Features of all runs with the blocks and findings of what was inspected over all of them.
 
     Bursts of the floor are looked for once its even vibration is out of the accelerometers.
     """
     grids = [e.features.grid for e in examined]
     height = examined[0].features.survey.height_m
     more: list[list[Block]] = [[] for _ in examined]
-    steps = _steps(marks)
+    steps = _steps(findings)
     for row, entry in zip(more, examined, strict=True):
         for name, family in channels.items():
             grid = entry.features.grid
@@ -240,10 +242,10 @@ def completed(
         examined[0].features.survey,
         bending,
     )
-    marks = [[*row, *own] for row, own in zip(marks, bursts, strict=True)]
+    findings = [[*row, *own] for row, own in zip(findings, bursts, strict=True)]
     runs = []
-    known = beside_stairs(examined, steps)
-    for row, entry, vibration, seen, read in zip(more, examined, vibrations, marks, known, strict=True):
+    known = with_quantisation_errors(examined, steps)
+    for row, entry, vibration, seen, read in zip(more, examined, vibrations, findings, known, strict=True):
         grid = entry.features.grid
         if vibration is not None:
             shown = vibration.amplitude if vibration.found else 0.0
@@ -257,7 +259,7 @@ def completed(
         families: dict[str, str] = {s.id: s.family for s in entry.run.sensors}
         families |= {family: family for family in _FAMILIES}
         named = tuple(replace(m, family=families.get(m.key.partition("@")[2], "")) for m in seen)
-        features = replace(read, vibration=vibration, wiring=wiring, marks=named)
+        features = replace(read, vibration=vibration, wiring=wiring, findings=named)
         runs.append(features.with_blocks(row))
     return runs
 
@@ -310,6 +312,6 @@ def calibrations(runs: Sequence[RockingRun]) -> dict[str, dict[str, float]]:
     }
 
 
-def found_marks(runs: Sequence[RockingRun]) -> dict[str, str]:
+def conditions_found(runs: Sequence[RockingRun]) -> dict[str, str]:
     """Conditions of the electronics that are there in any run, with the family of their channels."""
-    return {mark.key: mark.family for run in runs for mark in run.marks if mark.value > 0.0}
+    return {finding.key: finding.family for run in runs for finding in run.findings if finding.value > 0.0}

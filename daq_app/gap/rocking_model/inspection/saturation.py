@@ -10,7 +10,7 @@ import numpy as np
 
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.marks import Mark
+from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.motion.late_joint import lateness
 from daq_app.gap.rocking_model.motion.rotation import (
     GRID_HZ,
@@ -28,13 +28,13 @@ _OTHER: dict[Family, Family] = {"lvdt": "wire", "wire": "lvdt"}
 
 def saturated(
     runs: Sequence[GapRun], steps: Mapping[str, float] = MappingProxyType({})
-) -> tuple[list[GapRun], list[list[Mark]]]:
-    """Runs with the ranges that the channels really have, and a mark per family: 1/limit, 0 for no limit.
+) -> tuple[list[GapRun], list[list[RunFinding]]]:
+    """Runs with the ranges that the channels really have, and a finding per family: 1/limit, 0 for no limit.
 
     `steps` are those, m, of families and channels whose reading goes in steps: their tops are flat for that.
     """
     rotations = {family: [_rotation(run, family) for run in runs] for family in _OTHER}
-    marks: list[list[Mark]] = [[] for _ in runs]
+    findings: list[list[RunFinding]] = [[] for _ in runs]
     limits: dict[str, float] = {}
     for family, other in _OTHER.items():
         ids = [runs[0].sensors[i].id for i in runs[0].indices(family)]
@@ -68,13 +68,13 @@ def saturated(
         # Where several clip, those that travel furthest stand for them; zeros differ, so their middle does.
         furthest = max((limits[ids[k]] for k in clipped), default=0.0)
         chosen = [k for k in clipped if limits[ids[k]] > 0.9 * furthest]
-        for run_marks, row in zip(marks, table, strict=True):
+        for run_findings, row in zip(findings, table, strict=True):
             seen = [row[k, 0] for k in chosen if row[k, 0] > 0.0]
             usual = float(np.median(row[chosen or slice(None), 1])) if len(ids) else 0.0
             limit = float(np.median(seen)) if seen else 0.0
             value, sd = (1.0 / limit, LIMIT_SD / limit) if limit else (0.0, 0.6 / max(usual, 1e-6))
-            run_marks.append(Mark(f"saturation@{key}", "inverse of the limit", "1/m", value, sd))
-    return [_narrowed(run, limits) for run in runs], marks
+            run_findings.append(RunFinding(f"saturation@{key}", "inverse of the limit", "1/m", value, sd))
+    return [_narrowed(run, limits) for run in runs], findings
 
 
 def _narrowed(run: GapRun, limits: dict[str, float]) -> GapRun:

@@ -7,28 +7,28 @@ from collections.abc import Sequence
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.marks import Mark
 from daq_app.gap.rocking_model.features.response import first_order
+from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import coarse, zeroed
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.tolerances import MOUNT_SD, TURNED
 
 
-def second_axis(runs: Sequence[GapRun], grids: Sequence[Grid]) -> list[list[Mark]]:
-    """Marks of the second axes that follow the rotation by more than a mount is turned, run by run.
+def second_axis(runs: Sequence[GapRun], grids: Sequence[Grid]) -> list[list[RunFinding]]:
+    """Findings of the second axes that follow the rotation by more than a mount is turned, run by run.
 
     No effect explains them: another signal gets into that channel, or the instrument is badly mounted.
     """
-    marks: list[list[Mark]] = [[] for _ in runs]
+    findings: list[list[RunFinding]] = [[] for _ in runs]
     for place in runs[0].indices("tiltmeter", "y"):
         shares = [_share(run, grid, place) for run, grid in zip(runs, grids, strict=True)]
         if abs(float(np.median(shares))) <= TURNED:
             continue
         key = f"crossed@{runs[0].sensors[place].id}"
-        for row, share in zip(marks, shares, strict=True):
-            row.append(Mark(key, "share of the rotation", "1", abs(share), MOUNT_SD))
-    return marks
+        for row, share in zip(findings, shares, strict=True):
+            row.append(RunFinding(key, "share of the rotation", "1", abs(share), MOUNT_SD))
+    return findings
 
 
 def _share(run: GapRun, grid: Grid, place: int) -> float:

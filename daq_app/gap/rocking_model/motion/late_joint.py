@@ -36,7 +36,7 @@ def lateness(mine: FloatArray, other: FloatArray) -> float:
     It is where the correlation of the rates is largest, to which flat tops add nothing.
     """
     most = round(MOST_LATE_S * GRID_HZ)
-    return _largest(_alike(mine, other, most))
+    return _largest(_correlation(mine, other, most))
 
 
 def common_lateness(mine: FloatArray, other: FloatArray, rate_hz: float) -> float:
@@ -49,23 +49,25 @@ def common_lateness(mine: FloatArray, other: FloatArray, rate_hz: float) -> floa
         float(np.gradient(y) @ np.gradient(y)) * float(np.gradient(e) @ np.gradient(e)) for y, e in pairs
     ]
     return _largest(
-        np.sum([_alike(y, e, most) ** 2 / own for (y, e), own in zip(pairs, power, strict=True)], axis=0)
+        np.sum(
+            [_correlation(y, e, most) ** 2 / own for (y, e), own in zip(pairs, power, strict=True)], axis=0
+        )
     )
 
 
-def _alike(mine: FloatArray, other: FloatArray, most: int) -> FloatArray:
+def _correlation(mine: FloatArray, other: FloatArray, most: int) -> FloatArray:
     """Correlation of the rates for delays of −`most` to `most` samples."""
     rates = np.gradient(mine), np.gradient(other)
     inner = slice(most, mine.size - most)
     return np.array([float(rates[0][inner] @ np.roll(rates[1], k)[inner]) for k in range(-most, most + 1)])
 
 
-def _largest(alike: FloatArray) -> float:
+def _largest(correlation: FloatArray) -> float:
     """Place of the maximum from the middle, by a parabola through it and its neighbours."""
-    k = min(max(int(np.argmax(alike)), 1), alike.size - 2)
-    bend = float(alike[k - 1] - 2.0 * alike[k] + alike[k + 1])
-    between = 0.5 * float(alike[k - 1] - alike[k + 1]) / bend if bend < 0.0 else 0.0
-    return k - alike.size // 2 + between
+    k = min(max(int(np.argmax(correlation)), 1), correlation.size - 2)
+    bend = float(correlation[k - 1] - 2.0 * correlation[k] + correlation[k + 1])
+    between = 0.5 * float(correlation[k - 1] - correlation[k + 1]) / bend if bend < 0.0 else 0.0
+    return k - correlation.size // 2 + between
 
 
 def in_step(joint: Rotation, grid: Grid, rate_hz: float) -> InStep:

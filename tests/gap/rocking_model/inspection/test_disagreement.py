@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from daq_app.gap.rocking_model.findings import findings_of
-from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels, found_marks
+from daq_app.gap.rocking_model.inspection.inspect_runs import conditions_found, found_channels
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import diagnose_runs, model_and_library, prepare
 from tests.support.simulated_wall import simulate
@@ -35,7 +35,7 @@ def test_several_channels_of_one_family_that_disagree_are_named_together(factors
     prepared, _ = prepare(_scaled(factors))
     family = "lvdt" if "LV-A03" in factors else "accelerometer"
     assert found_channels(prepared) == {}
-    assert found_marks(prepared) == {f"disagreement@{family}": family}
+    assert conditions_found(prepared) == {f"disagreement@{family}": family}
     (finding,) = findings_of(prepared)
     assert all(name in finding.words for name in factors)
     wires = next(b for b in prepared[0].blocks if b.family == "wire")
@@ -51,7 +51,7 @@ def test_a_second_axis_that_follows_the_rotation_is_marked() -> None:
         run.channels[place["TL-1Y"]] += 0.08 * run.channels[place["TL-1X"]]
         run.channels[place["TL-2Y"]] += 0.01 * run.channels[place["TL-2X"]]
     prepared, _ = prepare(runs)
-    assert found_marks(prepared) == {"crossed@TL-1Y": "tiltmeter"}
+    assert conditions_found(prepared) == {"crossed@TL-1Y": "tiltmeter"}
     (finding,) = findings_of(prepared)
     assert "TL-1Y" in finding.words
     assert finding.size == pytest.approx(0.08, abs=0.01)
@@ -71,8 +71,8 @@ def _shaken(amplitude_m_s2: float) -> list[GapRun]:
 
 def test_a_burst_of_shaking_is_found_in_the_run_that_has_it() -> None:
     prepared, _ = prepare(_shaken(0.1))
-    marks = [found_marks([run]) for run in prepared]
-    assert marks == [{"shaking@floor": ""}, {}]
+    findings = [conditions_found([run]) for run in prepared]
+    assert findings == [{"shaking@floor": ""}, {}]
     (finding,) = findings_of(prepared)
     assert "burst of shaking" in finding.words
     assert finding.where == "1 of 2 runs"

@@ -12,7 +12,7 @@ from daq_app.gap.rocking_model.features.coefficients import block_coefficients
 from daq_app.gap.rocking_model.features.oscillations.rings import ring_columns
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.findings import findings_of
-from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels, found_marks
+from daq_app.gap.rocking_model.inspection.inspect_runs import conditions_found, found_channels
 from daq_app.gap.rocking_model.inspection.saturation import saturated
 from daq_app.gap.rocking_model.inspection.wiring import mend
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
@@ -40,7 +40,7 @@ def _prepared(effects: dict[str, dict[str, float]], levels: tuple[float, ...] = 
 
 
 def _mark(run: RockingRun, name: str) -> float:
-    return next(mark.value for mark in run.marks if mark.key == name)
+    return next(finding.value for finding in run.findings if finding.key == name)
 
 
 def _words(runs: list[RockingRun]) -> str:
@@ -58,7 +58,7 @@ def healthy() -> list[RockingRun]:
 
 
 def test_healthy_runs_carry_no_mark_and_no_suspect(healthy: list[RockingRun]) -> None:
-    assert found_marks(healthy) == {}
+    assert conditions_found(healthy) == {}
     assert found_channels(healthy) == {}
     _, library = model_and_library(healthy)
     assert "ambient" not in library, "no vibration of the floor is seen, so none can explain anything"
@@ -74,7 +74,7 @@ def test_electronics_are_named_by_channel_with_their_size(healthy: list[RockingR
             "quantisation@LV-A09": {"step": 1e-3},
         }
     )
-    assert set(found_marks(runs)) == {
+    assert set(conditions_found(runs)) == {
         "polarity@LV-B06",
         "hum@WP-2",
         "dropout@LV-A02",
@@ -85,7 +85,7 @@ def test_electronics_are_named_by_channel_with_their_size(healthy: list[RockingR
         assert _mark(run, "dropout@LV-A02") == pytest.approx(0.06, abs=0.06)
         assert _mark(run, "quantisation@LV-A09") == pytest.approx(1e-3, rel=0.05)
     # A sound channel never freezes: each run's share counts against how well it is read off that run.
-    frozen = next(mark for mark in runs[0].marks if mark.key == "dropout@LV-A02")
+    frozen = next(finding for finding in runs[0].findings if finding.key == "dropout@LV-A02")
     assert frozen.sd < 0.02 * 0.06 + 1e-3
     for run, clean in zip(runs, healthy, strict=True):
         assert run.swings.peak_rad[1] == pytest.approx(clean.swings.peak_rad[1], rel=1e-3)
@@ -97,12 +97,12 @@ def test_a_wall_that_dwells_upright_under_a_coarse_converter_is_no_wire_that_fre
     for run in runs:
         for i in run.indices("wire"):
             run.channels[i] = np.round(run.channels[i] / 5.9e-4) * 5.9e-4
-    assert not any("dropout" in mark for mark in found_marks(prepare(runs)[0]))
+    assert not any("dropout" in finding for finding in conditions_found(prepare(runs)[0]))
 
 
 def test_a_channel_with_far_more_pick_up_than_its_family_stands_for_itself() -> None:
     runs = _prepared({"hum@wire": {"amplitude": 2e-4}, "hum@WP-2": {"amplitude": 8e-4}})
-    assert set(found_marks(runs)) == {"hum@wire", "hum@WP-2"}
+    assert set(conditions_found(runs)) == {"hum@wire", "hum@WP-2"}
     for run in runs:
         assert _mark(run, "hum@wire") == pytest.approx(2e-4, rel=0.2)
         assert _mark(run, "hum@WP-2") > 5e-4
@@ -116,7 +116,7 @@ def test_exchanged_plugs_are_put_back() -> None:
     for run in plain:
         _exchange(run, "WP-1", "WP-4")
     crossed, _ = prepare(plain)
-    assert set(found_marks(crossed)) == {"swap@wire"}
+    assert set(conditions_found(crossed)) == {"swap@wire"}
     assert abs(_value(crossed[0], "wire", "gain")) < 5e-3
     assert "WP-1 and WP-4 exchanged" in _words(crossed)
 
@@ -147,7 +147,7 @@ def test_accelerometers_along_z_that_are_exchanged_are_put_back() -> None:
     for run in plain:
         _exchange(run, "AC-7", "AC-8")
     crossed, _ = prepare(plain)
-    assert set(found_marks(crossed)) == {"swap@accelerometer"}
+    assert set(conditions_found(crossed)) == {"swap@accelerometer"}
     assert "AC-7 and AC-8 exchanged" in _words(crossed)
 
 
@@ -162,7 +162,7 @@ def test_plugs_that_are_all_moved_on_are_put_back(target: str, places: float, wo
     """Two wires of one height show the same: which of these is which stays open, and needs no answer."""
     key = f"swap@{target}"
     crossed, _ = prepare(simulate({key: {"places": places}}, ONE))
-    assert set(found_marks(crossed)) == {key}
+    assert set(conditions_found(crossed)) == {key}
     assert _mark(crossed[0], key) == places
     assert abs(_value(crossed[0], "wire", "gain")) < 5e-3
     assert words in _words(crossed)
@@ -175,7 +175,7 @@ def test_a_channel_that_shows_no_sensor_of_its_kind_does_not_hide_exchanged_plug
         _exchange(run, "WP-1", "WP-4")
         run.channels[place["WP-3"]] *= 4.0
     crossed, _ = prepare(runs)
-    assert "swap@wire" in found_marks(crossed)
+    assert "swap@wire" in conditions_found(crossed)
     assert "WP-1 and WP-4 exchanged" in _words(crossed)
 
 
@@ -206,7 +206,7 @@ def test_a_drift_of_one_channel_is_no_curvature_of_its_family() -> None:
 def test_steps_of_all_wires_are_no_fault_of_one() -> None:
     """At rest such a reading shows no step, and in motion the same ones in every half-cycle."""
     runs = _prepared({"quantisation@wire": {"step": 7e-3}})
-    assert set(found_marks(runs)) == {"quantisation@wire"}
+    assert set(conditions_found(runs)) == {"quantisation@wire"}
     assert found_channels(runs) == {}
 
 
@@ -220,13 +220,13 @@ def test_an_lvdt_that_steps_out_of_time_with_its_face_is_no_fault() -> None:
             zero = run.channels[i, -600:].mean()
             run.channels[i] = np.round(gain * (run.channels[i] - zero) / step) * step
     prepared = prepare(runs)[0]
-    assert set(found_marks(prepared)) == {"quantisation@lvdt"}
+    assert set(conditions_found(prepared)) == {"quantisation@lvdt"}
     assert found_channels(prepared) == {}
 
 
 def test_a_family_that_stops_short_of_its_range_is_found_and_the_motion_read_elsewhere() -> None:
     runs = _prepared({"saturation@lvdt": {"limit": 0.04}})
-    assert set(found_marks(runs)) == {"saturation@lvdt"}
+    assert set(conditions_found(runs)) == {"saturation@lvdt"}
     by_amplitude = sorted(runs, key=lambda run: abs(run.swings.peak_rad[0]))
     assert 1.0 / _mark(by_amplitude[-1], "saturation@lvdt") == pytest.approx(0.04, rel=0.03)
     assert by_amplitude[-1].reference == "wire"
@@ -240,7 +240,7 @@ def test_a_limit_is_found_where_the_other_side_travels_further_from_a_zero_that_
     other_way = 0.155 / float(np.abs(raw[-400:].mean() - raw.min()))
     centred = raw - raw[-400:].mean()
     runs[0].channels[place] = np.minimum(np.where(centred < 0, other_way * centred, centred) + 0.02, 0.17)
-    assert set(found_marks(prepare(runs)[0])) == {"saturation@WP-4"}
+    assert set(conditions_found(prepare(runs)[0])) == {"saturation@WP-4"}
 
 
 @pytest.mark.parametrize("fault", [{"lag@lvdt": {"tau": 0.049}}, {"slow_response@wire": {"tau": 0.047}}])
@@ -248,8 +248,8 @@ def test_a_family_that_comes_late_does_not_make_the_other_stop_short(
     fault: dict[str, dict[str, float]],
 ) -> None:
     """Held against a rotation that has not begun to fall, a channel seems to stand still at its top."""
-    _, marks = saturated(simulate(fault, (0.4,)))
-    assert [mark.value for mark in marks[0]] == [0.0, 0.0]
+    _, findings = saturated(simulate(fault, (0.4,)))
+    assert [finding.value for finding in findings[0]] == [0.0, 0.0]
 
 
 def test_what_ends_one_face_ends_the_other_that_hardly_gets_there() -> None:
@@ -258,8 +258,8 @@ def test_what_ends_one_face_ends_the_other_that_hardly_gets_there() -> None:
     rest = plain.channels[plain.indices("lvdt"), -400:].mean(axis=1, keepdims=True)
     tops = (plain.channels[plain.indices("lvdt")] - rest).max(axis=1)
     second = min(tops[:12].max(), tops[12:].max())
-    (run,), marks = saturated(simulate({"saturation@lvdt": {"limit": 0.98 * second}}, (0.4,)))
-    assert 1.0 / marks[0][0].value == pytest.approx(0.98 * second, rel=0.01)
+    (run,), findings = saturated(simulate({"saturation@lvdt": {"limit": 0.98 * second}}, (0.4,)))
+    assert 1.0 / findings[0][0].value == pytest.approx(0.98 * second, rel=0.01)
     ends = {run.sensors[i].id: run.sensors[i].range_si[1] for i in run.indices("lvdt")}
     assert len(ends) == 24
     assert max(ends.values()) < 0.99 * second
@@ -268,8 +268,8 @@ def test_what_ends_one_face_ends_the_other_that_hardly_gets_there() -> None:
 def test_wires_that_drift_do_not_make_lvdts_stop_short() -> None:
     """1.3 mrad in all of a record, and a hop of the wall at each impact."""
     fault = {"drift@wire": {"rate": -2.4e-3}, "bounce": {"tau": 0.0095}}
-    _, marks = saturated(simulate(fault, (0.4,)))
-    assert [mark.value for mark in marks[0]] == [0.0, 0.0]
+    _, findings = saturated(simulate(fault, (0.4,)))
+    assert [finding.value for finding in findings[0]] == [0.0, 0.0]
 
 
 def test_one_channel_with_another_gain_is_examined_on_its_own() -> None:
@@ -291,7 +291,7 @@ def test_a_very_slow_lvdt_at_the_end_of_its_row_is_told_from_its_neighbours() ->
     """It moves what three others are predicted by more than it leaves of its own fault."""
     runs = _prepared({"slow_response@LV-A12": {"tau": 0.03}, "base_tilt": {"beta": 0.0024}})
     assert found_channels(runs) == {"LV-A12": "lvdt"}
-    assert found_marks(runs) == {}
+    assert conditions_found(runs) == {}
 
 
 def test_a_wire_that_is_half_a_millisecond_late_is_examined_on_its_own() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from daq_app.gap.core import Alike, Confusion, Effect, Library, Options, diagnose
+from daq_app.gap.core import Confusion, Effect, Indistinguishable, Library, Options, diagnose
 from daq_app.gap.core.judging.evidence import Ranked, answers, credible_set
 from daq_app.gap.core.parameters import signed
 from daq_app.gap.rocking_model.library import rocking_library
@@ -19,7 +19,7 @@ SLOPE = Effect(
     confusable_with=(Confusion("twin", "nothing of use"),),
 )
 TWIN = Effect("twin", "loss", (signed("k", 0.1),), "same", "test")
-SAME = Alike(("slope", "twin"), "the same equation", "a torque sensor at the hinge")
+SAME = Indistinguishable(("slope", "twin"), "the same equation", "a torque sensor at the hinge")
 EFFECTS = (SLOPE, TWIN, LIBRARY["shift"])
 
 
@@ -70,11 +70,11 @@ def test_the_set_holds_classes_and_the_likeliest_class_comes_first() -> None:
 
 
 def test_alike_effects_must_be_there_and_in_one_class_only() -> None:
-    with pytest.raises(ValueError, match="kick is said to be alike"):
-        Library(EFFECTS, (Alike(("slope", "kick"), "", ""),))
-    with pytest.raises(ValueError, match="slope is said to be alike"):
-        Library(EFFECTS, (SAME, Alike(("slope", "shift"), "", "")))
-    assert Library(EFFECTS, (SAME,)).without("twin").alike == ()
+    with pytest.raises(ValueError, match="kick is in a group of indistinguishable"):
+        Library(EFFECTS, (Indistinguishable(("slope", "kick"), "", ""),))
+    with pytest.raises(ValueError, match="slope is in a group of indistinguishable"):
+        Library(EFFECTS, (SAME, Indistinguishable(("slope", "shift"), "", "")))
+    assert Library(EFFECTS, (SAME,)).without("twin").groups == ()
 
 
 def test_only_what_levels_and_sensors_cannot_separate_is_alike() -> None:
@@ -82,4 +82,4 @@ def test_only_what_levels_and_sensors_cannot_separate_is_alike() -> None:
     assert library.class_of(["eccentric_mass", "viscous"]) == ("base_tilt", "viscous")
     assert library.class_of(["filter_delay@WP-1"]) == ("lag@WP-1",)
     for name in ("pivot_shift", "rounded_edge", "dwell", "bounce", "slow_response@wire"):
-        assert library.alike_to(name) is None
+        assert library.indistinguishable_from(name) is None

@@ -13,11 +13,11 @@ EFFECT_SIZES: dict[str, str] = {
     "polarity": "on",
     "swap": "places",
 }
-"""Effect behind a mark, and the parameter that is its size."""
+"""Effect behind a finding, and the parameter that is its size."""
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class RunFinding:
     """One condition of one channel or family in one run: 0 ± sd on a healthy one."""
 
     key: str

@@ -27,7 +27,7 @@ WITHIN = 6
 """Instants in each interval of the grid: a wire passes a step of some millimetres in one interval."""
 
 
-def beside_stairs(examined: Sequence[Examined], steps: Mapping[str, float]) -> list[RockingRun]:
+def with_quantisation_errors(examined: Sequence[Examined], steps: Mapping[str, float]) -> list[RockingRun]:
     """The features of all runs with what steps, m, of whole families add to the errors of their blocks."""
     runs = [entry.features for entry in examined]
     for family in ("wire", "lvdt"):
