@@ -19,5 +19,5 @@ def result_path(runs: Sequence[Path]) -> Path:
 
 def newest_result(folder: Path) -> Path | None:
     """The result in a folder that was written last."""
-    found = sorted(folder.glob(f"*{SUFFIX}"), key=lambda path: path.stat().st_mtime)
-    return found[-1] if found else None
+    files = sorted(folder.glob(f"*{SUFFIX}"), key=lambda path: path.stat().st_mtime)
+    return files[-1] if files else None

@@ -101,14 +101,14 @@ def traces(result: Diagnosis, runs: Sequence[GapRun], most: int = 2) -> list[Tra
 
     Runs that cannot be followed (no motion, channels that reach their range) are passed over.
     """
-    found = []
+    traced = []
     for run in runs:
         try:
-            found.append(_rotations(run, result))
+            traced.append(_rotations(run, result))
         except CannotDiagnose:
             continue
-    found.sort(key=lambda entry: -abs(float(entry[1].peak_rad[0])))
-    chosen = found if len(found) <= most else [*found[: most - 1], found[-1]]
+    traced.sort(key=lambda entry: -abs(float(entry[1].peak_rad[0])))
+    chosen = traced if len(traced) <= most else [*traced[: most - 1], traced[-1]]
     return [_trace(result, *entry) for entry in chosen]
 
 
@@ -239,9 +239,9 @@ def _follow(
 
     def misfit(u: FloatArray) -> FloatArray:
         followed = simulate(u)
-        found = followed.motion.impact_time_s[followed.motion.impact_kind == 0][: impacts_s.size]
+        impacts = followed.motion.impact_time_s[followed.motion.impact_kind == 0][: impacts_s.size]
         late = np.full(impacts_s.size, 0.1)  # an impact that the simulation never comes to
-        late[: found.size] = found + followed.delay_s - impacts_s[: found.size]
+        late[: impacts.size] = impacts + followed.delay_s - impacts_s[: impacts.size]
         theta, speed, _ = followed.motion.evaluate(first_fall[0] - followed.delay_s)
         fall = (theta - first_fall[1]) / np.maximum(np.abs(speed), 0.02)
         return np.concatenate([late / _TIME_SD_S, fall / _TIME_SD_S, u])

@@ -89,15 +89,15 @@ def cause_in_words(effect: str, estimates: Mapping[str, Interval], otherwise: st
         return otherwise or effect.replace("_", " ")
     phrase = phrase.replace("{target}", _SENSORS.get(target, target) or "a channel")
     for parameter, unit in re.findall(r"\{(\w+)\|([^}]*)\}", phrase):
-        found = estimates.get(f"{effect}.{parameter}", estimates.get(parameter))
-        size = "an unknown amount" if found is None else with_interval(*found, unit)
+        estimate = estimates.get(f"{effect}.{parameter}", estimates.get(parameter))
+        size = "an unknown amount" if estimate is None else with_interval(*estimate, unit)
         phrase = phrase.replace(f"{{{parameter}|{unit}}}", size)
     return phrase
 
 
 def causes_in_words(causes: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
     """The material causes of a result (`causes` of its JSON), each with what it closes alone."""
-    said = []
+    sentences = []
     for cause in causes:
         if not cause["material"]:
             continue
@@ -105,8 +105,8 @@ def causes_in_words(causes: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
         words = cause_in_words(cause["name"], sizes, cause["words"])
         closes = cause["closes"]
         known = closes is not None and math.isfinite(closes)
-        said.append(f"{words} (closes {100.0 * closes:.0f} % of the gap alone)" if known else words)
-    return tuple(said)
+        sentences.append(f"{words} (closes {100.0 * closes:.0f} % of the gap alone)" if known else words)
+    return tuple(sentences)
 
 
 def with_interval(value: float, low: float, high: float, unit: str) -> str:

@@ -213,13 +213,13 @@ def plan_to_dict(plan: TaskPlan) -> dict[str, Any]:
 
 def software_versions() -> dict[str, str]:
     """Versions of this program and of what it stands on, for `RunHeader.versions`."""
-    found = {"python": platform.python_version(), "platform": platform.platform()}
+    versions = {"python": platform.python_version(), "platform": platform.platform()}
     for package in ("rocking-test-recorder", "nidaqmx", "numpy", "h5py"):
         try:
-            found[package] = version(package)
+            versions[package] = version(package)
         except PackageNotFoundError:
-            found[package] = "not installed as a package"
-    return found
+            versions[package] = "not installed as a package"
+    return versions
 
 
 def host_name() -> str:

@@ -59,24 +59,24 @@ def recover_job(journal: Path) -> Finished:
     from daq_app.acquisition.closing.derive import derive
     from daq_app.runfile import recover
 
-    (found,) = recover(journal, derive=lambda contents: derive(contents)[0])
-    if found.outcome == "in use":
+    (recovery,) = recover(journal, derive=lambda contents: derive(contents)[0])
+    if recovery.outcome == "in use":
         return Finished(True, "")
-    if found.outcome in ("recovered", "saved already", "empty"):
+    if recovery.outcome in ("recovered", "saved already", "empty"):
         _put_away(journal)
-    text = "" if found.outcome == "saved already" else found.text
-    return Finished(found.outcome != "failed", text, str(found.run or ""))
+    text = "" if recovery.outcome == "saved already" else recovery.text
+    return Finished(recovery.outcome != "failed", text, str(recovery.run or ""))
 
 
 def ring_job(place: Path, out: Path) -> Finished:
     """Look at a ring that was left behind; a release in it becomes a run."""
     from daq_app.acquisition.closing.ring_recovery import recover_ring
 
-    found = recover_ring(place, out)
-    if not found.path:
-        return found
-    made = recover_job(Path(found.path))
-    return Finished(made.ok, f"{found.text}. {made.text}", made.path)
+    kept = recover_ring(place, out)
+    if not kept.path:
+        return kept
+    made = recover_job(Path(kept.path))
+    return Finished(made.ok, f"{kept.text}. {made.text}", made.path)
 
 
 def _do(job: dict[str, str]) -> Finished:

@@ -141,9 +141,9 @@ class _Reader(threading.Thread):
 
     def line(self, pipe: IO[str], timeout_s: float) -> str:
         """The line of `pipe`, empty if it has ended; raises `queue.Empty` where there is none yet."""
-        while (found := self._lines.get(timeout=timeout_s))[0] is not pipe:
+        while (line_of_pipe := self._lines.get(timeout=timeout_s))[0] is not pipe:
             pass  # of a worker that was given up
-        return found[1]
+        return line_of_pipe[1]
 
 
 class _Worker:

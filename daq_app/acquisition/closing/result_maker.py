@@ -44,9 +44,9 @@ class ResultMaker(threading.Thread):
     def run(self) -> None:
         """Until `close`."""
         while (run := self._runs.get()) is not None:
-            ok, said = self._made(run)
+            ok, text = self._made(run)
             self._waiting -= 1
-            self._told(run, ok, said)
+            self._told(run, ok, text)
 
     def close(self, grace_s: float) -> None:
         """Finish what was asked for if that takes no longer than `grace_s`; `recover` makes the rest."""
@@ -71,7 +71,7 @@ class ResultMaker(threading.Thread):
             slow = psutil.BELOW_NORMAL_PRIORITY_CLASS if sys.platform == "win32" else 10
             psutil.Process(process.pid).nice(slow)
         assert process.stdout is not None
-        said = process.stdout.read().strip()
+        text = process.stdout.read().strip()
         code = process.wait()
         end_guarded(process)
-        return code == 0, said
+        return code == 0, text

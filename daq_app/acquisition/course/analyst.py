@@ -110,14 +110,14 @@ class Analyst(threading.Thread):
             self.voice.repeat()
 
     def _tell_fault(self, error: Exception) -> None:
-        said = f"{type(error).__name__}: {error}"
-        if said == self._fault:
+        fault = f"{type(error).__name__}: {error}"
+        if fault == self._fault:
             return
-        self._fault = said
+        self._fault = fault
         self._note(
             "analysis",
-            f"A step of the analysis failed ({said}). Recording goes on; stop by hand if the end of the test "
-            "is not noticed, and please report this",
+            f"A step of the analysis failed ({fault}). Recording goes on; stop by hand if the end of the "
+            "test is not noticed, and please report this",
             "error",
         )
 

@@ -57,13 +57,13 @@ def check_name(test: str) -> str:
 
 def check_modules(rig: Rig, devices: Sequence[DeviceInfo]) -> list[str]:
     """One sentence for each module that is not what the rig file says; empty if all are."""
-    found = {device.name: device for device in devices}
+    device_by_name = {device.name: device for device in devices}
     wrong = []
     for chassis in rig.hardware.chassis:
         bus = catalogue.chassis(chassis.product, own_products(rig.hardware).chassis).bus
         for module in chassis.modules:
             name = module.name or catalogue.device_name(chassis.name, bus, module.slot)
-            device = found.get(name)
+            device = device_by_name.get(name)
             if device is None:
                 continue  # no channel uses it, so it was not opened
             if sentence := wrong_module(name, module, device):

@@ -172,5 +172,5 @@ def ring_sessions(folder: Path) -> list[Path]:
     root = folder / FOLDER
     if not root.is_dir() or root.is_symlink():
         return []
-    found = [path for path in root.iterdir() if path.is_dir() and not path.is_symlink()]
-    return sorted(found, key=lambda path: path.stat().st_mtime_ns)
+    sessions = [path for path in root.iterdir() if path.is_dir() and not path.is_symlink()]
+    return sorted(sessions, key=lambda path: path.stat().st_mtime_ns)

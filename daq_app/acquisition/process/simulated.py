@@ -50,9 +50,9 @@ class SimulatedServer:
         wait_for_start(self._ready, self._process.pid, lambda text: None)
         if not self._port:
             self.close()
-            said = " ".join(self._said) or "it said nothing"
+            output = " ".join(self._said) or "it said nothing"
             raise DriverError(
-                f"The simulated device server did not start ({said})",
+                f"The simulated device server did not start ({output})",
                 advice="Start it by hand to see why: python -m sim_hardware.daqmx_server --config RIG.toml",
             )
         return f"grpc://127.0.0.1:{self._port}"

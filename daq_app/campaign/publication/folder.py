@@ -46,7 +46,7 @@ def sources(folder: Path) -> tuple[list[Source], list[str]]:
     Raises what `verdicts_of` raises.
     """
     verdicts: Mapping[str, OperatorVerdict] = verdicts_of(folder)
-    found, left_out = [], []
+    usable, left_out = [], []
     for path in find_runs(folder):
         try:
             with open_run(path) as run:
@@ -55,8 +55,8 @@ def sources(folder: Path) -> tuple[list[Source], list[str]]:
             left_out.append(f"{path.name}: {error}")
             continue
         if recorded is not None:
-            found.append(Source(path, recorded))
-    return sorted(found, key=lambda source: source.recorded.released_ns), left_out
+            usable.append(Source(path, recorded))
+    return sorted(usable, key=lambda source: source.recorded.released_ns), left_out
 
 
 def publish(

@@ -53,23 +53,23 @@ def datacite_json(publication: Publication) -> str:
 
 
 def _datacite_creator(creator: Creator) -> dict[str, Any]:
-    found: dict[str, Any] = {
+    entry: dict[str, Any] = {
         "name": creator.name,
         "nameType": "Personal",
         "givenName": creator.given_name,
         "familyName": creator.family_name,
     }
     if creator.affiliation:
-        found["affiliation"] = [{"name": creator.affiliation}]
+        entry["affiliation"] = [{"name": creator.affiliation}]
     if creator.orcid:
-        found["nameIdentifiers"] = [
+        entry["nameIdentifiers"] = [
             {
                 "nameIdentifier": f"{_ORCID}{creator.orcid}",
                 "nameIdentifierScheme": "ORCID",
                 "schemeUri": "https://orcid.org",
             }
         ]
-    return found
+    return entry
 
 
 def _rights(publication: Publication) -> dict[str, str]:

@@ -167,12 +167,12 @@ def summarise(test: RecordedTest, rig: Rig, analysis: TestAnalysis) -> TestSumma
 
 def _periods(analysis: TestAnalysis) -> tuple[float, ...]:
     """T_n = twice the half-cycle after impact n, for n = 1, 2, …, up to the first that is not known."""
-    found: list[float] = []
+    periods_s: list[float] = []
     for cycle in analysis.half_cycles[1:]:
         if not math.isfinite(cycle.duration_s):
             break
-        found.append(2.0 * cycle.duration_s)
-    return tuple(found)
+        periods_s.append(2.0 * cycle.duration_s)
+    return tuple(periods_s)
 
 
 def _methods(analysis: TestAnalysis) -> dict[str, MethodResult]:

@@ -37,9 +37,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     with contextlib.suppress(psutil.Error, OSError, AttributeError):
         psutil.Process().nice(psutil.BELOW_NORMAL_PRIORITY_CLASS if sys.platform == "win32" else 10)
     try:
-        found = collect(Path(folder), workers=1)
+        collected = collect(Path(folder), workers=1)
         plan = Campaign.model_validate_json(campaign)
-        write_collected(plan, Path(folder), found, Path(out), at_once=False)
+        write_collected(plan, Path(folder), collected, Path(out), at_once=False)
     except (ConfigError, RunFileError, OSError, ValueError) as error:
         print(error)
         return 1

@@ -160,16 +160,16 @@ def make_result(run: Path) -> Result:
     summaries: list[TestSummary] = []
     for test in [*earlier, this]:
         assert test.path is not None
-        found = load_summary(test.path)
-        if found is None:
+        summary = load_summary(test.path)
+        if summary is None:
             made = summarise_run(test, AnalysisOptions())
             if isinstance(made, Failure):
                 if test is this:
                     raise NoResult(f"{this.name} could not be analysed: {made.reason}")
                 continue
             save_summary(test.path, made)
-            found = made
-        summaries.append(judged(found, test))
+            summary = made
+        summaries.append(judged(summary, test))
     result = Result(summaries[-1], tuple(summaries[:-1]), facts=this.facts)
     try:
         from daq_app.campaign.result.report import write_result

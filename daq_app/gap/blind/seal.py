@@ -78,13 +78,13 @@ def read_seal(folder: Path) -> dict[str, Any]:
 
 def check_files(folder: Path, seal: dict[str, Any]) -> None:
     """Raise `SealBroken` unless the files of the case are exactly those that were sealed."""
-    found = _file_hashes(folder)
-    for name in sorted(found.keys() | seal["files"].keys()):
-        if name not in found:
+    hashes = _file_hashes(folder)
+    for name in sorted(hashes.keys() | seal["files"].keys()):
+        if name not in hashes:
             raise SealBroken(f"{folder.name}: {name} is missing")
         if name not in seal["files"]:
             raise SealBroken(f"{folder.name}: {name} was added after the sealing")
-        if found[name] != seal["files"][name]:
+        if hashes[name] != seal["files"][name]:
             raise SealBroken(f"{folder.name}: {name} was changed after the sealing")
 
 

@@ -84,18 +84,18 @@ class _Study(Hypotheses):
         """Ranking, held-out scores, what remains, decision."""
         ranked = self.ranked()
         best = answers(ranked, self.library)[0].effects
-        found, null = self._finished(best), self.fits[NULL]
+        fit, null = self._finished(best), self.fits[NULL]
         forms = self.free_forms(best)
         ranked = with_other_forms(ranked, best, forms, self.library, self.policy.prior_other_form)
         classes = answers(ranked, self.library)
-        rest = remainder(self.experiment, self.library, null, found, forms, self.policy)
+        rest = remainder(self.experiment, self.library, null, fit, forms, self.policy)
         detection = self._detection()
-        decision, following = decide(Evidence(self.library, classes, found, rest, detection), self.policy)
+        decision, following = decide(Evidence(self.library, classes, fit, rest, detection), self.policy)
         gap, alone = self._held_out(best)
-        if not found.converged:
+        if not fit.converged:
             limits.append(f"The fit of {' + '.join(best) or 'nothing missing'} has not settled.")
         known = 1.0 - rest.unknown
-        scales = self._scales(found)
+        scales = self._scales(fit)
         return Diagnosis(
             model=self.experiment.model.name,
             runs=tuple(run.name for run in self.experiment.runs),
@@ -105,13 +105,13 @@ class _Study(Hypotheses):
                 r for answer in credible_set(classes, self.policy.set_content) for r in answer.alternatives
             ),
             decision=decision,
-            parameters=self._estimates(found, nuisance=True),
-            effect_parameters=self._estimates(found, nuisance=False),
-            scatter=self._scatter(found),
+            parameters=self._estimates(fit, nuisance=True),
+            effect_parameters=self._estimates(fit, nuisance=False),
+            scatter=self._scatter(fit),
             gap=gap,
-            remaining=gap_map(found.residuals, scales, self.experiment.runs),
+            remaining=gap_map(fit.residuals, scales, self.experiment.runs),
             rest=rest,
-            causes=self._causes(ranked, found, alone),
+            causes=self._causes(ranked, fit, alone),
             free_forms=tuple(forms),
             probes=self._probes(),
             probe_shapes=self._shapes(),
@@ -122,17 +122,17 @@ class _Study(Hypotheses):
 
     def _finished(self, hypothesis: Hypothesis) -> Fit:
         """The fit of a hypothesis with exact Jacobians."""
-        found = self.fits[hypothesis]
-        if not found.columns:
-            task = FitTask(effects_of(hypothesis, self.library), found.known(), found.sizes)
-            (found,) = self.workers.run([task], "the best once more")
-            self.fits[hypothesis] = found
-        return found
+        fit = self.fits[hypothesis]
+        if not fit.columns:
+            task = FitTask(effects_of(hypothesis, self.library), fit.known(), fit.sizes)
+            (fit,) = self.workers.run([task], "the best once more")
+            self.fits[hypothesis] = fit
+        return fit
 
-    def _scales(self, found: Fit) -> list[np.ndarray[tuple[int], np.dtype[np.float64]]]:
+    def _scales(self, fit: Fit) -> list[np.ndarray[tuple[int], np.dtype[np.float64]]]:
         """What each feature scatters by when nothing is missing and the model is exact."""
-        problem, sizes = Problem(self.experiment, effects_of(found.effects, self.library)), found.sizes
-        exact, u = sizes.without_discrepancy(), problem.start(found.known())
+        problem, sizes = Problem(self.experiment, effects_of(fit.effects, self.library)), fit.sizes
+        exact, u = sizes.without_discrepancy(), problem.start(fit.known())
         return [
             exact.covariance(self.experiment, i, problem.predict(i, u)).marginal_sd
             for i in range(len(self.experiment.runs))
@@ -164,35 +164,35 @@ class _Study(Hypotheses):
         alone = {h[0]: against_null(h) for h in (single or ([best] if best else []))}
         return gap, {name: size.closure if size else math.nan for name, size in alone.items()}
 
-    def _causes(self, ranked: Sequence[Ranked], found: Fit, alone: dict[str, float]) -> tuple[Cause, ...]:
-        estimates = self._estimates(found, nuisance=False)
+    def _causes(self, ranked: Sequence[Ranked], fit: Fit, alone: dict[str, float]) -> tuple[Cause, ...]:
+        estimates = self._estimates(fit, nuisance=False)
         causes = []
         for name, probability in inclusion(ranked).items():
             if probability < self.policy.listed or self.library[name].kind != "effect":
                 continue
-            own = tuple(e for e in estimates if e.name.rpartition(".")[0] == name)
+            of_effect = tuple(e for e in estimates if e.name.rpartition(".")[0] == name)
             closes = alone.get(name, math.nan)
             effect = self.library[name]
             causes.append(
                 Cause(
                     name,
-                    _in_words(effect.signature or name, own),
+                    _in_words(effect.signature or name, of_effect),
                     effect.family,
                     probability,
-                    own,
+                    of_effect,
                     closes,
                     name in alone and not closes < self.policy.cause_closes,
                 )
             )
         return tuple(sorted(causes, key=lambda c: (-c.material, -np.nan_to_num(c.closes), -c.probability)))
 
-    def _estimates(self, found: Fit, *, nuisance: bool) -> tuple[Estimate, ...]:
-        problem = Problem(self.experiment.only([0]), effects_of(found.effects, self.library))
+    def _estimates(self, fit: Fit, *, nuisance: bool) -> tuple[Estimate, ...]:
+        problem = Problem(self.experiment.only([0]), effects_of(fit.effects, self.library))
         wanted = [q for q in problem.unknowns if bool(q.effect) != nuisance and (q.run is None or q.effect)]
         return tuple(
             Estimate(
                 q.key,
-                *(found.values[q.key] if q.run is None else _mean_of_runs(found, q.key)),
+                *(fit.values[q.key] if q.run is None else _mean_of_runs(fit, q.key)),
                 q.parameter.unit,
                 q.parameter.mean,
                 q.parameter.sd,
@@ -201,9 +201,9 @@ class _Study(Hypotheses):
             for q in wanted
         )
 
-    def _scatter(self, found: Fit) -> tuple[Estimate, ...]:
+    def _scatter(self, fit: Fit) -> tuple[Estimate, ...]:
         return tuple(
-            Estimate(s.name, found.sigmas[s.name], math.nan, math.nan, s.unit, s.median, s.log_sd, s.meaning)
+            Estimate(s.name, fit.sigmas[s.name], math.nan, math.nan, s.unit, s.median, s.log_sd, s.meaning)
             for s in self.experiment.model.scatters
         )
 
@@ -219,11 +219,11 @@ class _Study(Hypotheses):
     def _probes(self) -> tuple[Ranked, ...]:
         """The free forms by what each gains on top of nothing."""
         null = self.fits[NULL].log_evidence
-        found = [
+        ranked = [
             Ranked((p.name,), p.family, 0.0, null + self.alone[p.name].robust.evidence)
             for p in self.library.probes
         ]
-        return tuple(sorted(found, key=lambda r: -r.log_evidence))
+        return tuple(sorted(ranked, key=lambda r: -r.log_evidence))
 
     def _shapes(self) -> dict[str, dict[str, tuple[float, float, float]]]:
         """Probe → coefficient → (value, low, high), on top of nothing."""
@@ -248,11 +248,11 @@ def _in_words(what: str, estimates: Sequence[Estimate]) -> str:
     return f"{what.rstrip('.')}: {', '.join(sizes)}" if sizes else what.rstrip(".")
 
 
-def _mean_of_runs(found: Fit, key: str) -> tuple[float, float, float]:
+def _mean_of_runs(fit: Fit, key: str) -> tuple[float, float, float]:
     """A parameter that every run has for itself: mean over the runs with the interval of that mean."""
-    values = np.array([local[key] for local in found.local_values if key in local])
-    own = (values[:, 2] - values[:, 1]) / 3.92
+    values = np.array([local[key] for local in fit.local_values if key in local])
+    sd = (values[:, 2] - values[:, 1]) / 3.92
     between = float(values[:, 0].std(ddof=1)) if len(values) > 1 else 0.0
-    half = 1.96 * math.sqrt((float(np.mean(own**2)) + between**2) / len(values))
+    half = 1.96 * math.sqrt((float(np.mean(sd**2)) + between**2) / len(values))
     middle = float(values[:, 0].mean())
     return middle, middle - half, middle + half

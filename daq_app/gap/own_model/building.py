@@ -91,5 +91,9 @@ class _OneFunction:
 
     def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
         assert isinstance(run, Measured)
-        found = self.simulate(run, values)
-        return found if isinstance(found, Prediction) else Prediction(np.asarray(found, dtype=np.float64))
+        features = self.simulate(run, values)
+        return (
+            features
+            if isinstance(features, Prediction)
+            else Prediction(np.asarray(features, dtype=np.float64))
+        )

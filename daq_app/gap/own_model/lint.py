@@ -77,20 +77,20 @@ def _names(runs: Sequence[Run]) -> list[str]:
 
 def _recordings(runs: Sequence[Run]) -> list[str]:
     """Runs without features, and features that never change."""
-    found = []
+    doubts = []
     for run in runs:
         if len(run.features) == 0:
-            found.append(f"Run {run.name} has no features. Check the recording, or what `load` keeps of it.")
+            doubts.append(f"Run {run.name} has no features. Check the recording, or what `load` keeps of it.")
         groups: dict[tuple[str, str], list[float]] = {}
         for label, value in zip(run.features.labels, run.features.values, strict=True):
             groups.setdefault((label.channel, label.observable), []).append(float(value))
-        found += [
+        doubts += [
             f"{observable} of {channel} is {values[0]:g} in all {len(values)} places of run {run.name}: "
             "constant data. Check that the channel was connected, or leave it out."
             for (channel, observable), values in groups.items()
             if len(values) >= _CONSTANT_FROM and np.ptp(values) == 0.0
         ]
-    return found
+    return doubts
 
 
 def _prediction(model: Model, run: Run) -> list[str]:
@@ -125,13 +125,13 @@ def _prediction(model: Model, run: Run) -> list[str]:
 
 def _loadings(model: Model, run: Run, loadings: Mapping[str, FloatArray], n: int) -> list[str]:
     declared = [scatter.name for scatter in model.scatters]
-    found = [
+    doubts = [
         f"The model gives loadings of the scatter {name}, which it does not declare"
         f" ({', '.join(declared) or 'it declares none'}). Add Scatter({name!r}, …)."
         for name in loadings
         if name not in declared
     ]
-    return found + [
+    return doubts + [
         f"The loadings of the scatter {name} have shape {np.shape(value)} for run {run.name}: "
         f"({n},) for one draw each, or ({n}, k)."
         for name, value in loadings.items()
@@ -184,7 +184,7 @@ class _Asked:
 
     def silent_unknowns(self) -> list[str]:
         """Parameters of the model itself that change no feature."""
-        found = []
+        doubts = []
         for index, run in enumerate(self.runs):
             problem = Problem(Experiment.without_groups(self.model, [run]), ())
             for unknown in problem.unknowns:
@@ -194,11 +194,11 @@ class _Asked:
                 change = max(self._change(other, (), unknown.key, unknown.parameter) for other in others)
                 if change < _SILENT:
                     of_run = "" if unknown.run is None else f" of run {run.name}"
-                    found.append(
+                    doubts.append(
                         f"Parameter {unknown.key} changes no feature{of_run}. Does the model read it under "
                         "that name?"
                     )
-        return found
+        return doubts
 
     def effect(self, effect: Effect) -> tuple[list[str], list[str]]:
         """(refusals, notes) of one effect."""

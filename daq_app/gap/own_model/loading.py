@@ -65,7 +65,7 @@ def _checked(path: Path, model: Any, library: Any, load: Any) -> OwnModel:
     return OwnModel(path, model, library, load)
 
 
-def load_recordings(own: OwnModel, paths: Sequence[Path]) -> list[Run]:
+def load_recordings(own_model: OwnModel, paths: Sequence[Path]) -> list[Run]:
     """All runs of all recordings, in the order given; a folder stands for the files in it.
 
     Raises `CannotDiagnose` that names the recording that cannot be loaded.
@@ -73,16 +73,16 @@ def load_recordings(own: OwnModel, paths: Sequence[Path]) -> list[Run]:
     runs: list[Run] = []
     for path in _files(paths):
         try:
-            found = own.load(path)
+            loaded = own_model.load(path)
         except Exception as error:
             raise CannotDiagnose(
-                f"{path} cannot be loaded: `load` fails{_at(error, own.path)}.",
-                f"Look at the recording, or at `load` in {own.path.name}.",
+                f"{path} cannot be loaded: `load` fails{_at(error, own_model.path)}.",
+                f"Look at the recording, or at `load` in {own_model.path.name}.",
             ) from error
-        for run in found if isinstance(found, list | tuple) else [found]:
+        for run in loaded if isinstance(loaded, list | tuple) else [loaded]:
             if not isinstance(run, Run):
                 raise CannotDiagnose(
-                    f"`load` of {own.path.name} returned {type(run).__name__} for {path}, not a run.",
+                    f"`load` of {own_model.path.name} returned {type(run).__name__} for {path}, not a run.",
                     "Return measured(…), or a list of such runs.",
                 )
             runs.append(run)
@@ -90,15 +90,15 @@ def load_recordings(own: OwnModel, paths: Sequence[Path]) -> list[Run]:
 
 
 def _files(paths: Sequence[Path]) -> list[Path]:
-    found: list[Path] = []
+    files: list[Path] = []
     for path in paths:
         if not path.exists():
             raise CannotDiagnose(f"There is no recording {path}.", "Check the path.")
         if path.is_dir():
-            found += sorted(p for p in path.iterdir() if p.is_file() and not p.name.startswith("."))
+            files += sorted(p for p in path.iterdir() if p.is_file() and not p.name.startswith("."))
         else:
-            found.append(path)
-    return found
+            files.append(path)
+    return files
 
 
 def _at(error: BaseException, path: Path) -> str:

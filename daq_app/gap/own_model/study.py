@@ -17,9 +17,9 @@ def diagnose_own(path: Path, recordings: Sequence[Path], options: Options) -> Di
     It is computed in this process: the functions of a file need not be known to another one. Raises
     `CannotDiagnose` with everything that is wrong with the model or the recordings.
     """
-    own = load_model(path)
-    runs = load_recordings(own, recordings)
-    lint = check_model(own.model, own.library, runs)
+    own_model = load_model(path)
+    runs = load_recordings(own_model, recordings)
+    lint = check_model(own_model.model, own_model.library, runs)
     if lint.refusals:
         raise CannotDiagnose("\n".join(lint.refusals))
-    return diagnose(own.model, runs, own.library, replace(options, workers=1), lint.notes)
+    return diagnose(own_model.model, runs, own_model.library, replace(options, workers=1), lint.notes)

@@ -121,12 +121,12 @@ def _parameter(spec: EffectSpec, parameter: SpecParameter) -> Parameter:
     if (spec.name, parameter.name) in _LOGARITHMIC:
         low = max(parameter.low, SMALLEST.get((spec.name, parameter.name), 1e-6))
         ends = _RANGES.get((spec.name, parameter.name), ())
-        found = between(parameter.name, *(ends or (low, parameter.high)), parameter.unit, parameter.text)
-        return replace(found, per_run=per_run)
+        prior = between(parameter.name, *(ends or (low, parameter.high)), parameter.unit, parameter.text)
+        return replace(prior, per_run=per_run)
     reach = _WIDER.get((spec.name, parameter.name), parameter.high)
     of_sign = signed if parameter.low < 0 else positive
-    found = of_sign(parameter.name, reach, parameter.unit, parameter.text, per_run=per_run)
-    return found if per_run else replace(found, smallest=_smallest(spec, parameter))
+    prior = of_sign(parameter.name, reach, parameter.unit, parameter.text, per_run=per_run)
+    return prior if per_run else replace(prior, smallest=_smallest(spec, parameter))
 
 
 _FORMS = {

@@ -143,9 +143,9 @@ class GapRun:
         return self._with_excluded(self.excluded + more) if more else self
 
     def _with_excluded(self, ids: tuple[str, ...]) -> GapRun:
-        found = replace(self, excluded=ids)
-        object.__setattr__(found, "cache", self.cache)  # the channels are the same
-        return found
+        changed = replace(self, excluded=ids)
+        object.__setattr__(changed, "cache", self.cache)  # the channels are the same
+        return changed
 
     def aligned(self, index: int) -> FloatArray:
         """A channel at the instants of the sample clock, shape (n,)."""
@@ -219,11 +219,13 @@ def level_of(test: str) -> str:
 
 def _offsets(plan: dict[str, Any]) -> dict[str, float]:
     """Time offset of each channel from a run's task plan: multiplexer skew less converter delay."""
-    found = {}
+    offsets_s = {}
     for task in plan.get("tasks", []):
         for entry in task.get("channels", []):
-            found[str(entry["id"])] = float(entry.get("skew_s", 0.0)) - float(entry.get("input_delay_s", 0.0))
-    return found
+            offsets_s[str(entry["id"])] = float(entry.get("skew_s", 0.0)) - float(
+                entry.get("input_delay_s", 0.0)
+            )
+    return offsets_s
 
 
 def check_consistent(runs: Sequence[GapRun]) -> None:

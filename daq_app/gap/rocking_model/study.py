@@ -54,22 +54,22 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
     for place, (run, seen) in enumerate(zip(inspected.runs, inspected.findings, strict=True)):
         before = run.impacts_before or impacts
         try:
-            found = known.get(place) or examine(run, reference)
+            first_pass = known.get(place) or examine(run, reference)
         except CannotDiagnose as problem:
             if len(runs) == 1:
                 raise
             limits.append(f"Left out. {problem}")
             continue
-        entry = found.after(before)
+        entry = first_pass.after(before)
         examined.append(entry)
         findings.append(seen)
         impacts = entry.features.impacts_before + entry.features.swings.impacts
     if not examined:
         raise CannotDiagnose("None of the runs can be used.", " ".join(limits))
-    examined, channels, marks_of_all = without_outlier_channels(examined, findings, reference)
+    examined, channels, findings_of_all = without_outlier_channels(examined, findings, reference)
     for entry in examined:
         limits += entry.features.notes
-    whole = completed(examined, marks_of_all, channels, inspected.wiring)
+    whole = completed(examined, findings_of_all, channels, inspected.wiring)
     limits += [
         f"{name} disagrees with the other {family} channels; it is examined on its own."
         for name, family in channels.items()

@@ -47,8 +47,8 @@ class BiasSettings:
 def method_bias(settings: BiasSettings) -> dict[str, Bias]:
     """Bias by method (keys of `TestAnalysis.estimates`, and ``fit``)."""
     errors: dict[str, list[float]] = {}
-    for found in _estimates(settings):
-        for method, r in found.items():
+    for r_by_method in _estimates(settings):
+        for method, r in r_by_method.items():
             errors.setdefault(method, []).append(r - settings.r)
     return {method: summarise(values) for method, values in errors.items()}
 
@@ -141,13 +141,13 @@ def _estimates(wanted: BiasSettings) -> list[dict[str, float]]:
     }
     flat = iter(estimate_all([one for rows in series.values() for one in rows]))
     estimates = {method: [next(flat) for _ in rows] for method, rows in series.items()}
-    found: list[dict[str, float]] = []
+    r_by_run: list[dict[str, float]] = []
     for number, run in enumerate(runs):
-        own = {method: rows[number] for method, rows in estimates.items()}
-        known = {method: estimate.r for method, estimate in own.items() if estimate.r is not None}
-        fit = _fitted(wanted, run, own) if wanted.with_fit and number < _FIT_RUNS else None
-        found.append(known if fit is None else {**known, "fit": fit.r})
-    return found
+        of_run = {method: rows[number] for method, rows in estimates.items()}
+        known = {method: estimate.r for method, estimate in of_run.items() if estimate.r is not None}
+        fit = _fitted(wanted, run, of_run) if wanted.with_fit and number < _FIT_RUNS else None
+        r_by_run.append(known if fit is None else {**known, "fit": fit.r})
+    return r_by_run
 
 
 def _fitted(

@@ -48,8 +48,8 @@ def families_of(
         suffix = "" if name == instruments.signals.lead else f"_{name}"
         if track is not None and f"eav{suffix}" in estimates:
             eav, crt = estimates[f"eav{suffix}"], estimates[f"crt{suffix}"]
-            own = theta0.get(name)
-            rows.append(_rotation_view(family, instruments, track, tracks.lead, eav, crt, own))
+            family_theta0 = theta0.get(name)
+            rows.append(_rotation_view(family, instruments, track, tracks.lead, eav, crt, family_theta0))
     if "tiltmeters" in theta0:
         value = theta0["tiltmeters"]
         rows.append(FamilyView("tiltmeters", value.value, value.sigma, used=True))
@@ -72,7 +72,9 @@ def _rotation_view(
     theta0: ValueWithSigma | None,
 ) -> FamilyView:
     body = body_of(track, instruments.gains.of("lvdts" if family == "LVDTs" else "wires"))
-    apart = [own - other for own, other in zip(track.impacts_s, lead.impacts_s, strict=True)]
+    apart = [
+        impact - lead_impact for impact, lead_impact in zip(track.impacts_s, lead.impacts_s, strict=True)
+    ]
     return FamilyView(
         family=family,
         theta0_rad=track.theta0_rad if theta0 is None else theta0.value,
@@ -103,12 +105,12 @@ def body_of(track: MotionTrack, gain_sigma: float) -> BodyEstimate | None:
         ]
     ).reshape(-1, 4)
     peaks, sigma_peaks, durations, sigma_durations = columns.T
-    found = body_of_half_cycles(
+    body = body_of_half_cycles(
         peaks, sigma_peaks, durations, sigma_durations, track.settings.alpha_rad, track.settings.p_rad_s
     )
-    if found is None:
+    if body is None:
         return None
-    return replace(found, sigma_alpha_rad=math.hypot(found.sigma_alpha_rad, gain_sigma * found.alpha_rad))
+    return replace(body, sigma_alpha_rad=math.hypot(body.sigma_alpha_rad, gain_sigma * body.alpha_rad))
 
 
 def _remarks(family: str, findings: Sequence[FamilyFinding]) -> tuple[str, ...]:
@@ -131,16 +133,16 @@ def verdict_of(
     if not other_is_blamed(findings, other):
         for method, name in (("eav", "EAV"), ("crt", "CRT")):
             if f"{method}_{other}" in series:
-                own, others = series[method], series[f"{method}_{other}"]
-                wires, lvdts = (own, others) if lead == "wires" else (others, own)
-                said = families_apart(name, compare_series(wires, lvdts))
-                if said is not None:
-                    disagreements.append(said)
-                    findings.append(words.disagreement(said))
-    said = methods_apart(estimates["eav"], estimates["crt"])
-    if said is not None:
-        disagreements.append(said)
-        findings.append(words.not_housner(said))
+                lead_series, other_series = series[method], series[f"{method}_{other}"]
+                wires, lvdts = (lead_series, other_series) if lead == "wires" else (other_series, lead_series)
+                disagreement = families_apart(name, compare_series(wires, lvdts))
+                if disagreement is not None:
+                    disagreements.append(disagreement)
+                    findings.append(words.disagreement(disagreement))
+    disagreement = methods_apart(estimates["eav"], estimates["crt"])
+    if disagreement is not None:
+        disagreements.append(disagreement)
+        findings.append(words.not_housner(disagreement))
     verdict = judge(estimates["eav"], estimates["crt_exact"], LEADS[lead], findings, disagreements)
     return verdict, tuple(findings)
 

@@ -20,22 +20,22 @@ def theta0_by_family(signals: Signals, track: MotionTrack, gains: FamilyGains) -
     """θ0 over the last half second of the hold (slow tiltmeters have settled), and the best."""
     hold, rate = hold_samples(signals, track.release.time_s), signals.record.rate_hz
     zero = signals.settings.zero_sigma_rad
-    found: dict[str, ValueWithSigma] = {}
+    theta0: dict[str, ValueWithSigma] = {}
     tilts = signals.tilts_rad[:, hold]
     value = signals.geometry.tilt(tilts, track.theta0_rad)
     if math.isfinite(value):
         _, noise = steady_level(tilts.mean(axis=0), rate)
-        found["tiltmeters"] = _level(value, math.hypot(noise, zero), gains.tiltmeters)
-    found[signals.lead] = _level(track.theta0_rad, track.sigma_theta0_rad, gains.of(signals.lead))
+        theta0["tiltmeters"] = _level(value, math.hypot(noise, zero), gains.tiltmeters)
+    theta0[signals.lead] = _level(track.theta0_rad, track.sigma_theta0_rad, gains.of(signals.lead))
     others = {"wires": signals.wire_rotation_rad}
     if signals.joint is not None:
         others["lvdts"] = signals.joint.rotation_rad
     for name, rotation in others.items():
         value, noise = steady_level(rotation[hold], rate)
         if name != signals.lead and math.isfinite(value):
-            found[name] = _level(value, math.hypot(noise, zero), gains.of(name))
-    found["best"] = best_value(found)
-    return found
+            theta0[name] = _level(value, math.hypot(noise, zero), gains.of(name))
+    theta0["best"] = best_value(theta0)
+    return theta0
 
 
 def _level(value_rad: float, sigma_rad: float, gain_sigma: float) -> ValueWithSigma:
@@ -45,5 +45,5 @@ def _level(value_rad: float, sigma_rad: float, gain_sigma: float) -> ValueWithSi
 
 def levels_apart(theta0: Mapping[str, ValueWithSigma]) -> list[FamilyFinding]:
     """The family whose θ0 is off where the two others agree."""
-    found = level_outlier({_NAMES[name]: value.value for name, value in theta0.items() if name in _NAMES})
-    return [] if found is None else [found]
+    finding = level_outlier({_NAMES[name]: value.value for name, value in theta0.items() if name in _NAMES})
+    return [] if finding is None else [finding]

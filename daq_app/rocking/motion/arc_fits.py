@@ -112,17 +112,17 @@ def fit_stack(x: Floats, y: Floats, present: Bools, kappa: Floats, noise_rad: Fl
     coefficients = np.zeros((count.size, _COLUMNS))
     covariance = np.zeros((count.size, _COLUMNS, _COLUMNS))
     for candidate in _NESTED:
-        own = np.flatnonzero(best == candidate)
-        if own.size:
+        chosen = np.flatnonzero(best == candidate)
+        if chosen.size:
             wide = STIFF + len(POWERS[candidate])
-            part = inverse[own, :wide, :wide]
-            coefficients[own, :wide] = np.einsum("ajk,ak->aj", part, projected[own, :wide])
-            covariance[own, :wide, :wide] = part @ np.swapaxes(part, 1, 2)
+            part = inverse[chosen, :wide, :wide]
+            coefficients[chosen, :wide] = np.einsum("ajk,ak->aj", part, projected[chosen, :wide])
+            covariance[chosen, :wide, :wide] = part @ np.swapaxes(part, 1, 2)
     if alone is not None:
         among = np.flatnonzero(best[apart] == 1)
-        own = np.flatnonzero(apart)[among]
-        coefficients[np.ix_(own, columns)] = alone[0][among]
-        covariance[np.ix_(own, columns, columns)] = alone[1][among]
+        chosen = np.flatnonzero(apart)[among]
+        coefficients[np.ix_(chosen, columns)] = alone[0][among]
+        covariance[np.ix_(chosen, columns, columns)] = alone[1][among]
     square = squares[arcs, best]
     widths = np.array([STIFF + len(powers) for powers in POWERS])
     covariance *= np.maximum(square / (count - widths[best]), noise_rad**2)[:, None, None]
@@ -197,11 +197,11 @@ def crossings(fits: ArcFits, guess: float, half_s: Floats, zero_sigma: float) ->
         # The speed is read where the fit crosses zero: its error counts through the shift of that place.
         gradient = slope - (curvature / speed)[:, None] * value
         shift = np.hypot(np.sqrt(_square(value, fits.covariance)), zero_sigma) / np.abs(speed)
-        own = np.maximum(_square(gradient, fits.covariance), 0.0)
-        sigma = np.sqrt(own + (curvature / speed * zero_sigma) ** 2 + (_MODEL_SHARE * speed) ** 2)
-    found = np.stack([x, shift, speed / half_s, sigma / half_s])
-    found[:, ~np.isfinite(found).all(axis=0)] = np.nan
-    return found
+        variance = np.maximum(_square(gradient, fits.covariance), 0.0)
+        sigma = np.sqrt(variance + (curvature / speed * zero_sigma) ** 2 + (_MODEL_SHARE * speed) ** 2)
+    zeros = np.stack([x, shift, speed / half_s, sigma / half_s])
+    zeros[:, ~np.isfinite(zeros).all(axis=0)] = np.nan
+    return zeros
 
 
 def speed_kept(fits: ArcFits, ends: Floats) -> Floats:
@@ -215,14 +215,14 @@ def speed_kept(fits: ArcFits, ends: Floats) -> Floats:
         for x in ends:
             value, slope, curve = fits.rows(x)
             speed, curvature = _dot(slope, fits.odd_coefficients), _dot(curve, fits.odd_coefficients)
-            own = slope - (curvature / speed)[:, None] * value
-            log_speed.append(np.log(np.abs(_dot(own, fits.odd_coefficients))))
-            gradient.append(own / speed[:, None])
+            at_zero = slope - (curvature / speed)[:, None] * value
+            log_speed.append(np.log(np.abs(_dot(at_zero, fits.odd_coefficients))))
+            gradient.append(at_zero / speed[:, None])
         kept = log_speed[1] - log_speed[0]
         sigma = np.sqrt(np.maximum(_square(gradient[1] - gradient[0], fits.odd_covariance), 0.0))
-    found = np.stack([kept, sigma])
-    found[:, ~np.isfinite(found).all(axis=0)] = np.nan
-    return found
+    log_ratio = np.stack([kept, sigma])
+    log_ratio[:, ~np.isfinite(log_ratio).all(axis=0)] = np.nan
+    return log_ratio
 
 
 def extrema(fits: ArcFits) -> Floats:
@@ -243,9 +243,9 @@ def extrema(fits: ArcFits) -> Floats:
         row = fits.rows(x)[0]
         value = _dot(row, fits.coefficients)
         sigma = np.hypot(np.sqrt(_square(row, fits.covariance)), _MODEL_SHARE * value)
-    found = np.stack([x, value, sigma])
-    found[:, ~(np.abs(x) < 1.0)] = np.nan
-    return found
+    tops = np.stack([x, value, sigma])
+    tops[:, ~(np.abs(x) < 1.0)] = np.nan
+    return tops
 
 
 def _dot(rows: Floats, coefficients: Floats) -> Floats:

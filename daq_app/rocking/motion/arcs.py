@@ -120,23 +120,23 @@ def fit_arcs(
     guard = np.maximum(_GUARD_S, _GUARD_SHARE * length)
     first = np.where(index == 0, start + (1.0 - _FALL_SHARE) * length, start + guard)
     low, size, groups = _grouping(time_s, first, end - guard)
-    found: list[Arc | None] = [None] * start.size
+    fitted: list[Arc | None] = [None] * start.size
     kept = np.flatnonzero(groups >= _MIN_POINTS)
     if not kept.size:
-        return found
+        return fitted
     t, y = _averaged(time_s, rotation_rad, low[kept], size[kept], groups[kept])
     present = np.isfinite(y)
     enough = present.sum(axis=1) >= _MIN_POINTS
     kept, t, y, present = kept[enough], t[enough], y[enough], present[enough]
     if not kept.size:
-        return found
+        return fitted
     left = np.where(index == 0, first, start)[kept]
     noise = slow_noise_rad / np.sqrt(size[kept])
     stack = _Stack(index[kept], start[kept], (left + end[kept]) / 2.0, (end[kept] - left) / 2.0, noise)
     arcs = stack.fitted(t, y, present, p_rad_s, alpha_rad, zero_sigma_rad)
     for place, arc in zip(kept.tolist(), arcs, strict=True):
-        found[place] = arc
-    return found
+        fitted[place] = arc
+    return fitted
 
 
 @dataclass(frozen=True, slots=True)

@@ -115,9 +115,9 @@ def fit_motion(
     for span in sorted({min(4, count), count}) if spread is None else [count]:
         x = np.concatenate((x, start[x.size - FIXED : span]))
         end = min(impacts_s[span] if span < len(impacts_s) else stop, stop)
-        found = _least(problem, x, span, end)
-        x = found.x
-    return _result(problem, found, count, sigma)
+        solution = _least(problem, x, span, end)
+        x = solution.x
+    return _result(problem, solution, count, sigma)
 
 
 def _least(problem: MotionModel, start: Floats, span: int, stop_s: float) -> OptimizeResult:
@@ -143,9 +143,9 @@ def _deviations(speeds_rad_s: list[float], count: int, log_r: float) -> Floats:
     """ln r of single impacts about `log_r`, from the speeds at neighbouring impacts; 0 where unknown."""
     speeds = np.abs(np.asarray(speeds_rad_s, dtype=np.float64))
     with np.errstate(invalid="ignore", divide="ignore"):
-        found = np.log(speeds[1:] / speeds[:-1]) - log_r
-    found = np.where(np.isfinite(found), np.clip(found, -0.2, 0.2), 0.0)
-    return np.concatenate((found, np.zeros(count)))[:count]
+        log_ratios = np.log(speeds[1:] / speeds[:-1]) - log_r
+    log_ratios = np.where(np.isfinite(log_ratios), np.clip(log_ratios, -0.2, 0.2), 0.0)
+    return np.concatenate((log_ratios, np.zeros(count)))[:count]
 
 
 def _points(

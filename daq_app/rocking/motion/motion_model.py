@@ -122,17 +122,17 @@ class MotionModel:
 
     def _course(self, x: Floats, span: int, time_s: Floats) -> _Course:
         key = (x.tobytes(), span, time_s.size)
-        found = self._last.get(key)
-        if found is None:
+        course = self._last.get(key)
+        if course is None:
             motion = self.motion(x, span)
             index, local, sign = motion.locate(time_s)
             rotation, speed = half_cycle_rotation(
                 local, motion.peaks_rad[index], motion.p_rad_s, motion.alpha_rad
             )
-            found = _Course(motion, index, local, sign, rotation, speed)
+            course = _Course(motion, index, local, sign, rotation, speed)
             self._last.clear()
-            self._last[key] = found
-        return found
+            self._last[key] = course
+        return course
 
     def _rotation(self, x: Floats, course: _Course, time_s: Floats) -> Floats:
         motion, model = course.motion, course.sign * course.rotation

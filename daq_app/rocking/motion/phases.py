@@ -292,10 +292,10 @@ class PhaseDetector:
         middle = self._frames.end - frames.size + np.arange(frames.size) + 0.5
         times = self._sample_of(middle) / self.settings.rate_hz
         inside = self.side * frames > 0.03 * abs(self._hold_rad)
-        found = locate_release(
+        release = locate_release(
             times[inside], frames[inside], self._hold_rad, self.settings.p_rad_s, self.settings.alpha_rad
         )
-        sample = crude if found is None else found.time_s * self.settings.rate_hz
+        sample = crude if release is None else release.time_s * self.settings.rate_hz
         if not self._sample(self._frames.end - count) <= sample <= self._sample(self._frames.end):
             sample = crude
         self.phase = Phase.FALLING

@@ -69,9 +69,9 @@ class _Fall:
     def fitted(self) -> tuple[float, float, float]:
         """start / quarter, height / α, and the rms misfit in rad."""
         start = np.array([0.0, self.level_rad / self.alpha_rad, 1.0])
-        found = least_squares(self._residual, start, jac=self._jacobian, method="lm", max_nfev=60)
-        rms = math.sqrt(float(np.mean(found.fun[:-1] ** 2))) * _SHARE * self.level_rad
-        return float(found.x[0]), float(found.x[1]), rms
+        solution = least_squares(self._residual, start, jac=self._jacobian, method="lm", max_nfev=60)
+        rms = math.sqrt(float(np.mean(solution.fun[:-1] ** 2))) * _SHARE * self.level_rad
+        return float(solution.x[0]), float(solution.x[1]), rms
 
     def _elapsed(self, x: Floats) -> tuple[Floats, Floats]:
         """Time in the fall, and whether it lies within what the model knows."""

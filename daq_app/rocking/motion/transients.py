@@ -61,21 +61,21 @@ def find_onsets(
         return [None] * len(windows)
     start = min(low for places in windows for low, _ in places)
     acceleration = read(start, max(high for places in windows for _, high in places))
-    found: list[Onset | None] = []
+    onsets: list[Onset | None] = []
     for places in windows:
-        alike: dict[int, list[int]] = {}
+        rows_by_length: dict[int, list[int]] = {}
         for row, (low, high) in enumerate(places):
-            alike.setdefault(high - low, []).append(row)
+            rows_by_length.setdefault(high - low, []).append(row)
         picks = []
-        for rows in alike.values():
+        for rows in rows_by_length.values():
             parts = np.array(
                 [acceleration[row, places[row][0] - start : places[row][1] - start] for row in rows]
             )
             for row, (sample, strength) in zip(rows, _picks(parts), strict=True):
                 if strength >= _SHOCK_SIGMAS:
                     picks.append((first_s + (places[row][0] + sample) / rate_hz + offsets_s[row], strength))
-        found.append(_agreement(picks))
-    return found
+        onsets.append(_agreement(picks))
+    return onsets
 
 
 def _picks(windows: Floats) -> list[tuple[float, float]]:

@@ -184,8 +184,8 @@ def _on_samples(
 ) -> NDArray[np.float64]:
     """Derived values on columns start … stop of the run: straight lines between them, NaN beyond."""
     wanted = run.first_sample + np.arange(start, stop)
-    own = derived.first_sample + derived.step * np.arange(values.size)
-    return np.interp(wanted, own, values, left=np.nan, right=np.nan)
+    samples = derived.first_sample + derived.step * np.arange(values.size)
+    return np.interp(wanted, samples, values, left=np.nan, right=np.nan)
 
 
 def _column(run: Run, time_s: float) -> int:

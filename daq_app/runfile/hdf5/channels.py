@@ -77,25 +77,25 @@ def _write_channels(file: h5py.File, header: RunHeader, scaling: RunScaling) -> 
     group = file.create_group(layout.CHANNELS)
     ids = group.create_dataset("channel", data=list(header.channel_ids), dtype=_TEXT)
     ids.make_scale("channel")
-    found = [scaling.channels.get(channel_id) for channel_id in header.channel_ids]
+    channels = [scaling.channels.get(channel_id) for channel_id in header.channel_ids]
     texts: dict[str, list[str]] = {
-        "family": [c.family if c else "" for c in found],
-        "physical_channel": [c.physical_channel if c else "" for c in found],
+        "family": [c.family if c else "" for c in channels],
+        "physical_channel": [c.physical_channel if c else "" for c in channels],
         "reading_units": list(header.reading_units),
-        "si_units": [c.si_unit if c else "" for c in found],
-        "sensitivity_unit": [c.sensitivity_unit if c else "" for c in found],
-        "certificate": [c.certificate.number if c else "" for c in found],
-        "calibrated": [c.certificate.calibrated.isoformat() if c else "" for c in found],
-        "calibration_due": [c.certificate.due.isoformat() if c else "" for c in found],
+        "si_units": [c.si_unit if c else "" for c in channels],
+        "sensitivity_unit": [c.sensitivity_unit if c else "" for c in channels],
+        "certificate": [c.certificate.number if c else "" for c in channels],
+        "calibrated": [c.certificate.calibrated.isoformat() if c else "" for c in channels],
+        "calibration_due": [c.certificate.due.isoformat() if c else "" for c in channels],
     }
     numbers: dict[str, tuple[str, list[float]]] = {
-        "x": ("m", [c.position_m[0] if c else np.nan for c in found]),
-        "y": ("m", [c.position_m[1] if c else np.nan for c in found]),
-        "z": ("m", [c.position_m[2] if c else np.nan for c in found]),
-        "sensitivity": ("see sensitivity_unit", [c.sensitivity if c else np.nan for c in found]),
-        "offset": ("see reading_units", [c.offset if c else np.nan for c in found]),
+        "x": ("m", [c.position_m[0] if c else np.nan for c in channels]),
+        "y": ("m", [c.position_m[1] if c else np.nan for c in channels]),
+        "z": ("m", [c.position_m[2] if c else np.nan for c in channels]),
+        "sensitivity": ("see sensitivity_unit", [c.sensitivity if c else np.nan for c in channels]),
+        "offset": ("see reading_units", [c.offset if c else np.nan for c in channels]),
         "tare": ("see reading_units", [header.tare.get(i, 0.0) for i in header.channel_ids]),
-        "polarity": ("1", [float(c.polarity) if c else np.nan for c in found]),
+        "polarity": ("1", [float(c.polarity) if c else np.nan for c in channels]),
         "time_offset": ("s", [header.time_offset_s(i) for i in header.channel_ids]),
     }
     for name, values in texts.items():

@@ -227,13 +227,13 @@ class Run:
                 f"{self.path} is an HDF5 file but no run of this program",
                 advice="Foreign recordings come in through `daq-app import`.",
             )
-        found: dict[str, Any] = {}
+        attributes: dict[str, Any] = {}
         for name in RunAttributes.model_fields:
             if name in self._file.attrs:
                 value = self._file.attrs[name]
-                found[name] = value.item() if isinstance(value, np.generic) else value
+                attributes[name] = value.item() if isinstance(value, np.generic) else value
         try:
-            return RunAttributes.model_validate(found)
+            return RunAttributes.model_validate(attributes)
         except ValidationError as error:
             first = error.errors()[0]
             raise RunFileError(
@@ -269,21 +269,23 @@ class Run:
 
     def _channels(self) -> dict[str, h5py.Dataset]:
         group = self._group(layout.RAW)
-        found = {
+        datasets = {
             channel_id: checked_dataset(self.path, group, channel_id, itemsize=8, length=self.n_samples)
             for channel_id in self.header.channel_ids
         }
-        if any(dataset.chunks is None for dataset in found.values()):
+        if any(dataset.chunks is None for dataset in datasets.values()):
             raise RunFileError(f"{self.path}: its readings are not stored in chunks")
-        return found
+        return datasets
 
     def _chunk_checks(self) -> dict[str, list[int]]:
         group = self._group(layout.CHECKS)
-        found = {channel_id: read_column(self.path, group, channel_id) for channel_id in self._raw}
-        for channel_id, checks in found.items():
+        checks_by_channel = {
+            channel_id: read_column(self.path, group, channel_id) for channel_id in self._raw
+        }
+        for channel_id, checks in checks_by_channel.items():
             if len(checks) != -(-self.n_samples // self._raw[channel_id].chunks[0]):
                 raise RunFileError(f"{self.path}: the table of checks of {channel_id} is not complete")
-        return found
+        return checks_by_channel
 
     def _json(self, group: h5py.Group, name: str) -> dict[str, Any]:
         try:

@@ -80,28 +80,32 @@ class ImportedRun:
 
     def doubts(self, rig: Rig) -> list[str]:
         """What the values and units make doubtful; walks through all samples once."""
-        found = []
+        doubts_in_words = []
         units = {item.foreign.unit for item in self.mapped if item.foreign.unit}
         if len(units) == 1 and len(self.mapped) > 1 and is_time(next(iter(units))):
-            found.append(
+            doubts_in_words.append(
                 f"every unit in the file is {next(iter(units))!r}, which cannot be true: not believed"
             )
         for channel_id, rows in self._short():
             longest = max(self._lengths())
-            found.append(f"{channel_id} has {rows} samples where others have {longest}: the rest is NaN")
+            doubts_in_words.append(
+                f"{channel_id} has {rows} samples where others have {longest}: the rest is NaN"
+            )
         if not self.findings.pieces:  # in a file of several pieces each announces its own number
             for item in self.mapped:
                 declared, rows = item.foreign.n_declared, self.spool.length(item.foreign.name)
                 if declared is not None and declared != rows:
-                    found.append(f"{item.channel.id}: the file announces {declared} samples and holds {rows}")
+                    doubts_in_words.append(
+                        f"{item.channel.id}: the file announces {declared} samples and holds {rows}"
+                    )
         if abs(self.header.rate_hz / rig.acquisition.rate_hz - 1) > 1e-6:
-            found.append(
+            doubts_in_words.append(
                 f"the rate is {self.header.rate_hz:g} Hz and not the rig's {rig.acquisition.rate_hz:g} Hz"
             )
-        return found + self._doubts_about_values()
+        return doubts_in_words + self._doubts_about_values()
 
     def _doubts_about_values(self) -> list[str]:
-        found = []
+        doubts_in_words = []
         for item in self.mapped:
             low, high, absent, rows = np.inf, -np.inf, 0, 0
             for chunk in self.spool.chunks(item.foreign.name):
@@ -112,9 +116,11 @@ class ImportedRun:
                     low, high = min(low, float(chunk[~bad].min())), max(high, float(chunk[~bad].max()))
             name = item.channel.id
             if absent:
-                found.append(f"{name}: {absent} of {rows} values are missing or no numbers")
+                doubts_in_words.append(f"{name}: {absent} of {rows} values are missing or no numbers")
             if low == high and rows > 1:
-                found.append(f"{name} never changes: is the sensor connected, the column the right one?")
+                doubts_in_words.append(
+                    f"{name} never changes: is the sensor connected, the column the right one?"
+                )
             if low > high:
                 continue
             ends = item.to_readings(np.array([low, high]))
@@ -122,11 +128,11 @@ class ImportedRun:
             allowed = item.channel.range_si
             span = allowed[1] - allowed[0]
             if si[0] < allowed[0] - span or si[1] > allowed[1] + span:
-                found.append(
+                doubts_in_words.append(
                     f"{name} goes from {si[0]:.4g} to {si[1]:.4g} {item.channel.si_unit}, its sensor only "
                     f"from {allowed[0]:g} to {allowed[1]:g}: is {item.unit} the right unit?"
                 )
-        return found
+        return doubts_in_words
 
     def _lengths(self) -> list[int]:
         return [self.spool.length(item.foreign.name) for item in self.mapped]

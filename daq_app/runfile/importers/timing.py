@@ -106,13 +106,13 @@ def _doubt_column(spool: Spool, name: str | None, rate_hz: float, doubts: list[s
     if name is None or spool.length(name) < 2:
         return
     try:
-        found = 1.0 / time_axis(spool, name).interval_s
+        column_hz = 1.0 / time_axis(spool, name).interval_s
     except RunFileError as error:
         doubts.append(f"{error.message}; {rate_hz:g} Hz was used all the same")
         return
-    if abs(found / rate_hz - 1) > _ROUGH:
+    if abs(column_hz / rate_hz - 1) > _ROUGH:
         doubts.append(
-            f"a column {name!r} says {found:g} Hz, but {rate_hz:g} Hz was used; settle it in the map "
+            f"a column {name!r} says {column_hz:g} Hz, but {rate_hz:g} Hz was used; settle it in the map "
             "(time_column or rate_hz)"
         )
 

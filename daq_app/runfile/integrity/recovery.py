@@ -59,15 +59,15 @@ def recover(
 
 def _bad_runs(folder: Path, with_journal: set[Path]) -> tuple[Recovery, ...]:
     """Run files that cannot be opened and that no journal is there for: they are left alone, and told."""
-    found = []
+    damaged = []
     for path in find_runs(folder):
         if path in with_journal:
             continue
         try:
             open_run(path).close()
         except (RunFileError, OSError) as error:
-            found.append(Recovery(path, "left alone", str(error)))
-    return tuple(found)
+            damaged.append(Recovery(path, "left alone", str(error)))
+    return tuple(damaged)
 
 
 def _recover_one(journal: Path, thorough: bool, derive: Derive | None) -> Recovery:

@@ -51,15 +51,15 @@ def payload_is_good(file: BinaryIO, frame: Frame) -> bool:
 def scan_frames(file: BinaryIO, file_bytes: int) -> Scan:
     """Scan a journal. Raises `RunFileError` if it holds no frame at all, or absurdly many."""
     scan = Scan([], file_bytes=file_bytes)
-    found: list[Frame] = []
+    frames: list[Frame] = []
     offset = 0
     reread = 0
     while offset + HEADING_BYTES <= file_bytes:
         frame = _heading_at(file, offset)
         if frame is not None and frame.end_offset <= file_bytes:
             if payload_is_good(file, frame):
-                found.append(frame)
-                if len(found) > _MAX_FRAMES:
+                frames.append(frame)
+                if len(frames) > _MAX_FRAMES:
                     raise RunFileError(f"more than {_MAX_FRAMES} frames: this is no journal of a test")
                 offset = frame.end_offset
                 continue
@@ -72,7 +72,7 @@ def scan_frames(file: BinaryIO, file_bytes: int) -> Scan:
     if offset < file_bytes:
         scan.bad_ranges.append((offset, file_bytes))
     scan.bad_ranges = _merged(scan.bad_ranges)
-    _keep_one_journal(scan, found)
+    _keep_one_journal(scan, frames)
     return scan
 
 

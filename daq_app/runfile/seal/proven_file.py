@@ -65,17 +65,17 @@ class ProvenFile(io.RawIOBase):
 
     def damaged_ranges(self) -> list[tuple[int, int]]:
         """Byte ranges [start, end) that are not the ones that were sealed; empty for a whole file."""
-        found: list[tuple[int, int]] = []
+        ranges: list[tuple[int, int]] = []
         size = self._seal.block_bytes
         for index in range(len(self._seal.digests)):
             if not self._seal.proves(index, self._read(index)):
                 start, end = index * size, min((index + 1) * size, self._seal.file_bytes)
-                if found and found[-1][1] == start:
-                    start = found.pop()[0]
-                found.append((start, end))
+                if ranges and ranges[-1][1] == start:
+                    start = ranges.pop()[0]
+                ranges.append((start, end))
         if self._size > self._seal.file_bytes:
-            found.append((self._seal.file_bytes, self._size))
-        return found
+            ranges.append((self._seal.file_bytes, self._size))
+        return ranges
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         base = {os.SEEK_SET: 0, os.SEEK_CUR: self._position, os.SEEK_END: self._size}[whence]

@@ -50,8 +50,8 @@ def signature_is_good(seal: Seal) -> bool:
 
 def made_here(seal: Seal) -> bool:
     """Whether this machine sealed the file: then what it holds was written by this program."""
-    own = own_public_key()
-    return bool(own) and seal.public_key == own and signature_is_good(seal)
+    public_key = own_public_key()
+    return bool(public_key) and seal.public_key == public_key and signature_is_good(seal)
 
 
 @lru_cache(maxsize=4)

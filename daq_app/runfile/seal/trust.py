@@ -23,15 +23,15 @@ def trusted_folder() -> Path:
 
 def trusted_keys() -> dict[str, str]:
     """Name of each trusted recorder → its public key in hexadecimal; files that hold none are left out."""
-    found = {}
+    keys = {}
     for path in sorted(trusted_folder().glob(f"*{_SUFFIX}")):
         try:
             key = path.read_text(encoding="ascii").strip()
         except (OSError, ValueError):
             continue
         if _KEY.fullmatch(key):
-            found[path.stem] = key.lower()
-    return found
+            keys[path.stem] = key.lower()
+    return keys
 
 
 def trust(name: str, key: str, *, replace: bool = False) -> Path:

@@ -96,12 +96,12 @@ class ChannelWatch:
         `at_end`: channels at the end of their travel: they stand still there without being stuck.
         """
         readings = block.readings
-        found = [*self._stuck(block, at_end), *self._leaps(block)]
+        doubts = [*self._stuck(block, at_end), *self._leaps(block)]
         if not moving:
-            found += self._hum(block)
-            found += self._contradictions(block)
+            doubts += self._hum(block)
+            doubts += self._contradictions(block)
         self._last, self._last_sample = readings[:, -1].copy(), block.first_sample + block.n_samples
-        return found
+        return doubts
 
     def _new(self, rows: Iterable[int], name: str, sample: int, text: str) -> list[Doubt]:
         doubts = []

@@ -65,11 +65,11 @@ class OverloadWatch:
         ended = at_high | (smallest <= self._travel_low) & (smallest >= self._lowest)
         reported = set(block.overloaded)
         flags = zip(self._ids, railed | ended, strict=True)
-        found = tuple(name for name, flag in flags if flag or name in reported)
+        overloaded = tuple(name for name, flag in flags if flag or name in reported)
         self.at_end = frozenset(name for name, end in zip(self._ids, ended, strict=True) if end)
-        self._news = tuple(name for name in found if name not in self._now)
-        self._now = frozenset(found)
-        return found
+        self._news = tuple(name for name in overloaded if name not in self._now)
+        self._now = frozenset(overloaded)
+        return overloaded
 
     def forget(self) -> None:
         """Tell everything again that is still so."""

@@ -48,8 +48,8 @@ class Order:
 
     def place(self) -> Laboratory:
         """Raises `ValueError` for a laboratory or an imperfection that does not exist."""
-        found = laboratory(self.laboratory)
-        return found.alone(self.alone) if self.alone else found
+        lab = laboratory(self.laboratory)
+        return lab.alone(self.alone) if self.alone else lab
 
     def engine_of(self, index: int) -> Engine:
         """What moves the wall of case `index`."""

@@ -35,8 +35,8 @@ def load_diagnoser(name: str) -> Diagnoser:
         ) from None
     if not callable(function):
         raise DiagnoserError(f"`{name}` is not a function")
-    found: Diagnoser = function
-    return found
+    diagnoser: Diagnoser = function
+    return diagnoser
 
 
 def product(case: Path, without: Collection[str] = ()) -> Result:

@@ -42,16 +42,16 @@ def swaying(scene: Scene, sway: Sway, wall: Wall) -> Scene:
     """A scene whose held part sways into the state that the wall was let go with."""
     held = scene.time_s < 0.0
     time_s = scene.time_s[held]
-    more, speed, acceleration = (np.zeros_like(scene.theta) for _ in range(3))
-    more[held] = sway.at(time_s) - sway.at(np.zeros(1))
+    rotation, speed, acceleration = (np.zeros_like(scene.theta) for _ in range(3))
+    rotation[held] = sway.at(time_s) - sway.at(np.zeros(1))
     speed[held] = sway.at(time_s, 1)
     acceleration[held] = sway.at(time_s, 2)
     # A contact engine's wall turns about the middle of its base, which rises with the rotation.
-    rise = wall.half_width * np.sign(scene.theta) * more if scene.pivot_dd is not None else 0.0
+    rise = wall.half_width * np.sign(scene.theta) * rotation if scene.pivot_dd is not None else 0.0
     return replace(
         scene,
-        theta=scene.theta + more,
-        lean=scene.lean + more,
+        theta=scene.theta + rotation,
+        lean=scene.lean + rotation,
         omega=scene.omega + speed,
         theta_dd=scene.theta_dd + acceleration,
         lift=scene.lift + rise,

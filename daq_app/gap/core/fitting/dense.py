@@ -13,10 +13,10 @@ def factor(matrix: FloatArray) -> FloatArray:
     """Lower Cholesky factor. Raises `numpy.linalg.LinAlgError` where the matrix is not positive definite."""
     if not matrix.size:
         return matrix.copy()
-    found, info = dpotrf(matrix, lower=1, clean=1)
+    factored, info = dpotrf(matrix, lower=1, clean=1)
     if info:
         raise np.linalg.LinAlgError("the matrix is not positive definite")
-    lower: FloatArray = found
+    lower: FloatArray = factored
     return lower
 
 
@@ -24,13 +24,13 @@ def solve(lower: FloatArray, right: FloatArray) -> FloatArray:
     """A⁻¹ right, with the factor of A."""
     if not lower.size:
         return right.copy()
-    found: FloatArray = dpotrs(lower, right, lower=1)[0]
-    return found
+    solution: FloatArray = dpotrs(lower, right, lower=1)[0]
+    return solution
 
 
 def inverse_factor(lower: FloatArray) -> FloatArray:
     """The inverse of a lower triangular matrix."""
     if not lower.size:
         return lower.copy()
-    found: FloatArray = dtrtri(lower, lower=1)[0]
-    return found
+    inverse: FloatArray = dtrtri(lower, lower=1)[0]
+    return inverse

@@ -113,9 +113,9 @@ def fitted(
     search = Search(problem, problem.start(known), sizes, columns)
     if not math.isfinite(search.objective):
         # A linear step may end where the model diverges: there is nothing of the effects to begin with.
-        own = {(q.key, q.run) for q in problem.unknowns if q.effect}
+        of_effects = {(q.key, q.run) for q in problem.unknowns if q.effect}
         search = Search(
-            problem, problem.start({k: u for k, u in known.items() if k not in own}), sizes, columns
+            problem, problem.start({k: u for k, u in known.items() if k not in of_effects}), sizes, columns
         )
     converged = search.run(4, 4, _LOOSE)
     if polish:
@@ -139,23 +139,23 @@ def polished(search: Search) -> bool:
 def starts(problem: Problem, base: FloatArray, known: Known) -> list[FloatArray]:
     """Starting vectors over the effects' unknown parameters, at most `MAX_STARTS` besides zero."""
     new = [k for k, q in enumerate(problem.unknowns) if q.effect and (q.key, q.run) not in known]
-    own = [k for k in new if problem.unknowns[k].run is None]
+    common = [k for k in new if problem.unknowns[k].run is None]
     per_run = [k for k in new if problem.unknowns[k].run is not None]
-    choices = [problem.unknowns[k].parameter.start_coordinates() for k in own]
-    combinations = list(itertools.islice(itertools.product(*choices), 0, 64)) if own else [()]
+    choices = [problem.unknowns[k].parameter.start_coordinates() for k in common]
+    combinations = list(itertools.islice(itertools.product(*choices), 0, 64)) if common else [()]
     if len(combinations) > MAX_STARTS:
         pick = np.linspace(0, len(combinations) - 1, MAX_STARTS).round().astype(int)
         combinations = [combinations[i] for i in pick]
-    found = [base]
+    vectors = [base]
     for combination in combinations:
         u = base.copy()
-        u[own] = combination
+        u[common] = combination
         for k in per_run:
             u[k] = problem.unknowns[k].parameter.start_coordinates()[0]
         u = np.clip(u, problem.low, problem.high)
-        if not any(np.array_equal(u, other) for other in found):
-            found.append(u)
-    return found
+        if not any(np.array_equal(u, other) for other in vectors):
+            vectors.append(u)
+    return vectors
 
 
 def finish(search: Search, converged: bool, exact: bool) -> Fit:

@@ -78,22 +78,22 @@ def score(
         trained = finish(search, True, exact=False)
         strain = strain_of(experiment.model, trained) / len(runs)
         for i in fold:
-            own: Columns = {
+            of_run: Columns = {
                 (key, 0): column for (key, index), column in (columns or {}).items() if index == i
             }
-            results.append(_predict(experiment.only([i]), effects, trained, own, strain))
+            results.append(_predict(experiment.only([i]), effects, trained, of_run, strain))
     return results
 
 
 def strain_of(model: Model, trained: Fit) -> float:
     """Squared distance from the priors of those parameters that are the model's own, beyond chance."""
-    own = {p.name for p in model.nuisance}
+    names = {p.name for p in model.nuisance}
     square = math.fsum(
         float(u) ** 2
         for (key, run), u in zip(trained.keys, trained.u, strict=True)
-        if run is None and key in own
+        if run is None and key in names
     )
-    return max(square - len(own), 0.0)
+    return max(square - len(names), 0.0)
 
 
 def _renumber(

@@ -58,10 +58,10 @@ class Covariance:
         self.log_det = 0.0
         if self._rows.size:
             block = coupling.product.copy()
-            own = np.arange(self._rows.size)
-            block[own, own] += diagonal[self._rows]
+            diagonal_places = np.arange(self._rows.size)
+            block[diagonal_places, diagonal_places] += diagonal[self._rows]
             self._variance = diagonal.copy()
-            self._variance[self._rows] = block[own, own]
+            self._variance[self._rows] = block[diagonal_places, diagonal_places]
             lower = dense.factor(block)
             self._inverse = dense.inverse_factor(lower)
             # The block has its own factor: its rows count as of variance one in the diagonal.
@@ -83,17 +83,17 @@ class Covariance:
 
     def back(self, white: FloatArray) -> FloatArray:
         """Mᵀ X."""
-        found: FloatArray = white / (self._root if white.ndim == 1 else self._root[:, None])
+        product: FloatArray = white / (self._root if white.ndim == 1 else self._root[:, None])
         if self._rows.size:
-            found[self._rows] = self._inverse.T @ white[self._rows]
-        return found
+            product[self._rows] = self._inverse.T @ white[self._rows]
+        return product
 
     def inverse_diagonal(self) -> FloatArray:
         """diag C⁻¹, shape (n,)."""
-        found: FloatArray = 1.0 / self._root**2
+        inverse: FloatArray = 1.0 / self._root**2
         if self._rows.size:
-            found[self._rows] = np.sum(self._inverse**2, axis=0)
-        return found
+            inverse[self._rows] = np.sum(self._inverse**2, axis=0)
+        return inverse
 
     def solve(self, right: FloatArray) -> FloatArray:
         """C⁻¹ right."""

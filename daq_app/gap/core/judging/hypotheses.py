@@ -95,8 +95,8 @@ class Hypotheses:
 
     def _best(self, count: int) -> list[Hypothesis]:
         """Refitted hypotheses of so many causes, best first."""
-        found = [h for h in self.fits if len(h) == count]
-        return sorted(found, key=lambda h: -self.fits[h].log_evidence)
+        refitted = [h for h in self.fits if len(h) == count]
+        return sorted(refitted, key=lambda h: -self.fits[h].log_evidence)
 
     def _leads(self, count: int) -> list[Hypothesis]:
         """Hypotheses of so many causes that a further one is sought to; none where they are not worth it."""
@@ -108,7 +108,7 @@ class Hypotheses:
 
     def _extend(self, base: Hypothesis, text: str, *, with_probes: bool = False) -> None:
         """Screen every further effect on top of a hypothesis, and refit the most promising."""
-        found = self.fits[base]
+        fit = self.fits[base]
         taken = set(self.library.class_of(base))
         further = [e for e in self.library.named if not taken & set(self.library.class_of([e.name]))]
         probes = list(self.library.probes) if with_probes else []
@@ -118,10 +118,10 @@ class Hypotheses:
         promising = [e.name for e in further if base == NULL or self._promises(screened[e.name])]
         for name in promising:
             hypothesis = tuple(sorted((*base, name)))
-            approximate = found.log_evidence + screened[name].robust.evidence
+            approximate = fit.log_evidence + screened[name].robust.evidence
             self.evidence.setdefault(hypothesis, approximate)
         tasks = [
-            self._refit(hypothesis, step, found)
+            self._refit(hypothesis, step, fit)
             for hypothesis, step in self._chosen(base, [screened[name] for name in promising])
         ]
         for result in self.workers.run(tasks, text):
@@ -134,7 +134,7 @@ class Hypotheses:
             ScreenTask(named, self.fits[base], part)
             for part in (tuple(effects[k : k + share]) for k in range(0, len(effects), share))
         ]
-        return {found.effect: found for part in self.workers.run(tasks, text) for found in part}
+        return {screened.effect: screened for part in self.workers.run(tasks, text) for screened in part}
 
     def _promises(self, screened: Screened) -> bool:
         return max(screened.robust.gain, screened.strict.gain) > self.policy.further_nats

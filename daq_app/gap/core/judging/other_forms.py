@@ -69,10 +69,10 @@ def _log_bayes(score: Score, typical: float) -> float:
     """
     if typical == 0.0 or not math.isfinite(score.error):
         return math.nan
-    own = math.hypot(score.error, POLICY.own_form * typical)
-    other = math.hypot(score.error, 0.5 * typical)
-    sides = [norm.logpdf(score.coefficient, side * typical, other) for side in (-1.0, 1.0)]
-    return float(np.logaddexp(*sides) - math.log(2.0) - norm.logpdf(score.coefficient, 0.0, own))
+    named_form = math.hypot(score.error, POLICY.own_form * typical)
+    other_form = math.hypot(score.error, 0.5 * typical)
+    sides = [norm.logpdf(score.coefficient, side * typical, other_form) for side in (-1.0, 1.0)]
+    return float(np.logaddexp(*sides) - math.log(2.0) - norm.logpdf(score.coefficient, 0.0, named_form))
 
 
 def with_other_forms(
@@ -101,8 +101,8 @@ def with_other_forms(
             Ranked(effects, family_of(effects, library), named.probability * odds * factor, evidence)
         )
     total = sum(entry.probability for entry in (*ranked, *others))
-    found = [replace(entry, probability=entry.probability / total) for entry in (*ranked, *others)]
-    return sorted(found, key=lambda r: (-r.probability, len(r.effects), r.effects))
+    reweighted = [replace(entry, probability=entry.probability / total) for entry in (*ranked, *others)]
+    return sorted(reweighted, key=lambda r: (-r.probability, len(r.effects), r.effects))
 
 
 def is_other_form(effects: Collection[str], library: Library) -> bool:

@@ -116,12 +116,12 @@ def _white(
     sizes: Sizes,
 ) -> list[FloatArray]:
     u = problem.start(known)
-    found = []
+    residuals = []
     for i, run in enumerate(experiment.runs):
         prediction = problem.predict(i, u)
         covariance = sizes.covariance(experiment, i, prediction)
-        found.append(covariance.whiten(run.features.values - prediction.features))
-    return found
+        residuals.append(covariance.whiten(run.features.values - prediction.features))
+    return residuals
 
 
 def _size(white: Sequence[FloatArray]) -> float:
@@ -143,11 +143,11 @@ def _groups(
     for index, z in zip(groups.index, white, strict=True):
         square += np.bincount(index, z**2, len(groups))
         count += np.bincount(index, minlength=len(groups))
-    found = []
+    rests = []
     costs = misfit_nats(experiment, best.sizes, policy)
     for (channel, observable), n, nu, s, nats in zip(
         groups.names, count, np.sqrt(best.sizes.discrepancy), square, costs.tolist(), strict=True
     ):
         size = math.sqrt(float(s) / max(float(n), 1.0))
-        found.append(GroupRest(channel, observable, int(n), float(nu), size, nats))
-    return tuple(sorted(found, key=lambda g: (-g.nats, -g.in_noise)))
+        rests.append(GroupRest(channel, observable, int(n), float(nu), size, nats))
+    return tuple(sorted(rests, key=lambda g: (-g.nats, -g.in_noise)))

@@ -94,7 +94,7 @@ def _cell(key: tuple[str, str, str, str, str], rows: Sequence[_Row]) -> Cell:
 
 def _repeatable(rows: Sequence[_Row]) -> float | None:
     """Share of variance common to runs of one level, from the analysis of variance over repetitions."""
-    common, total, found = 0.0, 0.0, False
+    common, total, repeated = 0.0, 0.0, False
     for level in {r.level for r in rows}:
         by_run: dict[int, list[float]] = {}
         for row in rows:
@@ -102,14 +102,14 @@ def _repeatable(rows: Sequence[_Row]) -> float | None:
                 by_run.setdefault(row.run, []).append(row.residual)
         if len(by_run) < 2:
             continue
-        found = True
+        repeated = True
         length = min(len(v) for v in by_run.values())
         stack = np.array([v[:length] for v in by_run.values()])
         within = float(np.mean(np.var(stack, axis=0, ddof=1)))
         mean_square = float(np.mean(np.mean(stack, axis=0) ** 2))
         common += max(mean_square - within / len(stack), 0.0)
         total += max(mean_square - within / len(stack), 0.0) + within
-    if not found:
+    if not repeated:
         return None
     return common / total if total > 0 else 0.0
 

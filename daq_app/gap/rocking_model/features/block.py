@@ -87,8 +87,8 @@ class Block:
 
     def coefficients(self, series: FloatArray) -> FloatArray:
         """What the regression makes of a difference given on the whole grid."""
-        found: FloatArray = self.projection @ series[self.pick]
-        return found
+        coefficients: FloatArray = self.projection @ series[self.pick]
+        return coefficients
 
 
 def regress(

@@ -45,7 +45,7 @@ def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
         else:
             series = responded(true, effect, given) - true
         total = series if total is None else total + series
-    found = np.zeros(len(block.names))
+    coefficients = np.zeros(len(block.names))
     apart = _moved_apart(run, block, values)
     if total is not None or apart is not None:
         total = np.zeros_like(true) if total is None else total
@@ -55,12 +55,12 @@ def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
             total = block.wire.sensor.position_m[2] * block.wire.rotation(true + total) - block.expected
         total = total if apart is None else total + apart
         seen = total[block.pick]
-        found[:-1] = block.projection @ seen
+        coefficients[:-1] = block.projection @ seen
         left = seen - block.design @ (block.design.T @ seen)
-        found[-1] = 0.5 * np.log1p(float(left @ left) / seen.size / block.noise**2)
+        coefficients[-1] = 0.5 * np.log1p(float(left @ left) / seen.size / block.noise**2)
     for k, shape in enumerate(block.names[: len(block.levers)]):
-        found[k] += values.get(f"cal_{block.family}_{shape}", 0.0)
-    return found
+        coefficients[k] += values.get(f"cal_{block.family}_{shape}", 0.0)
+    return coefficients
 
 
 def _moved_apart(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray | None:

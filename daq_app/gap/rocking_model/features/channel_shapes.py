@@ -132,11 +132,13 @@ def _leaked(left: FloatArray, columns: FloatArray, beside: Others) -> FloatArray
     if beside.imperfections is None:
         return np.zeros_like(left)
     basis = np.linalg.qr(columns / (np.abs(columns).max(axis=0) + 1e-300))[0]
-    own = beside.imperfections[:, beside.pick].T
-    own = own - basis @ (basis.T @ own)
+    imperfections = beside.imperfections[:, beside.pick].T
+    imperfections = imperfections - basis @ (basis.T @ imperfections)
     noise = float(left @ left) / left.size
-    sizes = np.linalg.solve(own.T @ own + noise * np.eye(own.shape[1]), own.T @ left)
-    return np.asarray(own @ sizes)
+    sizes = np.linalg.solve(
+        imperfections.T @ imperfections + noise * np.eye(imperfections.shape[1]), imperfections.T @ left
+    )
+    return np.asarray(imperfections @ sizes)
 
 
 def usual_remains(of_channels: Sequence[float]) -> float:
@@ -150,24 +152,24 @@ def usual_remains(of_channels: Sequence[float]) -> float:
 
 def block_of(name: str, family: Family, beside: Others, usual: float, wire: Wire | None = None) -> Block:
     """Block of the coefficients of a channel; `usual` is what remains (`Deviation`) of a sound one."""
-    found = deviation(beside)
+    misfit = deviation(beside)
     k = len(SHAPES[family])
     covariance = np.zeros((k + 1, k + 1))
-    covariance[:k, :k] = found.covariance
+    covariance[:k, :k] = misfit.covariance
     covariance[k, k] = STRUCTURE_SD**2
-    remains = 0.0 if family in RINGING else max(found.remains - usual, 0.0)
+    remains = 0.0 if family in RINGING else max(misfit.remains - usual, 0.0)
     return Block(
         name,
         (*SHAPES[family], "what remains"),
         (*_UNITS[family], "1"),
-        np.append(found.values, remains),
+        np.append(misfit.values, remains),
         covariance,
-        found.projection,
+        misfit.projection,
         beside.pick,
         kind="channel",
         expected=beside.expected,
-        design=found.design,
-        noise=found.noise * float(np.exp(usual)),
+        design=misfit.design,
+        noise=misfit.noise * float(np.exp(usual)),
         wire=wire,
         tags={name: family},
         levers=_levers(family, beside),

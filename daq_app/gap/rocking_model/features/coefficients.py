@@ -105,7 +105,7 @@ def sensor_priors(survey: Survey) -> tuple[Parameter, ...]:
     A bias is what a certificate lets pass and a regression cannot avoid, the same in all runs; an effect on a
     sensor thus counts as far as it exceeds what sound sensors do.
     """
-    own = (parameter for family in sensor_families() for parameter in family.priors(survey))
+    family_priors = (parameter for family in sensor_families() for parameter in family.priors(survey))
     biases = (
         Parameter(
             _bias_name(family, coefficient),
@@ -127,4 +127,4 @@ def sensor_priors(survey: Survey) -> tuple[Parameter, ...]:
     shared = Parameter(
         CROSSTALK_SHARE, 0.0, CROSSTALK, "1", meaning="crosstalk from the channel scanned before"
     )
-    return (*own, *biases, *unequal, shared)
+    return (*family_priors, *biases, *unequal, shared)

@@ -139,5 +139,5 @@ def base_rotation(run: RockingRun, block: Block, values: Mapping[str, float]) ->
 
     moment = unit_coefficients(run, block, "moment", lambda: seen(moment_shape(theta, run.survey.alpha_rad)))
     reaction = unit_coefficients(run, block, "reaction", lambda: seen(side_of(theta)))
-    found: FloatArray = values["compliance.phi"] * (fall * moment + (1.0 - fall) * reaction)
-    return found
+    coefficients: FloatArray = values["compliance.phi"] * (fall * moment + (1.0 - fall) * reaction)
+    return coefficients

@@ -34,9 +34,11 @@ def travel(run: RockingRun, block: Block, values: Mapping[str, float], of_base: 
     theta = run.grid.theta
     inwards, apart = pivots(run, values)
     each = run.cache.constant("pivots", lambda: pivots_off(run.wires, theta))[of_base]
-    found = inwards * unit_coefficients(run, block, "travel", lambda: each)
-    found = found + apart * unit_coefficients(run, block, "lopsided travel", lambda: side_of(theta) * each)
+    coefficients = inwards * unit_coefficients(run, block, "travel", lambda: each)
+    coefficients = coefficients + apart * unit_coefficients(
+        run, block, "lopsided travel", lambda: side_of(theta) * each
+    )
     if "winkler.theta_c" in values:
         root = np.sqrt(values["winkler.theta_c"] / np.maximum(np.abs(theta), values["winkler.theta_c"]))
-        found = found + block.coefficients(-2.0 * values["half_base"] * root * each)
-    return found
+        coefficients = coefficients + block.coefficients(-2.0 * values["half_base"] * root * each)
+    return coefficients

@@ -21,8 +21,8 @@ def first_order(values: FloatArray, time_constant_s: float, rate_hz: float = GRI
     b0 = 1.0 - (1.0 - a) * time_constant_s * rate_hz
     b1 = (1.0 - a) * time_constant_s * rate_hz - a
     state = np.array([values[0] - b0 * values[0]])
-    found: FloatArray = lfilter([b0, b1], [1.0, -a], values, zi=state)[0]
-    return found
+    response: FloatArray = lfilter([b0, b1], [1.0, -a], values, zi=state)[0]
+    return response
 
 
 def slow_response(values: FloatArray, time_constants_s: FloatArray) -> FloatArray:
@@ -46,8 +46,8 @@ def resonator(values: FloatArray, natural: float, zeta: float, rate_hz: float = 
     A bilinear transform would be off in delay by a fifth where the response is as quick as the grid.
     """
     numerator, denominator = _discrete(float(natural), float(zeta), rate_hz)
-    found: FloatArray = lfilter(numerator, denominator, values - values[0]) + values[0]
-    return found
+    response: FloatArray = lfilter(numerator, denominator, values - values[0]) + values[0]
+    return response
 
 
 @lru_cache(maxsize=64)
@@ -82,17 +82,17 @@ def responded(values: FloatArray, effect: str, given: Mapping[str, float]) -> Fl
 
 def transfer(rate: complex, family: str, values: Mapping[str, float]) -> complex:
     """What a family's sensors make of exp(rate · t): the Laplace transform of their response."""
-    found = 1.0 + 0.0j
+    factor = 1.0 + 0.0j
     if tau := values.get(f"lag@{family}.tau", 0.0):
-        found *= np.exp(-rate * tau)
+        factor *= np.exp(-rate * tau)
     if tau := values.get(f"slow_response@{family}.tau", 0.0):
-        found /= 1.0 + rate * tau
+        factor /= 1.0 + rate * tau
     if tau := values.get(f"filter_delay@{family}.tau", 0.0):
-        found *= 3.0 / ((rate * tau) ** 2 + 3.0 * rate * tau + 3.0)
+        factor *= 3.0 / ((rate * tau) ** 2 + 3.0 * rate * tau + 3.0)
     if frequency := values.get(f"wire_inertia@{family}.frequency", 0.0):
         natural, zeta = 2.0 * np.pi * frequency, values.get(f"wire_inertia@{family}.zeta", 0.2)
-        found *= natural**2 / (rate**2 + 2.0 * zeta * natural * rate + natural**2)
-    return complex(found)
+        factor *= natural**2 / (rate**2 + 2.0 * zeta * natural * rate + natural**2)
+    return complex(factor)
 
 
 def delay(family: str, values: Mapping[str, float]) -> float:

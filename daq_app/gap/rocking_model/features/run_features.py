@@ -62,9 +62,9 @@ def examine(run: GapRun, reference: str = "") -> Examined:
     scene = Scene(run, joint, grid, swings, reference, quiet(run, grid), wanted == "late")
     seen = (block for family in sensor_families() for block in family.observe(scene))
     blocks = tuple(block for block in seen if block is not None)
-    let_go = release_speed(theta, noise, swings, run.survey, run.rate_hz)
-    if let_go is not None:
-        entry = ("speed away from upright", "rad/s", let_go[0], let_go[1] ** 2)
+    initial_speed = release_speed(theta, noise, swings, run.survey, run.rate_hz)
+    if initial_speed is not None:
+        entry = ("speed away from upright", "rad/s", initial_speed[0], initial_speed[1] ** 2)
         blocks = (*blocks, scalar_block("release", (entry,), grid))
     values, sds, labels, places = _times(swings, reference, run.survey)
     peaks = np.arange(1, swings.peak_s.size)

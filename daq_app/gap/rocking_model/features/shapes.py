@@ -22,8 +22,8 @@ def side_of(theta: FloatArray) -> FloatArray:
 
     def integral(rotation: FloatArray) -> FloatArray:
         size = np.abs(rotation) / UPRIGHT_RAD
-        found: FloatArray = size + np.log1p(np.exp(-2.0 * size))
-        return found
+        integral_rad: FloatArray = size + np.log1p(np.exp(-2.0 * size))
+        return integral_rad
 
     mean: FloatArray = 0.5 * UPRIGHT_RAD / half * (integral(theta + half) - integral(theta - half))
     return mean

@@ -43,7 +43,7 @@ def turn_share(run: RockingRun, *, of_base: bool) -> float:
 
 def turned_coefficients(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     """Coefficients of the rotation about the vertical itself, (k,)."""
-    found = np.zeros(len(block.names))
+    coefficients = np.zeros(len(block.names))
     for form, size in turns(values).items():
-        found = found + size * unit_coefficients(run, block, form, partial(turned, run, form))
-    return found
+        coefficients = coefficients + size * unit_coefficients(run, block, form, partial(turned, run, form))
+    return coefficients

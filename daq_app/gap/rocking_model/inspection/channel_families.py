@@ -46,19 +46,19 @@ def channel_family(
     """A family of one run, with the channels of `include` though they are excluded; None of too few."""
     whole = run.including(include)
     moving = (grid.time_s > -0.5) & (grid.time_s < grid.rest_s + 0.2)
-    found: ChannelFamily | None = None
+    data: ChannelFamily | None = None
     match family:
         case "lvdt":
-            found = _lvdts(whole, moving & grid.valid)
+            data = _lvdts(whole, moving & grid.valid)
         case "wire":
-            found = _wires(whole, moving)
+            data = _wires(whole, moving)
         case "accelerometer":
-            found = _accelerometers(whole, moving & ~grid.near_impact)
-    if found is None:
+            data = _accelerometers(whole, moving & ~grid.near_impact)
+    if data is None:
         return None
-    places = [i for name in found.ids for i, sensor in enumerate(run.sensors) if sensor.id == name]
+    places = [i for name in data.ids for i, sensor in enumerate(run.sensors) if sensor.id == name]
     return replace(
-        found,
+        data,
         step=step,
         repeats=grid.impact_s.size,
         sided="side" in SHAPES[family],
@@ -105,9 +105,9 @@ def beside(data: ChannelFamily, name: str, without: tuple[str, ...]) -> Others:
     expected = weights @ data.signals[others]
     # A channel far from the others is predicted by a difference of them: their errors grow.
     sizes = np.sqrt(np.mean(data.signals[others] ** 2, axis=1))
-    own = float(np.sqrt(np.mean(expected**2))) + 1e-300
-    spread = float(np.sqrt(1.0 + np.sum((weights * sizes / own) ** 2)))
-    curved = float(np.sqrt(1.0 + np.sum((weights * (sizes / own) ** 2) ** 2)))
+    expected_rms = float(np.sqrt(np.mean(expected**2))) + 1e-300
+    spread = float(np.sqrt(1.0 + np.sum((weights * sizes / expected_rms) ** 2)))
+    curved = float(np.sqrt(1.0 + np.sum((weights * (sizes / expected_rms) ** 2) ** 2)))
     rough = data.step / np.sqrt(12.0) * float(np.sqrt(1.0 + np.sum(weights**2)))
     # The imperfections of the others are in the prediction.
     rows = [] if data.leaked is None else [data.leaked[place] - weights @ data.leaked[others]]

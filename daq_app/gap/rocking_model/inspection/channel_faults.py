@@ -98,12 +98,12 @@ def find_outlier_channels(
         order = [n for n in sorted(sizes, key=lambda n: -sizes[n]) if sizes[n] > 0.5 * SUSPECT[family]]
         if not order:
             continue
-        together = _outlier_set(usable, family)
-        alone = None if together else _single_outlier(usable, family, order[:LOOKED_AT])
-        if together:
-            several[family] = together
-        elif alone is not None:
-            single[family] = alone
+        several_ids = _outlier_set(usable, family)
+        single_id = None if several_ids else _single_outlier(usable, family, order[:LOOKED_AT])
+        if several_ids:
+            several[family] = several_ids
+        elif single_id is not None:
+            single[family] = single_id
     return OutlierChannels(single, several)
 
 
@@ -115,9 +115,9 @@ def _single_outlier(usable: Sequence[ChannelFamily], family: Family, order: Sequ
     agreed: list[tuple[float, float, str]] = []
     for name in order:
         rest = _sizes(usable, family, (name,))
-        own = rest.pop(name)
-        agree = max(bar, 0.4 * own)
-        if own > bar and max(rest.values()) < agree:
+        size = rest.pop(name)
+        agree = max(bar, 0.4 * size)
+        if size > bar and max(rest.values()) < agree:
             doubt = _wires_doubt(usable, name) if family == "wire" else max(rest.values())
             agreed.append((doubt, agree, name))
     if not agreed:
@@ -148,15 +148,15 @@ def _outlier_set(usable: Sequence[ChannelFamily], family: Family) -> tuple[str, 
     """
     if family not in CROWDED:
         return ()
-    bar, found = SUSPECT[family], list[str]()
+    bar, outliers = SUSPECT[family], list[str]()
     for _ in range(max(len(usable[0].ids) // 4, 2) + 1):
-        sizes = _sizes(usable, family, tuple(found))
-        rest = {name: size for name, size in sizes.items() if name not in found}
+        sizes = _sizes(usable, family, tuple(outliers))
+        rest = {name: size for name, size in sizes.items() if name not in outliers}
         worst = max(rest, key=lambda name: rest[name])
         if rest[worst] <= bar:
-            clear = all(0.4 * sizes[name] > min(rest[worst], bar) for name in found)
-            return tuple(sorted(found)) if len(found) > 1 and clear else ()
-        found.append(worst)
+            clear = all(0.4 * sizes[name] > min(rest[worst], bar) for name in outliers)
+            return tuple(sorted(outliers)) if len(outliers) > 1 and clear else ()
+        outliers.append(worst)
     return ()
 
 
@@ -180,13 +180,13 @@ def _misfit(data: ChannelFamily, without: str) -> float:
     for i, name in enumerate(data.ids):
         if name == without:
             continue
-        found = deviation(Others(data.signals[i], heights[i] * mean, data.pick, 1.0, sided=data.sided))
+        misfit = deviation(Others(data.signals[i], heights[i] * mean, data.pick, 1.0, sided=data.sided))
         # In units of the errors of this wire, which differ from shape to shape and hang together.
-        whiten = np.linalg.inv(np.linalg.cholesky(np.diag(tolerance**2) + found.covariance))
+        whiten = np.linalg.inv(np.linalg.cholesky(np.diag(tolerance**2) + misfit.covariance))
         rows.append(
             whiten @ np.hstack([np.diag(heights[i] ** (1.0 - powers)), np.diag(heights[i] ** -powers)])
         )
-        values.append(whiten @ found.values)
+        values.append(whiten @ misfit.values)
     still = np.hstack([np.zeros((powers.size, powers.size)), np.diag(1.0 / np.array(_STILL))])
     design = np.vstack([*rows, still])
     seen = np.concatenate([*values, np.zeros(powers.size)])
@@ -202,18 +202,20 @@ def _sizes(
     for entry in data:
         rows_beside = {name: beside(entry, name, without) for name in entry.ids}
         table = {name: deviation(other) for name, other in rows_beside.items()}
-        usual = usual_remains([found.remains for found in table.values()])
-        for name, found in table.items():
+        usual = usual_remains([misfit.remains for misfit in table.values()])
+        for name, misfit in table.items():
             tolerance = np.array(TOLERANCE[family]) * rows_beside[name].spread
-            sd = np.hypot(tolerance, np.sqrt(np.diag(found.covariance)))
-            sizes = np.abs(found.values / sd)
+            sd = np.hypot(tolerance, np.sqrt(np.diag(misfit.covariance)))
+            sizes = np.abs(misfit.values / sd)
             if shape:
                 rows.setdefault(name, []).append(float(sizes[SHAPES[family].index(shape)]))
                 continue
             size = float(sizes.max())
             if family in RINGING:
-                usual = found.remains
-            rows.setdefault(name, []).append(max(size, SUSPECT[family] * (found.remains - usual) / STRUCTURE))
+                usual = misfit.remains
+            rows.setdefault(name, []).append(
+                max(size, SUSPECT[family] * (misfit.remains - usual) / STRUCTURE)
+            )
     return {name: float(np.median(values)) for name, values in rows.items()}
 
 
@@ -238,9 +240,9 @@ def channel_block(run: GapRun, grid: Grid, family: Family, name: str, step: floa
     data = channel_family(run, grid, family, step, include=(name,))
     if data is None or name not in data.ids:
         return None
-    own = beside(data, name, (name,))
+    others = beside(data, name, (name,))
     usual = usual_remains([deviation(beside(data, n, (name,))).remains for n in data.ids if n != name])
-    return block_of(name, family, own, usual, _wire(run, name) if family == "wire" else None)
+    return block_of(name, family, others, usual, _wire(run, name) if family == "wire" else None)
 
 
 def _wire(run: GapRun, name: str) -> Wire:

@@ -93,11 +93,11 @@ def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray |
     rest = values[-count:] - values[-count:].mean()
     t = (np.arange(values.size) - (values.size - count)) / rate_hz
     design = _wave_columns(t[-count:], MAINS_HZ)
-    found = np.linalg.lstsq(design, rest, rcond=None)[0]
-    left = rest - design @ found
+    coefficients = np.linalg.lstsq(design, rest, rcond=None)[0]
+    left = rest - design @ coefficients
     noise = float(np.sqrt(np.mean(left**2)))
     sd = noise * np.sqrt(2.0 / count)
-    amplitude = float(np.hypot(*found[:2]))
+    amplitude = float(np.hypot(*coefficients[:2]))
     if amplitude < 6.0 * sd:
         return 0.0, float(sd), None
     # Over the whole record the frequency is sharp enough for the phase to hold.
@@ -240,7 +240,7 @@ def findings_per_run(
     findings: list[list[RunFinding]] = [[] for _ in runs]
     for family in _FAMILIES:
         ids = [s.id for s in runs[0].sensors if s.family == family and s.id in conditions[0]]
-        rows = [[found[name] for name in ids] for found in conditions]
+        rows = [[of_run[name] for name in ids] for of_run in conditions]
         if not ids:
             continue
         noise = float(np.median([[c.noise_si for c in row] for row in rows]))

@@ -69,8 +69,8 @@ def floor_bursts(
     findings: list[list[RunFinding]] = [[] for _ in runs]
     if not known:
         return findings
-    together = np.concatenate([cycle.columns for cycle in known])
-    rings = np.linalg.lstsq(together[:, 1:], together[:, 0], rcond=None)[0]
+    columns = np.concatenate([cycle.columns for cycle in known])
+    rings = np.linalg.lstsq(columns[:, 1:], columns[:, 0], rcond=None)[0]
     floor, per_jump = _usual(
         np.array([cycle.jump for cycle in known]), np.array([cycle.power(rings) for cycle in known])
     )
@@ -113,25 +113,25 @@ def _half_cycles(run: GapRun, grid: Grid, survey: Survey, ring: Ring | None) -> 
     if ring is not None:
         forced = forced_column(grid, ring.frequency_hz, ring.zeta, accelerations=True)
         columns = np.column_stack([columns, ring_columns(grid, ring.frequency_hz, ring.zeta), forced])
-    found = []
+    half_cycles = []
     for part, basis in cleaner(grid, seen.pick, slow=False):
         if part.size < _SHORTEST:
             continue
         before = int(np.searchsorted(grid.impact_s, grid.time_s[part[0]])) - 1
         left = columns[part] - basis @ (basis.T @ columns[part])
         middle = float(grid.time_s[part].mean())
-        found.append(_HalfCycle(middle, float(grid.jumps[before]), left, part.size - basis.shape[1]))
-    return found
+        half_cycles.append(_HalfCycle(middle, float(grid.jumps[before]), left, part.size - basis.shape[1]))
+    return half_cycles
 
 
 def _usual(jump: FloatArray, power: FloatArray) -> tuple[float, float]:
     """Power that half-cycles usually leave: a part of its own, and one per square of the jump before."""
     columns = np.column_stack([np.ones_like(jump), jump**2])
     usual, kept = np.full(jump.size, float(np.median(power))), np.ones(jump.size, dtype=bool)
-    found = np.zeros(2)
+    parts = np.zeros(2)
     for _ in range(_ROUNDS):
-        found, _ = nnls((columns / usual[:, None])[kept], (power / usual)[kept])
-        usual = np.maximum(columns @ found, 1e-3 * float(np.median(power)))
+        parts, _ = nnls((columns / usual[:, None])[kept], (power / usual)[kept])
+        usual = np.maximum(columns @ parts, 1e-3 * float(np.median(power)))
         ratio = power / usual
         kept = ratio < _USUAL * float(np.median(ratio))
-    return float(found[0]), float(found[1])
+    return float(parts[0]), float(parts[1])

@@ -56,10 +56,10 @@ def inspect(runs: Sequence[GapRun]) -> Inspected:
     """Mend the wiring, inspect the electronics. Raises nothing: what cannot be judged is left as it is."""
     mended, wiring = mend(list(runs))
     mended = [run.excluding(wiring.reversed_ids) for run in mended]
-    found = conditions_of(mended)
-    findings = findings_per_run(mended, found)
+    conditions = conditions_of(mended)
+    findings = findings_per_run(mended, conditions)
     # Readings that stand still or go in steps must be seen as they were; all else is put on one clock.
-    clean = [without_hum(run, c).at_clock() for run, c in zip(mended, found, strict=True)]
+    clean = [without_hum(run, c).at_clock() for run, c in zip(mended, conditions, strict=True)]
     families: dict[str, Family] = {s.id: s.family for s in runs[0].sensors}
     single = {
         finding.key.partition("@")[2]
@@ -158,22 +158,22 @@ def without_outlier_channels(
     grids = [e.features.grid for e in examined]
     runs = [e.run for e in examined]
     along_z = odd_vertical(runs, grids, [_late(e.features) for e in examined])
-    found = find_outlier_channels(runs, grids, _steps(findings)).plus("accelerometer", along_z)
-    again = _examined_without(examined, found.ids, reference)
-    gross = _left_out(again).difference(found.ids)
+    outliers = find_outlier_channels(runs, grids, _steps(findings)).plus("accelerometer", along_z)
+    again = _examined_without(examined, outliers.ids, reference)
+    gross = _left_out(again).difference(outliers.ids)
     for name in sorted(gross):
-        found = found.plus("lvdt", name)
+        outliers = outliers.plus("lvdt", name)
     if gross:
-        again = _examined_without(examined, found.ids, reference)
-    more = [
+        again = _examined_without(examined, outliers.ids, reference)
+    disagreements = [
         RunFinding(
             f"disagreement@{family}", f"disagreement ({', '.join(names)})", "1", float(len(names)), COUNT_SD
         )
-        for family, names in found.several.items()
+        for family, names in outliers.several.items()
     ]
     turned = second_axis([e.run for e in again], [e.features.grid for e in again])
-    rows = [[*row, *more, *own] for row, own in zip(findings, turned, strict=True)]
-    return again, {name: family for family, name in found.single.items()}, rows
+    rows = [[*row, *disagreements, *own] for row, own in zip(findings, turned, strict=True)]
+    return again, {name: family for family, name in outliers.single.items()}, rows
 
 
 def _examined_without(examined: Sequence[Examined], ids: Sequence[str], reference: str) -> list[Examined]:
@@ -220,9 +220,9 @@ def completed(
     """
     grids = [e.features.grid for e in examined]
     height = examined[0].features.survey.height_m
-    more: list[list[Block]] = [[] for _ in examined]
+    blocks_by_run: list[list[Block]] = [[] for _ in examined]
     steps = _steps(findings)
-    for row, entry in zip(more, examined, strict=True):
+    for row, entry in zip(blocks_by_run, examined, strict=True):
         for name, family in channels.items():
             grid = entry.features.grid
             block = channel_block(entry.run, grid, family, name, steps.get(family, 0.0))
@@ -232,8 +232,8 @@ def completed(
                 row.append(block)
     bends = [bend_signals(e.run, e.features.grid, height) for e in examined]
     turns = [turn_signals(e.run, e.joint, e.features.grid, height) for e in examined]
-    bending = _add_rings(more, examined, bends, "bending", slow=False)
-    _add_rings(more, examined, turns, "turning", slow=True)
+    bending = _add_rings(blocks_by_run, examined, bends, "bending", slow=False)
+    _add_rings(blocks_by_run, examined, turns, "turning", slow=True)
     vibrations = find_vibration([e.run for e in examined], grids)
     examined = [_on_still_floor(e, v) for e, v in zip(examined, vibrations, strict=True)]
     bursts = floor_bursts(
@@ -245,7 +245,9 @@ def completed(
     findings = [[*row, *own] for row, own in zip(findings, bursts, strict=True)]
     runs = []
     known = with_quantisation_errors(examined, steps)
-    for row, entry, vibration, seen, read in zip(more, examined, vibrations, findings, known, strict=True):
+    for row, entry, vibration, seen, read in zip(
+        blocks_by_run, examined, vibrations, findings, known, strict=True
+    ):
         grid = entry.features.grid
         if vibration is not None:
             shown = vibration.amplitude if vibration.found else 0.0
@@ -273,7 +275,7 @@ def _on_still_floor(entry: Examined, vibration: Vibration | None) -> Examined:
 
 
 def _add_rings(
-    more: list[list[Block]],
+    blocks_by_run: list[list[Block]],
     examined: Sequence[Examined],
     signals: Sequence[list[Signal]],
     name: str,
@@ -285,14 +287,14 @@ def _add_rings(
     ring = scan(grids, signals, slow=slow)
     if ring is None:
         return None
-    found: list[Block] = []
+    ring_blocks: list[Block] = []
     rows: list[list[Block]] = []
-    for row, entry, listed in zip(more, examined, signals, strict=True):
+    for row, entry, listed in zip(blocks_by_run, examined, signals, strict=True):
         block = ring_block(name, entry.features.grid, listed, ring, slow=slow)
         if block is not None:
-            found.append(block)
+            ring_blocks.append(block)
             rows.append(row)
-    for row, block in zip(rows, with_repeatability(found), strict=True):
+    for row, block in zip(rows, with_repeatability(ring_blocks), strict=True):
         row.append(block)
     return ring
 

@@ -32,8 +32,8 @@ def with_quantisation_errors(examined: Sequence[Examined], steps: Mapping[str, f
     runs = [entry.features for entry in examined]
     for family in ("wire", "lvdt"):
         if family in steps:
-            found = [_rounded(entry, family, steps[family]) for entry in examined]
-            runs = [_widened(run, more) for run, more in zip(runs, _known_once(found), strict=True)]
+            errors = [_rounded(entry, family, steps[family]) for entry in examined]
+            runs = [_widened(run, more) for run, more in zip(runs, _known_once(errors), strict=True)]
     return runs
 
 
@@ -87,18 +87,18 @@ def _weights(run: GapRun, family: str, chosen: Sequence[int]) -> dict[str, Float
     return {"wire": -theta, "joint": lift, "twist": twist}
 
 
-def _known_once(found: Sequence[Mapping[str, FloatArray]]) -> list[dict[str, FloatArray]]:
+def _known_once(errors_by_run: Sequence[Mapping[str, FloatArray]]) -> list[dict[str, FloatArray]]:
     """Covariances, (k, k), of those coefficients in each run.
 
     What the same zero does alike in all runs is known only once, however many runs there are; the likelihood
     takes the errors of runs for independent, so each bears its share of what is not.
     """
-    rows: list[dict[str, FloatArray]] = [{} for _ in found]
-    for name in dict.fromkeys(name for run in found for name in run):
-        having = [(row, run[name]) for row, run in zip(rows, found, strict=True) if name in run]
+    rows: list[dict[str, FloatArray]] = [{} for _ in errors_by_run]
+    for name in dict.fromkeys(name for run in errors_by_run for name in run):
+        having = [(row, run[name]) for row, run in zip(rows, errors_by_run, strict=True) if name in run]
         sds = [np.sqrt(np.mean(errors**2, axis=0)) + 1e-300 for _, errors in having]
-        together = np.sum([errors / sd for (_, errors), sd in zip(having, sds, strict=True)], axis=0)
-        share = np.sqrt(np.maximum(np.mean(together**2, axis=0) / len(having), 1.0))
+        standardised = np.sum([errors / sd for (_, errors), sd in zip(having, sds, strict=True)], axis=0)
+        share = np.sqrt(np.maximum(np.mean(standardised**2, axis=0) / len(having), 1.0))
         for row, errors in having:
             row[name] = np.outer(share, share) * (errors.T @ errors) / DRAWS
     return rows

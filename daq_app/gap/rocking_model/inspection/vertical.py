@@ -42,11 +42,11 @@ def odd_vertical(runs: Sequence[GapRun], grids: Sequence[Grid], late_s: Sequence
     sizes: dict[str, list[float]] = {}
     for run, grid, late in zip(runs, grids, late_s, strict=True):
         for name, beside in _vertical(run, grid, late).items():
-            found = deviation(beside)
+            misfit = deviation(beside)
             # On one edge such a place hardly moves, so that a gain and a curvature look much alike here:
             # together they say what neither says alone.
             tolerance = np.diag((np.array(TOLERANCE["accelerometer"]) * beside.spread) ** 2)
-            square = found.values @ np.linalg.solve(found.covariance + tolerance, found.values)
+            square = misfit.values @ np.linalg.solve(misfit.covariance + tolerance, misfit.values)
             sizes.setdefault(name, []).append(float(np.sqrt(square)))
     usual = {name: float(np.median(values)) for name, values in sizes.items()}
     if len(usual) < 2:
@@ -79,7 +79,7 @@ def _vertical(run: GapRun, grid: Grid, late_s: float) -> dict[str, Others]:
     shown = np.sqrt(np.mean(signals**2, axis=1)) / (np.sqrt(np.mean(turning**2)) + 1e-300)
     spread = float(np.sqrt(1.0 + np.sum((weights * shown) ** 2)))
     leaked, turned = _imperfections(run, grid, along_x)
-    found = {}
+    compared = {}
     for i, measured in zip(along_z, smoothed(run, along_z, late_s), strict=True):
         lever = lever_arm(run.sensors[i], grid, run.survey.half_base_m)
         upright = GRAVITY_M_S2 * (np.cos(grid.theta) - 1.0) - grid.omega**2 * run.sensors[i].position_m[2]
@@ -88,10 +88,10 @@ def _vertical(run: GapRun, grid: Grid, late_s: float) -> dict[str, Others]:
         rows = np.vstack(
             [own_leaked + lever * (weights @ leaked), own_turned, weights[:, None] * turned * lever]
         )
-        found[run.sensors[i].id] = Others(
+        compared[run.sensors[i].id] = Others(
             measured, upright - turning * lever, pick, spread, imperfections=rows
         )
-    return found
+    return compared
 
 
 def _imperfections(run: GapRun, grid: Grid, places: Sequence[int]) -> tuple[FloatArray, FloatArray]:

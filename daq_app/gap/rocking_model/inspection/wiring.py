@@ -32,13 +32,13 @@ LOW_PASS_HZ = 12.0
 
 def mend(runs: list[GapRun]) -> tuple[list[GapRun], Wiring]:
     """Runs with reversed channels turned round and exchanged ones put back, and what was done."""
-    found = [_check(run) for run in runs]
-    first = found[0]
-    same = all(w.exchanged == first.exchanged for w in found)
+    wirings = [_check(run) for run in runs]
+    first = wirings[0]
+    same = all(w.exchanged == first.exchanged for w in wirings)
     kept = Wiring(
-        tuple(name for name in first.reversed_ids if all(name in w.reversed_ids for w in found)),
+        tuple(name for name in first.reversed_ids if all(name in w.reversed_ids for w in wirings)),
         first.exchanged if same else (),
-        min(w.places for w in found) if same else 0,
+        min(w.places for w in wirings) if same else 0,
     )
     if kept == Wiring():
         return runs, kept

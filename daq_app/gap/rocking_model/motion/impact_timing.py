@@ -67,7 +67,7 @@ def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
 
 def _windows(grid: Grid) -> list[tuple[slice, FloatArray]]:
     """Samples around each impact that stands alone, with the slow shapes that are free there."""
-    found = []
+    windows = []
     gaps = np.diff(grid.impact_s, append=grid.impact_s[-1] + 0.5)
     for k, (time, gap) in enumerate(zip(grid.impact_s, gaps, strict=True)):
         before = time - grid.impact_s[k - 1] if k else 1.0
@@ -78,10 +78,10 @@ def _windows(grid: Grid) -> list[tuple[slice, FloatArray]]:
         if part.start < 0 or part.stop > grid.time_s.size:
             continue
         x = np.linspace(-1.0, 1.0, part.stop - part.start)
-        found.append((part, np.linalg.qr(np.vander(x, _SLOW_SHAPES))[0]))
-        if len(found) == MOST:
+        windows.append((part, np.linalg.qr(np.vander(x, _SLOW_SHAPES))[0]))
+        if len(windows) == MOST:
             break
-    return found
+    return windows
 
 
 def _left(difference: FloatArray, basis: FloatArray) -> float:

@@ -50,7 +50,8 @@ def common_lateness(mine: FloatArray, other: FloatArray, rate_hz: float) -> floa
     ]
     return _largest(
         np.sum(
-            [_correlation(y, e, most) ** 2 / own for (y, e), own in zip(pairs, power, strict=True)], axis=0
+            [_correlation(y, e, most) ** 2 / product for (y, e), product in zip(pairs, power, strict=True)],
+            axis=0,
         )
     )
 

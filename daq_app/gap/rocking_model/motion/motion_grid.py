@@ -151,16 +151,16 @@ def _speeds(
 
 def _impact_samples(theta: FloatArray, smooth: FloatArray, release: int) -> list[int]:
     """Samples at which the rotation passes zero, until half-cycles become too short to see."""
-    found: list[int] = []
+    impacts: list[int] = []
     signs = np.sign(smooth)
     for k in np.flatnonzero(np.diff(signs) != 0).tolist():
         if k <= release:
             continue
-        if found and (k - found[-1] < 100 or np.abs(smooth[found[-1] : k]).max() < SMALLEST_GRID_RAD):
+        if impacts and (k - impacts[-1] < 100 or np.abs(smooth[impacts[-1] : k]).max() < SMALLEST_GRID_RAD):
             break
         # The smoothed record rounds the corner; the crossing itself is read from the raw one nearby.
         window = slice(max(k - 60, 0), k + 60)
         t = np.arange(-60, k + 60 - max(k - 60, 0) - 60)
         slope, level = np.polyfit(t, theta[window], 1)
-        found.append(int(k + np.clip(-level / slope, -40, 40)) if slope else int(k))
-    return found
+        impacts.append(int(k + np.clip(-level / slope, -40, 40)) if slope else int(k))
+    return impacts

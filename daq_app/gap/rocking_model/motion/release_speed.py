@@ -47,12 +47,12 @@ def release_speed(
         starts = starts[best] + np.linspace(-width, width, 9, dtype=np.float64)
         lost = [_fit(seen, time_s, start, survey.p_rad_s)[0] for start in starts]
         best = int(np.argmin(lost))
-    left, found, _ = _fit(seen, time_s, float(starts[best]), survey.p_rad_s)
+    left, coefficients, _ = _fit(seen, time_s, float(starts[best]), survey.p_rad_s)
     variance = max(left / max(count - 4, 1), noise_rad**2 / step)
-    told = _told(seen, time_s, survey.p_rad_s, float(found[1]), variance)
+    told = _told(seen, time_s, survey.p_rad_s, float(coefficients[1]), variance)
     # Thrown up the wall rises v²/2a above its hold; what the hold sways by is as good as that.
-    swayed = 2.0 * swings.hold_sd * abs(found[2]) / max(abs(found[1]), 1e-6)
-    return float(found[1]), float(np.linalg.norm([told, swayed, RELEASE_SPEED_RAD_S]))
+    swayed = 2.0 * swings.hold_sd * abs(coefficients[2]) / max(abs(coefficients[1]), 1e-6)
+    return float(coefficients[1]), float(np.linalg.norm([told, swayed, RELEASE_SPEED_RAD_S]))
 
 
 def _told(seen: FloatArray, time_s: FloatArray, p: float, speed: float, variance: float) -> float:
@@ -87,6 +87,6 @@ def _fit(
 ) -> tuple[float, FloatArray, FloatArray]:
     """(squares left, coefficients, design) with the release at `start_s`."""
     design = _design(time_s, start_s, p)
-    found: FloatArray = np.linalg.lstsq(design, seen, rcond=None)[0].astype(np.float64)
-    left = seen - design @ found
-    return float(left @ left), found, design
+    coefficients: FloatArray = np.linalg.lstsq(design, seen, rcond=None)[0].astype(np.float64)
+    left = seen - design @ coefficients
+    return float(left @ left), coefficients, design

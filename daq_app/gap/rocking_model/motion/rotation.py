@@ -64,8 +64,8 @@ def coarse(values: FloatArray, rate_hz: float) -> FloatArray:
     """Averages over the grid's intervals; shape (n,) → (m,)."""
     step = round(rate_hz / GRID_HZ)
     m = values.size // step
-    found: FloatArray = values[: m * step].reshape(m, step).mean(axis=1)
-    return found
+    means: FloatArray = values[: m * step].reshape(m, step).mean(axis=1)
+    return means
 
 
 def gridded(run: GapRun, index: int, early: int = 0) -> FloatArray:
@@ -83,8 +83,8 @@ def gridded(run: GapRun, index: int, early: int = 0) -> FloatArray:
 
 def sooner(values: FloatArray, samples: int) -> FloatArray:
     """A record (n,) as if it came `samples` sooner; its ends are held."""
-    found: FloatArray = values[np.clip(np.arange(values.size) + samples, 0, values.size - 1)]
-    return found
+    moved: FloatArray = values[np.clip(np.arange(values.size) + samples, 0, values.size - 1)]
+    return moved
 
 
 def sample_noise(values: FloatArray, rate_hz: float) -> float:
@@ -203,8 +203,8 @@ def _turned(wires: Sequence[Wire], theta: FloatArray, shortenings: Sequence[Floa
     """Mean rotation (weights z²), rad, that wires shorter by `shortenings` show beyond `theta`."""
     weights = np.array([wire.sensor.position_m[2] for wire in wires]) ** 2
     turned = np.array([wire.rotation(s) - theta for wire, s in zip(wires, shortenings, strict=True)])
-    found: FloatArray = np.tensordot(weights / np.sum(weights), turned, 1)
-    return found
+    mean: FloatArray = np.tensordot(weights / np.sum(weights), turned, 1)
+    return mean
 
 
 def _moved(wires: Sequence[Wire], theta: FloatArray, shortenings: Sequence[FloatArray]) -> FloatArray:
@@ -212,8 +212,8 @@ def _moved(wires: Sequence[Wire], theta: FloatArray, shortenings: Sequence[Float
     z = np.array([wire.sensor.position_m[2] for wire in wires])
     moved = np.array([s - wire.shortening(theta) for wire, s in zip(wires, shortenings, strict=True)])
     at_base = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
-    found: FloatArray = np.tensordot(at_base, moved, 1)
-    return found
+    mean: FloatArray = np.tensordot(at_base, moved, 1)
+    return mean
 
 
 def wall_rotation(run: GapRun) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:

@@ -26,14 +26,14 @@ def swing_delay(run: GapRun, grid: Grid, of_impacts_s: float | None) -> tuple[fl
     if not grid.impact_s.size or not chosen:
         return None
     late = 0.0 if of_impacts_s is None else of_impacts_s - MIDDLE_OF_IMPACT_S
-    found: tuple[float, float] | None = None
+    delay: tuple[float, float] | None = None
     for _ in range(_ROUNDS):
         early = round(late * run.rate_hz) if abs(late) > LATE_S else 0
-        found = _in_step(run, grid, chosen, early)
-        if found is None or abs(found[0] - early / run.rate_hz) < LATE_S:
+        delay = _in_step(run, grid, chosen, early)
+        if delay is None or abs(delay[0] - early / run.rate_hz) < LATE_S:
             break
-        late = found[0]
-    return found
+        late = delay[0]
+    return delay
 
 
 def _in_step(run: GapRun, grid: Grid, chosen: list[int], early: int) -> tuple[float, float] | None:

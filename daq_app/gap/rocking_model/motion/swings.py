@@ -157,14 +157,14 @@ def _hold(
     step = int(0.02 * rate_hz)
     count = (end - start) // step
     means = theta[end - count * step : end].reshape(count, step).mean(axis=1)
-    own = noise / np.sqrt(step)
-    sway = float(np.sqrt(max(np.var(means) - own**2, 0.0)))
+    mean_noise = noise / np.sqrt(step)
+    sway = float(np.sqrt(max(np.var(means) - mean_noise**2, 0.0)))
     rates = np.diff(means) * rate_hz / step
-    speed = float(np.sqrt(max(np.var(rates) - 2 * (own * rate_hz / step) ** 2, 0.0)))
-    if sway < 0.5 * own:
+    speed = float(np.sqrt(max(np.var(rates) - 2 * (mean_noise * rate_hz / step) ** 2, 0.0)))
+    if sway < 0.5 * mean_noise:
         return float(means.mean()), float(noise / np.sqrt(count * step)), 0.0, 0.0
     last = means[-4:]
-    return float(last.mean()), float(own / 2.0), sway, speed
+    return float(last.mean()), float(mean_noise / 2.0), sway, speed
 
 
 def _release(smooth: FloatArray, noise: float, first_crossing: int, rate_hz: float) -> float:
@@ -192,7 +192,7 @@ def _peaks(
     theta: FloatArray, smooth: FloatArray, crossings: np.ndarray, noise: float, rate_hz: float
 ) -> list[tuple[float, float, float, int]]:
     """(time in s, signed peak, its sd, sample) of each half-cycle after the first impact."""
-    found = []
+    peaks = []
     for start, stop in itertools.pairwise(crossings):
         part = smooth[start:stop]
         if part.size < 0.04 * rate_hz:
@@ -214,10 +214,10 @@ def _peaks(
         row = np.vander([top], TOP_DEGREE + 1, increasing=True)[0]
         covariance = np.linalg.inv(design.T @ design)
         sd = noise * float(np.sqrt(row @ covariance @ row))
-        found.append((at / rate_hz + top * scale, side * float(row @ coefficients), sd, at))
-        if len(found) >= MOST:
+        peaks.append((at / rate_hz + top * scale, side * float(row @ coefficients), sd, at))
+        if len(peaks) >= MOST:
             break
-    return found
+    return peaks
 
 
 def _crossing(

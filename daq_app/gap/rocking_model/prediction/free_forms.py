@@ -66,10 +66,10 @@ def with_uneven_loss(
     growth, side = values.get("loss_growth.zeta", 0.0), values.get("loss_side.zeta", 0.0)
     if growth == 0.0 and side == 0.0:
         return table
-    own = growth * np.log(np.abs(true) / (_MIDDLE * run.survey.alpha_rad)) + side * np.sign(true)
+    zeta = growth * np.log(np.abs(true) / (_MIDDLE * run.survey.alpha_rad)) + side * np.sign(true)
     ahead, behind = vector.copy(), vector.copy()
     ahead[par.ZETA] += _ZETA_STEP
     behind[par.ZETA] -= _ZETA_STEP
-    more, less = (half_cycle_table(run, v, true, levels) for v in (ahead, behind))
-    found: FloatArray = table + own[:, None] * (more - less) / (2.0 * _ZETA_STEP)
-    return found
+    damped_more, damped_less = (half_cycle_table(run, v, true, levels) for v in (ahead, behind))
+    moved: FloatArray = table + zeta[:, None] * (damped_more - damped_less) / (2.0 * _ZETA_STEP)
+    return moved

@@ -73,9 +73,9 @@ class RockingModel:
                 meaning="half width of the base",
             ),
             *(
-                Parameter(f"cal_{name}_{shape}", 0.0, own, meaning=f"{shape} of {name}", linear=True)
+                Parameter(f"cal_{name}_{shape}", 0.0, sd, meaning=f"{shape} of {name}", linear=True)
                 for name, sound in self.channels.items()
-                for shape, own in sound.items()
+                for shape, sd in sound.items()
             ),
             *sensor_priors(s),
         )

@@ -40,12 +40,12 @@ def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
 
 def _bent(run: RockingRun, values: Mapping[str, float], theta: FloatArray) -> FloatArray | float:
     """What wires out of line add to a rotation that is read from them."""
-    found: FloatArray | float = 0.0
+    added: FloatArray | float = 0.0
     if bend := values.get(f"wire_cosine@{run.reference}.kappa", 0.0):
-        found = bend * run.wire_bend_m * theta**2
+        added = bend * run.wire_bend_m * theta**2
     if higher := values.get(f"wire_anchor@{run.reference}.height", 0.0):
-        found = found + anchors_turn(run.wires, theta, higher)
-    return found
+        added = added + anchors_turn(run.wires, theta, higher)
+    return added
 
 
 def _second_order(values: Mapping[str, float], name: str) -> float:

@@ -92,5 +92,5 @@ def restitution_of(
         r = r + np.interp(speeds, PROBE_SPEEDS, knots) + sides * values["free_restitution.side"]
         r = r + values["free_restitution.order"] * impacts / 10.0
     r = r * (1.0 - values.get("restitution_wear.loss", 0.0) * 0.01 * (run.impacts_before + impacts))
-    found: FloatArray = np.clip(r, 0.05, 1.2)
-    return found
+    clipped: FloatArray = np.clip(r, 0.05, 1.2)
+    return clipped

@@ -32,10 +32,10 @@ class _Carried:
 
 def peaks_carry(run: RockingRun, values: Mapping[str, float]) -> FloatArray | float:
     """What the peaks of the reference have beyond those of the wall, (n,), rad."""
-    found: FloatArray | float = 0.0
+    carried_rad: FloatArray | float = 0.0
     for size, carried in _forms(run, values):
-        found = found + size * carried.peaks
-    return found
+        carried_rad = carried_rad + size * carried.peaks
+    return carried_rad
 
 
 def times_carry(run: RockingRun, values: Mapping[str, float]) -> FloatArray | float:
@@ -43,10 +43,10 @@ def times_carry(run: RockingRun, values: Mapping[str, float]) -> FloatArray | fl
 
     Beside what the peaks carry already, by which the levels of a half-cycle are moved.
     """
-    found: FloatArray | float = 0.0
+    carried_s: FloatArray | float = 0.0
     for size, carried in _forms(run, values):
-        found = found + size * carried.times
-    return found
+        carried_s = carried_s + size * carried.times
+    return carried_s
 
 
 def _forms(run: RockingRun, values: Mapping[str, float]) -> Iterator[tuple[float, _Carried]]:

@@ -48,11 +48,11 @@ def gains_of(signals: Signals, times: TestTimes, wires: SingleWires | None) -> F
     """What the wires' motion and the levels of LVDTs and tiltmeters in the hold say of their gains."""
     assert times.release_s is not None
     hold = hold_samples(signals, times.release_s)
-    own = CALIBRATION_SHARE
+    wires_sigma = CALIBRATION_SHARE
     if wires is not None:
-        own = wires.family_gain_sigma(signals.geometry.weights()[0])
+        wires_sigma = wires.family_gain_sigma(signals.geometry.weights()[0])
     return FamilyGains(
-        wires=math.hypot(own, _DATUM_SHARE),
+        wires=math.hypot(wires_sigma, _DATUM_SHARE),
         lvdts=_lvdts(signals, hold),
         tiltmeters=_tiltmeters(signals, hold, times.hold_rad),
     )

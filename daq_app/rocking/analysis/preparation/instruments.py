@@ -117,7 +117,7 @@ def _without_hum(record: TestRecord, ids: tuple[str, ...]) -> tuple[TestRecord, 
     hum = find_hum(record.load(ids), noises, record.rate_hz)
     if hum is None:
         return record, []
-    found = []
+    findings = []
     for family, name in words.FAMILY_NAMES.items():
         rows = [k for k, channel_id in enumerate(ids) if record.rig.channel(channel_id).family == family]
         rows = [k for k in rows if hum.amplitude[k]]
@@ -126,21 +126,21 @@ def _without_hum(record: TestRecord, ids: tuple[str, ...]) -> tuple[TestRecord, 
             unit = record.rig.channel(ids[rows[0]]).si_unit
             largest = float(np.abs(hum.amplitude[rows]).max())
             channels = tuple(ids[k] for k in rows)
-            found.append(words.hum(name, channels, largest, unit, hum.frequency_hz, notable=notable))
-    return without_hum(record, ids, hum), found
+            findings.append(words.hum(name, channels, largest, unit, hum.frequency_hz, notable=notable))
+    return without_hum(record, ids, hum), findings
 
 
 def _put_to_scale(record: TestRecord) -> tuple[list[FamilyFinding], Corrections]:
     """Signs and units of whole families, from rotations that need no hold to be found."""
-    found, factors = [], {}
+    findings, factors = [], {}
     size = max(1, round(_CRUDE_MEAN_S * record.rate_hz))
     wrong = wrong_scales(_crude_rotations(record, size), record.rate_hz / size)
     for name, factor in wrong.items():
         family = words.families_by_name()[name]
         axis = "x" if family == "tiltmeter" else None
-        found.append(words.scale(name, factor))
+        findings.append(words.scale(name, factor))
         factors.update(dict.fromkeys(record.family(family, axis), 1.0 / factor))
-    return found, Corrections(factors=factors)
+    return findings, Corrections(factors=factors)
 
 
 def _crude_rotations(record: TestRecord, size: int) -> dict[str, Floats]:
@@ -158,8 +158,10 @@ def _crude_rotations(record: TestRecord, size: int) -> dict[str, Floats]:
         levers = {
             wire: float(lever) for wire, lever in zip(geometry.wires.ids, geometry.wires.lever_m, strict=True)
         }
-        own = means(ids) / np.array([[levers[channel_id]] for channel_id in ids])
-        rotations["wires"] = np.median(own - np.nanmedian(own, axis=1, keepdims=True), axis=0)
+        of_each_wire = means(ids) / np.array([[levers[channel_id]] for channel_id in ids])
+        rotations["wires"] = np.median(
+            of_each_wire - np.nanmedian(of_each_wire, axis=1, keepdims=True), axis=0
+        )
     lvdts = record.family("lvdt")
     try:
         joint = BaseJoint.from_rig(record.rig, lvdts)
@@ -231,8 +233,8 @@ def _single_wires(signals: Signals, times: TestTimes) -> SingleWires | None:
     if len(signals.excluded_share) > 1:
         return None  # they are named already, and the median of the rest is no judge
     wires = signals.geometry.wires
-    own = wires.rotation_of_each(signals.wires_m[:, _motion(signals, times)])
-    return compare_wires(own, signals.record.rate_hz, wires.position_m[:, 1] / wires.lever_m)
+    of_each_wire = wires.rotation_of_each(signals.wires_m[:, _motion(signals, times)])
+    return compare_wires(of_each_wire, signals.record.rate_hz, wires.position_m[:, 1] / wires.lever_m)
 
 
 def _follow(signals: Signals, times: TestTimes) -> Response | None:
@@ -319,10 +321,10 @@ def _with_errors(signals: Signals, times: TestTimes) -> Signals:
     still = [signals.rotation_rad[start:stop]]
     if times.rest is not None:
         still.append(signals.rotation_rad[times.rest])
-    found = [slow for slow in (slow_noise(part, rate) for part in still) if math.isfinite(slow)]
+    slow_noises = [slow for slow in (slow_noise(part, rate) for part in still) if math.isfinite(slow)]
     settings = signals.settings
     if signals.zeroed_at_rest:
         settings = replace(settings, zero_sigma_rad=REST_ZERO_SIGMA_RAD)
-    if found:
-        settings = replace(settings, slow_noise_rad=max(min(found), signals.noise_rad))
+    if slow_noises:
+        settings = replace(settings, slow_noise_rad=max(min(slow_noises), signals.noise_rad))
     return replace(signals, settings=settings)

@@ -88,9 +88,9 @@ class CsvReader:
             for count, line in enumerate(lines_of(file, self._path)):
                 if count > _MAX_COMMENT_LINES:
                     break
-                own = _OWN_CHANNEL.match(line)
-                if own:
-                    self._units[own[1]] = own[2]
+                channel = _OWN_CHANNEL.match(line)
+                if channel:
+                    self._units[channel[1]] = channel[2]
                 told = start_in_line(line)
                 if told:
                     self._told[told[0]] = told[1]

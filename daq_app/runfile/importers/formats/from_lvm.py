@@ -195,10 +195,10 @@ class LvmReader:
         )
         if commas and not self._comma and not source.decimal:
             self._comma = True
-            said = f"its head says {decimal!r}" if decimal else "its head does not say so"
+            head_words = f"its head says {decimal!r}" if decimal else "its head does not say so"
             self.findings.doubts.append(
-                f"the numbers have decimal commas and {said}: the numbers are believed (decimal in the map "
-                "goes over it)"
+                f"the numbers have decimal commas and {head_words}: the numbers are believed (decimal in the "
+                "map goes over it)"
             )
 
     def _guess_comma(self, piece: _Piece) -> bool:

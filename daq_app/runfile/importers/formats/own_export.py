@@ -13,8 +13,8 @@ _LINE: Final = re.compile(r"# (first_row_utc_ns|start_utc_ns): (\d{1,18}\d?)\s*$
 
 def start_in_line(line: str) -> tuple[str, int] | None:
     """(key, nanoseconds) of a comment line of a CSV that tells it; None of any other."""
-    found = _LINE.match(line)
-    return None if found is None or not _possible(int(found[2])) else (found[1], int(found[2]))
+    match = _LINE.match(line)
+    return None if match is None or not _possible(int(match[2])) else (match[1], int(match[2]))
 
 
 def start_in_json(text: str) -> int | None:

@@ -40,11 +40,11 @@ Feet = tuple[Foot, ...]
 
 def feet(wall: Wall, effects: Mapping[str, Parameters]) -> Feet:
     """The feet of a wall with those of `effects` that change them; sharp edges at ±b/2 without."""
-    found: Feet = (Foot(-wall.half_width), Foot(wall.half_width))
+    changed: Feet = (Foot(-wall.half_width), Foot(wall.half_width))
     for name, change in FORMS.items():
         if name in effects:
-            found = change(wall, found, effects[name])
-    return found
+            changed = change(wall, changed, effects[name])
+    return changed
 
 
 def _pivot_shift(wall: Wall, standing: Feet, q: Parameters) -> Feet:

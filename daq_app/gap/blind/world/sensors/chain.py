@@ -54,9 +54,9 @@ def draw_calibration(
     span = np.array([c.range_si[1] - c.range_si[0] for c in rig.channels])
     noise = np.array([c.noise_si for c in rig.channels])
     zero = 0.005 * span * rng.uniform(-1.0, 1.0, n)
-    found = zero + noise / np.sqrt(_TARE_SAMPLES) * rng.standard_normal(n)
+    measured_zero = zero + noise / np.sqrt(_TARE_SAMPLES) * rng.standard_normal(n)
     factor = Scaling.of(rig.channels).gain[:, 0]
-    tare = {c.id: float(v) for c, v in zip(rig.channels, found / factor, strict=True)}
+    tare = {c.id: float(v) for c, v in zip(rig.channels, measured_zero / factor, strict=True)}
     return Calibration(gain, zero, tare)
 
 

@@ -70,8 +70,8 @@ def _acceleration_block(scene: Scene) -> Block | None:
         expected = gravity + inertia - grid.omega**2 * arm
         columns["gain of gravity"], columns["gain of inertia"] = (gravity, "1"), (inertia, "1")
     # No lag here: between impacts the specific force hardly changes. The impacts themselves tell it.
-    found = with_crosstalk(regress("accelerometer", measured - expected, columns, pick, ("zero",)), leaked)
-    return found and with_systematic(found, _TURNED, across_axes(run, grid, chosen).mean(axis=0))
+    block = with_crosstalk(regress("accelerometer", measured - expected, columns, pick, ("zero",)), leaked)
+    return block and with_systematic(block, _TURNED, across_axes(run, grid, chosen).mean(axis=0))
 
 
 def _sway(grid: Grid) -> FloatArray:
@@ -79,24 +79,28 @@ def _sway(grid: Grid) -> FloatArray:
 
     Its mean is the change of speed over the hold: 1 % of gravity for a few mrad/s, and well measured.
     """
-    found = np.zeros_like(grid.raw)
+    theta_dd = np.zeros_like(grid.raw)
     before = grid.time_s < 0.0
     low_pass = butter(3, SWAY_HZ, fs=GRID_HZ, output="sos")
     theta = sosfiltfilt(low_pass, grid.raw[before] - grid.raw[before].mean())
-    found[before] = np.gradient(np.gradient(theta, 1 / GRID_HZ), 1 / GRID_HZ)
-    return found
+    theta_dd[before] = np.gradient(np.gradient(theta, 1 / GRID_HZ), 1 / GRID_HZ)
+    return theta_dd
 
 
 def _predict(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
-    own = values["cal_accelerometer"] + values.get("gain@accelerometer.error", 0.0)
+    gain = values["cal_accelerometer"] + values.get("gain@accelerometer.error", 0.0)
     name = run.reference
     reference = own_gain(run, values) + values.get(f"gain@{name}.error", 0.0)
     clock = 1.0 + values.get("clock.error", 0.0)
-    ratio = (1.0 + own) / (1.0 + reference)
+    ratio = (1.0 + gain) / (1.0 + reference)
     gains = {"gain of gravity": ratio - 1.0, "gain of inertia": ratio / clock**2 - 1.0}
-    found = np.array([gains.get(name, 0.0) for name in block.names])
+    coefficients = np.array([gains.get(name, 0.0) for name in block.names])
     # The base turns slowly: of its rotation the accelerometers show gravity alone, as in the simulator.
-    return found - GRAVITY_M_S2 * base_rotation(run, block, values) if "compliance.phi" in values else found
+    return (
+        coefficients - GRAVITY_M_S2 * base_rotation(run, block, values)
+        if "compliance.phi" in values
+        else coefficients
+    )
 
 
 def _predict_impact_timing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:

@@ -66,26 +66,26 @@ def _predict_joint(run: RockingRun, block: Block, values: Mapping[str, float]) -
     size = np.abs(theta)
     inwards, apart = pivots(run, values)
     curved = 0.5 * (values.get("rounded_edge.rho", 0.0) - values["mount_height"])
-    found: FloatArray = inwards * unit_coefficients(
+    coefficients: FloatArray = inwards * unit_coefficients(
         run, block, "size", lambda: size
     ) + apart * unit_coefficients(run, block, "theta", lambda: theta)
-    found = found + curved * unit_coefficients(run, block, "square", lambda: size**2)
+    coefficients = coefficients + curved * unit_coefficients(run, block, "square", lambda: size**2)
     # The opening is told against |θ|, whose zero is where the wall came to rest: a wall that rests a
     # hundredth of a milliradian off upright makes a step from side to side of it.
-    found = found - values["half_base"] * values["zero"] * unit_coefficients(
+    coefficients = coefficients - values["half_base"] * values["zero"] * unit_coefficients(
         run, block, "sides", lambda: np.sign(theta)
     )
     if "winkler.theta_c" in values:
         theta_c, half = values["winkler.theta_c"], values["half_base"]
         opened = half * (theta_c - 2.0 * np.sqrt(theta_c * np.maximum(size, theta_c)))
-        found = found + block.coefficients(np.where(size > theta_c, opened, -half * size))
+        coefficients = coefficients + block.coefficients(np.where(size > theta_c, opened, -half * size))
     if "drift@lvdt.rate" in values:
         rest = run.swings.rest_s - run.swings.release_s
-        found = found + values["drift@lvdt.rate"] * unit_coefficients(
+        coefficients = coefficients + values["drift@lvdt.rate"] * unit_coefficients(
             run, block, "time", lambda: run.grid.time_s - rest
         )
     smeared = _smeared_opening(run, block.undone_s, values) if block.undone_s else None
-    return found if smeared is None else found + block.coefficients(smeared)
+    return coefficients if smeared is None else coefficients + block.coefficients(smeared)
 
 
 def _smeared_opening(run: RockingRun, undone_s: float, values: Mapping[str, float]) -> FloatArray | None:
@@ -107,8 +107,8 @@ def _smeared_opening(run: RockingRun, undone_s: float, values: Mapping[str, floa
 
 def _predict_twist(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     follow = values["twist_follow"] + values.get("twist.follow", 0.0)
-    found: FloatArray = follow * unit_coefficients(run, block, "theta", lambda: run.grid.theta)
-    return found
+    coefficients: FloatArray = follow * unit_coefficients(run, block, "theta", lambda: run.grid.theta)
+    return coefficients
 
 
 def _observe(scene: Scene) -> Iterator[Block | None]:
@@ -117,10 +117,10 @@ def _observe(scene: Scene) -> Iterator[Block | None]:
         yield _lift_block(run, joint, grid, scene.in_range)
         yield _twist_block(run, joint, grid, scene.in_range)
     elif scene.late and joint.whole:
-        own = in_step(joint, grid, run.rate_hz)
-        lifted = _lift_block(run, own.joint, own.grid, scene.in_range & own.pick)
-        yield lifted and replace(lifted, undone_s=own.late_s)
-        yield _twist_block(run, own.joint, own.grid, scene.in_range & own.pick)
+        stepped = in_step(joint, grid, run.rate_hz)
+        lifted = _lift_block(run, stepped.joint, stepped.grid, scene.in_range & stepped.pick)
+        yield lifted and replace(lifted, undone_s=stepped.late_s)
+        yield _twist_block(run, stepped.joint, stepped.grid, scene.in_range & stepped.pick)
 
 
 def _priors(survey: Survey) -> tuple[Parameter, ...]:

@@ -50,21 +50,21 @@ def _tilt_block(scene: Scene) -> Block | None:
     measured = [gridded(run, i) for i in chosen]
     nominal = np.array([max(run.sensors[i].time_constant_s, _SHORTEST_S) for i in chosen])
     slow = np.array([_time_constant(scene, m, s, pick) for m, s in zip(measured, nominal, strict=True)])
-    found = regress(
+    block = regress(
         "tiltmeter",
         np.mean(measured, axis=0) - slow_response(grid.theta, slow),
         _columns(scene, slow, nominal),
         pick,
         absorbed=("zero", "start"),
     )
-    found = with_crosstalk(found, crosstalk(run, chosen).mean(axis=0))
-    if found is None:
+    block = with_crosstalk(block, crosstalk(run, chosen).mean(axis=0))
+    if block is None:
         return None
     later = -np.gradient(slow_response(grid.theta, slow), 1.0 / GRID_HZ)
-    systematic = {**found.systematic, _DELAY: found.coefficients(later)}
-    values = found.values.copy()
-    values[found.names.index("time constant")] += float(np.mean(slow / nominal - 1.0))
-    return replace(found, values=values, systematic=systematic, time_constants_s=tuple(slow.tolist()))
+    systematic = {**block.systematic, _DELAY: block.coefficients(later)}
+    values = block.values.copy()
+    values[block.names.index("time constant")] += float(np.mean(slow / nominal - 1.0))
+    return replace(block, values=values, systematic=systematic, time_constants_s=tuple(slow.tolist()))
 
 
 def _columns(scene: Scene, slow: FloatArray, nominal: FloatArray) -> dict[str, tuple[FloatArray, str]]:
@@ -109,23 +109,23 @@ def _predict(run: RockingRun, block: Block, values: Mapping[str, float]) -> Floa
     def seen(shape: FloatArray) -> FloatArray:
         return slow_response(shape, slow)
 
-    found = values["cal_tiltmeter"] * unit_coefficients(run, block, "theta", lambda: seen(theta))
+    coefficients = values["cal_tiltmeter"] * unit_coefficients(run, block, "theta", lambda: seen(theta))
     # Each face of the joint has its own calibration: the slow response makes their difference a drift.
     first, second = values["cal_wire"], values["cal_wire"]
     if run.reference == "lvdt":
         first, second = face_gain(values, "face_a"), face_gain(values, "face_b")
     positive = unit_coefficients(run, block, "positive", lambda: seen(np.maximum(theta, 0.0)))
     negative = unit_coefficients(run, block, "negative", lambda: seen(np.minimum(theta, 0.0)))
-    found = found - first * positive - second * negative
+    coefficients = coefficients - first * positive - second * negative
     if "compliance.phi" in values:
-        found = found + base_rotation(run, block, values)
+        coefficients = coefficients + base_rotation(run, block, values)
     series = difference_of(run, "tiltmeter", run.reference, values)
     if series is not None:
-        found = found + block.coefficients(seen(series))
+        coefficients = coefficients + block.coefficients(seen(series))
     # A clock that is off shows the time constant as another one.
     response = values["tilt_response"] + 1.0 / (1.0 + values.get("clock.error", 0.0)) - 1.0
-    found[block.names.index("time constant")] += response
-    return found
+    coefficients[block.names.index("time constant")] += response
+    return coefficients
 
 
 def _observe(scene: Scene) -> Iterator[Block | None]:

@@ -61,11 +61,11 @@ def _wire_block(scene: Scene) -> Block | None:
         coarse(joint.theta, run.rate_hz) if reference == "wire" else grid.theta
     )
     columns = rotation_columns(grid, run.survey.alpha_rad)
-    found = regress("wire", compared, columns, scene.in_range & grid.settled, ("zero",))
-    if found is not None and some:
+    block = regress("wire", compared, columns, scene.in_range & grid.settled, ("zero",))
+    if block is not None and some:
         # Other wires than in the other runs: their mean has another calibration.
-        found.covariance[found.names.index("gain"), found.names.index("gain")] += _OTHER_WIRES**2
-    return with_crosstalk(found, leaked_turn(run))
+        block.covariance[block.names.index("gain"), block.names.index("gain")] += _OTHER_WIRES**2
+    return with_crosstalk(block, leaked_turn(run))
 
 
 def leaked_turn(run: GapRun) -> FloatArray:
@@ -112,8 +112,8 @@ def _translation_block(scene: Scene) -> Block | None:
         "follows rotation": (grid.theta, "m/rad"),
         "drift": (grid.time_s, "m/s"),
     }
-    found = regress("base", moved, columns, scene.rocking, ("zero", "drift"))
-    return with_crosstalk(found, at_base @ _leaked(run, names))
+    block = regress("base", moved, columns, scene.rocking, ("zero", "drift"))
+    return with_crosstalk(block, at_base @ _leaked(run, names))
 
 
 def _turn_block(scene: Scene) -> Block | None:
@@ -146,65 +146,75 @@ def _turn_block(scene: Scene) -> Block | None:
     pick = scene.rocking & grid.settled & (grid.time_s < grid.impact_s[count])
     # A zero is no part of the shapes: least norm would give some of it to the turns, of which play is a sum.
     columns = {name: (shape - shape[pick].mean(), unit) for name, (shape, unit) in (absorbed | turns).items()}
-    found = regress("turn", turned - turned[pick].mean(), columns, pick, tuple(absorbed))
+    block = regress("turn", turned - turned[pick].mean(), columns, pick, tuple(absorbed))
     sides = {name: "+" if grid.approach[k] > 0.0 else "−" for k, name in enumerate(turns)}
-    said = {name: ("turn", f"turn per speed at impacts to {side}") for name, side in sides.items()}
-    return found and replace(found, said=said)
+    labels = {name: ("turn", f"turn per speed at impacts to {side}") for name, side in sides.items()}
+    return block and replace(block, said=labels)
 
 
 def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     theta = run.grid.theta
-    found = values["cal_wire"] * unit_coefficients(run, block, "theta", lambda: theta)
-    found = found - face_gain(values, "face_a") * unit_coefficients(
+    coefficients = values["cal_wire"] * unit_coefficients(run, block, "theta", lambda: theta)
+    coefficients = coefficients - face_gain(values, "face_a") * unit_coefficients(
         run, block, "positive", lambda: np.maximum(theta, 0.0)
     )
-    found = found - face_gain(values, "face_b") * unit_coefficients(
+    coefficients = coefficients - face_gain(values, "face_b") * unit_coefficients(
         run, block, "negative", lambda: np.minimum(theta, 0.0)
     )
-    found = found + values["wire_even"] * unit_coefficients(run, block, "even", lambda: theta**2)
+    coefficients = coefficients + values["wire_even"] * unit_coefficients(
+        run, block, "even", lambda: theta**2
+    )
     if "compliance.phi" in values:
-        found = found + base_rotation(run, block, values)
+        coefficients = coefficients + base_rotation(run, block, values)
     if "sliding.c" in values:
-        found = found + values["sliding.c"] / run.wire_height_m * unit_coefficients(
+        coefficients = coefficients + values["sliding.c"] / run.wire_height_m * unit_coefficients(
             run, block, "slip", partial(slip_shape, run.grid)
         )
-    found = found + travel(run, block, values, of_base=False) + _bent(run, block, values, of_base=False)
-    found = found + turn_share(run, of_base=False) * turned_coefficients(run, block, values)
+    coefficients = (
+        coefficients + travel(run, block, values, of_base=False) + _bent(run, block, values, of_base=False)
+    )
+    coefficients = coefficients + turn_share(run, of_base=False) * turned_coefficients(run, block, values)
     series = difference_of(run, "wire", "lvdt", values)
-    return found if series is None else found + block.coefficients(series)
+    return coefficients if series is None else coefficients + block.coefficients(series)
 
 
 def _bent(run: RockingRun, block: Block, values: Mapping[str, float], of_base: bool) -> FloatArray | float:
     """What a wall that bends adds to the wires' mean rotation or to the base."""
     share = bent_share(run, of_base=of_base)
-    found: FloatArray | float = 0.0
+    coefficients: FloatArray | float = 0.0
     for form, size in bent_wall(run, values).items():
-        found = found + size * share * unit_coefficients(run, block, form, partial(bent_form, run, form))
-    return found
+        coefficients = coefficients + size * share * unit_coefficients(
+            run, block, form, partial(bent_form, run, form)
+        )
+    return coefficients
 
 
 def _predict_base(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     follow = values["base_follow"] * run.base_lever
-    found = follow * unit_coefficients(run, block, "theta", lambda: run.grid.theta)
-    total: FloatArray = found + values.get("sliding.c", 0.0) * unit_coefficients(
+    following = follow * unit_coefficients(run, block, "theta", lambda: run.grid.theta)
+    coefficients: FloatArray = following + values.get("sliding.c", 0.0) * unit_coefficients(
         run, block, "slip", partial(slip_shape, run.grid)
     )
-    total = total + travel(run, block, values, of_base=True) + _bent(run, block, values, of_base=True)
-    total = total + turn_share(run, of_base=True) * turned_coefficients(run, block, values)
+    coefficients = (
+        coefficients + travel(run, block, values, of_base=True) + _bent(run, block, values, of_base=True)
+    )
+    coefficients = coefficients + turn_share(run, of_base=True) * turned_coefficients(run, block, values)
     if "wire_cosine@wire.kappa" in values:
         bend = values["wire_cosine@wire.kappa"] * run.base_bend_m2
-        total = total + bend * unit_coefficients(run, block, "square", lambda: run.grid.theta**2)
+        coefficients = coefficients + bend * unit_coefficients(
+            run, block, "square", lambda: run.grid.theta**2
+        )
     if higher := values.get("wire_anchor@wire.height", 0.0):
-        total = total + block.coefficients(anchors_move(run.wires, run.grid.theta, higher))
-    return total
+        coefficients = coefficients + block.coefficients(anchors_move(run.wires, run.grid.theta, higher))
+    return coefficients
 
 
 def _predict_turn(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     """Turns that stay, and what a wall that rings about the vertical or twists shows beside them."""
-    found = turned_coefficients(run, block, values)
+    coefficients = turned_coefficients(run, block, values)
     for key, kick in kicks_that_turn(run, values).items():
-        found = found + kick * unit_coefficients(run, block, key, partial(_rung, run, key))
-    return found
+        coefficients = coefficients + kick * unit_coefficients(run, block, key, partial(_rung, run, key))
+    return coefficients
 
 
 def _rung(run: RockingRun, key: str) -> FloatArray:

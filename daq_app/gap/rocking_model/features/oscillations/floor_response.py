@@ -13,11 +13,11 @@ from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 
 def floor(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     """The sinusoid of the floor while the wall does not move."""
-    found = {
+    sizes = {
         "amplitude": values.get("ambient.amplitude", 0.0),
         "frequency": values.get("ambient.fitted", run.vibration.frequency_hz if run.vibration else 0.0),
     }
-    return np.array([found[name] for name in block.names])
+    return np.array([sizes[name] for name in block.names])
 
 
 def with_measured_inputs(run: RockingRun, values: Mapping[str, float]) -> Mapping[str, float]:

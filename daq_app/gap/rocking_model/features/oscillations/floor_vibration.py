@@ -57,13 +57,13 @@ def find_vibration(runs: Sequence[GapRun], grids: Sequence[Grid]) -> list[Vibrat
         return [None] * len(runs)
     gain = np.sum([_gain(d, FREQUENCIES_HZ) for d in usable], axis=0)
     best = float(FREQUENCIES_HZ[int(np.argmax(gain))])
-    found = float(gain.max()) > FLOOR_GAIN * len(usable)
+    significant = float(gain.max()) > FLOOR_GAIN * len(usable)
     fine = best + np.linspace(-0.03, 0.03, 31)
     sharp = np.sum([_gain(d, fine) for d in usable], axis=0)
     best = float(fine[int(np.argmax(sharp))])
     bend = float(np.gradient(np.gradient(sharp, fine[1] - fine[0]), fine[1] - fine[0]).min())
     sd = float(1.0 / np.sqrt(max(-bend, 1.0)))
-    return [None if d is None else _share(d, best, sd, found) for d in data]
+    return [None if d is None else _share(d, best, sd, significant) for d in data]
 
 
 def without_vibration(run: GapRun, grid: Grid, found: Vibration) -> GapRun:
@@ -103,13 +103,13 @@ def _quiet(run: GapRun, grid: Grid) -> _Quiet | None:
 
 def _sway(rotation: FloatArray, part: NDArray[np.bool_], height: float) -> list[FloatArray]:
     """What a rotation of the wall in one part of the run makes of the accelerometers, and of late ones."""
-    found = np.zeros((3, rotation.size))
+    shown = np.zeros((3, rotation.size))
     if part.sum() >= _SHORTEST:
         low_pass = butter(3, 8.0, fs=GRID_HZ, output="sos")
         theta = sosfiltfilt(low_pass, rotation[part] - rotation[part].mean())
         twice = np.gradient(np.gradient(theta, 1 / GRID_HZ), 1 / GRID_HZ)
-        found[:, part] = -GRAVITY_M_S2 * theta, height * twice, np.gradient(height * twice, 1 / GRID_HZ)
-    return list(found)
+        shown[:, part] = -GRAVITY_M_S2 * theta, height * twice, np.gradient(height * twice, 1 / GRID_HZ)
+    return list(shown)
 
 
 def quiet(run: GapRun, grid: Grid) -> NDArray[np.bool_]:
@@ -119,8 +119,8 @@ def quiet(run: GapRun, grid: Grid) -> NDArray[np.bool_]:
     for i in run.indices("accelerometer"):
         if np.all(np.isfinite(run.channels[i])):
             cells = run.channels[i, : spread.size * step].reshape(spread.size, step)
-            own = cells.std(axis=1)
-            spread = np.maximum(spread, own / max(float(np.median(own[-60:])), 1e-12))
+            deviation = cells.std(axis=1)
+            spread = np.maximum(spread, deviation / max(float(np.median(deviation[-60:])), 1e-12))
     loud = np.convolve(spread > 2.5, np.ones(round(0.12 * GRID_HZ)), "same") > 0
     return np.asarray(~loud)
 
@@ -132,8 +132,8 @@ def _gain(data: _Quiet, frequencies: FloatArray) -> FloatArray:
     fraction = max(independent_fraction(values), 0.05)
     gains = np.empty(frequencies.size)
     for k, frequency in enumerate(frequencies):
-        found = _fit(data, values, frequency)
-        share = min(max(float(found[2]) / power, 0.0), 0.9999)
+        fit = _fit(data, values, frequency)
+        share = min(max(float(fit[2]) / power, 0.0), 0.9999)
         gains[k] = -0.5 * fraction * values.size * np.log1p(-share)
     return gains
 

@@ -25,15 +25,15 @@ def _ring_coefficients(
     frequency, zeta, _ = ring.ring
     natural = 2.0 * np.pi * frequency
     rate = natural * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
-    found = []
+    coefficients = []
     for name, shares in zip(block.names, block.shares, strict=False):
         family = name.partition(" in ")[2].removesuffix("s")
-        own = _moved(ring, shares, values)
+        size = _moved(ring, shares, values)
         undone = block.undone_s if family == "accelerometer" else 0.0
         early = np.exp(rate * (undone + delay(run.reference, values)))
         twice = -((1.0 - 2.0 * zeta**2) + 2j * zeta) if family == "accelerometer" else 1.0
-        found.append(own * twice * transfer(rate, family, values) * early if own else 0.0j)
-    return found
+        coefficients.append(size * twice * transfer(rate, family, values) * early if size else 0.0j)
+    return coefficients
 
 
 def _forced(values: Mapping[str, float]) -> float:
@@ -60,13 +60,13 @@ def _put(
     run: RockingRun, block: Block, values: Mapping[str, float], frequency: float, zeta: float
 ) -> FloatArray:
     """The coefficients of a ring-down as numbers, with those of the oscillator."""
-    found = np.zeros(len(block.names))
+    coefficients = np.zeros(len(block.names))
     for k, c in enumerate(_ring_coefficients(run, block, block, values)):
-        found[k] = c.real if block.names[k].startswith("sine") else c.imag
-    own = {"frequency": frequency, "damping": zeta}
+        coefficients[k] = c.real if block.names[k].startswith("sine") else c.imag
+    oscillator = {"frequency": frequency, "damping": zeta}
     for k, name in enumerate(block.names):
-        found[k] = own.get(name, found[k])
-    return found * _faded(block, zeta) + _of_the_other(run, block, values)
+        coefficients[k] = oscillator.get(name, coefficients[k])
+    return coefficients * _faded(block, zeta) + _of_the_other(run, block, values)
 
 
 _EVEN = 1e-9
@@ -78,10 +78,10 @@ def _of_the_other(run: RockingRun, block: Block, values: Mapping[str, float]) ->
 
     Sensors on both sides of the middle keep them apart; with one of them left out they do not.
     """
-    found = np.zeros(len(block.names))
+    coefficients = np.zeros(len(block.names))
     other = next((b for b in run.blocks if b.ring[0] and b.kind != block.kind), None)
     if other is None or not any(abs(_moved(other, s, values)) > _EVEN for s in block.shares):
-        return found
+        return coefficients
     frequency, zeta, _ = other.ring
     columns = run.cache.constant(
         (block.family, "the other ring"),
@@ -89,8 +89,8 @@ def _of_the_other(run: RockingRun, block: Block, values: Mapping[str, float]) ->
     )
     for k, c in enumerate(_ring_coefficients(run, block, other, values)):
         size = (2.0 * np.pi * frequency) ** 2 if block.names[k].endswith("accelerometers") else 1.0
-        found[k] = size * float(columns[k] @ (c.real, c.imag))
-    return found
+        coefficients[k] = size * float(columns[k] @ (c.real, c.imag))
+    return coefficients
 
 
 def bent_wall(run: RockingRun, values: Mapping[str, float]) -> Mapping[str, float]:
@@ -138,22 +138,22 @@ def bending(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
     # Bending is told against the rotation of the reference; wires as the reference show none of it.
     wires = None if run.reference == "wire" else difference_of(run, "wire", "lvdt", values)
     frequency, zeta, _ = block.ring
-    own = (values.get("flexible_wall.frequency", frequency), values.get("flexible_wall.zeta", zeta))
-    return _put(run, block, values, *own) + _forced_ring(run, block, values) + _in_wires(block, wires)
+    oscillator = (values.get("flexible_wall.frequency", frequency), values.get("flexible_wall.zeta", zeta))
+    return _put(run, block, values, *oscillator) + _forced_ring(run, block, values) + _in_wires(block, wires)
 
 
 def _forced_ring(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     """What the part of a bending that the wall's own inertia forces looks like as sine and cosine."""
-    found = np.zeros(len(block.names))
+    coefficients = np.zeros(len(block.names))
     if not (forced := _forced(values)):
-        return found
+        return coefficients
     for k, (name, shares) in enumerate(zip(block.names, block.shares, strict=False)):
         family = name.partition(" in ")[2].removesuffix("s")
         columns = run.cache.constant(
             (block.family, "forced", family), partial(_forced_columns, run, block, family)
         )
-        found[k] = -forced * _size(block, shares, values) * float(columns[k])
-    return found
+        coefficients[k] = -forced * _size(block, shares, values) * float(columns[k])
+    return coefficients
 
 
 def _forced_columns(run: RockingRun, block: Block, family: str) -> FloatArray:
@@ -173,8 +173,8 @@ def turning(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
     wires = difference_of(run, "wire", "lvdt", values) if uneven else None
     frequency, zeta, _ = block.ring
     other = "yaw" if "yaw.kick" in values else "twist"
-    own = (values.get(f"{other}.frequency", frequency), values.get(f"{other}.zeta", zeta))
-    return _put(run, block, values, *own) + _in_wires(block, wires)
+    oscillator = (values.get(f"{other}.frequency", frequency), values.get(f"{other}.zeta", zeta))
+    return _put(run, block, values, *oscillator) + _in_wires(block, wires)
 
 
 def _shows_rotation(block: Block) -> bool:
@@ -187,16 +187,16 @@ def _shows_rotation(block: Block) -> bool:
 
 def _faded(block: Block, zeta: float) -> FloatArray:
     """Size of each coefficient, made with the block's damping, of a ring-down with another damping."""
-    found = np.ones(len(block.names))
-    found[: len(block.fading)] += np.array(block.fading) * np.log(zeta / block.ring[1])
-    return found
+    factors = np.ones(len(block.names))
+    factors[: len(block.fading)] += np.array(block.fading) * np.log(zeta / block.ring[1])
+    return factors
 
 
 def _in_wires(block: Block, series: FloatArray | None) -> FloatArray:
     """What a difference of the wires' rotation, if any, makes of the columns read from wires."""
-    found = np.zeros(len(block.names))
+    coefficients = np.zeros(len(block.names))
     if series is not None:
         for k, name in enumerate(block.names):
             if name.endswith("in wires"):
-                found[k] = block.shares[k].rotation * float(block.projection[k] @ series)
-    return found
+                coefficients[k] = block.shares[k].rotation * float(block.projection[k] @ series)
+    return coefficients

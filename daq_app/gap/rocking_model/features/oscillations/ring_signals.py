@@ -39,7 +39,7 @@ class Signal:
 
 def bend_signals(run: GapRun, grid: Grid, height_m: float) -> list[Signal]:
     """Bending of the wall as wires and accelerometers show it, in metres (m/s²) of its top."""
-    found = []
+    signals = []
     rows, heights, names = wall_rotation(run)
     if len(rows) >= 3:
         shape = (heights / height_m) ** 2
@@ -47,15 +47,15 @@ def bend_signals(run: GapRun, grid: Grid, height_m: float) -> list[Signal]:
         beyond = beyond - heights[:, None] * grid.theta
         weights = shape / (shape @ shape)
         shares = _shares(weights, _along(run, names), heights, height_m)
-        found.append(Signal("wire", weights @ beyond, _between_late(grid, beyond, heights), shares))
+        signals.append(Signal("wire", weights @ beyond, _between_late(grid, beyond, heights), shares))
     chosen = run.steady_accelerometers("x")
     if len(chosen) >= 3:
         z = np.array([run.sensors[i].position_m[2] for i in chosen])
         shape = (z / height_m) ** 2
         y = np.array([run.sensors[i].position_m[1] for i in chosen])
         shares = _shares(shape / (shape @ shape), y, z, height_m)
-        found.append(_of_accelerometers(accelerations(run, grid, chosen), shape, z, shares))
-    return found
+        signals.append(_of_accelerometers(accelerations(run, grid, chosen), shape, z, shares))
+    return signals
 
 
 def _along(run: GapRun, names: Sequence[str]) -> FloatArray:
@@ -75,7 +75,7 @@ def _shares(weights: FloatArray, y: FloatArray, z: FloatArray, height_m: float) 
 
 def turn_signals(run: GapRun, joint: Rotation, grid: Grid, height_m: float) -> list[Signal]:
     """Slope along the length of what wires, accelerometers (per metre) and the joint show."""
-    found = []
+    signals = []
     rows, heights, names = wall_rotation(run)
     y = _along(run, names)
     if len(rows) >= 3 and float(np.ptp(y)) > 0.2:
@@ -83,17 +83,17 @@ def turn_signals(run: GapRun, joint: Rotation, grid: Grid, height_m: float) -> l
         beyond = beyond - heights[:, None] * grid.theta
         weights = y / (y @ y)
         shares = _shares(weights, y, heights, height_m)
-        found.append(Signal("wire", weights @ beyond, _between_late(grid, beyond, heights), shares))
+        signals.append(Signal("wire", weights @ beyond, _between_late(grid, beyond, heights), shares))
     chosen = run.steady_accelerometers("x")
     y = np.array([run.sensors[i].position_m[1] for i in chosen])
     if len(chosen) >= 3 and float(np.ptp(y)) > 0.2:
         z = np.array([run.sensors[i].position_m[2] for i in chosen])
         shares = _shares(y / (y @ y), y, z, height_m)
-        found.append(_of_accelerometers(accelerations(run, grid, chosen), y, z, shares))
+        signals.append(_of_accelerometers(accelerations(run, grid, chosen), y, z, shares))
     if len(joint.used) >= 8:
         pick = _between(grid, DISPLACEMENT_MASK_S) & grid.valid
-        found.append(Signal("lvdt", coarse(joint.twist, run.rate_hz), pick, Shares(twist=1.0)))
-    return found
+        signals.append(Signal("lvdt", coarse(joint.twist, run.rate_hz), pick, Shares(twist=1.0)))
+    return signals
 
 
 @dataclass(frozen=True, slots=True)

@@ -196,9 +196,9 @@ def _colour(
     factors = [f for f in (0.55, 0.62, 0.7, 0.78, 1.28, 1.43, 1.6, 1.8) if ring.frequency_hz * f < 60.0]
     waves = ring_table(grid, ring.frequency_hz * np.array(factors), np.full(len(factors), 0.03))
     waves = _clean(waves, bases)
-    own = _clean(ring_columns(grid, ring.frequency_hz, ring.zeta), bases)
+    ring_waves = _clean(ring_columns(grid, ring.frequency_hz, ring.zeta), bases)
     # The ring itself, if there is one, must not count as its own surroundings.
-    left = values - own @ np.linalg.lstsq(own, values, rcond=None)[0]
+    left = values - ring_waves @ np.linalg.lstsq(ring_waves, values, rcond=None)[0]
     size = np.sqrt(np.maximum((waves**2).sum(0), 1e-300))
     z = (waves.T @ left) / size / max(float(np.std(left)), 1e-300)
     return max(1.0, 1.48 * float(np.median(np.abs(z))))
@@ -216,8 +216,8 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
             continue
         places = np.concatenate([part for part, _ in bases])
         inverse: FloatArray = np.linalg.pinv(both[:, 1:]).astype(np.float64)
-        found = inverse @ both[:, 0]
-        left = both[:, 0] - both[:, 1:] @ found
+        coefficients = inverse @ both[:, 0]
+        left = both[:, 0] - both[:, 1:] @ coefficients
         fraction = max(independent_fraction(left), 0.05)
         variance = float(left @ left) / max(left.size - 2, 1) / fraction * np.diag(inverse @ inverse.T)
         # What is left of the motion is no white noise: neighbouring frequencies say how large chance is.
@@ -234,7 +234,7 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
             fading.append(float(slopes[k]))
             names.append(f"{word} in {signal.family}s")
             units.append("m s/rad" if not slow else "s")
-            values.append(found[k] / scale)
+            values.append(coefficients[k] / scale)
             variances.append(variance[k] / scale**2)
             rows.append(full[k] / scale)
             shares.append(signal.shares)
@@ -290,7 +290,7 @@ def with_repeatability(blocks: Sequence[Block]) -> list[Block]:
         for name, values in parts.items()
         if name.startswith("sine")
     }
-    found = []
+    widened = []
     for block in blocks:
         covariance = block.covariance.copy()
         for k, name in enumerate(block.names):
@@ -298,5 +298,5 @@ def with_repeatability(blocks: Sequence[Block]) -> list[Block]:
                 covariance[k, k] += (REPEATABILITY * usual.get(name.partition(" in ")[2], 0.0)) ** 2
             else:
                 covariance[k, k] *= len(blocks)
-        found.append(replace(block, covariance=covariance))
-    return found
+        widened.append(replace(block, covariance=covariance))
+    return widened
