@@ -95,7 +95,7 @@ class Library(Mapping[str, Effect]):
             for name in group.names:
                 if name not in self._effects or name in self._group_of:
                     raise ValueError(
-                        f"{name} is said to be indistinguishable from others, but is unknown or said so twice"
+                        f"{name} is in a group of indistinguishable effects, but unknown or in two of them"
                     )
                 self._group_of[name] = group
 

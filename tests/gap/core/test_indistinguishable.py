@@ -69,7 +69,7 @@ def test_the_set_holds_classes_and_the_likeliest_class_comes_first() -> None:
     assert [a.effects for a in credible_set(found)] == [("slope",), ("shift",)]
 
 
-def test_alike_effects_must_be_there_and_in_one_class_only() -> None:
+def test_indistinguishable_effects_must_be_there_and_in_one_group_only() -> None:
     with pytest.raises(ValueError, match="kick is in a group of indistinguishable"):
         Library(EFFECTS, (Indistinguishable(("slope", "kick"), "", ""),))
     with pytest.raises(ValueError, match="slope is in a group of indistinguishable"):
