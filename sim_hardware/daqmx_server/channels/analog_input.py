@@ -86,7 +86,7 @@ class AnalogInput(VirtualChannel):
             return 1.0 / float(attributes["AI_EXCIT_VAL"])
         units = self.scale.pre_scaled_units if self.scale else self.units
         per_si = UNITS_PER_SI.get(units, 1.0) if self.quantity else 1.0
-        if self.measurement == "SOUND_PRESSURE_MICROPHONE":
+        if self.measurement == _MICROPHONE:
             return per_si / (1e-3 * float(attributes["AI_MICROPHONE_SENSITIVITY"]))
         sensitivity = self.kind.attributes.get("sensitivity")
         if sensitivity is None or sensitivity not in attributes:
@@ -97,7 +97,16 @@ class AnalogInput(VirtualChannel):
     @property
     def limits(self) -> Range:
         """The smallest and largest value expected (AI.Min, AI.Max), in the unit of the reading."""
+        if "AI_MAX" not in self.attributes and self.measurement == _MICROPHONE:
+            level_db = float(self.attributes["AI_SOUND_PRESSURE_MAX_SOUND_PRESSURE_LVL"])
+            highest_pa = _HEARING_THRESHOLD_PA * 10.0 ** (level_db / 20.0)
+            return -highest_pa, highest_pa
         return float(self.attributes.get("AI_MIN", 0.0)), float(self.attributes.get("AI_MAX", 1.0))
+
+    @property
+    def has_limits(self) -> bool:
+        """Whether the call that made the channel told what it will measure."""
+        return self.measurement == _MICROPHONE or {"AI_MIN", "AI_MAX"} <= self.attributes.keys()
 
     @property
     def limits_electrical(self) -> Range:
@@ -171,5 +180,8 @@ class AnalogInput(VirtualChannel):
         _ = self.input_range
 
 
+_MICROPHONE: Final = "SOUND_PRESSURE_MICROPHONE"
+_HEARING_THRESHOLD_PA: Final = 20e-6
+"""Sound pressure of 0 dB: NI's argument `max_snd_press_level` is in decibels above it."""
 _FROM_TEDS: Final = TEDSUnits.FROM_TEDS.value
 FROM_CUSTOM_SCALE: Final = VoltageUnits.FROM_CUSTOM_SCALE.value

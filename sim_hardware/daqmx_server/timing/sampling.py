@@ -10,18 +10,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.channels.converter import Converter
+from sim_hardware.daqmx_server.timing.open_inputs import noisy_sines
 from sim_hardware.daqmx_server.timing.sample_times import SampleTimes
-
-_SINE_SAMPLES: Final = 100
-_SINE_SHIFT_RAD: Final = np.deg2rad(5.0)
-"""Each further channel of a task is ahead of the one before (NI-DAQmx User Manual, "Reading and Writing Data
-with NI-DAQmx Simulated Devices": five degrees)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +32,11 @@ class Input:
     """A slow converter's own period: between its conversions it repeats the last one."""
     shown: tuple[float, float] = (-1.0, 1.0)
     """Ends of the sine that a simulated device shows where nothing is wired, electrical quantity."""
+
+    @property
+    def step(self) -> float:
+        """One code of the converter, electrical quantity."""
+        return self.converter.step
 
 
 class Wiring(Protocol):
@@ -129,20 +130,6 @@ class Sampler:
             self._ahead = (number + 1, self._helper.submit(self._make, number + 1))
         return codes
 
-    def _sines(self, rows: NDArray[np.int64], start: int, count: int) -> NDArray[np.float64]:
-        """NI's sine between each channel's minimum and maximum, one period in `_SINE_SAMPLES` samples.
-
-        It keeps one code away from both ends, so that no rounded reading lies beyond them.
-        """
-        inputs = [self._inputs[row] for row in rows]
-        index = self._taken_before + np.arange(start, start + count)
-        phase = 2.0 * np.pi * index / _SINE_SAMPLES + _SINE_SHIFT_RAD * rows[:, None]
-        ends = np.array([entry.shown for entry in inputs])
-        steps = np.array([entry.converter.step for entry in inputs])
-        middle, half = ends.mean(axis=1), np.maximum(0.5 * (ends[:, 1] - ends[:, 0]) - steps, 0.0)
-        sines: NDArray[np.float64] = middle[:, None] + half[:, None] * np.sin(phase)
-        return sines
-
     def _make(self, number: int) -> NDArray[np.int32]:
         start, stop = number * self._chunk, (number + 1) * self._chunk
         instants = self.times.at(np.arange(start, stop))
@@ -155,7 +142,9 @@ class Sampler:
             ideal = self._source.volts(terminals, times)
             open_rows = np.flatnonzero(np.isnan(ideal[:, :1]).any(axis=1))
             if len(open_rows):
-                ideal[open_rows] = self._sines(rows[open_rows], start, taken)
+                inputs = [self._inputs[row] for row in rows[open_rows]]
+                numbers = self._taken_before + np.arange(start, start + taken)
+                ideal[open_rows] = noisy_sines(inputs, rows[open_rows], numbers)
             volts[rows, :taken] = self._distortion.distort(terminals, times, ideal)
         np.subtract(volts, self._middle, out=volts)
         np.multiply(volts, self._scale, out=volts)

@@ -8,13 +8,15 @@ import grpc
 import nidaqmx
 import numpy as np
 import pytest
-from nidaqmx.constants import AcquisitionType, TaskMode
+from nidaqmx.constants import AcquisitionType, ReadRelativeTo, TaskMode
 from nidaqmx.errors import DaqError
 
 from sim_hardware.control import SimControl
 from sim_hardware.daqmx_server.program import build_bench, parser
 from sim_hardware.daqmx_server.services.server import DaqmxServer
 
+NOISE_V = 0.03 * 2.0 + 1e-3
+"""Three per cent of the full scale of these tests, and a code."""
 DEVICES = ["--device", "Dev1=PCIe-6361", "--device", "Dev2=PCIe-6361", "--real", "Dev2"]
 
 
@@ -105,14 +107,41 @@ def test_channels_of_a_task_show_sines_five_degrees_apart(options: nidaqmx.GrpcS
         task.ai_channels.add_ai_voltage_chan("Dev1/ai0:2", min_val=-2.0, max_val=2.0)
         task.timing.cfg_samp_clk_timing(1000.0, samps_per_chan=100)
         first = np.array(task.read(100, timeout=5.0))[:, 0]
-    assert first == pytest.approx(2.0 * np.sin(np.deg2rad([0.0, 5.0, 10.0])), abs=1e-3)
+    assert first == pytest.approx(2.0 * np.sin(np.deg2rad([0.0, 5.0, 10.0])), abs=NOISE_V)
+
+
+def test_the_sine_has_noise_of_three_per_cent_that_is_the_same_when_it_is_read_again(
+    options: nidaqmx.GrpcSessionOptions,
+) -> None:
+    with nidaqmx.Task(grpc_options=options) as task:
+        task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1", min_val=-2.0, max_val=2.0)
+        task.timing.cfg_samp_clk_timing(10_000.0, samps_per_chan=2000)
+        first = np.array(task.read(2000, timeout=5.0))
+        task.in_stream.relative_to = ReadRelativeTo.FIRST_SAMPLE
+        again = np.array(task.read(2000, timeout=5.0))
+    phase = 2.0 * np.pi * np.arange(2000) / 100 + np.deg2rad([[0.0], [5.0]])
+    noise = (first - 2.0 * np.sin(phase))[np.abs(np.sin(phase)) < 0.9]
+    assert 0.9 * NOISE_V < np.abs(noise).max() < NOISE_V
+    assert abs(noise.mean()) < 0.05 * NOISE_V
+    assert np.array_equal(first, again)
+    assert abs(np.corrcoef(first - 2.0 * np.sin(phase))[0, 1]) < 0.1
 
 
 def test_values_that_software_takes_one_by_one_go_along_the_sine(options: nidaqmx.GrpcSessionOptions) -> None:
     with nidaqmx.Task(grpc_options=options) as task:
         task.ai_channels.add_ai_voltage_chan("Dev1/ai0", min_val=-2.0, max_val=2.0)
         taken = [task.read(timeout=5.0) for _ in range(26)]
-    assert taken == pytest.approx(2.0 * np.sin(2.0 * np.pi * np.arange(26) / 100), abs=1e-3)
+    assert taken == pytest.approx(2.0 * np.sin(2.0 * np.pi * np.arange(26) / 100), abs=NOISE_V)
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_raw_array_is_cleared_behind_the_last_scan(options: nidaqmx.GrpcSessionOptions) -> None:
+    with nidaqmx.Task(grpc_options=options) as task:
+        task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1", min_val=1.0, max_val=2.0)
+        raw = np.full(7, -32768, dtype=np.int16)
+        assert task.in_stream.readinto(raw) == 3
+    assert (raw[:6] > 0).all()
+    assert raw[6] == 0
 
 
 def test_a_counter_without_pulses_reads_0(options: nidaqmx.GrpcSessionOptions) -> None:

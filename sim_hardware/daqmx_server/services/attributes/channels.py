@@ -32,7 +32,7 @@ def _reading_range(channel: AnalogInput, end: int) -> float:
     """End of the input range in the unit of the reading: what AI.Max reads back once the range is known."""
     volts = channel.input_range[end] / channel.volts_per_electrical
     value = volts * channel.unit_per_electrical
-    if not {"AI_MIN", "AI_MAX"} <= channel.attributes.keys():
+    if not channel.has_limits:
         raise DaqmxError(Code.NO_LIMITS, f"Channel Name: {channel.name}")
     return value if channel.scale is None else float(channel.scale.forward(np.array(value)))
 

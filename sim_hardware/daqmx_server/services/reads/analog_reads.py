@@ -82,7 +82,10 @@ def _binary_handler(rpc: str, dtype: str) -> Handler:
 
 
 def read_raw(bench: Bench, request: Any) -> Any:
-    """Bytes as the device sends them: scan by scan, each channel in its own width."""
+    """Bytes as the device sends them: scan by scan, each channel in its own width.
+
+    As many as the client's array has: it clears what is behind the last scan with them.
+    """
     task = task_named(bench, request.task.name)
     width = sum(channel.raw_bytes for channel in task.channels)
     got = read(task, request.num_samps_per_chan, request.timeout)
@@ -93,8 +96,9 @@ def read_raw(bench: Bench, request: Any) -> Any:
     scans = np.empty(got.count, dtype=types)
     for (name, _), codes in zip(types, got.codes, strict=True):
         scans[name] = codes
+    read_array = scans.tobytes().ljust(request.array_size_in_bytes, b"\0")
     return pb.ReadRawResponse(
-        status=got.status, read_array=scans.tobytes(), samps_read=got.count, num_bytes_per_samp=width
+        status=got.status, read_array=read_array, samps_read=got.count, num_bytes_per_samp=width
     )
 
 
