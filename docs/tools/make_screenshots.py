@@ -15,10 +15,14 @@ from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
+from PySide6.QtWidgets import QWidget
+
 from daq_app.acquisition.messages.published import State
 from daq_app.acquisition.viewers.launcher import AcquisitionProcess
 from daq_app.cli.record.simulate import simulate_run
 from daq_app.monitor.data.settings import WindowSettings
+from daq_app.monitor.look.theme import THEMES, apply_theme
+from daq_app.monitor.pages.start_page import StartWindow
 from daq_app.monitor.window.app import application, open_window
 from daq_app.monitor.window.main_window import MainWindow
 from sim_hardware.control import SimControl
@@ -30,6 +34,12 @@ FAULTS = (
     {"kind": "channel_hum", "family": "LV-A07", "amplitude_v": 0.25},
     {"kind": "channel_stuck", "family": "WP-3"},
 )
+
+
+def save(widget: QWidget, path: Path) -> None:
+    """Write the picture of a widget, and say so."""
+    widget.grab().save(str(path))
+    print(path.name, flush=True)
 
 
 class Studio:
@@ -90,8 +100,7 @@ class Studio:
             self.window._on_slow()
             self.app.processEvents()  # lays out what has just changed
             path = self.folder / f"{name}-{theme}-{width}x{height}.png"
-            self.window.grab().save(str(path))
-            print(path.name, flush=True)
+            save(self.window, path)
 
     def order(self, name: str) -> None:
         """Press one of the window's buttons as soon as it can be pressed."""
@@ -108,7 +117,6 @@ def take_test(studio: Studio, name: str, look: Look) -> None:
     studio.state(State.ARMED)
     studio.live_for(1.0)
     studio.wall.command("pull", theta0_over_alpha=0.35)
-    window.show_page(window.prepare)
     studio.dress(look)
     studio.live_for(1.4)
     studio.shoot("pull", [look])
@@ -170,6 +178,7 @@ def main() -> None:
             take_gap(rig, Path(temporary), folder)
         if options.part == "gap":
             return
+        take_start(Path(temporary), folder)
         runs = Path(temporary) / "runs"
         runs.mkdir()
         acquisition = AcquisitionProcess(["--rig", str(rig), "--out", str(runs)])
@@ -233,7 +242,31 @@ def take_all(acquisition: AcquisitionProcess, rig: Path, temporary: Path, folder
     window.replay.choose(["θ", "dθ/dt", "AC-7", "LV-A01", "LV-B01", "WP-4"])
     window.replay.plots.set_cursor(0.46)
     studio.shoot("replay")
+    window.show_page(window.messages)
+    studio.shoot("messages")
+    shoot_channel(studio, "LV-A07")
     window.close()
+
+
+def shoot_channel(studio: Studio, name: str) -> None:
+    """One channel large, in the look of the window."""
+    studio.window.open_channel(name)
+    channel = studio.window.channel
+    studio.live_for(3.0)
+    theme = studio.window.settings.theme
+    save(channel, studio.folder / f"channel-{theme}-{channel.width()}x{channel.height()}.png")
+    channel.close()
+
+
+def take_start(temporary: Path, folder: Path) -> None:
+    """The window that asks which rig."""
+    app, colours = application(), THEMES["dark"]
+    chooser = StartWindow(WindowSettings(temporary / "start.ini"), Path("runs"), lambda _rig, _out: None)
+    apply_theme(app, chooser, colours, WindowSettings(temporary / "start.ini").type_size)
+    chooser.show()
+    app.processEvents()
+    save(chooser, folder / f"start-dark-{chooser.width()}x{chooser.height()}.png")
+    chooser.close()
 
 
 if __name__ == "__main__":

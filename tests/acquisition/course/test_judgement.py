@@ -79,7 +79,10 @@ def test_no_two_words_contradict_each_other(now: Situation) -> None:
         assert not re.search(r"\b(pull|hold|holding|on target)\b", said)
     if "on target" in said:
         assert now.armed and not judgement.alarm
+        assert now.plan.band is not None and now.plan.band[0] <= ratio <= now.plan.band[1]
         assert "pull" not in said and "ease back" not in said
+    if now.plan.band is None:
+        assert "target rotation" not in said
     if not now.armed and now.sampling and now.state in (State.PREVIEWING, State.SAVED) and ratio >= PULLED:
         assert judgement.alarm, "a wall in the air that nobody armed is always an alarm"
     assert (judgement.target, judgement.low) == (

@@ -44,6 +44,12 @@ class Situation:
     text: str = ""
     """What the state says of itself; shown after a test and after a failure."""
 
+    @property
+    def on_target(self) -> bool:
+        """Whether a target is planned and the rotation, which is known, lies within its tolerance."""
+        band = self.plan.band
+        return band is not None and band[0] <= abs(self.rotation_rad) / self.alpha_rad <= band[1]
+
 
 def judge(situation: Situation, settings: Acquisition) -> Judgement:
     """The judgement of a situation."""
@@ -134,11 +140,9 @@ def _word(call: Call, now: Situation) -> str:
 _SENTENCES: Final[dict[Call, str]] = {
     Call.START: "No sensor is read. Start the live view (F4).",
     Call.PREPARE: "Nothing is recorded but the ring of the last minutes. Choose, zero, check, then arm (F5).",
-    Call.PULL: "Pull the wall to its target rotation.",
     Call.EASE_BACK: "Too far: ease the wall back into the band.",
     Call.STOP: "STOP: near overturning. Ease the wall back.",
     Call.DO_NOT_RELEASE: "Do not release: nothing reaches the disk now.",
-    Call.RELEASE: "Held still on target. Release.",
     Call.ARM_FIRST: "Not armed. Do not release: arm first (F5), or lower the wall.",
 }
 """The calls whose sentence is the same in every situation."""
@@ -148,9 +152,16 @@ def _sentence(call: Call, now: Situation, settings: Acquisition, held_s: float) 
     match call:
         case Call.OTHER_SIDE:
             return f"Wrong side: this test is planned towards {now.plan.side}. Lower the wall."
+        case Call.PULL if now.plan.band is None:
+            return "Pull the wall as far as this test asks: no target is planned."
+        case Call.PULL:
+            return "Pull the wall to its target rotation."
         case Call.HOLD:
             left_s = math.ceil(max(0.0, settings.hold_s - held_s))
-            return f"On target: hold still{f', {left_s} s more' if now.steady and left_s else ''}."
+            hold = "On target: hold still" if now.on_target else "Hold still"
+            return f"{hold}{f', {left_s} s more' if now.steady and left_s else ''}."
+        case Call.RELEASE:
+            return "Held still on target. Release." if now.on_target else "Held still. Release."
         case Call.KEEP_CLEAR if not now.armed:
             return "Keep clear. Nobody had armed: this release is kept from the ring."
         case Call.KEEP_CLEAR:
@@ -208,5 +219,5 @@ def _gauge(call: Call, now: Situation, ratio: float) -> str:
         case Call.EASE_BACK:
             return f"{-missing_mrad:.1f} mrad too far: ease back"
         case Call.HOLD:
-            return "On target: hold" if band else "Hold still"
+            return "On target: hold" if now.on_target else "Hold still"
     return _GAUGE_WORDS.get(call, "")
