@@ -21,8 +21,14 @@ from daq_app.gap.blind.scoring.confusion import confusion
 from daq_app.gap.blind.scoring.judge import Judged, judge
 from daq_app.gap.blind.scoring.laboratories import by_laboratory
 from daq_app.gap.blind.scoring.report import write_markdown, write_report
-from daq_app.gap.blind.scoring.score import Row, Score, score_folder, table
-from daq_app.gap.blind.scoring.statistics import auroc, calibration_error, reliability, share
+from daq_app.gap.blind.scoring.score import Row, Score, claims, score_folder, table
+from daq_app.gap.blind.scoring.statistics import (
+    auroc,
+    calibration_error,
+    calibration_error_by_chance,
+    reliability,
+    share,
+)
 from daq_app.gap.blind.seal import SealBroken, read_seal, seal_case
 from daq_app.gap.blind.world.effects.catalogue import ENTRIES, LIBRARY, OUTSIDE
 from daq_app.gap.rocking_model.library import rocking_library
@@ -268,6 +274,15 @@ def test_a_hidden_fault_that_was_measured_is_right_if_it_belongs_into_the_answer
     assert not judged_with(["hum"], both).answered_rightly
 
 
+def test_a_measured_fault_that_no_effect_does_is_right_and_claims_no_probability() -> None:
+    """ "None of these, spikes were measured" gives next to nothing to the hypotheses, and is right."""
+    spikes = {"name": "spikes@lvdt", "material": True}
+    found = judged_with(["spikes"], claim([], 0.0, "none_of_these", findings=[spikes]))
+    assert found.answered_rightly
+    assert claims([found]) == ([], [])
+    assert claims([judged_with(["hum"], claim(["hum@wire"], 0.9, findings=[HUM]))]) == ([0.9], [True])
+
+
 def test_three_effects_are_right_in_any_order_and_only_together() -> None:
     truth = ["viscous", "gain", "base_tilt"]
     assert judged_with(truth, claim(["gain@WP-1", "eccentric_mass", "viscous"], 0.9, "several")).exact
@@ -322,6 +337,14 @@ def test_wilson_and_calibration_against_known_numbers() -> None:
     assert [bar.found.n for bar in reliability([0.1, 0.9, 1.0], [True, True, False])] == [1, 2]
     assert auroc([2.0, 3.0], [1.0, 2.0]) == pytest.approx(0.875)
     assert math.isnan(auroc([], [1.0]))
+
+
+def test_few_answers_are_off_by_chance_however_well_calibrated_they_are() -> None:
+    one = calibration_error_by_chance([0.5])  # right or wrong, it is off by a half
+    hundred = calibration_error_by_chance([0.95] * 100)  # mean absolute deviation of a binomial share
+    assert one.value == pytest.approx(0.5)
+    assert hundred.value == pytest.approx(math.sqrt(2 / math.pi * 0.95 * 0.05 / 100), rel=0.1)
+    assert hundred.low < hundred.value < hundred.high
 
 
 @pytest.fixture

@@ -51,7 +51,8 @@ class Judged:
     """Effects of the answer; empty for answers that name none."""
     named_family: str
     claimed: float
-    """Probability that the diagnosis gives its first answer: of all forms that no sensor tells apart."""
+    """Probability that the diagnosis gives its first answer: of all forms that no sensor tells apart. NaN
+    where it names a measured fault that no effect does: its probabilities are then no claim about that."""
     first_right: bool
     family_right: bool
     in_set: bool
@@ -113,6 +114,8 @@ def judge(label: dict[str, Any], outcome: Outcome) -> Judged:
     sought = [names for names in accept if not _measured(names, findings)]
     decision = _decision(result, which, measured=len(sought) < len(accept))
     named, family, claimed = _answer(decision, result, which)
+    if decision != "none_of_these" and result.get("decision") == "none_of_these":
+        claimed = math.nan
     gap = result.get("gap") or {}
     error, covered = _parameter(label, result, decision)
     return Judged(

@@ -14,6 +14,7 @@ _ROWS: Final = {
     "decisions right": "decision right, all cases",
     "first right ≥ 4 sd": "first answer right, effect ≥ 4 sd",
     "calibration error": "expected calibration error",
+    "calibration error by chance": "calibration error by chance alone",
     "AUROC outside": "outside the library: AUROC",
     "set holds truth": "95 % set holds the truth",
     "closure ≥ 0.9": "closure ≥ 0.9",

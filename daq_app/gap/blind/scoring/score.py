@@ -20,6 +20,7 @@ from daq_app.gap.blind.scoring.statistics import (
     auroc_interval,
     bootstrap,
     calibration_error,
+    calibration_error_by_chance,
     share,
 )
 from daq_app.gap.blind.seal import SealBroken, open_label
@@ -125,6 +126,7 @@ def table(judged: Sequence[Judged]) -> list[Row]:
         Row("95 % set: mean size", _mean([float(j.set_size) for j in known if j.set_size]), high=1.5),
         Row("wrong at p > 0.95", share([wrong_and_sure(j) for j in speaking]), high=0.01),
         Row("expected calibration error", _calibration(judged), high=0.05),
+        Row("calibration error by chance alone", calibration_error_by_chance(claims(judged)[0])),
         *_outside_rows(judged),
         Row("nothing hidden, yet blamed on an effect", share([j.blames for j in nulls]), high=0.05),
         *_closure_rows(judged),
@@ -212,7 +214,8 @@ def claims(judged: Sequence[Judged]) -> tuple[list[float], list[bool]]:
 
     Where it says "none of these" its probabilities are conditional on the library and no claim.
     """
-    kept = [j for j in judged if j.decision not in ("failed", "none_of_these")]
+    spoken = [j for j in judged if j.decision not in ("failed", "none_of_these")]
+    kept = [j for j in spoken if not math.isnan(j.claimed)]
     return [j.claimed for j in kept], [j.first_right for j in kept]
 
 

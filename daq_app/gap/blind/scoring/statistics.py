@@ -82,6 +82,22 @@ def calibration_error(claimed: Sequence[float], right: Sequence[bool], bins: int
     return sum(b.found.n * abs(b.claimed - b.found.value) for b in found) / n if n else math.nan
 
 
+def calibration_error_by_chance(claimed: Sequence[float], bins: int = 10) -> Value:
+    """Calibration error of answers that are right exactly as often as they claim: mean and 95 % range.
+
+    A bin of few cases is off by chance alone, so the error of a finite number of cases is never zero.
+    """
+    p = np.asarray(claimed, dtype=np.float64)
+    if not p.size:
+        return NOTHING
+    index = np.minimum((p * bins).astype(int), bins - 1)
+    right = np.random.default_rng(0).random((_RESAMPLES, p.size)) < p
+    off = [np.abs((right - p)[:, index == k].sum(axis=1)) for k in range(bins)]
+    errors = np.sum(off, axis=0) / p.size
+    low, high = np.quantile(errors, [0.025, 0.975])
+    return Value(float(errors.mean()), float(low), float(high), p.size)
+
+
 def auroc(positive: Sequence[float], negative: Sequence[float]) -> float:
     """Probability that a positive scores above a negative, ties half; NaN if one side is empty."""
     a, b = np.asarray(positive, dtype=np.float64), np.asarray(negative, dtype=np.float64)
