@@ -53,29 +53,39 @@ SCREENED = 3
 """Runs that are looked at before all are."""
 
 
+EXAMINED = 2
+"""Channels of one family that are examined one by one (assumed). Raising it lets effects on single channels
+stand for what many of them have together."""
+
+
 @dataclass(frozen=True, slots=True)
 class OutlierChannels:
-    """Channels that disagree with their family."""
+    """Channels that disagree with their family: those of each family without which the others agree."""
 
-    single: dict[Family, str]
-    """The one channel without which all others of its family agree."""
-    several: dict[Family, tuple[str, ...]]
-    """Channels of one family, two or more, without which the others agree."""
+    channels: dict[Family, tuple[str, ...]]
 
     @property
     def ids(self) -> tuple[str, ...]:
         """All of them."""
-        return (*self.single.values(), *(name for names in self.several.values() for name in names))
+        return tuple(name for names in self.channels.values() for name in names)
+
+    @property
+    def single(self) -> dict[str, Family]:
+        """Those whose faults effects may explain one by one, each with its family."""
+        few = {family: names for family, names in self.channels.items() if len(names) <= EXAMINED}
+        return {name: family for family, names in few.items() for name in names}
+
+    @property
+    def several(self) -> dict[Family, tuple[str, ...]]:
+        """Those of families in which more disagree than can be examined one by one."""
+        return {family: names for family, names in self.channels.items() if len(names) > EXAMINED}
 
     def plus(self, family: Family, name: str | None) -> OutlierChannels:
-        """These with one more of a family; two of a family have no one cause."""
+        """These with one more of a family."""
         if name is None:
             return self
-        known = {*self.several.get(family, ()), *(n for f, n in self.single.items() if f == family)}
-        if not known:
-            return replace(self, single={**self.single, family: name})
-        left = {f: n for f, n in self.single.items() if f != family}
-        return OutlierChannels(left, {**self.several, family: tuple(sorted({*known, name}))})
+        known = {*self.channels.get(family, ()), name}
+        return OutlierChannels({**self.channels, family: tuple(sorted(known))})
 
 
 def find_outlier_channels(
@@ -85,8 +95,7 @@ def find_outlier_channels(
 
     `steps` are those of the families, m, whose readings go in steps.
     """
-    single: dict[Family, str] = {}
-    several: dict[Family, tuple[str, ...]] = {}
+    channels: dict[Family, tuple[str, ...]] = {}
     for family in TOLERANCE:
         step = steps.get(family, 0.0)
         data = [channel_family(run, grid, family, step) for run, grid in zip(runs, grids, strict=True)]
@@ -101,10 +110,10 @@ def find_outlier_channels(
         several_ids = _outlier_set(usable, family)
         single_id = None if several_ids else _single_outlier(usable, family, order[:LOOKED_AT])
         if several_ids:
-            several[family] = several_ids
+            channels[family] = several_ids
         elif single_id is not None:
-            single[family] = single_id
-    return OutlierChannels(single, several)
+            channels[family] = (single_id,)
+    return OutlierChannels(channels)
 
 
 def _single_outlier(usable: Sequence[ChannelFamily], family: Family, order: Sequence[str]) -> str | None:

@@ -152,8 +152,8 @@ def without_outlier_channels(
 ) -> tuple[list[Examined], dict[str, Family], list[list[RunFinding]]]:
     """The runs less the channels that disagree with their family; single ones; findings with the several.
 
-    What a single one shows, an effect may explain. Several of one family have no one cause that the
-    library knows: that they disagree is a finding that nothing explains, and not a reason to forget them.
+    What one or two of a family show, effects may explain. More than two have no causes that the library
+    knows: that they disagree is a finding that nothing explains, and not a reason to forget them.
     """
     grids = [e.features.grid for e in examined]
     runs = [e.run for e in examined]
@@ -173,7 +173,7 @@ def without_outlier_channels(
     ]
     turned = second_axis([e.run for e in again], [e.features.grid for e in again])
     rows = [[*row, *disagreements, *own] for row, own in zip(findings, turned, strict=True)]
-    return again, {name: family for family, name in outliers.single.items()}, rows
+    return again, outliers.single, rows
 
 
 def _examined_without(examined: Sequence[Examined], ids: Sequence[str], reference: str) -> list[Examined]:
