@@ -96,7 +96,7 @@ class Motion:
     def evaluate(
         self, times_s: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """(θ, θ̇, θ̈) at `times_s`."""
+        """(θ, θ̇, θ̈), rad and s, at `times_s`; each has the shape of the times."""
         rotation, velocity, acceleration = self._evaluate(times_s, 3)
         return rotation, velocity, acceleration
 

@@ -24,7 +24,7 @@ N_COLUMNS: Final = 19
 
 @part
 def horner(row: NDArray[np.float64], first: int, x: float) -> float:
-    """Polynomial of degree 7 whose coefficients start at column `first`."""
+    """Polynomial of degree 7 at x in [0, 1]; its coefficients start at column `first` of `row`, (19,)."""
     value = row[first + 7]
     for k in range(6, -1, -1):
         value = value * x + row[first + k]
@@ -42,7 +42,7 @@ def horner_slope(row: NDArray[np.float64], first: int, x: float) -> float:
 
 @part
 def find_piece(pieces: NDArray[np.float64], t: float, hint: int) -> int:
-    """Row that holds at `t`, or −1 before the first; fast when `hint` is near."""
+    """Row of `pieces` (m, 19) that holds at `t`, s, or −1 before the first; fast when `hint` is near."""
     n = pieces.shape[0]
     i = hint
     if i < 0 or i >= n or pieces[i, START] > t:
@@ -94,7 +94,7 @@ def evaluate(
     velocity: NDArray[np.float64],
     acceleration: NDArray[np.float64],
 ) -> None:
-    """Fill the outputs that have the length of `times`; an output of length 0 is left out."""
+    """Fill θ, θ̇, θ̈ (n,), rad and s, at `times` (n,); an output of length 0 is left out."""
     want_velocity, want_acceleration = velocity.size > 0, acceleration.size > 0
     if not want_velocity and not want_acceleration:
         _rotation_only(pieces, times, rotation)

@@ -150,7 +150,7 @@ def _held_share(x: float, even: float) -> float:
 
 @part
 def acceleration(q: float, v: float, t: float, c: NDArray[np.float64]) -> float:
-    """q̈ in the branch that `set_region` fixed."""
+    """q̈, rad/s², at q, rad, and v, rad/s, in the branch that `set_region` fixed; `c` (N_COEFFICIENTS,)."""
     if c[C_PLAIN] > 0.0:
         return float(-c[C_STIFF] * sine(c[C_ALPHA] - q))
     a = _restoring(q, v, c) - c[C_VISCOUS] * v - c[C_QUADRATIC] * v * abs(v) - c[C_COULOMB] * c[C_RISING]

@@ -92,10 +92,10 @@ class PlainRun:
 
 
 def independent_fraction(residual: FloatArray) -> float:
-    """Share of independent samples in an autocorrelated residual: 1/τ, τ = 1 + 2 Σ ρ_k.
+    """Share of independent samples in an autocorrelated residual, (n,): 1/τ, τ = 1 + 2 Σ ρ_k.
 
-    The sum runs to the first negative autocorrelation (Geyer's initial positive sequence in its
-    simplest form), so that noise in the far lags does not enter.
+    The sum runs to the first negative autocorrelation (Geyer, Practical Markov chain Monte Carlo,
+    1992, in its simplest form), so that noise in the far lags does not enter.
     """
     centred = residual - residual.mean()
     n = centred.size

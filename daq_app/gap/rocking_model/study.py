@@ -88,10 +88,6 @@ def _without_gaps(run: GapRun) -> GapRun:
     return run
 
 
-PARTS = ("scatter", "channels", "probes")
-"""Parts of the method that a diagnosis can be made without, to see what each is worth."""
-
-
 def diagnose_runs(
     runs: Sequence[GapRun],
     options: Options | None = None,
@@ -101,7 +97,8 @@ def diagnose_runs(
     """Where, which and how far, for tests of one specimen on one rig.
 
     With `only`, no effects but these are considered (and no probes): a quick answer to a narrow question.
-    `without` names some of `PARTS`: no scatter of r, no channels beyond the rotation, …
+    `without` leaves out parts of the method, to see what each is worth: ``scatter`` of r, ``channels`` beyond
+    the rotation, ``probes``.
 
     Raises `CannotDiagnose` with the reason in words, and `parallel.Interrupted` when stopped.
     """

@@ -31,14 +31,11 @@ class Response:
     """follower(t) ≈ gain · [reference, delayed and slowed](t) + offset + drift · t."""
 
     gain: float
-    offset_rad: float
     drift_rad_s: float
     delay_s: float
     response_s: float
     """Time constant of a first order; negative where it is the reference that is slow."""
     residual_rad: float
-    plain_residual_rad: float
-    """Without delay and response."""
     span_s: float
     """Length of what was compared."""
 
@@ -57,7 +54,6 @@ def compare(time_s: Floats, reference_rad: Floats, follower_rad: Floats) -> Resp
     pair, turned = _Pair(x, y, step), _Pair(y, x, step)
     if min(pair.known, turned.known) < _FEWEST or np.nanstd(x) < 1e-4 or np.nanstd(y) < 1e-4:
         return None
-    plain = pair.solved(0.0, 0.0)
     delay = _least(lambda value: pair.solved(value, 0.0).rms, -_LARGEST_S)
     slow = _least(lambda value: pair.solved(0.0, value).rms, 0.0)
     turned_slow = _least(lambda value: turned.solved(0.0, value).rms, 0.0)
@@ -87,10 +83,9 @@ def compare(time_s: Floats, reference_rad: Floats, follower_rad: Floats) -> Resp
         # The reference is the slower one: the other way round the fit is better.
         solved = turned.solved(0.0, -response)
         gain = 1.0 / solved.gain
-        offset, drift = -solved.offset * gain, -solved.drift * gain
-        return Response(gain, offset, drift, 0.0, response, turned_rms, plain.rms, span)
+        return Response(gain, -solved.drift * gain, 0.0, response, turned_rms, span)
     solved = pair.solved(delay, response)
-    return Response(solved.gain, solved.offset, solved.drift, delay, response, solved.rms, plain.rms, span)
+    return Response(solved.gain, solved.drift, delay, response, solved.rms, span)
 
 
 def _noise(values: Floats) -> float:
@@ -118,7 +113,6 @@ def _least(cost: Callable[[float], float], low: float) -> float:
 @dataclass(frozen=True, slots=True)
 class _Solved:
     gain: float
-    offset: float
     drift: float
     rms: float
 
@@ -155,5 +149,5 @@ class _Pair:
         normal = table.T @ table
         solution = np.linalg.solve(normal, table.T @ y)
         left = y - table @ solution
-        gain, offset, drift = (float(value) for value in solution)
-        return _Solved(gain, offset, drift, float(np.sqrt(np.mean(left**2))))
+        gain, _, drift = (float(value) for value in solution)
+        return _Solved(gain, drift, float(np.sqrt(np.mean(left**2))))

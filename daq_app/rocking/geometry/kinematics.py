@@ -127,9 +127,6 @@ class RotationGeometry:
     wires: WireGeometry
     tilt_ids: tuple[str, ...]
     """Tiltmeter channels that measure tilt towards x, the rotation."""
-    cross_tilt_ids: tuple[str, ...]
-    """Tiltmeter channels that measure tilt along the wall's length."""
-    tilt_noise_rad: float
     frame_samples: int
     """Wires are checked against each other on means of this many samples."""
     _weights: dict[tuple[bool, ...], Floats] = field(default_factory=dict, repr=False, compare=False)
@@ -144,14 +141,9 @@ class RotationGeometry:
         if not wires:
             raise ValueError("the rig has no wire potentiometers: rotation cannot be computed")
         half = rig.specimen.base_width_m / 2.0 - pivot_inset_m
-        tilts = rig.of_family("tiltmeter")
-        towards_x = [channel for channel in tilts if channel.axis == "x"]
-        noise = float(np.mean([channel.noise_si for channel in towards_x])) if towards_x else float("nan")
         return cls(
             wires=WireGeometry.of(wires, half),
-            tilt_ids=tuple(channel.id for channel in towards_x),
-            cross_tilt_ids=tuple(channel.id for channel in tilts if channel.axis == "y"),
-            tilt_noise_rad=noise,
+            tilt_ids=tuple(c.id for c in rig.of_family("tiltmeter") if c.axis == "x"),
             frame_samples=frame_samples,
         )
 

@@ -3,7 +3,8 @@
 Equation numbers are those of Costa et al., "Free rocking tests on stone masonry wallettes".
 Everything here belongs to the *linearised* equation θ̈ = p²(θ − α·sgn θ); the exact counterparts
 for θ̈ = −p² sin(α·sgn θ − θ) live in `daq_app.rocking.theory.housner` and are never mixed in silently.
-Amplitudes are given as φ = |θ_peak| / α. r is a ratio of angular velocities, the energy ratio is r².
+All functions take scalars or arrays that broadcast, and return that shape. Amplitudes are given as
+φ = |θ_peak| / α. r is a ratio of angular velocities, the energy ratio is r².
 """
 
 from __future__ import annotations

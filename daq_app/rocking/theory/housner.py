@@ -7,7 +7,8 @@ a Jacobi elliptic function: for a peak at time 0 with u = u_p,
 
 (the classical solution of the pendulum, e.g. NIST DLMF 22.19.2, shifted by half a turn). There is no
 time step and no truncation error. Names say *exact* where
-`daq_app.rocking.theory.classic` has a linearised twin.
+`daq_app.rocking.theory.classic` has a linearised twin. Functions work element by element on scalars or
+arrays that broadcast.
 """
 
 from __future__ import annotations

@@ -98,6 +98,11 @@ def every_n_samples(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
     event = pb.RegisterEveryNSamplesEventResponse(
         every_n_samples_event_type=kind, every_n_samples_event_type_raw=kind, n_samples=interval
     )
+    yield from _repeated(bench, stream, event, interval)
+
+
+def _repeated(bench: Bench, stream: EventStream, event: Any, interval: int) -> Iterator[Any]:
+    """The event at every `interval` counts of each run, until the task goes or nobody listens."""
     try:
         while True:
             with bench.changed:
@@ -175,24 +180,7 @@ def signal(bench: Bench, request: Any, context: Any) -> Iterator[Any]:
         stream = EventStream(bench, request, context, f"signal{wanted}", Code.SIGNAL_REGISTERED)
     context.send_initial_metadata(())
     event = pb.RegisterSignalEventResponse(signal_id=wanted)
-    try:
-        while True:
-            with bench.changed:
-                if not stream.wait_for_run():
-                    return
-                run = stream.task.run
-            count = 0
-            while True:
-                with bench.changed:
-                    if not stream.wait_for_count(count + 1, 1):
-                        break
-                count += 1
-                yield event
-            with bench.changed:
-                stream.wait_for_end(run)
-    finally:
-        with bench.changed:
-            stream.close()
+    yield from _repeated(bench, stream, event, 1)
 
 
 def unregister(bench: Bench, task_name: str, kind: str) -> None:

@@ -77,7 +77,7 @@ def test_indistinguishable_effects_must_be_there_and_in_one_group_only() -> None
     assert Library(EFFECTS, (SAME,)).without("twin").groups == ()
 
 
-def test_only_what_levels_and_sensors_cannot_separate_is_alike() -> None:
+def test_only_what_levels_and_sensors_cannot_separate_is_indistinguishable() -> None:
     library = rocking_library({"WP-1": "wire"})
     assert library.class_of(["eccentric_mass", "viscous"]) == ("base_tilt", "viscous")
     assert library.class_of(["filter_delay@WP-1"]) == ("lag@WP-1",)

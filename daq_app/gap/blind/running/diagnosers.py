@@ -42,7 +42,7 @@ def load_diagnoser(name: str) -> Diagnoser:
 def product(case: Path, without: Collection[str] = ()) -> Result:
     """What ``daq-app gap diagnose`` says of all runs of the case with its rig file.
 
-    One process: the cases fill the cores. `without`: parts of the method to leave out (`study.PARTS`).
+    One process: the cases fill the cores. `without`: parts of the method to leave out (`diagnose_runs`).
     """
     from daq_app.config import ConfigError, load_rig
     from daq_app.gap.core import CannotDiagnose, Options

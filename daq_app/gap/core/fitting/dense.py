@@ -10,7 +10,7 @@ from daq_app.gap.core.features import FloatArray
 
 
 def factor(matrix: FloatArray) -> FloatArray:
-    """Lower Cholesky factor. Raises `numpy.linalg.LinAlgError` where the matrix is not positive definite."""
+    """Lower Cholesky factor, (p, p). Raises `numpy.linalg.LinAlgError` for a matrix not positive definite."""
     if not matrix.size:
         return matrix.copy()
     factored, info = dpotrf(matrix, lower=1, clean=1)
@@ -21,7 +21,7 @@ def factor(matrix: FloatArray) -> FloatArray:
 
 
 def solve(lower: FloatArray, right: FloatArray) -> FloatArray:
-    """A⁻¹ right, with the factor of A."""
+    """A⁻¹ B for B of shape (p,) or (p, m), with the Cholesky factor (p, p) of A."""
     if not lower.size:
         return right.copy()
     solution: FloatArray = dpotrs(lower, right, lower=1)[0]
@@ -29,7 +29,7 @@ def solve(lower: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def inverse_factor(lower: FloatArray) -> FloatArray:
-    """The inverse of a lower triangular matrix."""
+    """The inverse, (p, p), of a lower triangular matrix."""
     if not lower.size:
         return lower.copy()
     inverse: FloatArray = dtrtri(lower, lower=1)[0]

@@ -71,7 +71,7 @@ class Covariance:
 
     @property
     def marginal_sd(self) -> FloatArray:
-        """√diag C: what one feature alone would scatter by."""
+        """√diag C, (n,): what each feature alone would scatter by."""
         return np.sqrt(self._variance)
 
     def whiten(self, matrix: FloatArray) -> FloatArray:
@@ -82,7 +82,7 @@ class Covariance:
         return white
 
     def back(self, white: FloatArray) -> FloatArray:
-        """Mᵀ X."""
+        """Mᵀ X for X of shape (n,) or (n, m), with the M of `whiten`."""
         product: FloatArray = white / (self._root if white.ndim == 1 else self._root[:, None])
         if self._rows.size:
             product[self._rows] = self._inverse.T @ white[self._rows]
@@ -96,12 +96,12 @@ class Covariance:
         return inverse
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """C⁻¹ right."""
+        """C⁻¹ X for X of shape (n,) or (n, m)."""
         return self.back(self.whiten(right))
 
 
 def log_density(residual: FloatArray, covariance: Covariance) -> float:
-    """ln N(residual; 0, C)."""
+    """ln N(r; 0, C) of a residual r, (n,)."""
     white = covariance.whiten(residual)
     return -0.5 * (float(white @ white) + covariance.log_det + residual.size * LOG_2PI)
 

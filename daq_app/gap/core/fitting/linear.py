@@ -51,7 +51,7 @@ class Linear:
 
     @cached_property
     def factor(self) -> FloatArray:
-        """Lower Cholesky factor of the Hessian."""
+        """Lower Cholesky factor of the Hessian, (p, p)."""
         return dense.factor(self.hessian)
 
     @property
@@ -61,16 +61,19 @@ class Linear:
 
     @property
     def covariance(self) -> FloatArray:
-        """Posterior covariance of the unknowns."""
+        """Posterior covariance of the unknowns in unit coordinates, (p, p)."""
         return dense.solve(self.factor, np.eye(len(self.problem)))
 
     def free(self, gradient: FloatArray, u: FloatArray) -> Mask:
-        """Unknowns that are not pressed against a bound."""
+        """Unknowns, (p,), that the gradient does not press against a bound at `u`."""
         low, high = self.problem.low, self.problem.high
         return np.asarray(~(((u <= low) & (gradient > 0)) | ((u >= high) & (gradient < 0))))
 
     def solution(self, held: Mask | None = None, damping: float = 0.0) -> FloatArray:
-        """The lowest point within the bounds, in unit coordinates; `held` unknowns stay where they are."""
+        """The lowest point, (p,), within the bounds in unit coordinates; `held` unknowns stay where they are.
+
+        `damping`: share of the diagonal of the Hessian that is added to it (Levenberg and Marquardt).
+        """
         u = self.u.copy()
         matrix = self.hessian + damping * np.diag(np.diag(self.hessian)) if damping else self.hessian
         for _ in range(_PASSES):
@@ -92,7 +95,7 @@ class Linear:
         return u
 
     def objective_at(self, u: FloatArray) -> float:
-        """−log posterior to second order."""
+        """−log posterior at `u`, (p,), to second order about the point of linearisation."""
         step = u - self.u
         return self.objective + float(self.gradient @ step) + 0.5 * float(step @ self.hessian @ step)
 
@@ -101,7 +104,7 @@ class Linear:
         return self.objective_at(u) + 0.5 * self.log_det
 
     def updated_sizes(self, u: FloatArray) -> Sizes:
-        """One step of the restricted-likelihood update, for the residuals at `u`."""
+        """One step of the restricted-likelihood update of the sizes, for the residuals at `u`, (p,)."""
         scatters = self.problem.model.scatters
         groups = self.problem.experiment.groups
         scatter = np.zeros((2, len(scatters)))

@@ -78,7 +78,7 @@ class Problem:
         return self._columns[run]
 
     def values(self, run: int, u: FloatArray) -> dict[str, float]:
-        """What the model is asked with for one run."""
+        """Parameters by name, in their own units, for one run; `u` (p,) are unit coordinates."""
         coordinates = u.tolist()
         return {key: value(coordinates[k]) for k, key, value in self._asked[run]}
 
@@ -92,6 +92,7 @@ class Problem:
         }
 
     def predict(self, run: int, u: FloatArray) -> Prediction:
+        """The model's features of one run at `u`, (p,). Whatever the model raises passes through."""
         return self.model.predict(self.runs[run], self.values(run, u))
 
     def linearise(

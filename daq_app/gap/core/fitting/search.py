@@ -34,7 +34,7 @@ class Search:
         self._linear: Linear | None = None
 
     def value_at(self, u: FloatArray, predictions: list[Prediction]) -> float:
-        """−log posterior; infinite where the model diverges."""
+        """−log posterior at `u`, (p,); infinite where the model diverges."""
         total = 0.5 * float(u @ u) + self.sizes.cost(self.problem.model.scatters)
         for i, (run, prediction) in enumerate(zip(self.problem.runs, predictions, strict=True)):
             residual = run.features.values - prediction.features

@@ -44,7 +44,7 @@ class GapMap:
 
 
 def gap_map(residuals: Sequence[FloatArray], scales: Sequence[FloatArray], runs: Sequence[Run]) -> GapMap:
-    """The map of residuals; `scales` is what each feature scatters by when nothing is missing.
+    """The map of residuals; `scales`, (n,) for each run, is what features scatter by if nothing is missing.
 
     Take the scales from the best hypothesis: those of a hypothesis that misfits have grown to
     swallow the misfit.

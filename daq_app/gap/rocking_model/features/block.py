@@ -86,7 +86,7 @@ class Block:
         return self.kind or self.family
 
     def coefficients(self, series: FloatArray) -> FloatArray:
-        """What the regression makes of a difference given on the whole grid."""
+        """Coefficients, (k,), that the regression makes of a difference on the whole grid, (m,)."""
         coefficients: FloatArray = self.projection @ series[self.pick]
         return coefficients
 
@@ -98,7 +98,7 @@ def regress(
     pick: NDArray[np.bool_],
     absorbed: tuple[str, ...] = (),
 ) -> Block | None:
-    """Least squares of a difference on named shapes; None with too few samples.
+    """Least squares of a difference, (m,), on named shapes, (m,) with their units; None with too few samples.
 
     The shapes `absorbed` are fitted but say nothing about the wall or the sensor, and are dropped.
     """

@@ -35,7 +35,7 @@ def _family_keys(family: str) -> tuple[str, ...]:
 
 
 def family_difference(run: RockingRun, family: str, values: Mapping[str, float]) -> FloatArray | None:
-    """What a family's sensor effects add to the rotation it shows, on the grid; None for nothing."""
+    """What a family's sensor effects add to the rotation it shows, (m,), rad; None for nothing."""
     shown = run.grid.theta
     if family == "wire" and family != run.reference and "sliding.c" in values:
         # A slip is a step to whatever the wires answer with.
@@ -97,7 +97,7 @@ def _added_by(
 
 
 def difference_of(run: RockingRun, first: str, second: str, values: Mapping[str, float]) -> FloatArray | None:
-    """What one family shows more than another because of sensor effects; None for nothing."""
+    """What one family shows more than another because of sensor effects, (m,), rad; None for nothing."""
     a, b = family_difference(run, first, values), family_difference(run, second, values)
     if a is None:
         return None if b is None else -b
@@ -122,7 +122,7 @@ def own_gain(run: RockingRun, values: Mapping[str, float]) -> float:
 def unit_coefficients(
     run: RockingRun, block: Block, name: str, shape: Callable[[], FloatArray]
 ) -> FloatArray:
-    """Coefficients of a fixed shape, worked out once per run."""
+    """Coefficients, (k,), of a fixed shape, (m,), worked out once per run."""
     return run.cache.constant((block.family, name), lambda: block.coefficients(shape()))
 
 

@@ -13,7 +13,7 @@ from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 
 
 def first_order(values: FloatArray, time_constant_s: float, rate_hz: float = GRID_HZ) -> FloatArray:
-    """Response of a slow sensor that starts in balance."""
+    """Response, (n,), of a first-order sensor that starts in balance: τ ẏ + y = x."""
     if time_constant_s <= 0:
         return values
     a = np.exp(-1.0 / (time_constant_s * rate_hz))
@@ -33,7 +33,7 @@ def slow_response(values: FloatArray, time_constants_s: FloatArray) -> FloatArra
 
 
 def bessel(values: FloatArray, delay_s: float, rate_hz: float = GRID_HZ) -> FloatArray:
-    """Second-order Bessel low-pass of group delay `delay_s`."""
+    """Second-order Bessel low-pass, (n,), of group delay `delay_s`."""
     if delay_s <= 1e-5:
         # As good as a delay, and not nothing: a fit that starts from none has to see where it leads.
         return values - delay_s * rate_hz * np.gradient(values)
@@ -41,8 +41,9 @@ def bessel(values: FloatArray, delay_s: float, rate_hz: float = GRID_HZ) -> Floa
 
 
 def resonator(values: FloatArray, natural: float, zeta: float, rate_hz: float = GRID_HZ) -> FloatArray:
-    """ÿ/ω² + 2ζẏ/ω + y = x for an x that is straight between samples; starts settled.
+    """ÿ/ω² + 2ζẏ/ω + y = x for an x, (n,), that is straight between samples; it starts settled.
 
+    `natural`: ω, rad/s.
     A bilinear transform would be off in delay by a fifth where the response is as quick as the grid.
     """
     numerator, denominator = _discrete(float(natural), float(zeta), rate_hz)
@@ -60,7 +61,7 @@ def _discrete(natural: float, zeta: float, rate_hz: float) -> tuple[FloatArray, 
 
 
 def responded(values: FloatArray, effect: str, given: Mapping[str, float]) -> FloatArray:
-    """A signal on the grid as a sensor with the effect shows it."""
+    """A signal, (m,) on the grid, as a sensor with the effect shows it."""
     match effect:
         case "gain":
             return values * (1.0 + given["error"])

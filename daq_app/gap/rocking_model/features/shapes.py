@@ -30,7 +30,7 @@ def side_of(theta: FloatArray) -> FloatArray:
 
 
 def moment_shape(theta: FloatArray, alpha: float) -> FloatArray:
-    """Overturning moment over its largest value: sgn θ · sin(α − |θ|)/sin α, rounded at upright."""
+    """Overturning moment, (m,), over its largest value: sgn θ · sin(α − |θ|)/sin α, rounded at upright."""
     shape: FloatArray = side_of(theta) * np.sin(alpha - np.abs(theta)) / np.sin(alpha)
     return shape
 
@@ -52,7 +52,7 @@ def turned_shape(grid: Grid, *, alternating: bool) -> FloatArray:
 
 
 def turn_shape(grid: Grid, impact: int) -> FloatArray:
-    """The approach speed of one impact, without sign, from that impact on; 0 before."""
+    """The approach speed of one impact, rad/s, without sign, from that impact on, (m,); 0 before."""
     shape: FloatArray = _after(grid)[:, impact] * abs(float(grid.approach[impact]))
     return shape
 

@@ -68,7 +68,7 @@ class Grid:
 def make_grid(
     theta: FloatArray, valid: NDArray[np.bool_], swings: Swings, rate_hz: float, survey: Survey
 ) -> Grid:
-    """Reference motion with its derivatives.
+    """Reference motion with its derivatives, from the rotation `theta`, (n,), rad, at `rate_hz`.
 
     Between impacts the rotation is a polynomial fitted to all samples of the half-cycle: a filter
     that keeps the impacts sharp leaves far too much noise in the second derivative, and noise in an

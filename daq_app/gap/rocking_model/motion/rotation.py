@@ -54,7 +54,7 @@ class Rotation:
 
 
 def zeroed(run: GapRun, index: int) -> FloatArray:
-    """A channel less its mean at the end of the record."""
+    """A channel, (n,), less its mean at the end of the record."""
     values = run.aligned(index)
     tail = values[-max(int(TAIL_S * run.rate_hz), 1) :]
     return values - float(np.nanmean(tail))
@@ -88,7 +88,7 @@ def sooner(values: FloatArray, samples: int) -> FloatArray:
 
 
 def sample_noise(values: FloatArray, rate_hz: float) -> float:
-    """Rms noise of one sample, as averages over the timing windows see it, from the rest at the end."""
+    """Rms noise of one of the samples (n,), as averages over the timing windows see it, from the rest."""
     return timing_noise(values[-int(NOISE_S * rate_hz) :], rate_hz)
 
 
@@ -140,7 +140,7 @@ def _clipped(values: FloatArray, limits: tuple[float, float]) -> NDArray[np.bool
 
 
 def reaches_its_range(values: FloatArray, limits: tuple[float, float]) -> bool:
-    """Whether a channel is ever at the end of its declared range."""
+    """Whether a channel, (n,), is ever at the end of its declared range."""
     return bool(at_range_end(values, *limits).any())
 
 

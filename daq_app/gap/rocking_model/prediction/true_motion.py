@@ -56,7 +56,7 @@ def _second_order(values: Mapping[str, float], name: str) -> float:
 
 
 def pause_at_impact(values: Mapping[str, float], speeds: FloatArray) -> FloatArray:
-    """Time lost at each impact: contact, or the flight of a hop less what it saves on the way up."""
+    """Time lost at each impact, (k,), s: contact, or the flight of a hop less what it saves on the way up."""
     pause = np.full(speeds.shape, values.get("dwell.tau", 0.0))
     flight = values.get("bounce.tau", 0.0)
     if flight:

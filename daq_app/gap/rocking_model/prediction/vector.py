@@ -83,7 +83,10 @@ def restitution_of(
     sides: FloatArray,
     impacts: NDArray[np.intp],
 ) -> FloatArray:
-    """r of each impact, as the simulator's impact rule has it, plus free forms."""
+    """r of each impact, (k,), as the simulator's impact rule has it, plus free forms.
+
+    `speeds` before the impacts, rad/s; `sides` that the wall comes from, ±1; `impacts` counted from 0.
+    """
     r = values["r"] + values.get("restitution_slope.k", 0.0) * (speeds - 0.2)
     r = r + _curvature(run, values, speeds)
     r = r + sides * values.get("restitution_asymmetry.d", 0.0)

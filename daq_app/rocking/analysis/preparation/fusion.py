@@ -27,9 +27,6 @@ class Fused:
     sigma_rad: Floats
     gain: float
     """Slope of LVDT rotation against wire rotation; 1 when they agree."""
-    offset_rad: float
-    scatter_rad: float
-    """rms of the difference after gain and offset."""
 
 
 def fuse(wires_rad: Floats, lvdts_rad: Floats, wire_noise_rad: float, lvdt_noise_rad: float) -> Fused:
@@ -39,12 +36,11 @@ def fuse(wires_rad: Floats, lvdts_rad: Floats, wire_noise_rad: float, lvdt_noise
     differ by.
     """
     both = np.isfinite(wires_rad) & np.isfinite(lvdts_rad)
-    gain, offset, scatter = 1.0, 0.0, math.nan
+    gain, offset = 1.0, 0.0
     if np.count_nonzero(both) > 10 and np.ptp(wires_rad[both]) > 5e-3:
         x, y = wires_rad[both], lvdts_rad[both]
         gain = float(((x - x.mean()) @ (y - y.mean())) / ((x - x.mean()) @ (x - x.mean())))
         offset = float(y.mean() - gain * x.mean())
-        scatter = float(np.std(y - gain * x - offset))
     w, v = 1.0 / wire_noise_rad**2, 1.0 / lvdt_noise_rad**2
     rotation = np.where(
         both,
@@ -58,7 +54,7 @@ def fuse(wires_rad: Floats, lvdts_rad: Floats, wire_noise_rad: float, lvdt_noise
     share = np.where(both, CALIBRATION_SHARE / math.sqrt(2.0), CALIBRATION_SHARE)
     disagreement = 0.5 * np.abs((gain - 1.0) * size) + 0.5 * abs(offset)
     sigma = np.sqrt(noise**2 + (share * size) ** 2 + ZERO_SHARE_RAD**2 + disagreement**2)
-    return Fused(rotation, sigma, gain, offset, scatter)
+    return Fused(rotation, sigma, gain)
 
 
 def best_value(families: Mapping[str, ValueWithSigma]) -> ValueWithSigma:
