@@ -61,6 +61,15 @@ def test_axes_and_strips_grow_with_the_type(rocking_window):
     assert axis.style["tickFont"].pointSizeF() < before[0]
 
 
+def test_the_second_axis_stands_at_the_rotation_alone(rocking_window):
+    live = rocking_window.live
+    shown = [
+        plot.plot_item.getAxis("right").isVisible()
+        for plot in (live.motion.rotation, live.phase, live.periods)
+    ]
+    assert shown == [True, False, False] and not live.restitution.plot.plot_item.getAxis("right").isVisible()
+
+
 def test_figures_below_zero_have_a_true_minus_sign(rocking_window):
     axis = rocking_window.live.motion.rotation.plot_item.getAxis("left")
     assert axis.tickStrings([-50.0, 0.0], 1.0, 50.0) == ["−50", "0"]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QDateTime, Qt, Signal
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QFrame, QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.result.motions import period_deviation
@@ -129,12 +129,26 @@ class ResultPage(QWidget):
         layout.addWidget(self.chooser)
         layout.addWidget(self.banner)
         layout.addLayout(tiles)
-        layout.addWidget(self.plots, 1)
+        layout.addWidget(self._lower_part(), 1)
+
+    def _lower_part(self) -> QScrollArea:
+        """Plots and tables; in large type on a small screen there is more of them than fits."""
         tables = QHBoxLayout()
         tables.setSpacing(6)
         for table, share in ((self.table, 4), (self.families, 5)):
             tables.addWidget(table, share, Qt.AlignmentFlag.AlignTop)
+        content = QWidget()
+        layout = QVBoxLayout(content)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(6)
+        layout.addWidget(self.plots, 1)
         layout.addLayout(tables)
+        area = QScrollArea()
+        area.setWidget(content)
+        area.setWidgetResizable(True)
+        area.setFrameShape(QFrame.Shape.NoFrame)
+        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        return area
 
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""

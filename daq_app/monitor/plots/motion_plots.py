@@ -16,7 +16,7 @@ from daq_app.acquisition.messages.published import RECORDING, EstimateMessage, M
 from daq_app.monitor.data.session import Session
 from daq_app.monitor.look.theme import Colours
 from daq_app.monitor.plots.live_plot import LivePlot
-from daq_app.monitor.plots.plot_base import Array, line_pen
+from daq_app.monitor.plots.plot_base import Array, Axis, line_pen
 from daq_app.monitor.plots.theory_overlay import current_restitution, housner_motion
 
 WINDOW_S = 12.0
@@ -33,13 +33,11 @@ class MotionPlots(QWidget):
         self.rotation = LivePlot("Rotation θ", "θ  (mrad)", "")
         self.velocity = LivePlot("Angular velocity dθ/dt", "dθ/dt  (rad/s)", "time  (s)")
         self.velocity.setXLink(self.rotation)
-        self.rotation.plot_item.showAxis("right")
-        self.rotation.plot_item.setLabel("right", "θ/α")
         for plot in (self.rotation, self.velocity):
+            plot.plot_item.setAxisItems({"right": Axis("right")})
             plot.set_axis_width("left", 62)
-        self.velocity.plot_item.showAxis("right")
-        for plot in (self.rotation, self.velocity):
             plot.set_axis_width("right", 52)
+        self.rotation.plot_item.setLabel("right", "θ/α")
         self.velocity.plot_item.getAxis("right").setStyle(showValues=False)
         self.rotation.plot_item.getAxis("bottom").setStyle(showValues=False)
         self.rotation.plot_item.getAxis("bottom").setHeight(6)

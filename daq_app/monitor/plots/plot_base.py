@@ -65,8 +65,8 @@ class Axis(pg.AxisItem):  # type: ignore[misc]
 
 
 def axes() -> dict[str, Axis]:
-    """New axes for a plot: left, below and right, which shows where it is asked for."""
-    return {side: Axis(side) for side in ("left", "bottom", "right")}
+    """New axes for a plot: left and below."""
+    return {side: Axis(side) for side in ("left", "bottom")}
 
 
 class Plot(pg.PlotWidget):  # type: ignore[misc]
@@ -112,7 +112,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]
             axis.setPen(pg.mkPen(colours.line))
             axis.setTextPen(pg.mkPen(colours.muted))
             axis.setTickFont(small)
-            axis.text_px = QFontMetricsF(small).height()
+            if isinstance(axis, Axis):
+                axis.text_px = QFontMetricsF(small).height()
             axis.setStyle(tickLength=-4, hideOverlappingLabels=True)
             # Axes and grid change rarely and cost most of a frame: keep them as a picture.
             axis.setCacheMode(pg.QtWidgets.QGraphicsItem.CacheMode.DeviceCoordinateCache)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import Final
 
 import numpy as np
 import pyqtgraph as pg
@@ -16,6 +17,9 @@ from daq_app.config.wording import METHOD_MARKS
 from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.plot_base import Plot, line_pen
 from daq_app.rocking.theory import classic as theory
+
+_LEAST_PX: Final = 240
+"""Height, at the usual type size, below which the names of the axes have no room beside them."""
 
 
 class ResultPlots(QWidget):
@@ -53,6 +57,7 @@ class ResultPlots(QWidget):
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""
         self._colours = colours
+        self.setMinimumHeight(colours.px(_LEAST_PX))
         for plot in (self.rotation, self.velocity, self.restitution, self.periods):
             plot.restyle(colours)
         self.legend.setText(
