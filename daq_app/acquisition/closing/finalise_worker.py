@@ -21,7 +21,7 @@ from typing import TextIO
 import psutil
 
 from daq_app.acquisition.closing.finaliser import Finished
-from daq_app.acquisition.closing.freed_memory import give_back
+from daq_app.acquisition.closing.freed_memory import give_back, share_one_heap
 from daq_app.guarded import keep_input
 
 
@@ -109,6 +109,7 @@ def main() -> None:
     # Reading and drawing come first; a run file may take a second longer.
     with contextlib.suppress(psutil.Error, OSError, AttributeError):
         psutil.Process().nice(psutil.BELOW_NORMAL_PRIORITY_CLASS if sys.platform == "win32" else 5)
+    share_one_heap()
     answers = sys.stdout
     sys.stdout = sys.stderr  # whatever a library prints must not be taken for an answer
     jobs: queue.SimpleQueue[str] = queue.SimpleQueue()

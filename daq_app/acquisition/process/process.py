@@ -18,6 +18,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from daq_app.acquisition.closing.finaliser import Finaliser
+from daq_app.acquisition.closing.freed_memory import share_one_heap
 from daq_app.acquisition.messages.items import RequestRefused
 from daq_app.acquisition.messages.options import READY, parse, time_factor
 from daq_app.acquisition.messages.published import Command, Reply
@@ -172,6 +173,7 @@ class Process:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the process with these options; errors are one paragraph on standard error."""
     options = parse(argv)
+    share_one_heap()
     try:
         rig = load_rig(options.rig)
         plan = plan_tasks(rig, str(options.rig))

@@ -8,6 +8,38 @@ import sys
 
 import pytest
 
+_IN_THREADS = """
+import numpy, psutil, sys, threading
+from daq_app.acquisition.closing.freed_memory import share_one_heap
+if sys.argv[1] == "one heap":
+    share_one_heap()
+numpy.ones(400_000)  # freed at once, it raises the size from which the library maps memory
+memory = lambda: psutil.Process().memory_info().rss / 2**20
+turn = threading.Barrier(4)
+def use_blocks(place):
+    for taking in range(4):
+        turn.wait()
+        if taking == place:
+            blocks = [numpy.ones(100_000) for _ in range(100)]  # 80 MB
+            kept = bytes(50_000)
+            del blocks
+    turn.wait()
+    turn.wait()
+threads = [threading.Thread(target=use_blocks, args=(place,)) for place in range(3)]
+before = memory()
+for thread in threads:
+    thread.start()
+for _ in range(5):
+    turn.wait()
+print(memory() - before)
+turn.wait()
+"""
+
+
+def _glibc() -> bool:
+    return platform.libc_ver()[0] == "glibc"
+
+
 _PROGRAM = """
 import numpy, psutil, sys
 from daq_app.acquisition.closing.freed_memory import give_back
@@ -22,9 +54,16 @@ print(freed - before, memory() - before)
 """
 
 
-@pytest.mark.skipif(
-    platform.libc_ver()[0] != "glibc", reason="other allocators give pages back by themselves"
-)
+@pytest.mark.skipif(not _glibc(), reason="other allocators give pages back by themselves")
+def test_what_one_thread_has_freed_the_next_one_takes() -> None:
+    def held(how: str) -> float:
+        program = [sys.executable, "-c", _IN_THREADS, how]
+        return float(subprocess.run(program, capture_output=True, text=True, check=True).stdout)
+
+    assert held("one heap") < 100.0 < 200.0 < held("a heap for each thread")
+
+
+@pytest.mark.skipif(not _glibc(), reason="other allocators give pages back by themselves")
 def test_pages_between_what_is_still_in_use_go_back_to_the_system() -> None:
     done = subprocess.run([sys.executable, "-c", _PROGRAM], capture_output=True, text=True, check=True)
     freed, given_back = map(float, done.stdout.split())
