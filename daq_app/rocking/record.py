@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,14 @@ from daq_app.config.rig import Family, Rig
 from daq_app.config.scaling import Scaling
 
 Floats = NDArray[np.float64]
+
+
+_LONGEST_S: Final = 240.0
+"""Longest part of a recording that is analysed, s. Assumed; a wall rocks for 3 to 10 s. One second of 41
+channels at 4000 Hz takes 6 MB of memory: raising it lets a wall that stood armed for long fill it."""
+_BEFORE_RELEASE_S: Final = 120.0
+"""Of that part, what lies before the release, s: noise, zero and hold are read from it (assumed)."""
+_RELEASE_EVENTS: Final = frozenset({"released", "rocking"})
 
 
 class HeaderLike(Protocol):
@@ -27,17 +35,33 @@ class HeaderLike(Protocol):
     def time_offset_s(self, channel_id: str) -> float: ...
 
 
-class RunLike(Protocol):
+class EventLike(Protocol):
+    """What the analysis needs of an event."""
+
+    @property
+    def kind(self) -> str: ...
+    @property
+    def sample(self) -> int: ...
+
+
+class RunSpan(Protocol):
+    """Which samples a run has, and what happened in them."""
+
+    @property
+    def first_sample(self) -> int: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def events(self) -> Sequence[EventLike]: ...
+
+
+class RunLike(RunSpan, Protocol):
     """What the analysis needs of an opened run."""
 
     @property
     def header(self) -> HeaderLike: ...
     @property
     def rate_hz(self) -> float: ...
-    @property
-    def first_sample(self) -> int: ...
-    @property
-    def n_samples(self) -> int: ...
     @property
     def channel_ids(self) -> tuple[str, ...]: ...
     def si(self, ids: Sequence[str] | None = None, start: int = 0, stop: int | None = None) -> Floats:
@@ -72,6 +96,8 @@ class TestRecord:
     label: str = ""
     zeros_si: Mapping[str, float] = field(default_factory=dict)
     """What that zero took off each channel, SI: ranges hold for values with it. 0 where not listed."""
+    part_of: int | None = None
+    """Number of samples of the recording of which this is only a part; None where it is all of it."""
 
     @classmethod
     def from_array(
@@ -103,18 +129,25 @@ class TestRecord:
 
     @classmethod
     def from_run(cls, run: RunLike, rig: Rig) -> TestRecord:
-        """A record on an opened run, which must stay open while it is analysed."""
+        """A record on the `analysed_part` of an opened run, which must stay open while it is analysed."""
+        begin, end = analysed_part(run, run.rate_hz)
+
+        def load(ids: tuple[str, ...], start: int = 0, stop: int | None = None) -> Floats:
+            first, last, _ = slice(start, stop).indices(end - begin)
+            return run.si(ids, begin + first, begin + max(first, last))
+
         return cls(
             rig=rig,
             rate_hz=run.rate_hz,
-            n_samples=run.n_samples,
+            n_samples=end - begin,
             channel_ids=run.channel_ids,
-            load=run.si,
-            first_sample=run.first_sample,
+            load=load,
+            first_sample=run.first_sample + begin,
             time_offsets_s={cid: run.header.time_offset_s(cid) for cid in run.channel_ids},
             tared=bool(run.header.tare),
             label=run.header.test or run.header.run_id,
             zeros_si=tare_si(rig, run.header.tare),
+            part_of=None if end - begin == run.n_samples else run.n_samples,
         )
 
     def family(self, family: Family, axis: str | None = None) -> tuple[str, ...]:
@@ -132,6 +165,24 @@ class TestRecord:
     def time_s(self, offset_s: float = 0.0) -> Floats:
         """(n,) absolute sample index / rate, plus an offset."""
         return np.asarray((self.first_sample + np.arange(self.n_samples)) / self.rate_hz + offset_s)
+
+
+def analysed_part(run: RunSpan, rate_hz: float) -> tuple[int, int]:
+    """First sample and end (from the run's first sample on) of what is analysed: all of a usual run.
+
+    A wall may stand armed for half an hour; its readings are kept whole, but the analysis would need
+    gigabytes of memory for them. So a long run is analysed from two minutes before its release on, or, where
+    nothing was released, at its end.
+    """
+    longest = round(_LONGEST_S * rate_hz)
+    if run.n_samples <= longest:
+        return 0, run.n_samples
+    released = [event.sample for event in run.events if event.kind in _RELEASE_EVENTS]
+    if not released:
+        return run.n_samples - longest, run.n_samples
+    before = round(_BEFORE_RELEASE_S * rate_hz)
+    start = min(max(0, released[-1] - run.first_sample - before), run.n_samples - longest)
+    return start, start + longest
 
 
 def tare_si(rig: Rig, tare: Mapping[str, float]) -> dict[str, float]:

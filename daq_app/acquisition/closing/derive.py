@@ -14,15 +14,13 @@ from daq_app.config.scaling import Scaling
 from daq_app.rocking.analysis.analyse import AnalysisOptions, analyse_record
 from daq_app.rocking.analysis.results import Series
 from daq_app.rocking.live import LiveAnalyser
-from daq_app.rocking.record import TestRecord, tare_si
+from daq_app.rocking.record import TestRecord, analysed_part, tare_si
 from daq_app.runfile import DerivedData, DerivedSignal, JournalContents
 from daq_app.runfile.source import RunSource, rig_of
 
 Floats = NDArray[np.float64]
 
 _WINDOW: Final = 4000
-_LONGEST_S: Final = 600.0
-_BEFORE_RELEASE_S: Final = 120.0
 _OPTIONS: Final = AnalysisOptions(fit=False, bias_runs=0)
 """What takes long (simulated bias, fit of the whole motion) waits for `daq-app analyse`."""
 _SIGNALS: Final = {
@@ -42,7 +40,7 @@ def derive(contents: JournalContents) -> tuple[DerivedData | None, str]:
     rig = rig_of(contents.header)
     if rig is None or rig.channel_ids != contents.header.channel_ids:
         return None, "The run's rig file is not understood, so nothing was derived"
-    start, stop = _analysed(contents)
+    start, stop = analysed_part(contents, contents.header.rate_hz)
     try:
         analysis = analyse_record(_record(contents, rig, start, stop), _OPTIONS)
         online = _online(contents, rig)
@@ -68,7 +66,7 @@ def derive_imported(run: RunSource) -> DerivedData | None:
     rig = rig_of(run.header)
     if run.n_samples == 0 or rig is None:
         return None
-    start, stop = _analysed(run)
+    start, stop = analysed_part(run, run.header.rate_hz)
     try:
         analysis = analyse_record(_record(run, rig, start, stop), _OPTIONS)
     except Exception as error:
@@ -76,24 +74,6 @@ def derive_imported(run: RunSource) -> DerivedData | None:
         return DerivedData(run.first_sample, {}, results={"quality": quality})
     results = {"analysis": analysis.as_dict(), "quality": judge_imported(run, analysis)}
     return DerivedData(run.first_sample + start, _signals(analysis.series), results=results)
-
-
-def _analysed(contents: RunSource) -> tuple[int, int]:
-    """First sample and end (from the run's first sample on) of what is analysed: all of a usual run.
-
-    A wall may stand armed for half an hour; its readings are kept whole, but the analysis would need
-    gigabytes of memory for them. So a long run is analysed from two minutes before its release on, or, where
-    nothing was released, at its end.
-    """
-    longest = round(_LONGEST_S * contents.header.rate_hz)
-    if contents.n_samples <= longest:
-        return 0, contents.n_samples
-    released = [event.sample for event in contents.events if event.kind in ("released", "rocking")]
-    if not released:
-        return contents.n_samples - longest, contents.n_samples
-    before = round(_BEFORE_RELEASE_S * contents.header.rate_hz)
-    start = min(max(0, released[-1] - contents.first_sample - before), contents.n_samples - longest)
-    return start, start + longest
 
 
 def _record(contents: RunSource, rig: Rig, start: int, stop: int) -> TestRecord:
@@ -126,6 +106,7 @@ def _record(contents: RunSource, rig: Rig, start: int, stop: int) -> TestRecord:
         tared=bool(header.tare),
         label=header.test or header.run_id,
         zeros_si=tare_si(rig, header.tare),
+        part_of=None if whole == contents.n_samples else contents.n_samples,
     )
 
 

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from daq_app.rocking import TestAnalysis
     from daq_app.runfile import Run
 
-_LONGEST_S: Final = 600.0
-"""A longer run goes out with what was derived when it was recorded: its analysis would need gigabytes."""
 _PHASES: Final = "0 before the release, 1 falling, 2 rocking (from the first impact), 3 at rest"
 
 
@@ -25,10 +23,9 @@ def derived_of(run: Run) -> DerivedData | None:
 
     if run.rig is None:
         return None
-    if run.n_samples > _LONGEST_S * run.rate_hz:
-        return run.derived
+    record = TestRecord.from_run(run, run.rig)
     try:
-        analysis = analyse_record(TestRecord.from_run(run, run.rig))
+        analysis = analyse_record(record)
     except ValueError:
         return None
     if not analysis.found or analysis.series is None:
@@ -42,7 +39,7 @@ def derived_of(run: Run) -> DerivedData | None:
         "rotation_fused": DerivedSignal(series.best_rotation_rad, "rad", "rotation from wires and LVDTs"),
         "neutral_axis": DerivedSignal(series.neutral_axis_m, "m", "x of zero opening of the base joint"),
     }
-    return DerivedData(run.first_sample, signals, results={"analysis": analysis.as_dict()})
+    return DerivedData(record.first_sample, signals, results={"analysis": analysis.as_dict()})
 
 
 def _half_cycle(analysis: TestAnalysis, time_s: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -32,7 +32,7 @@ def quality_notes(
 ) -> tuple[QualityNote, ...]:
     """All notes, warnings first."""
     notes = [QualityNote(finding.severity, finding.text) for finding in findings]
-    notes += [*_sensors(record, signals), *_course(times), _alignment(record)]
+    notes += [*_part(record), *_sensors(record, signals), *_course(times), _alignment(record)]
     if track is not None and analysis is not None:
         notes += [*_agreement(signals, analysis), *_motion(times, track, analysis), *_shocks(record, onsets)]
     return tuple(sorted(notes, key=lambda note: note.severity != "warning"))
@@ -44,6 +44,14 @@ def _warn(text: str) -> QualityNote:
 
 def _info(text: str) -> QualityNote:
     return QualityNote("info", text)
+
+
+def _part(record: TestRecord) -> list[QualityNote]:
+    if record.part_of is None:
+        return []
+    whole_s, start_s = record.part_of / record.rate_hz, record.first_sample / record.rate_hz
+    end_s = start_s + record.n_samples / record.rate_hz
+    return [_info(f"analysed from {start_s:.0f} s to {end_s:.0f} s of this recording of {whole_s:.0f} s")]
 
 
 def _sensors(record: TestRecord, signals: Signals) -> list[QualityNote]:

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from daq_app.acquisition.closing import derive as module
 from daq_app.acquisition.closing.derive import derive
+from daq_app.rocking import AnalysisOptions, TestRecord, analyse_record
+from daq_app.rocking import record as module
 from daq_app.runfile import DerivedData, JournalWriter, RunHeader, finalise, open_run, read_journal, verify
 
 
@@ -60,3 +61,8 @@ def test_the_part_around_the_release_gives_the_same_r(
     assert verify(run).ok
     with open_run(run) as opened:
         assert opened.n_samples == wall_test.n_samples, "all readings are kept"
+        options = AnalysisOptions(fit=False, bias_runs=0)
+        later = analyse_record(TestRecord.from_run(opened, opened.rig), options)
+        told = [note.text for note in later.notes if "of this recording of" in note.text]
+        assert len(told) == 1
+        assert later.as_dict() == part.results["analysis"], "whoever analyses it later takes the same part"
