@@ -20,6 +20,7 @@ import nidaqmx.system
 from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
 from drivers.protocol import DriverError
+from drivers.replies import READ_CALL, in_place
 
 _CHANNEL_OPTIONS = [
     # gRPC refuses messages above 4 MB unless told otherwise, and what a refused reply held is lost:
@@ -91,17 +92,19 @@ class _Deadline:
 class _LimitedChannel:
     """Gives every call a deadline: the nidaqmx client sets none, so a frozen server would hang us.
 
-    gRPC's interceptors would do it, too, but make each call from its method anew: a sixth of what a short
-    call costs here.
+    Samples of a read are taken from the reply where they lie. gRPC's interceptors would give a deadline, too,
+    but make each call from its method anew: a sixth of what a short call costs here.
     """
 
     def __init__(self, channel: Any, deadline: _Deadline) -> None:
         self._channel = channel
         self._deadline = deadline
 
-    def unary_unary(self, *method: Any, **options: Any) -> Callable[..., Any]:
+    def unary_unary(self, method: str, **options: Any) -> Callable[..., Any]:
         """The call of one request and one reply, made in the time that is allowed when it is called."""
-        call, deadline = self._channel.unary_unary(*method, **options), self._deadline
+        if method == READ_CALL:
+            options["response_deserializer"] = in_place(options["response_deserializer"])
+        call, deadline = self._channel.unary_unary(method, **options), self._deadline
 
         def limited(request: Any, metadata: Any = None) -> Any:
             return call(request, timeout=deadline.seconds, metadata=metadata)
