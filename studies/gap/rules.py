@@ -51,7 +51,7 @@ class Rule:
 
 RULES = (
     Rule("nothing"),
-    Rule("a share that remains", replace(POLICY, unknown_weighted_nats=NEVER)),
+    Rule("a share that remains", replace(POLICY, unknown_share=NEVER)),
     Rule("a group that is off by far", replace(POLICY, unknown_misfit=NEVER)),
     Rule("a free form that gains on top", replace(POLICY, form_nats=NEVER)),
     Rule("another form as a hypothesis", other_forms=False),
@@ -86,7 +86,8 @@ def _unknown(result: dict[str, Any], named: Sequence[dict[str, Any]], policy: Po
     """Probability of something unknown behind what the best hypothesis leaves."""
     rest = result["rest"]
     largest = max((group["discrepancy"] for group in rest["groups"]), default=0.0)
-    known = 1.0 - policy.chance(rest["share"] * rest["nats"], policy.unknown_weighted_nats)
+    share = policy.chance(rest["share"], policy.unknown_share)
+    known = 1.0 - share * policy.chance(rest["nats"], policy.unknown_nats)
     known *= 1.0 - policy.chance(largest, policy.unknown_misfit)
     gain = max((form["excess"] for form in result["free_forms"]), default=0.0)
     best = named[0]["log_evidence"]

@@ -67,10 +67,12 @@ class Policy:
     """Probability of "nothing missing" below which a weak cause is there all the same."""
 
     # What remains
-    unknown_weighted_nats: float = 10.0
-    """Nats of discrepancy beyond the usual, times their share of the gap, at which what remains is as likely
-    something unknown as not. In development laboratories known causes leave 1.7 at most, unknown ones of that
-    kind 60 or more. Raising it calls a bed with dampers a soft joint."""
+    unknown_share: float = 0.3
+    """Share of the gap, in nats, at which what remains is as likely something unknown as not. In the
+    project's own worlds known causes leave 0.01 at most, unknown ones 0.6 or more."""
+    unknown_nats: float = 20.0
+    """Nats of discrepancy beyond the usual at which what remains matters as likely as not. In own worlds
+    known causes leave 1 at most, unknown ones 29 or more; ordinary laboratories leave some."""
     unknown_misfit: float = 25.0
     """Discrepancy of one group, in nominal sd, that is as likely something unknown as the model's own. In
     development laboratories known causes leave 11 at most, unknown ones of that kind 45 or more; raising it

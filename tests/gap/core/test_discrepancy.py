@@ -68,14 +68,3 @@ def test_the_gate_opens_by_degrees() -> None:
     assert unknown[0] < 0.05
     assert unknown[-1] > 0.9
     assert all(b > a - 0.05 for a, b in itertools.pairwise(unknown)), unknown
-
-
-def test_a_strong_cause_does_not_outshine_what_it_leaves() -> None:
-    """A third of the gap, five nominal sd in one of two groups: more than a model is usually wrong by."""
-    runs = make_runs(2, scatter=0.002, slope_k=0.3)
-    for run in runs:
-        run.features.values[PEAKS:] += 0.005 * np.sign(np.sin(np.arange(PEAKS)))
-    result = diagnose(DecayModel(), runs, LIBRARY.without("free"), Options())
-    assert result.rest.share < 0.35
-    assert result.decision.verdict == "none_of_these"
-    assert result.rest.unknown > 0.95

@@ -101,12 +101,12 @@ def remainder(
 def _unknown(share: float, nats: float, largest: float, policy: Policy) -> float:
     """Probability of something unknown behind a remainder of that share and size.
 
-    Nats count by their share: a small share is the form of a strong cause, and all of little is little. Or
-    the discrepancy of one group (`largest`) is more than any model is wrong by.
+    A share that matters, or one group whose discrepancy (`largest`) is more than any model is wrong by.
     """
-    matters = policy.chance(share * nats, policy.unknown_weighted_nats)
+    counts = policy.chance(share, policy.unknown_share)
+    matters = policy.chance(nats, policy.unknown_nats)
     gross = policy.chance(largest, policy.unknown_misfit)
-    return 1.0 - (1.0 - matters) * (1.0 - gross)
+    return 1.0 - (1.0 - counts * matters) * (1.0 - gross)
 
 
 def _white(
