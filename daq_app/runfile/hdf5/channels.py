@@ -68,7 +68,7 @@ def _long_name(channel: Channel) -> str:
         "wire": "shortening of the wire",
         "accelerometer": "acceleration",
         "tiltmeter": "rotation",
-    }[channel.family]
+    }.get(channel.family, f"reading of the {channel.family}")
     return f"{quantity} at {channel.id}"
 
 
