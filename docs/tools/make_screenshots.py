@@ -21,8 +21,6 @@ from daq_app.acquisition.messages.published import State
 from daq_app.acquisition.viewers.launcher import AcquisitionProcess
 from daq_app.cli.record.simulate import simulate_run
 from daq_app.monitor.data.settings import WindowSettings
-from daq_app.monitor.look.theme import THEMES, apply_theme
-from daq_app.monitor.pages.start_page import StartWindow
 from daq_app.monitor.window.app import application, open_window
 from daq_app.monitor.window.main_window import MainWindow
 from sim_hardware.control import SimControl
@@ -178,7 +176,6 @@ def main() -> None:
             take_gap(rig, Path(temporary), folder)
         if options.part == "gap":
             return
-        take_start(Path(temporary), folder)
         runs = Path(temporary) / "runs"
         runs.mkdir()
         acquisition = AcquisitionProcess(["--rig", str(rig), "--out", str(runs)])
@@ -230,6 +227,7 @@ def take_all(acquisition: AcquisitionProcess, rig: Path, temporary: Path, folder
     window.prepare.card.propose("FR1-L3-1", 0.35)
     studio.live_for(4.0)
     check_with_faults(studio)
+    studio.until(window.prepare.tare_button.isEnabled)
     window.prepare.tare_button.click()
     studio.until(lambda: bool(window.prepare.zero.record))
     take_test(studio, "FR1-L3-1", LOOKS[1])
@@ -256,17 +254,6 @@ def shoot_channel(studio: Studio, name: str) -> None:
     theme = studio.window.settings.theme
     save(channel, studio.folder / f"channel-{theme}-{channel.width()}x{channel.height()}.png")
     channel.close()
-
-
-def take_start(temporary: Path, folder: Path) -> None:
-    """The window that asks which rig."""
-    app, colours = application(), THEMES["dark"]
-    chooser = StartWindow(WindowSettings(temporary / "start.ini"), Path("runs"), lambda _rig, _out: None)
-    apply_theme(app, chooser, colours, WindowSettings(temporary / "start.ini").type_size)
-    chooser.show()
-    app.processEvents()
-    save(chooser, folder / f"start-dark-{chooser.width()}x{chooser.height()}.png")
-    chooser.close()
 
 
 if __name__ == "__main__":

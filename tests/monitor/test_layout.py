@@ -70,6 +70,18 @@ def test_the_second_axis_stands_at_the_rotation_alone(rocking_window):
     assert shown == [True, False, False] and not live.restitution.plot.plot_item.getAxis("right").isVisible()
 
 
+def test_the_headings_of_the_campaign_are_whole(rocking_window):
+    window = rocking_window
+    window.show_page(window.campaign)
+    header = window.campaign.table.horizontalHeader()
+    cut = [
+        place
+        for place in range(header.count() - 1)
+        if header.sectionSizeHint(place) > header.sectionSize(place)
+    ]
+    assert cut == []
+
+
 def test_figures_below_zero_have_a_true_minus_sign(rocking_window):
     axis = rocking_window.live.motion.rotation.plot_item.getAxis("left")
     assert axis.tickStrings([-50.0, 0.0], 1.0, 50.0) == ["−50", "0"]

@@ -49,6 +49,13 @@ def test_rigs_used_before_come_first_and_only_once(settings, configs, repository
     assert len(set(rigs)) == len(rigs) >= 4
 
 
+def test_a_long_name_of_a_rig_is_whole(qtbot, settings, tmp_path):
+    chooser = StartWindow(settings, tmp_path, lambda _rig, _out: None)
+    qtbot.addWidget(chooser)
+    chooser.show()
+    assert chooser.rigs.count() and chooser.rigs.horizontalScrollBar().maximum() == 0
+
+
 def test_the_chooser_shows_why_a_rig_cannot_be_opened_and_stays(qtbot, settings, tmp_path):
     def start(rig, folder):
         load_rig(rig)

@@ -51,6 +51,8 @@ class StartWindow(QWidget):
         title.setFont(font(22, bold=True))
         self.rigs = QListWidget()
         self.rigs.setFont(font(12))
+        self.rigs.setWordWrap(True)
+        self.rigs.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         for path in known_rigs(settings, Path.cwd()):
             self._add(path)
         if self.rigs.count():
