@@ -26,7 +26,7 @@ def _drop_stale_cache() -> None:
     here = Path(__file__).parent
     digest = hashlib.sha256(nb.__version__.encode())
     for name in _PACKAGES:
-        for source in sorted((here / name).glob("*.py")):
+        for source in sorted([*(here / name).glob("*.py"), *(here / name).glob("*.txt")]):
             digest.update(source.name.encode() + source.read_bytes())
     stamp = here / "__pycache__" / "kernels.stamp"
     with contextlib.suppress(OSError):  # a read-only installation: its sources do not change either

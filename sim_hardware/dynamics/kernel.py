@@ -295,9 +295,10 @@ def integrate(
     release_side = -1.0 if theta0 < 0.0 else 1.0
     side = release_side
     t, q, v = 0.0, abs(theta0), vector[par.OMEGA0]
-    n, n_impacts, n_peaks = 0, 0, 0
+    # of a type, not literals: parts would be compiled once for the literal 0 and again for other counts
+    n, n_impacts, n_peaks = int(np.int64(0)), int(np.int64(0)), int(np.int64(0))
     for i in range(2):
-        terms.setup(vector, 2.0 * i - 1.0, 0, release_side, both[i])
+        terms.setup(vector, 2.0 * i - 1.0, n_peaks, release_side, both[i])
         rest_energy[i] = terms.work_to(vector[par.REST_AMPLITUDE], both[i])
     terms.hold_back(vector, q, both[1 if side > 0.0 else 0])
     changes = vector[par.CRUSH_ALPHA] != 0.0 or vector[par.SLOW_RELEASE] != 0.0

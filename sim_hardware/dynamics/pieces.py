@@ -64,7 +64,7 @@ def _rotation_only(
     pieces: NDArray[np.float64], times: NDArray[np.float64], rotation: NDArray[np.float64]
 ) -> None:
     """θ alone, with the coefficients of the piece kept at hand from one time to the next."""
-    i, start, end, rate = -1, np.inf, -np.inf, 1.0
+    i, start, end, rate = int(np.int64(-1)), np.inf, -np.inf, 1.0
     c0 = c1 = c2 = c3 = c4 = c5 = c6 = c7 = 0.0
     for k in range(times.size):
         t = times[k]
@@ -99,7 +99,7 @@ def evaluate(
     if not want_velocity and not want_acceleration:
         _rotation_only(pieces, times, rotation)
         return
-    i = -1
+    i = int(np.int64(-1))
     for k in range(times.size):
         t = times[k]
         i = find_piece(pieces, t, i)

@@ -1,30 +1,31 @@
 """One Dormand–Prince 8(5,3) step of the folded equation, and its interpolant as polynomials.
 
-Coefficients: Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I*, DOP853, as
-SciPy carries them.  Rotation and speed are scalars, so a step costs no allocation.
+Coefficients: Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I*, DOP853; SciPy has the
+same ones behind an import that takes longer than this whole module. Rotation and speed are scalars, so a step
+costs no allocation.
 """
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import DOP853
 
 from sim_hardware.dynamics.terms import acceleration
 from sim_hardware.jit import part
 
 N_STAGES: Final = 12
 _N_ALL: Final = 16
-_A: Final = np.zeros((_N_ALL, _N_ALL))
-_A[:N_STAGES, :N_STAGES] = DOP853.A
-_A[13:, :] = DOP853.A_EXTRA
-_B: Final = np.array(DOP853.B)
-_C: Final = np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA])
-_E3: Final = np.array(DOP853.E3)
-_E5: Final = np.array(DOP853.E5)
-_D: Final = np.array(DOP853.D)
+TABLE: Final = np.loadtxt(Path(__file__).with_name("dop853.txt"))
+"""Rows as the file's head says."""
+_A: Final = np.ascontiguousarray(TABLE[:_N_ALL])
+_B: Final = TABLE[_N_ALL, :N_STAGES].copy()
+_C: Final = TABLE[_N_ALL + 1].copy()
+_E3: Final = TABLE[_N_ALL + 2, : N_STAGES + 1].copy()
+_E5: Final = TABLE[_N_ALL + 3, : N_STAGES + 1].copy()
+_D: Final = np.ascontiguousarray(TABLE[_N_ALL + 4 :])
 
 
 @part

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,8 @@ from sim_hardware.jit import kernel, part
 from sim_hardware.sensors import layout as la
 from sim_hardware.sensors.families import fill_quantity
 from sim_hardware.sensors.noise import deviate, share
+
+_NO_TABLES: Final = np.zeros((0, 2, 2))
 
 
 @part
@@ -94,20 +97,6 @@ def _finish(
 
 
 @kernel
-def fill_ideal(
-    rows: NDArray[np.float64],
-    times: NDArray[np.float64],
-    states: NDArray[np.float64],
-    events: NDArray[np.float64],
-    height: float,
-    out: NDArray[np.float64],
-) -> None:
-    """(rows, n) true quantities, SI, of the states at ascending `times`."""
-    for i in range(rows.shape[0]):
-        fill_quantity(rows[i], times, events, height, states, out[i])
-
-
-@kernel
 def fill_instants(
     row: NDArray[np.float64], key: np.uint64, times: NDArray[np.float64], out: NDArray[np.float64]
 ) -> None:
@@ -145,3 +134,26 @@ def fill_electrical(
         if curved or row[la.RW_DRIFT] != 0.0 or row[la.RW_HUM] != 0.0:
             _distort(row, instants, line)
         _finish(row, keys[i], instants, noisy, line)
+
+
+def fill_ideal(
+    rows: NDArray[np.float64],
+    times: NDArray[np.float64],
+    states: NDArray[np.float64],
+    events: NDArray[np.float64],
+    height: float,
+    out: NDArray[np.float64],
+) -> None:
+    """(rows, n) true quantities, SI, of the states at ascending `times`.
+
+    They are what sensors without response, faults and scale give: a kernel of their own would compile every
+    family of sensors a second time.
+    """
+    plain = rows.copy()
+    plain[
+        :, [la.RW_SAG, la.RW_QUADRATIC, la.RW_DRIFT, la.RW_HUM, la.RW_QUANTUM, la.RW_OFFSET, la.RW_ZERO]
+    ] = 0.0
+    plain[:, [la.RW_GAIN, la.RW_SLOPE]] = 1.0
+    plain[:, la.RW_LOW], plain[:, la.RW_HIGH], plain[:, la.RW_TABLE] = -np.inf, np.inf, -1.0
+    keys = np.zeros(len(rows), dtype=np.uint64)
+    fill_electrical(plain, keys, times, times, states, events, height, _NO_TABLES, 0, False, out)

@@ -135,7 +135,11 @@ def fill_states(
     states: NDArray[np.float64],
 ) -> None:
     """(N_STATE, n) states at `times`; events and epochs must have at least one row."""
-    piece, event, e = -1, -1, -1
+    piece, event, e = (
+        int(np.int64(-1)),
+        int(np.int64(-1)),
+        int(np.int64(-1)),
+    )  # literals would compile parts twice
     states[:, :] = 0.0
     for k in range(times.size):
         t = times[k]
@@ -171,7 +175,7 @@ def fill_states(
 @kernel
 def march(events: NDArray[np.float64], epochs: NDArray[np.float64]) -> None:
     """Fill the oscillators' states, and the slip and turn so far, of the events, in order of time."""
-    e = -1
+    e = int(np.int64(-1))
     for i in range(events.shape[0]):
         e = max(last_at(epochs, events[i, la.EV_TIME], e), 0)
         mode = twist = yaw = mode_rate = twist_rate = yaw_rate = slid = turned = 0.0

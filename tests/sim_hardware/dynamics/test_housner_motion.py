@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
+from scipy.integrate import DOP853, solve_ivp
 from scipy.special import ellipk, ellipkinc
 
 from sim_hardware.dynamics import Body, Motion, Release, Restitution, simulate_motion
+from sim_hardware.dynamics.step import TABLE
 
 FR1 = Body(alpha_rad=0.215, p_rad_s=2.20, r0_m=1.525, mass_kg=5229.0, length_m=1.2)
 
@@ -197,3 +198,13 @@ def test_values_without_meaning_are_refused_in_words() -> None:
         Body(2.0, 2.2, 1.5, 5000.0)
     with pytest.raises(ValueError, match="too large"):
         Body(0.2, 9.0, 1.5, 5000.0)
+
+
+def test_the_integrator_has_the_coefficients_that_scipy_has() -> None:
+    table = np.zeros((24, 16))
+    table[:12, :12], table[13:16] = DOP853.A, DOP853.A_EXTRA
+    table[16, :12] = DOP853.B
+    table[17] = [*DOP853.C, 1.0, *DOP853.C_EXTRA]
+    table[18, :13], table[19, :13] = DOP853.E3, DOP853.E5
+    table[20:] = DOP853.D
+    np.testing.assert_array_equal(TABLE, table)
