@@ -49,6 +49,8 @@ def test_a_rigid_block_in_an_ordinary_laboratory_is_not_doubted(seed: int):
         ("restitution_asymmetry", {"d": 0.02}, "side", "edges differ"),
         ("restitution_slope", {"k": 0.3}, "speed", "from"),
         ("dwell", {"tau": 0.002}, "pause", "impacts take"),
+        ("bounce", {"tau": 0.002}, "hop", "hops"),
+        ("bounce", {"tau": 0.008}, "hop", "hops"),
         ("winkler", {"theta_c": 2e-4}, "duration", "yields"),
     ],
 )
@@ -60,14 +62,41 @@ def test_what_no_rigid_block_does_is_named_and_r_doubted(effect, parameters, kin
     assert any(word in reason for reason in analysis.verdict.reasons)
 
 
-@pytest.mark.parametrize(("effect", "parameters"), [("coulomb", {"mu": 0.02}), ("viscous", {"zeta": 0.02})])
-def test_the_interval_of_an_r_with_friction_reaches_to_the_r_of_the_impacts(effect, parameters):
+@pytest.mark.parametrize(
+    ("effect", "parameters"),
+    [
+        ("coulomb", {"mu": 0.02}),
+        ("viscous", {"zeta": 0.02}),
+        ("bounce", {"tau": 0.002}),
+        ("bounce", {"tau": 0.008}),
+    ],
+)
+def test_the_interval_of_an_r_with_friction_or_hops_reaches_to_the_r_of_the_impacts(effect, parameters):
     test, analysis = drawn({effect: parameters})
     low, high = analysis.verdict.interval95
     r = test.truth["restitution"]
 
     assert abs(analysis.verdict.r - r) > 0.005
     assert low <= r <= high
+
+
+def test_r_that_changes_with_speed_by_less_than_is_named_is_in_the_stated_error_of_every_method():
+    _, changing = drawn({"restitution_slope": {"k": 0.05}})
+    _, sound = drawn({})
+
+    for method in ("eav", "crt"):
+        assert changing.estimates[method].standard_error > sound.estimates[method].standard_error
+
+
+def test_a_wall_that_is_let_go_slowly_is_fitted_from_its_first_impact_on():
+    test = draw_test(RIG, SEED, effects={"slow_release": {"tau": 0.3}})
+    analysis = analyse_record(test.record(), AnalysisOptions(bias_runs=0, keep_series=False))
+    fit = analysis.fit
+
+    assert not fit.from_release
+    assert fit.explains_the_motion
+    assert fit.r == pytest.approx(test.truth["restitution"], abs=0.002)
+    assert fit.alpha_rad == pytest.approx(test.truth["alpha_rad"], abs=3 * fit.sigma_alpha_rad)
 
 
 def test_pivots_inside_the_edges_change_the_largest_r_and_not_the_trust_in_r():

@@ -22,9 +22,9 @@ from daq_app.rocking.analysis.release_rotation import levels_apart, theta0_by_fa
 from daq_app.rocking.analysis.residuals import residuals_after
 from daq_app.rocking.analysis.results import Bias, Series, TestAnalysis, Theory
 from daq_app.rocking.analysis.tracks import decay_series, estimates_of, follow_families
-from daq_app.rocking.analysis.wall_checks import wall_findings
+from daq_app.rocking.analysis.wall_checks import pattern_of, wall_findings
 from daq_app.rocking.estimators import RestitutionEstimate
-from daq_app.rocking.families.verdict import judge
+from daq_app.rocking.families.verdict import judge, with_change_by_speed
 from daq_app.rocking.geometry.joint import JointMotion
 from daq_app.rocking.motion.filtered_peaks import filtered_peaks
 from daq_app.rocking.motion.motion_fit import MotionFit, fit_motion
@@ -98,8 +98,13 @@ def _analyse(
     theta0 = theta0_by_family(signals, track, instruments.gains)
     joint = summarise_joint(instruments.record, signals, track) if signals.joint is not None else None
     further = levels_apart(theta0)
-    further += wall_findings(instruments, tracks, joint, further)
-    verdict, findings = verdict_of(instruments, tracks, series, estimates, further)
+    pattern = pattern_of(instruments, tracks, further)
+    change = pattern.change_with_speed
+    further += wall_findings(instruments, tracks, joint, further, pattern)
+    verdict, findings = verdict_of(instruments, tracks, series, estimates, further, change)
+    estimates = {name: with_change_by_speed(estimate, change) for name, estimate in estimates.items()}
+    if fit is not None:
+        fit = replace(fit, standard_error=math.hypot(fit.standard_error, 0.5 * change))
     headline = theta0.get("tiltmeters", theta0["wires"])
     bias = _bias(record, signals, track, estimates, velocity_filter, options)
     residuals = residuals_after(signals, times.rest)
@@ -162,6 +167,7 @@ def _fit(
         speeds_rad_s=track.speeds_before_rad_s,
         r=_typical_r(estimates),
         scatter=max(estimates["eav"].scatter, estimates["crt"].scatter),
+        scatter_of_speeds=estimates["eav"].scatter,
         noise_rad=max(signals.noise_rad, signals.settings.slow_noise_rad),
         p_rad_s=signals.settings.p_rad_s,
         alpha_rad=signals.settings.alpha_rad,

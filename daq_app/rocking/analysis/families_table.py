@@ -22,6 +22,7 @@ from daq_app.rocking.families.verdict import (
     families_apart,
     judge,
     methods_apart,
+    with_change_by_speed,
 )
 from daq_app.rocking.motion.swings import MotionTrack
 from daq_app.rocking.motion.transients import Onset
@@ -123,8 +124,12 @@ def verdict_of(
     series: Mapping[str, DecaySeries],
     estimates: Mapping[str, RestitutionEstimate],
     further: Sequence[FamilyFinding],
+    change_by_speed: float,
 ) -> tuple[RVerdict, tuple[FamilyFinding, ...]]:
-    """The verdict of r, and every finding behind it; `further` are those of θ0 and of the wall."""
+    """The verdict of r, and every finding behind it; `further` are those of θ0 and of the wall.
+
+    `change_by_speed`: by how much r changes within the test. It is in the error, and no disagreement.
+    """
     named = {(finding.family, finding.kind) for finding in instruments.findings}
     findings = list(instruments.findings)
     findings += [finding for finding in further if (finding.family, finding.kind) not in named]
@@ -143,7 +148,8 @@ def verdict_of(
     if disagreement is not None:
         disagreements.append(disagreement)
         findings.append(words.not_housner(disagreement))
-    verdict = judge(estimates["eav"], estimates["crt_exact"], LEADS[lead], findings, disagreements)
+    eav, crt = (with_change_by_speed(estimates[name], change_by_speed) for name in ("eav", "crt_exact"))
+    verdict = judge(eav, crt, LEADS[lead], findings, disagreements)
     return verdict, tuple(findings)
 
 

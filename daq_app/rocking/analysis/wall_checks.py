@@ -11,11 +11,33 @@ from daq_app.rocking.analysis.results import JointSummary
 from daq_app.rocking.analysis.tracks import FamilyTracks
 from daq_app.rocking.families.block_checks import duration_findings, pattern_findings, pivot_findings
 from daq_app.rocking.families.finding import FamilyFinding
-from daq_app.rocking.motion.impact_pattern import impact_pattern
+from daq_app.rocking.motion.impact_pattern import ImpactPattern, impact_pattern
 from daq_app.rocking.theory.block import RigidBlock
 
-_MADE_BY_A_DRIFT: Final = ("side", "duration", "pause")
+_MADE_BY_A_DRIFT: Final = ("side", "duration", "pause", "hop")
 """A zero that moves makes leans to one side longer and faster than those to the other."""
+_P_SHARE: Final = 0.1
+_ALPHA_SHARE: Final = 0.2
+"""p and α by the half-cycles that are further from the survey's than this are no property of the wall."""
+
+
+def pattern_of(
+    instruments: Instruments, tracks: FamilyTracks, level_findings: Sequence[FamilyFinding]
+) -> ImpactPattern:
+    """How the impacts of the test differ, by both families together where no instrument is to blame."""
+    signals = instruments.signals
+    track, rotation = tracks.lead, signals.rotation_rad
+    blamed = other_is_blamed([*instruments.findings, *level_findings], tracks.other_name)
+    if tracks.fused is not None and signals.fused is not None and not blamed:
+        track, rotation = tracks.fused, signals.fused.rotation_rad
+    body = body_of(track, 0.0)
+    nominal = track.settings
+    if body is not None and (
+        abs(body.p_rad_s / nominal.p_rad_s - 1.0) < _P_SHARE
+        and abs(body.alpha_rad / nominal.alpha_rad - 1.0) < _ALPHA_SHARE
+    ):
+        track = track.fitted_again(body.p_rad_s, body.alpha_rad, signals.time_s, rotation)
+    return impact_pattern(track)
 
 
 def wall_findings(
@@ -23,6 +45,7 @@ def wall_findings(
     tracks: FamilyTracks,
     joint: JointSummary | None,
     level_findings: Sequence[FamilyFinding],
+    pattern: ImpactPattern,
 ) -> list[FamilyFinding]:
     """What the wall does that a rigid block on its edges does not.
 
@@ -34,7 +57,7 @@ def wall_findings(
     if tracks.other is not None and not other_is_blamed(findings, other):
         families[LEADS[other]] = tracks.other
     bodies = {name: body_of(track, 0.0) for name, track in families.items()}
-    found = [*pattern_findings(impact_pattern(tracks.lead)), *duration_findings(bodies)]
+    found = [*pattern_findings(pattern), *duration_findings(bodies)]
     if any(f.kind == "drift" and f.treatment == "none" and LEADS[lead] in f.family for f in findings):
         found = [finding for finding in found if finding.kind not in _MADE_BY_A_DRIFT]
     if joint is not None:

@@ -30,7 +30,7 @@ _FEWEST_DURATIONS: Final = 6
 
 
 def pattern_findings(pattern: ImpactPattern) -> list[FamilyFinding]:
-    """r that changes with speed or with side, speed that is lost between impacts, impacts that take time."""
+    """r that changes with speed or with side, speed lost between impacts, impacts that take time, hops."""
     findings = []
     change = pattern.r_slow - pattern.r_fast
     if _named(pattern.by_speed) and abs(change) > 2.0 * R_TOLERANCE:
@@ -44,8 +44,13 @@ def pattern_findings(pattern: ImpactPattern) -> list[FamilyFinding]:
     if kept is not None and kept.value < -R_TOLERANCE and kept.chance / 2.0 < _CHANCE:
         findings.append(words.lost_between(1.0 - math.exp(kept.value)))
     pause = pattern.pause
-    if pause is not None and pause.value > 0.0 and _named(pause) and pattern.pause_share > R_TOLERANCE:
-        findings.append(words.pause_at_impacts(pause.value, pattern.pause_share))
+    if pause is not None and _named(pause):
+        hop = pattern.hop_s * pattern.slowed_1_s
+        share = pause.value * pattern.slowed_1_s
+        if hop > R_TOLERANCE:
+            findings.append(words.hop_at_impacts(pattern.hop_s, hop))
+        elif share > R_TOLERANCE:
+            findings.append(words.pause_at_impacts(pause.value, share))
     return findings
 
 

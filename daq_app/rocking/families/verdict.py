@@ -115,6 +115,16 @@ def methods_apart(eav: RestitutionEstimate, crt: RestitutionEstimate) -> str | N
     )
 
 
+def with_change_by_speed(estimate: RestitutionEstimate, change: float) -> RestitutionEstimate:
+    """The estimate for r at any impact, where r changes by `change` from the fastest to the slowest.
+
+    The r of a decay is that of its middle impacts: the others' are up to half the change away.
+    """
+    if estimate.standard_error is None:
+        return estimate
+    return replace(estimate, standard_error=math.hypot(estimate.standard_error, 0.5 * change))
+
+
 def judge(
     eav: RestitutionEstimate,
     crt: RestitutionEstimate,
@@ -167,6 +177,6 @@ def _touches_r(finding: FamilyFinding) -> bool:
 
 def _share_of_r(finding: FamilyFinding, r: float) -> float:
     """What the r of single impacts may be off the one of the whole test by what the wall does."""
-    if finding.kind in ("speed", "side"):
+    if finding.kind == "side":
         return 0.5 * abs(finding.size)
-    return r * abs(finding.size) if finding.kind in ("loss", "pause") else 0.0
+    return r * abs(finding.size) if finding.kind in ("loss", "pause", "hop") else 0.0

@@ -168,6 +168,16 @@ def pause_at_impacts(pause_s: float, share: float) -> FamilyFinding:
     return FamilyFinding("wall", (), "pause", share, "1", "none", "warning", text)
 
 
+def hop_at_impacts(hop_s: float, share: float) -> FamilyFinding:
+    """The wall leaves the ground at its impacts."""
+    text = (
+        f"the wall hops at its impacts, for about {hop_s * 1e3:.0f} ms at a time: off the ground nothing "
+        f"slows its turning, and r by the decay is too large by about {share:.1%}. Usual causes: a hard or "
+        "uneven bed, mortar or grit under an edge, a twist of the base"
+    )
+    return FamilyFinding("wall", (), "hop", share, "1", "none", "warning", text)
+
+
 def not_housner_durations(family: str, sigmas: float) -> FamilyFinding:
     """Durations of half-cycles do not follow from their peaks."""
     text = (

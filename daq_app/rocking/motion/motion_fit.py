@@ -8,7 +8,7 @@ held to zero by that scatter: the standard error of the mean r then says so.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -24,6 +24,7 @@ from daq_app.rocking.motion.motion_model import (
     ZERO_PRIOR_RAD,
     MotionModel,
 )
+from daq_app.rocking.theory.housner import exact_amplitude, exact_energy, exact_quarter_period
 
 Floats = NDArray[np.float64]
 
@@ -31,7 +32,12 @@ _SMALLEST_SHARE = 0.02
 """The motion is fitted until its peaks fall below this share of the first."""
 
 _POOR = 1.5
-"""A fit that leaves more than this many times the noise may have ended in a minimum that is not the least."""
+"""A fit that leaves more than this many times the noise may have ended in a minimum, not the least."""
+_NO_CLEAN_FALL = 4.0
+"""Misfit in noises above which the motion is fitted from its first impact on: a wall that is let go slowly,
+or kicked, falls as no free block does, and rocks on as one."""
+_HIGHEST = 0.99
+"""Share of the energy at which a block falls over that a motion is begun with at most."""
 _ZERO_WALK_RAD = 1e-5
 """By how much the zero of the rotation may walk over the fitted motion: what a zero from rest, seconds old,
 may be wrong by. The fit takes up a zero that stands still; one that walks bends late half-cycles against
@@ -60,6 +66,8 @@ class MotionFit:
     """rms of what the model leaves."""
     noise_rad: float
     """rms expected of a perfect model at the fitted points."""
+    from_release: bool = True
+    """Whether the fall is fitted; else θ0 and release are those of a free fall to the same impact."""
 
     @property
     def explains_the_motion(self) -> bool:
@@ -83,6 +91,7 @@ def fit_motion(
     speeds_rad_s: list[float],
     r: float,
     scatter: float | None,
+    scatter_of_speeds: float | None = None,
     noise_rad: float,
     p_rad_s: float,
     alpha_rad: float,
@@ -92,7 +101,8 @@ def fit_motion(
     `r`, `impacts_s`, `peaks_rad` (release first) and `speeds_rad_s` (at the impacts) start the fit;
     `noise_rad` is the rms of one sample.
     `scatter` is the relative standard deviation of r from impact to impact (at least 0.0003 is
-    allowed for); None says that r is the same at every impact.
+    allowed for); None says that r is the same at every impact. `scatter_of_speeds`
+    counts in its place where the fall is left out.
     """
     count = _span(peaks_rad, len(impacts_s))
     if count < 2 or not 0.0 < r <= 1.0:
@@ -100,32 +110,82 @@ def fit_motion(
     stop = impacts_s[count - 1] + 0.5 * (
         impacts_s[count] - impacts_s[count - 1] if count < len(impacts_s) else 0.0
     )
-    t, y, sigma = _points(time_s, rotation_rad, release_s - 0.1, stop, noise_rad)
-    if t.size < 4 * FIXED:
-        return None
-    spread = None if scatter is None else max(scatter, 3e-4)
     side = 1.0 if theta0_rad > 0 else -1.0
-    problem = MotionModel(
-        t, y, sigma, release_s, abs(theta0_rad), side, p_rad_s, alpha_rad, math.log(r), spread
-    )
-    start = np.zeros(0) if spread is None else _deviations(speeds_rad_s, count, math.log(r)) / spread
+
+    def fit_from(
+        first_s: float,
+        begin_s: float,
+        amplitude_rad: float,
+        log_r: float,
+        scatter: float | None,
+        *,
+        thorough: bool,
+    ) -> MotionFit | None:
+        t, y, sigma = _points(time_s, rotation_rad, first_s, stop, noise_rad)
+        if t.size < 4 * FIXED:
+            return None
+        spread = None if scatter is None else max(scatter, 3e-4)
+        start = np.zeros(0) if spread is None else _deviations(speeds_rad_s, count, log_r) / spread
+        problem = MotionModel(t, y, sigma, begin_s, amplitude_rad, side, p_rad_s, alpha_rad, log_r, spread)
+        return _stepwise(problem, start, impacts_s, count, stop, thorough=thorough)
+
+    def fit_whole(*, thorough: bool) -> MotionFit | None:
+        start = abs(theta0_rad)
+        return fit_from(release_s - 0.1, release_s, start, math.log(r), scatter, thorough=thorough)
+
+    whole = fit_whole(thorough=False)
+    if whole is None or whole.residual_rad < _NO_CLEAN_FALL * whole.noise_rad:
+        poor = whole is not None and whole.residual_rad > _POOR * whole.noise_rad
+        return fit_whole(thorough=True) if poor else whole
+    # The fall is in φ0 of CRT and in the first speed: r and its scatter are those of the impacts left.
+    own = math.log(r) + float(np.median(_deviations(speeds_rad_s[1:], count, math.log(r))[: count - 1]))
+    spread = scatter if scatter_of_speeds is None else scatter_of_speeds
+    energy = exact_energy(np.array([peaks_rad[1]]), alpha_rad) * math.exp(-2.0 * own)
+    amplitude = float(exact_amplitude(np.minimum(energy, _HIGHEST), alpha_rad)[0])
+    fall_s = float(exact_quarter_period(np.array([amplitude]), p_rad_s, alpha_rad)[0])
+    begins = (impacts_s[0] + POINT_S, impacts_s[0] - fall_s, amplitude, own, spread)
+    later: MotionFit | None = None
+    for thorough in (False, True):
+        if math.isfinite(fall_s) and (later is None or later.residual_rad > _POOR * later.noise_rad):
+            later = fit_from(*begins, thorough=thorough)
+    if later is not None and later.explains_the_motion:
+        return replace(later, from_release=False)
+    return fit_whole(thorough=True)
+
+
+def _stepwise(
+    problem: MotionModel,
+    start: Floats,
+    impacts_s: list[float],
+    count: int,
+    stop_s: float,
+    *,
+    thorough: bool,
+) -> MotionFit | None:
+    """The fit of `count` impacts.
+
+    Where r is one number, later half-cycles join once the earlier ones are in phase; where every impact has
+    its own, the speeds put all of them in phase from the start.
+    """
     x = np.zeros(FIXED)
-    # Where r is one number, later half-cycles join once the earlier ones are in phase; where every
-    # impact has its own, the speeds put all of them in phase from the start.
-    for span in sorted({min(4, count), count}) if spread is None else [count]:
+    for span in sorted({min(4, count), count}) if problem.spread is None else [count]:
         x = np.concatenate((x, start[x.size - FIXED : span]))
-        end = min(impacts_s[span] if span < len(impacts_s) else stop, stop)
-        solution = _least(problem, x, span, end)
+        end = min(impacts_s[span] if span < len(impacts_s) else stop_s, stop_s)
+        solution = _least(problem, x, span, end, thorough=thorough)
         x = solution.x
-    return _result(problem, solution, count, sigma)
+    return _result(problem, solution, count, problem.sigma)
 
 
-def _least(problem: MotionModel, start: Floats, span: int, stop_s: float) -> OptimizeResult:
-    """The fit of the first `span` impacts; where it leaves too much, another way and start as well."""
+def _least(
+    problem: MotionModel, start: Floats, span: int, stop_s: float, *, thorough: bool
+) -> OptimizeResult:
+    """The fit of the first `span` impacts; `thorough`: where it leaves too much, in other ways as well."""
     search = partial(
         least_squares, problem.residual, jac=problem.jacobian, args=(span, stop_s), x_scale="jac", max_nfev=60
     )
     best = search(start, method="lm")
+    if not thorough:
+        return best
     settled = np.concatenate((best.x[:FIXED], np.clip(best.x[FIXED:], -1.0, 1.0)))
     for other, method in ((start, "trf"), (settled, "lm")):
         if np.mean(best.fun**2) > _POOR**2:

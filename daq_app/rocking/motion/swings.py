@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,6 +104,15 @@ class MotionTrack:
         self.crossings_s.extend(crossings_s)
         self.arcs.extend(arcs)
         return arcs
+
+    def fitted_again(
+        self, p_rad_s: float, alpha_rad: float, time_s: Floats, rotation_rad: Floats
+    ) -> MotionTrack:
+        """The same half-cycles fitted with another p and α; `time_s`, `rotation_rad` (n,) cover them."""
+        settings = replace(self.settings, p_rad_s=p_rad_s, alpha_rad=alpha_rad)
+        again = MotionTrack(settings, self.release, self.theta0_rad, self.sigma_theta0_rad)
+        again.add_impacts(self.crossings_s, time_s, rotation_rad)
+        return again
 
     @property
     def impacts_s(self) -> list[float]:
