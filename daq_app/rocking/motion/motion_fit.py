@@ -137,20 +137,37 @@ def fit_motion(
     if whole is None or whole.residual_rad < _NO_CLEAN_FALL * whole.noise_rad:
         poor = whole is not None and whole.residual_rad > _POOR * whole.noise_rad
         return fit_whole(thorough=True) if poor else whole
-    # The fall is in φ0 of CRT and in the first speed: r and its scatter are those of the impacts left.
-    own = math.log(r) + float(np.median(_deviations(speeds_rad_s[1:], count, math.log(r))[: count - 1]))
+    amplitude, begin_s, own = _fall_to_first_impact(
+        impacts_s[0],
+        peaks_rad[1],
+        _deviations(speeds_rad_s[1:], count, math.log(r)),
+        math.log(r),
+        p_rad_s,
+        alpha_rad,
+    )
     spread = scatter if scatter_of_speeds is None else scatter_of_speeds
-    energy = exact_energy(np.array([peaks_rad[1]]), alpha_rad) * math.exp(-2.0 * own)
-    amplitude = float(exact_amplitude(np.minimum(energy, _HIGHEST), alpha_rad)[0])
-    fall_s = float(exact_quarter_period(np.array([amplitude]), p_rad_s, alpha_rad)[0])
-    begins = (impacts_s[0] + POINT_S, impacts_s[0] - fall_s, amplitude, own, spread)
+    begin = (impacts_s[0] + POINT_S, begin_s, amplitude, own, spread)
     later: MotionFit | None = None
     for thorough in (False, True):
-        if math.isfinite(fall_s) and (later is None or later.residual_rad > _POOR * later.noise_rad):
-            later = fit_from(*begins, thorough=thorough)
+        if math.isfinite(begin_s) and (later is None or later.residual_rad > _POOR * later.noise_rad):
+            later = fit_from(*begin, thorough=thorough)
     if later is not None and later.explains_the_motion:
         return replace(later, from_release=False)
     return fit_whole(thorough=True)
+
+
+def _fall_to_first_impact(
+    impact_s: float, next_peak_rad: float, deviations: Floats, log_r: float, p_rad_s: float, alpha_rad: float
+) -> tuple[float, float, float]:
+    """Amplitude and release of a free fall that leads to this impact and the peak after it, and ln r.
+
+    The fall that was is in φ0 of CRT and in the first speed: r is that of the impacts that are left.
+    """
+    own = log_r + float(np.median(deviations[:-1]))
+    energy = exact_energy(np.array([next_peak_rad]), alpha_rad) * math.exp(-2.0 * own)
+    amplitude = exact_amplitude(np.minimum(energy, _HIGHEST), alpha_rad)
+    fall_s = float(exact_quarter_period(amplitude, p_rad_s, alpha_rad)[0])
+    return float(amplitude[0]), impact_s - fall_s, own
 
 
 def _stepwise(
