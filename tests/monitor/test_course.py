@@ -219,7 +219,7 @@ def test_the_live_page_keeps_the_record_of_the_last_test_until_the_next_arming(w
     assert (again[0] == x).all() and (again[1] == y).all()
     say(window.session, window.clock, State.ARMED, HOLD)
     window.live.draw_frame()
-    window.live._draw_estimate()
+    window.live.show_estimate()
     assert not window.live.motion.rotation.line[0].size
     assert window.live.restitution.shown == {"eav": 0, "crt": 0}
     assert all(not len(curve.getData()[0]) for curve in window.live.restitution._means.values())
