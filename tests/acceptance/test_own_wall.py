@@ -60,7 +60,7 @@ def test_a_wall_with_three_sensors_goes_from_nothing_to_a_report_in_less_than_te
 def test_a_wall_with_64_sensors_on_modules_of_different_rates_does_the_same(
     repository: Path, tmp_path: Path
 ) -> None:
-    small, (large,) = _commands(repository)
+    small, (large,), *_ = _commands(repository)
     _run(large, tmp_path)
     for line in small[1:3] + small[4:]:
         said = _run(_fast(line).replace("w1", "w64"), tmp_path)
