@@ -19,7 +19,8 @@ _LONGEST_S: Final = 240.0
 """Longest part of a recording that is analysed, s. Assumed; a wall rocks for 3 to 10 s. One second of 41
 channels at 4000 Hz takes 6 MB of memory: raising it lets a wall that stood armed for long fill it."""
 _BEFORE_RELEASE_S: Final = 120.0
-"""Of that part, what lies before the release, s: noise, zero and hold are read from it (assumed)."""
+"""Length before the release that is analysed of a long recording, s: noise, zero and hold are read from it
+(assumed)."""
 _RELEASE_EVENTS: Final = frozenset({"released", "rocking"})
 
 

@@ -97,7 +97,6 @@ class Analyst(threading.Thread):
             try:
                 item = self.inbox.get(timeout=REPEAT_S)
             except queue.Empty:
-                item = None
                 self.voice.repeat()
                 continue
             if item is None:
