@@ -160,7 +160,7 @@ def _said(python: Path, code: str) -> str:
 
 
 def _environment(python: Path) -> dict[str, str]:
-    """The environment in which the copy finds its own files and nothing of the Python that runs this."""
+    """The environment of the copy's own files, without anything of the Python that runs this script."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "VIRTUAL"))}
     if WINDOWS:
         return kept
