@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import Future
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,8 @@ import psutil
 import pytest
 
 from daq_app.acquisition.closing import finaliser as closing
-from daq_app.acquisition.closing.finaliser import Finaliser
+from daq_app.acquisition.closing.finaliser import Finaliser, Finished
+from daq_app.guarded import end_guarded
 from daq_app.runfile import JournalWriter, RunHeader, open_run
 
 
@@ -73,3 +76,42 @@ def test_a_killed_worker_has_a_successor(finaliser: Finaliser, tmp_path: Path) -
         job | {"journal": str(_journal(tmp_path / "b.journal")), "out": f"{tmp_path}/b.h5"}
     )
     assert second.result(120.0).ok
+
+
+def test_an_answer_is_told_once_there_is_memory(finaliser: Finaliser, tmp_path: Path) -> None:
+    told: list[str] = []
+
+    def tell(finished: Finished) -> None:
+        told.append(finished.path)
+        if len(told) < 3:
+            raise MemoryError
+
+    journal = _journal(tmp_path / "a.journal")
+    job = {"job": "finalise", "journal": str(journal), "out": str(tmp_path / "a.h5")}
+    assert finaliser.submit(job, tell).result(120.0).ok
+    finaliser.close()
+    assert told == [str(tmp_path / "a.h5")] * 3
+
+
+def test_a_worker_that_cannot_even_be_ended_for_want_of_memory_is_tried_again(
+    finaliser: Finaliser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refusals = iter([MemoryError(), MemoryError()])
+
+    def end(process: subprocess.Popen[str], grace_s: float = 2.0) -> None:
+        for refusal in refusals:
+            raise refusal
+        end_guarded(process, grace_s)
+
+    def save(name: str) -> Future[Finished]:
+        journal = _journal(tmp_path / f"{name}.journal")
+        return finaliser.submit({"job": "finalise", "journal": str(journal), "out": f"{tmp_path}/{name}.h5"})
+
+    assert save("a").result(120.0).ok
+    monkeypatch.setattr(closing, "end_guarded", end)
+    monkeypatch.setattr(closing, "_AGAIN_AFTER_S", 0.0)
+    for child in psutil.Process().children():
+        if "finalise_worker" in " ".join(child.cmdline()):
+            child.kill()
+            child.wait()
+    assert save("b").result(120.0).ok

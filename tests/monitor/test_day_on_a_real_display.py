@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import time
 from pathlib import Path
 
 import pytest
@@ -69,6 +70,12 @@ class Day:
     def wall(self, name: str, **arguments: float) -> None:
         with self.client() as client, SimControl(client.request("hello").data["connection"]) as wall:
             wall.command(name, **arguments)
+
+    def until_held(self) -> None:
+        """The pull is over: what is let go before may be too small a fall to count."""
+        with self.client() as client, SimControl(client.request("hello").data["connection"]) as wall:
+            while wall.command("status")["state"] != "held":
+                time.sleep(0.05)
 
     def end(self) -> None:
         for window in self.windows:
@@ -177,6 +184,7 @@ def test_a_whole_day(day_at, width, height, theme):
     assert window.words["recording"] != "On disk"
     day.wall("pull", theta0_over_alpha=0.15)
     window.says(state="Not armed", recording="Not recording")
+    day.until_held()
     day.shoot(window, "not-armed")
     day.wall("release")
     window.until(lambda words: "not armed" in words["state"] and words["page"] == "Test")

@@ -14,10 +14,12 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import IO, Final
 
 from daq_app.guarded import end_guarded, start_guarded
+from daq_app.short_memory import until_memory
 from daq_app.waiting import WorkWatch
 
 _WORKER: Final = "daq_app.acquisition.closing.finalise_worker"
@@ -62,7 +64,7 @@ class Finaliser(threading.Thread):
         """
         done: Future[Finished] = Future()
         if then is not None:
-            done.add_done_callback(lambda future: then(future.result()))
+            done.add_done_callback(lambda future: until_memory(partial(then, future.result())))
         if job["job"] == "recover":
             self._recovery.submit(job, done)
         else:
@@ -74,7 +76,7 @@ class Finaliser(threading.Thread):
         self._worker.start()
         while (entry := self._jobs.get()) is not None:
             job, done = entry
-            done.set_result(self._worker.do(job))
+            done.set_result(until_memory(partial(self._worker.do, job)))
         self._worker.end()
 
     def close(self) -> None:
@@ -102,7 +104,8 @@ class _Recovery:
         while (entry := self._jobs.get()) is not None:
             job, done = entry
             # What is not recovered before the session ends waits for the next start.
-            done.set_result(Finished(True, "") if self._closing else self._worker.do(job))
+            do = partial(Finished, True, "") if self._closing else partial(self._worker.do, job)
+            done.set_result(until_memory(do))
             if self._jobs.empty():
                 self._worker.end()
 

@@ -5,10 +5,12 @@ It comes after the recorder: whatever happens here, slow or wrong, the samples a
 
 from __future__ import annotations
 
+import contextlib
 import math
 import queue
 import threading
 from collections.abc import Sequence
+from functools import partial
 from typing import Final
 
 from daq_app.acquisition.course.clock_warnings import ClockWarnings, unplanned_rate
@@ -43,6 +45,7 @@ from daq_app.acquisition.messages.publisher import Publisher
 from daq_app.config.rig import Rig
 from daq_app.rocking.motion.phases import PhaseEvent
 from daq_app.runfile import TestPlan
+from daq_app.short_memory import until_memory
 from drivers import Block, Opened
 
 _MOVING: Final = frozenset({State.RELEASED, State.ROCKING})
@@ -76,7 +79,6 @@ class Analyst(threading.Thread):
         """Courses that are over and whose journal is not closed yet."""
         self._moves_on = False
         """Whether what the wall does still belongs to the course that was ended last."""
-        self.voice.sample = 0
         self._fault = ""
         self._clock = ClockWarnings()
         self._preparation: Preparation | None = None
@@ -101,12 +103,13 @@ class Analyst(threading.Thread):
                 continue
             if item is None:
                 return
-            try:
-                self._take(item)
-            except Exception as error:
-                # A fault of ours must not end the thread that knows when the test is over.
-                self._tell_fault(error)
-            self.voice.repeat()
+            # Neither a fault of ours nor want of memory must end the thread that knows when the test is over.
+            with contextlib.suppress(MemoryError):
+                try:
+                    self._take(item)
+                except Exception as error:
+                    self._tell_fault(error)
+                self.voice.repeat()
 
     def _tell_fault(self, error: Exception) -> None:
         fault = f"{type(error).__name__}: {error}"
@@ -137,7 +140,7 @@ class Analyst(threading.Thread):
             case Closed():
                 self._on_closed(item.end)
             case Saved():
-                self._on_saved(item)
+                until_memory(partial(self._on_saved, item))  # somebody waits for it
             case Noted(event=event):
                 self._clock.take(event)
 
@@ -176,9 +179,7 @@ class Analyst(threading.Thread):
 
     def _sensors_fail(self) -> bool:
         """Whether a rail is reached, or something new has been wrong with a sensor within `SETTLE_S`."""
-        assert self._opened is not None
-        if self._sensors is None:
-            return False
+        assert self._opened is not None and self._sensors is not None
         quiet = self.voice.sample - self._sensors.told_sample
         return bool(self.overloaded) or quiet < SETTLE_S * self._opened.rate_hz
 
@@ -289,10 +290,9 @@ class Analyst(threading.Thread):
         if ended.error is not None:
             self._note("driver", str(ended.error), "error")
         if self._sequence is not None:
-            outcome, text = (
-                ("failed", str(ended.error)) if ended.error else ("stopped", "The acquisition was stopped")
-            )
-            self._finish(End("failed" if outcome == "failed" else "stopped", self.voice.sample, text))
+            at, error = self.voice.sample, ended.error
+            stopped = End("stopped", at, "The acquisition was stopped")
+            self._finish(stopped if error is None else End("failed", at, str(error)))
         elif ended.error is not None:
             self._go(State.FAILED, str(ended.error))
         elif self.state is not State.SAVED:

@@ -108,12 +108,13 @@ class Ring(threading.Thread):
             try:
                 self._write(piece)
                 self.trouble = ""
-            except (OSError, ValueError, RunFileError) as error:
+            except (OSError, ValueError, RunFileError, MemoryError) as error:
                 # The ring is a second line: it gives way at once and is begun anew a little later.
-                self.trouble = str(error)
+                self.trouble = str(error) or "no memory"
                 self._retry_at_s = time.monotonic() + _RETRY_S
-                self._shut()
-                self._remove_all()
+                with contextlib.suppress(MemoryError):
+                    self._shut()
+                    self._remove_all()
 
     def _write(self, piece: Piece) -> None:
         match piece:

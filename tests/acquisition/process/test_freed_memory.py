@@ -35,6 +35,26 @@ print(memory() - before)
 turn.wait()
 """
 
+_WITHOUT_ANY_LEFT = """
+import numpy, resource, sys
+from daq_app.acquisition.closing.freed_memory import give_back, share_one_heap
+if sys.argv[1] == "reserve":
+    share_one_heap()
+blocks = [numpy.ones(12_000) for _ in range(2000)]
+kept = blocks[:10]
+del blocks
+give_back()
+resource.setrlimit(resource.RLIMIT_AS, (2**25, resource.RLIM_INFINITY))  # less than there is already
+held = []
+try:
+    while True:
+        held.append(numpy.ones(12_000))
+except MemoryError:
+    count = len(held)
+    del held
+print(count * 0.096)
+"""
+
 
 def _glibc() -> bool:
     return platform.libc_ver()[0] == "glibc"
@@ -61,6 +81,15 @@ def test_what_one_thread_has_freed_the_next_one_takes() -> None:
         return float(subprocess.run(program, capture_output=True, text=True, check=True).stdout)
 
     assert held("one heap") < 100.0 < 200.0 < held("a heap for each thread")
+
+
+@pytest.mark.skipif(not _glibc(), reason="other allocators keep what they keep")
+def test_some_memory_is_left_for_the_last_words_where_the_system_gives_none() -> None:
+    def left_mb(how: str) -> float:
+        program = [sys.executable, "-c", _WITHOUT_ANY_LEFT, how]
+        return float(subprocess.run(program, capture_output=True, text=True, check=True).stdout)
+
+    assert left_mb("reserve") > left_mb("none") + 20.0
 
 
 @pytest.mark.skipif(not _glibc(), reason="other allocators give pages back by themselves")
