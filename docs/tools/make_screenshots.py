@@ -249,11 +249,10 @@ def take_all(acquisition: AcquisitionProcess, rig: Path, temporary: Path, folder
 def shoot_channel(studio: Studio, name: str) -> None:
     """One channel large, in the look of the window."""
     studio.window.open_channel(name)
-    channel = studio.window.channel
+    (channel,) = studio.window.channels.shown
     studio.live_for(3.0)
     theme = studio.window.settings.theme
     save(channel, studio.folder / f"channel-{theme}-{channel.width()}x{channel.height()}.png")
-    channel.close()
 
 
 if __name__ == "__main__":

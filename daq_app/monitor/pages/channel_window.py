@@ -240,3 +240,36 @@ class ChannelWindow(QWidget):
             unit, factor = shown_unit(session.rig.channel(name).si_unit)
             value = float(session.block_mean[session.rig.channel_ids.index(name)])
             button.setText(f"{name}   {number(value * factor, 3, unit)}")
+
+
+class ChannelWindows:
+    """The channels that are open in windows of their own; they go with the operator's window."""
+
+    def __init__(self, session: Session, tare: Callable[[], Mapping[str, float]]) -> None:
+        """`tare`: gives the zero in force, reading by channel."""
+        self._session, self._tare = session, tare
+        self.shown: list[ChannelWindow] = []
+
+    def open(self, name: str, colours: Colours) -> ChannelWindow:
+        """The window of a channel, in front; the one that shows it already, if there is one."""
+        for window in self.shown:
+            if window.name == name and window.isVisible():
+                window.setWindowState(window.windowState() & ~Qt.WindowState.WindowMinimized)
+                window.raise_()
+                window.activateWindow()
+                return window
+        window = ChannelWindow(self._session, name, self._tare, colours)
+        self.shown.append(window)
+        window.destroyed.connect(lambda: self.shown.remove(window))
+        window.show()
+        return window
+
+    def restyle(self, colours: Colours) -> None:
+        """Take over a theme."""
+        for window in self.shown:
+            window.restyle(colours)
+
+    def close(self) -> None:
+        """Close them all."""
+        for window in self.shown:
+            window.close()

@@ -35,7 +35,7 @@ from daq_app.monitor.data.session import Session
 from daq_app.monitor.data.settings import TYPE_SIZES, WindowSettings
 from daq_app.monitor.look.theme import THEMES, Colours, apply_theme
 from daq_app.monitor.pages.campaign_page import CampaignPage
-from daq_app.monitor.pages.channel_window import ChannelWindow
+from daq_app.monitor.pages.channel_window import ChannelWindows
 from daq_app.monitor.pages.gap_page import GapPage
 from daq_app.monitor.pages.live_page import LivePage
 from daq_app.monitor.pages.messages_page import MessagesPage
@@ -127,6 +127,7 @@ class MainWindow(QMainWindow):
         self.stack, self.rail = self.frame.stack, self.frame.rail
         self.setCentralWidget(self.frame)
         self.display = TestDisplay(self.session, self.test, self.frame, self.settings, self)
+        self.channels = ChannelWindows(self.session, lambda: self.prepare.zero.readings)
         may_command = link is not None and link.may_command
         self.adoption = Adoption(self.session, self.prepare, self.gap, self.notices, may_command=may_command)
         self.splitters = {
@@ -184,8 +185,7 @@ class MainWindow(QMainWindow):
 
     def open_channel(self, name: str) -> None:
         """Show one channel large, in a window of its own."""
-        self.channel = ChannelWindow(self.session, name, lambda: self.prepare.zero.readings, self.colours)
-        self.channel.show()
+        self.channels.open(name, self.colours)
 
     def restyle(self) -> None:
         """Apply theme and type size to everything."""
@@ -199,6 +199,7 @@ class MainWindow(QMainWindow):
         for page in pages:
             page.restyle(self.colours)
         self.display.restyle(self.colours)
+        self.channels.restyle(self.colours)
         self.notices.restyle(self.colours)
 
     def toggle_theme(self) -> None:
@@ -384,6 +385,7 @@ class MainWindow(QMainWindow):
         self._frame_timer.stop()
         self._slow_timer.stop()
         self.display.close()
+        self.channels.close()
         self.settings.save_layout(self, self.splitters)
         if self.link is not None:
             idle = self.session.current_state not in RECORDING | {State.SAVING}

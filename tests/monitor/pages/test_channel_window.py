@@ -53,3 +53,19 @@ def test_a_double_click_on_a_strip_opens_its_channel_and_its_neighbours(qtbot, w
     window.clock.now += 1.0
     view.refresh()
     assert "not live" in view._facts["Now"].text()
+
+
+def test_channels_are_open_side_by_side_take_the_theme_and_go_with_the_window(qtbot, window, stand_in, play):
+    play(window.session, window.clock, stand_in, 3.9)
+    for name in ("WP-2", "LV-A07", "WP-2"):
+        window.open_channel(name)
+    assert [view.name for view in window.channels.shown] == ["WP-2", "LV-A07"]
+    before = [view.signal.backgroundBrush().color() for view in window.channels.shown]
+    window.toggle_theme()
+    after = [view.signal.backgroundBrush().color() for view in window.channels.shown]
+    assert all(now != then for now, then in zip(after, before, strict=True))
+    window.channels.shown[0].close()
+    qtbot.waitUntil(lambda: len(window.channels.shown) == 1)
+    window.open_channel("WP-2")
+    window.close()
+    qtbot.waitUntil(lambda: not window.channels.shown)
