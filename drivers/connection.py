@@ -193,6 +193,11 @@ class Connection:
             grpc_options=self._options(unique, SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION),
         )
 
+    def versions(self) -> str:
+        """Driver, way to it and client, for the run file."""
+        version = ".".join(map(str, self.system().driver_version))
+        return f"NI-DAQmx {version} via {self.target}, nidaqmx {nidaqmx.__version__}"
+
     def system(self) -> nidaqmx.system.System:
         """Inventory of the machine that this connection reaches."""
         if self.is_remote:

@@ -7,17 +7,17 @@ import time
 import warnings
 from pathlib import PurePath
 
-import nidaqmx
 import numpy as np
 from nidaqmx import errors as ni_errors
 
 from daq_app.config.planning.plan import TaskPlan
 from drivers.clock_line import ClockLine
 from drivers.connection import Connection
+from drivers.data_sheets import read_data_sheets, read_timing_modes
 from drivers.devices import Inspection, check_devices
 from drivers.error_advice import has_ended, is_garbled, translate
 from drivers.ledger import TaskLedger
-from drivers.protocol import Block, ClockReading, DeviceInfo, DriverError, Opened
+from drivers.protocol import Block, ClockReading, DataSheet, DeviceInfo, DriverError, Opened
 from drivers.stream import TaskStream
 from drivers.tasks import commit, create_task, log_to_tdms, read_ranges
 
@@ -78,6 +78,7 @@ class NidaqmxDriver:
         """Whether the last recovery met a reply that could not be understood."""
         self._rate_hz = 0.0
         self._backup_stem = ""
+        self._data_sheets: dict[str, DataSheet] | None = None
 
     def open(self, plan: TaskPlan) -> Opened:
         """Reserve and commit the tasks. Raises `DriverError`, leaving nothing reserved."""
@@ -91,6 +92,8 @@ class NidaqmxDriver:
         try:
             devices = check_devices(self._connection, plan, self._object_to)
             self._clear_what_was_left(plan)
+            if self._data_sheets is None:  # a recovery loses no time with sensors that have not changed
+                self._data_sheets = read_data_sheets(self._connection.system(), plan)
             for planned in plan.tasks:
                 self._streams.append(TaskStream(planned, create_task(self._connection, planned)))
             for stream in self._streams:
@@ -125,15 +128,16 @@ class NidaqmxDriver:
             )
         ranges: dict[str, tuple[float, float]] = {}
         for stream in self._streams:
-            ranges.update(read_ranges(stream.task, stream.planned))
+            ranges |= read_ranges(stream.task, stream.planned)
         self._buffer_samples = min(int(stream.task.in_stream.input_buf_size) for stream in self._streams)
-        version = ".".join(str(part) for part in self._connection.system().driver_version)
         return Opened(
             rate_hz=rates[0],
             ranges=ranges,
             buffer_samples=self._buffer_samples,
             devices=devices,
-            driver=f"NI-DAQmx {version} via {self._connection.target}, nidaqmx {nidaqmx.__version__}",
+            driver=self._connection.versions(),
+            adc_timing=read_timing_modes((stream.task, stream.planned) for stream in self._streams),
+            data_sheets=self._data_sheets or {},
         )
 
     def start(self) -> None:

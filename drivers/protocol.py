@@ -7,7 +7,7 @@ Nothing above this module knows which driver it talks to.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -59,6 +59,17 @@ class DeviceInfo:
 
 
 @dataclass(frozen=True, slots=True)
+class DataSheet:
+    """What the electronic data sheet of a sensor (TEDS, IEEE 1451.4) says of it."""
+
+    manufacturer: int
+    """Number of the maker, as IEEE gives them."""
+    model: int
+    version: str
+    serial: int
+
+
+@dataclass(frozen=True, slots=True)
 class Opened:
     """What the hardware made of the plan: values read back, never the ones asked for."""
 
@@ -69,6 +80,10 @@ class Opened:
     devices: tuple[DeviceInfo, ...]
     driver: str
     """Name and version of the driver, for the run file."""
+    adc_timing: dict[str, str] = field(default_factory=dict)
+    """Channel id → how its module's converter trades speed for resolution, where the module has modes."""
+    data_sheets: dict[str, DataSheet] = field(default_factory=dict)
+    """Channel id → data sheet of the sensor on it, where it has one."""
 
 
 class DriverError(Exception):

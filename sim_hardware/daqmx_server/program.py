@@ -20,6 +20,8 @@ from daq_app.config.loader import load_rig
 from daq_app.config.rig import Rig
 from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.bench.clock import BenchClock, PacedClock, SteppedClock
+from sim_hardware.daqmx_server.channels.teds import read_data_sheet
+from sim_hardware.daqmx_server.errors import DaqmxError
 from sim_hardware.daqmx_server.inventory.devices import Inventory, device_from_text
 from sim_hardware.daqmx_server.inventory.max_export import MaxExport, load_max_export
 from sim_hardware.daqmx_server.services.devices.storage import fill
@@ -107,6 +109,13 @@ def _add_devices(options: argparse.ArgumentParser) -> None:
         help="a device that calls itself not simulated: its inputs see its own outputs, not NI's sine",
     )
     options.add_argument(
+        "--teds",
+        action="append",
+        default=[],
+        metavar="TERMINAL=FILE",
+        help="a sensor with a data sheet (virtual TEDS file) on a module that asks for it; may be repeated",
+    )
+    options.add_argument(
         "--products",
         type=Path,
         action="append",
@@ -141,6 +150,9 @@ def build_bench(arguments: argparse.Namespace) -> Bench:
     faults = load_faults(arguments.faults) if arguments.faults is not None else []
     with bench.changed:
         fill(bench, export)
+        for text in arguments.teds:
+            terminal, _, file = text.partition("=")
+            bench.sensors[bench.inventory.named_channel(terminal, "AI")[1]] = read_data_sheet(file)
         for fault in faults:
             bench.add_fault(fault)
     return bench
@@ -205,7 +217,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     try:
         server = DaqmxServer(build_bench(arguments), arguments.port)
-    except (ConfigError, UnknownProduct, ValueError, OSError, RuntimeError) as error:
+    except (ConfigError, UnknownProduct, DaqmxError, ValueError, OSError, RuntimeError) as error:
         print(f"daqmx_server: {error}", file=sys.stderr)
         return 2
     _report_unknown(server.bench.inventory)

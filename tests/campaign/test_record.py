@@ -68,6 +68,11 @@ def planned(simulated_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Pa
             "notes": plan.notes,
             "run_id": "r1",
             "start_utc_ns": 1_893_456_000_000_000_000,
+            "opened": header.opened
+            | {
+                "adc_timing": {"AIR": "HIGH_RESOLUTION"},
+                "data_sheets": {"AC-1": {"manufacturer": 17, "model": 3, "version": "A1", "serial": 4711}},
+            },
         }
     )
     events = [
@@ -112,6 +117,12 @@ def test_it_says_plan_check_zero_course_and_result(record: Path) -> None:
         "Operator", "Test leader", "Checked by", "Signature",
     ):  # fmt: skip
         assert words in text, words
+
+
+def test_it_says_what_sensors_and_converters_told_of_themselves(record: Path) -> None:
+    text = text_of(record)
+    assert "Data sheet (TEDS) AC-1: maker 17, model 3, version A1, serial 4711" in text
+    assert "Converter timing AIR: HIGH_RESOLUTION" in text
 
 
 def test_every_sensor_stands_in_it_with_its_certificate_and_expired_ones_are_named(

@@ -148,6 +148,22 @@ def _rig_rows(source: RecordSource, rig: Rig) -> Iterator[tuple[str, str]]:
             kind = "simulated" if device.get("simulated") else f"serial {device.get('serial') or MISSING}"
             yield "Hardware" if number == 0 else "", f"{device.get('name')}: {device.get('product')}, {kind}"
 
+    yield from _told_by_the_hardware(source.header.opened)
+
+
+def _told_by_the_hardware(opened: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Data sheets (TEDS) of sensors and timing modes of converters, as far as the hardware has them."""
+    sheets, modes = opened.get("data_sheets"), opened.get("adc_timing")
+    for name, sheet in sheets.items() if isinstance(sheets, dict) else ():
+        if isinstance(sheet, dict):
+            yield (
+                "Data sheet (TEDS)",
+                f"{name}: maker {sheet.get('manufacturer')}, model {sheet.get('model')}, "
+                f"version {sheet.get('version')}, serial {sheet.get('serial')}",
+            )
+    if isinstance(modes, dict) and modes:
+        yield "Converter timing", ", ".join(f"{name}: {mode}" for name, mode in modes.items())
+
 
 def _sensor_row(
     channel: Channel, tare: Mapping[str, float], record: Mapping[str, Any], day: dt.date

@@ -168,6 +168,7 @@ def _with_inputs(name: str, bus: Bus, family: str, table: _Table, shared: dict[s
         tuple(map(float, table.take("iepe_currents_a", [], list))),
         _pair(name, table.take("excitation_v", [0.0, 0.0], list)),
         _pair(name, table.take("excitation_hz", [0.0, 0.0], list)),
+        table.take("teds", False, bool),
         table.take("external_clock", True, bool),
         **shared,
     )

@@ -113,6 +113,8 @@ class Product:
     excitation_v: Range = (0.0, 0.0)
     """AC excitation of native LVDT channels, volts rms."""
     excitation_hz: Range = (0.0, 0.0)
+    teds: bool = False
+    """Whether the module asks its sensors for their data sheets (NI knowledge base on TEDS classes)."""
     external_clock: bool = True
     """Whether the module can take its sample clock from another task."""
     category: str = ""

@@ -80,7 +80,9 @@ class Bench:
         self.analog_power_up: dict[str, tuple[float, int]] = {}
         """Value and kind (NI's number) of analogue outputs at power-up, by physical channel."""
         self.data_sheets: dict[str, DataSheet] = {}
-        """Data sheets (TEDS) of sensors, by physical channel."""
+        """Data sheets (TEDS) that the driver has for a physical channel."""
+        self.sensors: dict[str, DataSheet] = {}
+        """Data sheets in the memories of the sensors themselves, by physical channel."""
         self.calibration: dict[tuple[str, str], Any] = {}
         """(device, attribute) → value that a client has set."""
         self.saved_scales: dict[str, dict[str, str]] = {}

@@ -10,6 +10,7 @@ from nidaqmx.constants import Coupling, ExcitationSource, TEDSUnits, TerminalCon
 
 from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.products import Range
+from sim_hardware.daqmx_server.channels.applicability import has_attribute
 from sim_hardware.daqmx_server.channels.converter import Converter
 from sim_hardware.daqmx_server.channels.measurements import (
     QUANTITIES,
@@ -27,6 +28,12 @@ _EXCITED: Final = ("POSITION_LINEAR_LVDT", "POSITION_ANGULAR_RVDT")
 @dataclass(slots=True)
 class AnalogInput(VirtualChannel):
     """An analogue-input channel."""
+
+    def applies(self, attribute: str) -> bool:
+        units = self.kind.attributes.get("units", "")
+        return VirtualChannel.applies(self, attribute) and has_attribute(
+            attribute, self.measurement, units, self.product
+        )
 
     @property
     def raw_bytes(self) -> int:

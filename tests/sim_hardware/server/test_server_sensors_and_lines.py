@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 
 import numpy as np
@@ -28,26 +27,9 @@ from nptdms import TdmsFile
 
 from sim_hardware.daqmx_server.inventory.devices import module_device
 from tests.support.server_support import Rig, continuous
+from tests.support.teds_file import as_bits, data_sheet_file, single
 
 CARD = "PXI1Slot3"
-
-
-def _bits(*fields: tuple[int, int]) -> list[int]:
-    """Fields (value, width) as bits, least significant first."""
-    return [value >> place & 1 for value, width in fields for place in range(width)]
-
-
-def _single(value: float) -> tuple[int, int]:
-    return struct.unpack("<I", struct.pack("<f", value))[0], 32
-
-
-def _file(folder: Path, template: int, *fields: tuple[int, int]) -> Path:
-    """A virtual TEDS file: maker 17, model 1, version A1, number 12345, then a template."""
-    basic = ((17, 14), (1, 15), (1, 5), (1, 6), (12345, 24), (0, 2), (template, 8))
-    mark = [byte >> place & 1 for byte in b"[v03]" for place in range(8)]
-    path = folder / f"{template}.ted"
-    path.write_bytes(bytes(mark + _bits(*basic, *fields, (0, 64))))
-    return path
 
 
 def _sensor(rig: Rig, channel: str, file: Path) -> PhysicalChannel:
@@ -57,7 +39,7 @@ def _sensor(rig: Rig, channel: str, file: Path) -> PhysicalChannel:
 
 
 def test_a_sensor_s_data_sheet_tells_who_made_it(rig: Rig, tmp_path: Path) -> None:
-    place = _sensor(rig, f"{CARD}/ai0", _file(tmp_path, 30, (0, 6)))
+    place = _sensor(rig, f"{CARD}/ai0", data_sheet_file(tmp_path, 30, (0, 6)))
 
     assert (place.teds_mfg_id, place.teds_model_num, place.teds_serial_num) == (17, 1, 12345)
     assert (place.teds_version_letter, place.teds_version_num) == ("A", 1)
@@ -67,7 +49,7 @@ def test_a_sensor_s_data_sheet_tells_who_made_it(rig: Rig, tmp_path: Path) -> No
 
 def test_an_accelerometer_s_sensitivity_comes_from_its_data_sheet(rig: Rig, tmp_path: Path) -> None:
     sensitivity_v_per_m_s2 = 5e-7 * 1.0003**40000
-    _sensor(rig, "cDAQ1Mod3/ai0", _file(tmp_path, 25, (0, 1), (0, 1), (40000, 16)))
+    _sensor(rig, "cDAQ1Mod3/ai0", data_sheet_file(tmp_path, 25, (0, 1), (0, 1), (40000, 16)))
 
     with rig.task() as task:
         channel = task.ai_channels.add_teds_ai_accel_chan("cDAQ1Mod3/ai0", min_val=-5.0, max_val=5.0)
@@ -77,9 +59,9 @@ def test_an_accelerometer_s_sensitivity_comes_from_its_data_sheet(rig: Rig, tmp_
 
 
 def test_temperature_sensors_bring_their_curves(rig: Rig, tmp_path: Path) -> None:
-    couple = _file(tmp_path, 36, (0, 36), (3, 4))
-    resistor = _file(tmp_path, 37, (0, 56), (1, 3))
-    thermistor = _file(tmp_path, 38, (0, 78), _single(1.3e-3), _single(2.3e-4), _single(1e-7))
+    couple = data_sheet_file(tmp_path, 36, (0, 36), (3, 4))
+    resistor = data_sheet_file(tmp_path, 37, (0, 56), (1, 3))
+    thermistor = data_sheet_file(tmp_path, 38, (0, 78), single(1.3e-3), single(2.3e-4), single(1e-7))
     for number, file in enumerate((couple, resistor, thermistor)):
         _sensor(rig, f"{CARD}/ai{number}", file)
 
@@ -97,7 +79,7 @@ def test_a_bridge_s_impedance_and_unit_come_from_its_data_sheet() -> None:
     from sim_hardware.daqmx_server.channels.teds_templates import attributes_from
 
     fields = ((5, 6), (0, 64), (2, 2), (0, 64), (2, 2), (3490, 18))
-    bits = _bits((17, 14), (1, 15), (1, 5), (1, 6), (1, 24), (0, 2), (33, 8), *fields, (0, 6))
+    bits = as_bits((17, 14), (1, 15), (1, 5), (1, 6), (1, 24), (0, 2), (33, 8), *fields, (0, 6))
     stream = bytes(np.packbits(bits, bitorder="little"))
 
     read = attributes_from(DataSheet.from_stream(stream))

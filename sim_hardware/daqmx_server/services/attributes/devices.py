@@ -147,7 +147,12 @@ _AI: Final[dict[str, Callable[[Product], Any]]] = {
         _COUPLING_BITS["AC"] | _COUPLING_BITS["DC"] if product.iepe_currents_a else _COUPLING_BITS["DC"]
     ),
     "AI_TRIG_USAGE": lambda product: _START_AND_REFERENCE,
+    "TEDS_HWTEDS_SUPPORTED": lambda product: product.teds,
+}
+_IEPE: Final[dict[str, Callable[[Product], Any]]] = {
     "AI_CURRENT_INT_EXCIT_DISCRETE_VALS": lambda product: list(product.iepe_currents_a),
+}
+_EXCITED: Final[dict[str, Callable[[Product], Any]]] = {
     "AI_VOLTAGE_INT_EXCIT_RANGE_VALS": lambda product: list(product.excitation_v),
 }
 _AO: Final[dict[str, Callable[[Product], Any]]] = {
@@ -194,6 +199,8 @@ class DeviceGroup(_ReadOnly):
         product = device.product
         tables: list[tuple[bool, dict[str, Any]]] = [
             (product is not None and product.n_ai > 0, _AI),
+            (product is not None and bool(product.iepe_currents_a), _IEPE),
+            (product is not None and product.excitation_v[1] > 0, _EXCITED),
             (product is not None and product.outputs.n > 0, _AO),
             (product is not None and bool(product.ports.lines), _DIGITAL),
             (product is not None and product.counters.n > 0, _COUNTERS),

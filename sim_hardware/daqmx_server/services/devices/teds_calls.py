@@ -13,11 +13,15 @@ from sim_hardware.daqmx_server.services.attributes.groups import Handler
 
 
 def configure_teds(bench: Bench, request: Any) -> Any:
-    """A virtual data sheet from a file; −200709 where neither file nor sensor gives one."""
-    _, channel = bench.inventory.named_channel(request.physical_channel, "AI")
-    if not request.file_path:
+    """A virtual data sheet from a file, or that of the sensor; −200709 where neither gives one."""
+    device, channel = bench.inventory.named_channel(request.physical_channel, "AI")
+    if request.file_path:
+        bench.data_sheets[channel] = read_data_sheet(request.file_path)
+        return pb.ConfigureTEDSResponse()
+    asks_sensors = device.product is not None and device.product.teds
+    if not asks_sensors or channel not in bench.sensors:
         raise DaqmxError(Code.TEDS_NOT_DETECTED, f"Physical Channel Name: {channel}")
-    bench.data_sheets[channel] = read_data_sheet(request.file_path)
+    bench.data_sheets[channel] = bench.sensors[channel]
     return pb.ConfigureTEDSResponse()
 
 
