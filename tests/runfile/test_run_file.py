@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
 import zlib
 from pathlib import Path
 
@@ -50,6 +52,22 @@ def test_every_sample_comes_back(run, header: RunHeader, rig: Rig) -> None:
         assert derived is not None and derived.results == {"r": 0.9} and derived.step == 2
         np.testing.assert_array_equal(derived.signals["rotation"].values, np.arange(7.0))
         assert opened.results == {"r": 0.9}
+
+
+_NEVER_CLOSED = """
+import sys, threading
+from pathlib import Path
+from daq_app.runfile import open_run
+opened = open_run(Path(sys.argv[1]))
+def hold(run=opened):
+    threading.Event().wait()
+threading.Thread(target=hold, daemon=True).start()
+"""
+
+
+def test_a_program_that_never_closes_a_run_ends_well(run) -> None:
+    path, _ = run
+    subprocess.run([sys.executable, "-c", _NEVER_CLOSED, str(path)], check=True, timeout=120)
 
 
 def test_results_of_a_run_without_any(tmp_path: Path, make_journal) -> None:

@@ -6,6 +6,7 @@ ones, and datasets that claim more than their bytes on disk could hold.
 
 from __future__ import annotations
 
+import atexit
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,6 +28,14 @@ _MAX_DEFLATE_RATIO: Final = 1100
 _MAX_TEXT_BYTES: Final = 2**28
 _MAX_ROWS: Final = 1_000_000
 _FILTERS: Final = frozenset({h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_FLETCHER32})
+
+
+@atexit.register
+def _close_what_is_still_open() -> None:
+    """HDF5 closes open files after Python has ended; one that is read through Python would crash there."""
+    for file in h5py.h5f.get_obj_ids(types=h5py.h5f.OBJ_FILE):
+        if file.get_access_plist().get_driver() == h5py.h5fd.fileobj_driver:
+            h5py.File(file).close()
 
 
 @dataclass(frozen=True, slots=True)
