@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHeaderView, QTableWidget, QTableWidgetItem, QWidget
 
 from daq_app.campaign.report.summary import TestSummary
@@ -32,7 +33,18 @@ class FamilyTable(QTableWidget):
         """Take over a theme: rows are as high as its type needs."""
         self.verticalHeader().setDefaultSectionSize(colours.px(_ROW_PX))
         self.setMinimumHeight(colours.px(_HEADER_PX))
-        self.setMaximumHeight(colours.px(_HEADER_PX + _ROW_PX * _ROWS))
+        self._height_of_rows = colours.px(_HEADER_PX + _ROW_PX * _ROWS)
+        self._fit_height()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Make room for a bar below the rows, where long remarks need one."""
+        super().resizeEvent(event)
+        self._fit_height()
+
+    def _fit_height(self) -> None:
+        bar = self.horizontalScrollBar()
+        wider = self.horizontalHeader().length() > self.viewport().width()
+        self.setMaximumHeight(self._height_of_rows + (bar.sizeHint().height() if wider else 0))
 
     def show_test(self, test: TestSummary | None) -> None:
         """Show the families of a test; none where there is no result."""
@@ -43,3 +55,4 @@ class FamilyTable(QTableWidget):
                 item = QTableWidgetItem(text)
                 item.setFlags(item.flags() & ~Qt.ItemFlag.ItemIsEditable)
                 self.setItem(place, column, item)
+        self._fit_height()
