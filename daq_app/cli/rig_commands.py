@@ -19,6 +19,22 @@ from daq_app.config.authoring.terminals import CHASSIS
 from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.max_file import listed_in_export
 
+_Modules = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="NI's product name of a module, slot by slot; may be repeated.",
+        show_default="as many NI 9205 as needed",
+    ),
+]
+_Hardware = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SOURCE",
+        help="Instead of --module: the chassis and modules of an export of NI MAX (.ini), or of a "
+        "connection (local, grpc://HOST:PORT).",
+        show_default=False,
+    ),
+]
 _Sensors = Annotated[
     Path | None,
     typer.Option(
@@ -72,22 +88,8 @@ def new(
     accelerometers: Annotated[int, typer.Option(min=0, max=500, help="Without a list.")] = 2,
     tiltmeters: Annotated[int, typer.Option(min=0, max=500, help="Without a list: tilt axes.")] = 2,
     chassis: Annotated[str, typer.Option(help="NI's product name of the chassis.")] = CHASSIS,
-    module: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="NI's product name of a module, slot by slot; may be repeated.",
-            show_default="as many NI 9205 as needed",
-        ),
-    ] = None,
-    hardware: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SOURCE",
-            help="Instead of --module: the chassis and modules of an export of NI MAX (.ini), or of a "
-            "connection (local, grpc://HOST:PORT).",
-            show_default=False,
-        ),
-    ] = None,
+    module: _Modules = None,
+    hardware: _Hardware = None,
     rate: Annotated[float, typer.Option(min=1.0, help="Sample rate, Hz.")] = 4000.0,
 ) -> None:
     """Write a commented rig file for a wall of one's own, that `config check` calls good.
