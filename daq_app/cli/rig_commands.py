@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
+import tomli_w
 import typer
 
-from daq_app.cli.devices import devices_at, devices_of, reserve_at
+from daq_app.cli.devices import devices_at, devices_of, product_at, reserve_at
 from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, reported
 from daq_app.cli.help_page import command_group
 from daq_app.cli.terminal import echo
@@ -65,6 +66,7 @@ def register(app: typer.Typer) -> None:
     group.command("from-device", epilog="Example: daq-app rig from-device grpc://127.0.0.1:31763")(
         from_device
     )
+    group.command("product", epilog="Example: daq-app rig product cDAQ1Mod3 local > our_cards.toml")(product)
     group.command("reserve", epilog="Example: daq-app rig reserve cDAQ9188-1A2B3C4 local")(reserve)
     app.add_typer(group, name="rig")
 
@@ -159,6 +161,20 @@ def from_device(
     with reported():
         devices = devices_at(connection)
         _print(hardware_text(devices, f"NI-DAQmx at {connection}", connection))
+
+
+def product(
+    device: Annotated[str, typer.Argument(help="Name of a module or card in NI MAX.")],
+    connection: Annotated[
+        str, typer.Argument(help="local, grpc://HOST:PORT or grpcs://HOST:PORT.", metavar="CONNECTION")
+    ] = "local",
+) -> None:
+    """Print the table of a product file for a module or card that is there, from what NI-DAQmx tells of it.
+
+    For products that the catalogue lacks; a rig file names the file in hardware.products.
+    """
+    with reported():
+        _print(tomli_w.dumps({"product": [product_at(connection, device)]}))
 
 
 def reserve(
