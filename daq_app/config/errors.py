@@ -15,8 +15,7 @@ class Problem:
     right: str
 
     def __str__(self) -> str:
-        place = ": ".join(part for part in (self.file, self.key) if part)
-        return f"{place}: {self.wrong}. {self.right}".rstrip()
+        return f"{self.file}: {self.key}: {self.wrong}. {self.right}".rstrip()
 
 
 class ConfigError(Exception):
