@@ -44,12 +44,16 @@ export PYTHONSAFEPATH=1  # a file of the working folder never stands in for a mo
 unset PYTHONHOME PYTHONPATH
 exec "$here/python/bin/python3" -m daq_app.cli "$@"
 """
-_DESKTOP = """[Desktop Entry]
+_SH_WINDOW = """#!/bin/sh
+here=$(dirname "$(readlink -f "$0")")
+cd && exec "$here/daq-app"
+"""
+_DESKTOP = f"""[Desktop Entry]
 Type=Application
-Name={name}
+Name={NAME}
 Comment=Data acquisition for free-rocking tests
-Exec={exec}
-Path={home}
+Exec="@FOLDER@/daq-app"
+Path=@HOME@
 Terminal=false
 Categories=Science;
 """
@@ -139,17 +143,11 @@ def write_starters(folder: Path) -> None:
         (folder / f"{NAME}.cmd").write_text(_CMD_WINDOW, encoding="ascii", newline="\r\n")
         (folder / "add-shortcut.cmd").write_text(_CMD_ADD, encoding="ascii", newline="\r\n")
         return
-    # Quoted twice, as the specification of desktop entries asks; %k is where this entry stands.
-    beside = r"""sh -c "exec \\"\\$(dirname \\"\\$0\\")/daq-app\\"" %k"""
-    for name, text in {
-        "daq-app": _SH,
-        f"{NAME}.desktop": _DESKTOP.format(name=NAME, exec=beside, home=""),
-        "add-shortcut": _ADD_SH,
-    }.items():
-        (folder / name).write_text(text.replace("Path=\n", ""), encoding="utf-8")
+    # No desktop entry stands beside the program: most launchers do not tell one where it stands.
+    for name, text in {"daq-app": _SH, NAME: _SH_WINDOW, "add-shortcut": _ADD_SH}.items():
+        (folder / name).write_text(text, encoding="utf-8")
         (folder / name).chmod(0o755)
-    shortcut = _DESKTOP.format(name=NAME, exec='"@FOLDER@/daq-app"', home="@HOME@")
-    (folder / "python" / "shortcut.desktop").write_text(shortcut, encoding="utf-8")
+    (folder / "python" / "shortcut.desktop").write_text(_DESKTOP, encoding="utf-8")
 
 
 def _said(python: Path, code: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from daq_app.config.hardware.max_file import ListedDevice, listed_in_export
 
@@ -13,6 +14,14 @@ def devices_at(connection: str) -> list[ListedDevice]:
     from drivers.devices import list_devices
 
     return list_devices(connection)
+
+
+def product_at(connection: str, device: str) -> dict[str, Any]:
+    """The table of a product file that a device's attributes make. Raises `DriverError`."""
+    _require(connection)
+    from drivers.product_copy import describe_product
+
+    return describe_product(connection, device)
 
 
 def reserve_at(connection: str, chassis: str, *, override: bool) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
+import tomli_w
 import typer
 
-from daq_app.cli.devices import devices_at, devices_of, reserve_at
+from daq_app.cli.devices import devices_at, devices_of, product_at, reserve_at
 from daq_app.cli.errors import EXIT_BAD_INPUT, print_paragraph, reported
 from daq_app.cli.help_page import command_group
 from daq_app.cli.terminal import echo
@@ -19,6 +20,22 @@ from daq_app.config.authoring.terminals import CHASSIS
 from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.max_file import listed_in_export
 
+_Modules = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="NI's product name of a module, slot by slot; may be repeated.",
+        show_default="as many NI 9205 as needed",
+    ),
+]
+_Hardware = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SOURCE",
+        help="Instead of --module: the chassis and modules of an export of NI MAX (.ini), or of a "
+        "connection (local, grpc://HOST:PORT).",
+        show_default=False,
+    ),
+]
 _Sensors = Annotated[
     Path | None,
     typer.Option(
@@ -49,6 +66,7 @@ def register(app: typer.Typer) -> None:
     group.command("from-device", epilog="Example: daq-app rig from-device grpc://127.0.0.1:31763")(
         from_device
     )
+    group.command("product", epilog="Example: daq-app rig product cDAQ1Mod3 local > our_cards.toml")(product)
     group.command("reserve", epilog="Example: daq-app rig reserve cDAQ9188-1A2B3C4 local")(reserve)
     app.add_typer(group, name="rig")
 
@@ -72,22 +90,8 @@ def new(
     accelerometers: Annotated[int, typer.Option(min=0, max=500, help="Without a list.")] = 2,
     tiltmeters: Annotated[int, typer.Option(min=0, max=500, help="Without a list: tilt axes.")] = 2,
     chassis: Annotated[str, typer.Option(help="NI's product name of the chassis.")] = CHASSIS,
-    module: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="NI's product name of a module, slot by slot; may be repeated.",
-            show_default="as many NI 9205 as needed",
-        ),
-    ] = None,
-    hardware: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SOURCE",
-            help="Instead of --module: the chassis and modules of an export of NI MAX (.ini), or of a "
-            "connection (local, grpc://HOST:PORT).",
-            show_default=False,
-        ),
-    ] = None,
+    module: _Modules = None,
+    hardware: _Hardware = None,
     rate: Annotated[float, typer.Option(min=1.0, help="Sample rate, Hz.")] = 4000.0,
 ) -> None:
     """Write a commented rig file for a wall of one's own, that `config check` calls good.
@@ -157,6 +161,20 @@ def from_device(
     with reported():
         devices = devices_at(connection)
         _print(hardware_text(devices, f"NI-DAQmx at {connection}", connection))
+
+
+def product(
+    device: Annotated[str, typer.Argument(help="Name of a module or card in NI MAX.")],
+    connection: Annotated[
+        str, typer.Argument(help="local, grpc://HOST:PORT or grpcs://HOST:PORT.", metavar="CONNECTION")
+    ] = "local",
+) -> None:
+    """Print the table of a product file for a module or card that is there, from what NI-DAQmx tells of it.
+
+    For products that the catalogue lacks; a rig file names the file in hardware.products.
+    """
+    with reported():
+        _print(tomli_w.dumps({"product": [product_at(connection, device)]}))
 
 
 def reserve(

@@ -15,7 +15,8 @@ class Problem:
     right: str
 
     def __str__(self) -> str:
-        return f"{self.file}: {self.key}: {self.wrong}. {self.right}".rstrip()
+        place = ": ".join(part for part in (self.file, self.key) if part)
+        return f"{place}: {self.wrong}. {self.right}".rstrip()
 
 
 class ConfigError(Exception):

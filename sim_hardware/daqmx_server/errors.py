@@ -89,7 +89,8 @@ class Code(IntEnum):
     NO_MORE_SPACE = -200293
     OUTPUT_UNDERFLOW = -200290
     NO_OUTPUT_CHANNELS = -200459
-    NO_LIMITS = -200695
+    NO_MINIMUM = -200694
+    NO_MAXIMUM = -200695
     TEE_ROSETTE_GAUGES = -201446
     DELTA_ROSETTE_GAUGES = -201447
     ROSETTE_WITHOUT_QUANTITY = -201448
@@ -255,9 +256,9 @@ _TEXT: Final[dict[int, str]] = {
         "the generation has made no room within the time-out."
     ),
     Code.NO_MORE_SPACE: "There is no room for more samples behind the last one of the generation.",
-    Code.NO_LIMITS: (
-        "Minimum and maximum of the channel are not set, and there is no default for them: set both."
-    ),
+    Code.NO_MINIMUM: "The minimum of the channel is not set, and there is no default for it: set AI.Min.",
+    Code.NO_MAXIMUM: "The maximum of the channel is not set, and there is no default for it: set AI.Max.",
+    Code.TRIGGER_ON_DEMAND: "A trigger needs a sample clock: the sample timing of the task is On Demand.",
     Code.TEDS_DATA: "The electronic data sheet (TEDS) of the sensor is damaged, or is no data sheet.",
     Code.TEDS_NOT_DETECTED: "No TEDS sensor was detected on the physical channel.",
     Code.NUM_LINES_MISMATCH: (

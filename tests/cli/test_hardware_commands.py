@@ -7,18 +7,23 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
+import tomli_w
 from typer.testing import CliRunner
 
 from daq_app.cli.app import build_app
 from daq_app.config.authoring.hardware_text import hardware_text
 from daq_app.config.errors import ConfigError
+from daq_app.config.hardware import catalogue
 from daq_app.config.hardware.comparison import differences
 from daq_app.config.hardware.max_file import ListedDevice, listed_in_export
+from daq_app.config.hardware.product_files import product_set
 from daq_app.config.loader import load_rig
 from daq_app.config.rig import Hardware
+from drivers.product_copy import describe_product
 from sim_hardware.control import SimControl
 from sim_hardware.daqmx_server.program import build_bench, parser
 from sim_hardware.daqmx_server.services.server import DaqmxServer
@@ -43,6 +48,8 @@ CompactDAQ.SlotNum = 4
 ProductType = NI 9999
 CompactDAQ.ChassisDevName = cDAQ1
 CompactDAQ.SlotNum = 5
+[DAQmxDevice Dev1]
+ProductType = PCIe-6363
 """
 
 
@@ -74,7 +81,8 @@ def test_an_export_of_ni_max_becomes_the_hardware_of_a_rig_file(export: Path) ->
         (1, "NI 9205", "", "00000011"),
         (4, "NI 9237", "Bridges", ""),
     ]
-    assert "# cDAQ1Mod5 in slot 5 of cDAQ1 is a NI 9999, which the catalogue lacks." in done.stdout
+    assert "# cDAQ1Mod5 in slot 5 of cDAQ1 is a NI 9999, which the catalogue lacks" in done.stdout
+    assert "# Dev1 (PCIe-6363) is left out: no chassis and slot are listed for it." in done.stdout
 
 
 def test_what_ni_daqmx_finds_is_the_hardware_of_the_rig_that_it_serves(
@@ -89,6 +97,46 @@ def test_what_ni_daqmx_finds_is_the_hardware_of_the_rig_that_it_serves(
     assert [[(m.slot, m.product) for m in c.modules] for c in found.chassis] == [
         [(m.slot, m.product) for m in c.modules] for c in wanted.chassis
     ]
+
+
+COPIED = (
+    "NI 9205", "NI 9213", "NI 9215", "NI 9229", "NI 9234", "NI 9237", "NI 9401",
+    "NI 9263", "PXIe-4331", "PXIe-4499", "PCIe-6363",
+)  # fmt: skip
+NOT_TOLD = ("source", "external_clock", "delta_sigma", "measurements")
+
+
+def test_a_product_file_is_copied_from_a_device_that_is_there(tmp_path: Path) -> None:
+    """All that NI-DAQmx tells of a product makes the same product again."""
+    devices = [f"--device=D{number}={product}" for number, product in enumerate(COPIED[8:])]
+    devices += [
+        f"--device=C{number // 8}Mod{number % 8 + 1}={name}" for number, name in enumerate(COPIED[:9])
+    ]
+    server = DaqmxServer(build_bench(parser().parse_args(["--device=C0=cDAQ-9188", *devices])))
+    server.start()
+    names = {device.product_name: device.name for device in server.bench.present()}
+    try:
+        texts = [
+            tomli_w.dumps({"product": [describe_product(f"grpc://{server.address}", names[product])]})
+            for product in COPIED
+        ]
+        printed = daq_app("rig", "product", names["NI 9234"], f"grpc://{server.address}")
+        unknown = daq_app("rig", "product", "Dev9", f"grpc://{server.address}")
+        of_chassis = daq_app("rig", "product", "C0", f"grpc://{server.address}")
+    finally:
+        server.stop()
+
+    copies = product_set([tomllib.loads(text) for text in texts]).products
+    for name in COPIED:
+        original = catalogue.BUILT_IN.products[name]
+        for key in (field.name for field in fields(original) if field.name not in NOT_TOLD):
+            assert (name, key, getattr(copies[name], key)) == (name, key, getattr(original, key))
+    iepe, known = copies["NI 9234"].delta_sigma, catalogue.BUILT_IN.products["NI 9234"].delta_sigma
+    assert iepe is not None and known is not None
+    assert (iepe.timebase_hz, iepe.divisor, iepe.n_range) == (known.timebase_hz, known.divisor, known.n_range)
+    assert tomllib.loads(printed.stdout) == tomllib.loads(texts[COPIED.index("NI 9234")])
+    assert unknown.returncode == 3 and "There is no device Dev9" in " ".join(unknown.stderr.split())
+    assert of_chassis.returncode == 3 and "[[chassis]]" in of_chassis.stderr
 
 
 def test_a_rig_file_is_checked_against_the_devices_that_are_there(connection: str, configs: Path) -> None:
@@ -174,14 +222,27 @@ def test_devices_without_a_chassis_make_no_rig() -> None:
 
 def test_a_file_that_is_no_export_is_told_in_words(tmp_path: Path) -> None:
     (tmp_path / "a.ini").write_text("hello", encoding="utf-8")
-    with pytest.raises(ConfigError, match="the export cannot be read"):
+    with pytest.raises(ConfigError, match=r"a\.ini: the export cannot be read"):
         listed_in_export(tmp_path / "a.ini")
 
 
-def test_a_computer_without_ni_daqmx_says_so_before_anything_is_loaded(configs: Path) -> None:
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "fr1.toml", "--connection=local"],
+        ["config", "check", "fr1.toml", "--against", "local"],
+        ["rig", "from-device"],
+        ["rig", "product", "cDAQ1Mod1", "local"],
+        ["rig", "reserve", "cDAQ1"],
+    ],
+    ids=" ".join,
+)
+def test_a_computer_without_ni_daqmx_says_so_before_anything_is_loaded(
+    configs: Path, arguments: list[str]
+) -> None:
     """Loading takes the seconds that nobody should wait for this answer."""
-    command = [sys.executable, "-X", "importtime", "-m", "daq_app.cli", "run", str(configs / "fr1.toml")]
-    done = subprocess.run([*command, "--connection=local"], capture_output=True, text=True, check=False)
+    command = [sys.executable, "-X", "importtime", "-m", "daq_app.cli", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=configs)
 
     assert done.returncode == 3
     assert "NI-DAQmx is not installed on this computer" in done.stderr

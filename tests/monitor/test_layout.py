@@ -6,6 +6,7 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from daq_app.monitor.data.session import Published
+from daq_app.monitor.plots.plot_base import Axis
 from daq_app.monitor.window.main_window import MainWindow
 from tests.support.window.clipped_text import clipped_texts
 from tests.support.window.quiet_link import QuietLink
@@ -85,3 +86,12 @@ def test_the_headings_of_the_campaign_are_whole(rocking_window):
 def test_figures_below_zero_have_a_true_minus_sign(rocking_window):
     axis = rocking_window.live.motion.rotation.plot_item.getAxis("left")
     assert axis.tickStrings([-50.0, 0.0], 1.0, 50.0) == ["−50", "0"]
+
+
+def test_figures_of_a_logarithmic_axis_keep_apart(qapp):
+    axis = Axis("left")
+    axis.setLogMode(True)
+    decade = [-3.0, -2.69897, -2.522879, -2.39794, -2.30103, -2.221849, -2.154902, -2.09691, -2.045757]
+    assert [bool(text) for text in axis.tickStrings(decade, 1.0, 1.0)] == [
+        n in (1, 2, 5) for n in range(1, 10)
+    ]

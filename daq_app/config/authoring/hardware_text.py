@@ -19,8 +19,8 @@ _HEAD: Final = "# The hardware of {source}: put it in the place of [hardware] in
 def hardware_text(devices: Sequence[ListedDevice], source: str, connection: str = "local") -> str:
     """TOML of ``[hardware]``: every chassis with its modules, by name and slot.
 
-    Modules that the catalogue lacks stand as comments, and so does what no list of devices tells: the product
-    of a PXI chassis. Raises `ConfigError` where there is no module in a chassis.
+    Modules that the catalogue lacks and cards outside a chassis stand as comments, and so does the product
+    of a PXI chassis, which no list of devices tells. Raises `ConfigError` where there is no module in one.
     """
     tables, remarks = chassis_tables(devices, source)
     text = tomli_w.dumps({"hardware": {"connection": connection, "chassis": tables}})
@@ -45,6 +45,11 @@ def chassis_tables(devices: Sequence[ListedDevice], source: str) -> tuple[list[d
         tables.append(_chassis(owner, products.get(owner, PXI_UNNAMED), mine, remarks))
         if owner not in products:
             remarks.append(f"{owner}: NI-DAQmx does not name the product of a PXI chassis; write it")
+    remarks += [
+        f"{device.name} ({device.product}) is left out: no chassis and slot are listed for it"
+        for device in devices
+        if not device.is_chassis and not (device.chassis and device.slot)
+    ]
     return tables, remarks
 
 
@@ -55,7 +60,10 @@ def _chassis(name: str, product: str, modules: Sequence[ListedDevice], remarks: 
         known = catalogue.find(device.product, catalogue.MODULES, catalogue.BUILT_IN.products)
         if known is None:
             place = f"{device.name} in slot {device.slot} of {name}"
-            remarks.append(f"{place} is a {device.product}, which the catalogue lacks")
+            remarks.append(
+                f"{place} is a {device.product}, which the catalogue lacks: "
+                f"`daq-app rig product {device.name}` describes it"
+            )
             continue
         entry: dict[str, Any] = {"slot": device.slot, "product": known.name}
         if device.name != catalogue.device_name(name, bus, device.slot):

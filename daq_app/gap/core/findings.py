@@ -35,9 +35,6 @@ class Finding:
     """Name of its size in the library's words; empty where no effect of the library does the same."""
     in_noise: float = math.nan
     """Size over the rms noise of one reading of its family; NaN where that has no meaning."""
-    closes: float = math.nan
-    """Share of the gap that it alone closes; NaN where it is not known."""
-
     unknown: float = 0.0
     """Probability that it is something that matters and that no effect of the library does."""
 

@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 LINE_WIDTH: Final = 1
 """Width 1 takes Qt's fast path; only the few curves that are read from afar get a wider pen."""
 
+_LABELLED: Final = (1.0, 2.0, 5.0, 10.0)
+"""Steps of a decade whose figures keep apart on a logarithmic axis."""
+
 
 def envelope(x: Array, y: Array, columns: int) -> tuple[Array, Array]:
     """The smallest and largest y of each of about `columns` groups, in time order of x.
@@ -60,8 +63,14 @@ class Axis(pg.AxisItem):  # type: ignore[misc]
         return [(coarse, 0.0)] + [level for level in levels[1:] if coarse > level[0] >= least]
 
     def tickStrings(self, values: list[float], scale: float, spacing: float) -> list[str]:
-        """The texts of the ticks."""
-        return [text.replace("-", "−") for text in super().tickStrings(values, scale, spacing)]
+        """The texts of the ticks; on a logarithmic axis 1, 2 and 5 of each decade have one."""
+        texts = [text.replace("-", "−") for text in super().tickStrings(values, scale, spacing)]
+        if not self.logMode:
+            return texts
+        return [
+            text if round(10.0 ** (value % 1.0), 6) in _LABELLED else ""
+            for value, text in zip(values, texts, strict=True)
+        ]
 
 
 def axes() -> dict[str, Axis]:

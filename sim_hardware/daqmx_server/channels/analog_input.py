@@ -148,12 +148,21 @@ class AnalogInput(VirtualChannel):
             return (low, high) if low < high else (low - 1.0, low + 1.0)
         with contextlib.suppress(ValueError):
             return catalogue.coerce_range_of(ranges, low, high)
-        widest = ranges[-1]
-        end = "Max" if high > widest[1] else "Min"
-        per_volt = 1.0 if self.scale else self.unit_per_electrical / self.volts_per_electrical
-        raise DaqmxError(
+        raise self._outside(ranges[-1], low, high)
+
+    def _outside(self, widest: Range, low: float, high: float) -> DaqmxError:
+        """−200077 for the end of the range, or of what is to be measured, that the module does not reach."""
+        end = "High" if high > widest[1] else "Low"
+        set_to = self.attributes.get(f"AI_RNG_{end.upper()}")
+        if set_to is not None and set_to == (high if end == "High" else low):
+            name, asked, per_volt = f"AI_Rng_{end}", set_to, 1.0
+        else:
+            name = "AI_Max" if end == "High" else "AI_Min"
+            asked = self.attributes.get(name.upper())
+            per_volt = 1.0 if self.scale else self.unit_per_electrical / self.volts_per_electrical
+        return DaqmxError(
             Code.INVALID_VALUE,
-            f"Property: DAQmx_AI_{end}\nRequested Value: {self.attributes.get(f'AI_{end.upper()}')}\n"
+            f"Property: DAQmx_{name}\nRequested Value: {asked}\n"
             f"Maximum Value: {widest[1] * per_volt}\nMinimum Value: {widest[0] * per_volt}",
             f"Channel Name: {self.name}",
         )

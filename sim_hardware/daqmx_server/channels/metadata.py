@@ -15,6 +15,8 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from nidaqmx import constants
 from nidaqmx._stubs import nidaqmx_pb2
 
+from sim_hardware.daqmx_server.channels.value_sets import part_of
+
 CALL: Final = re.compile(
     r"^(?P<verb>Get|Set|Reset)(?P<group>[A-Za-z]+?)Attribute(?P<type>(?:Ex)?[A-Za-z0-9]*)$"
 )
@@ -89,7 +91,8 @@ def default_of(group: str, name: str) -> Any:
     """A value of the attribute's type that the client understands: the first of an enum, else zero."""
     number, kind = attributes_of(group)[name]
     if kind == "Int32" and number in _enums():
-        return _members(number)[0].value
+        part = part_of(group, name)
+        return next(item.value for item in _members(number) if part is None or item.value in part)
     return _DEFAULTS[kind]
 
 
@@ -124,4 +127,5 @@ def is_value(group: str, name: str, value: int) -> bool:
     number, kind = attributes_of(group)[name]
     if kind != "Int32" or number not in _enums():
         return True
-    return value in {int(item.value) for item in _members(number)}
+    part = part_of(group, name)
+    return value in ({int(item.value) for item in _members(number)} if part is None else part)

@@ -16,6 +16,7 @@ from nidaqmx._stubs import nidaqmx_pb2
 
 from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
+from sim_hardware.daqmx_server.limits import LIMITS
 from sim_hardware.daqmx_server.services.attributes.channels import ChannelGroup
 from sim_hardware.daqmx_server.services.attributes.devices import (
     CalibrationGroup,
@@ -157,15 +158,17 @@ def missing_calls() -> list[str]:
 
 
 def missing_table() -> str:
-    """Markdown: calls without a handler, those that the stock Python client makes first."""
+    """Markdown: what the server does not do, and what it does instead."""
     made = set(re.findall(r"self\._client\.(\w+)", inspect.getsource(_grpc_interpreter)))
     missing = missing_calls()
-    rows = {
-        "the Python client makes them": [call for call in missing if call in made],
-        "the Python client does not know them": [call for call in missing if call not in made],
+    calls = {
+        "calls of the Python client": [call for call in missing if call in made],
+        "calls that the Python client does not know": [call for call in missing if call not in made],
     }
-    lines = ["| calls without a handler | |", "|---|---|"]
-    return "\n".join([*lines, *(f"| {', '.join(calls)} | {who} |" for who, calls in rows.items())])
+    refused = "are answered with: the server does not support the operation"
+    rows = [(f"{whose}: {', '.join(names)}", refused) for whose, names in calls.items() if names]
+    lines = ["| what is not as on NI's hardware | the server |", "|---|---|"]
+    return "\n".join([*lines, *(f"| {what} | {does} |" for what, does in [*rows, *LIMITS])])
 
 
 def daqmx_handler(bench: Bench, gate: Gate) -> grpc.GenericRpcHandler:

@@ -12,8 +12,12 @@ from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory.devices import channel_list
 from sim_hardware.daqmx_server.requests import fields_of
 from sim_hardware.daqmx_server.services.attributes.groups import Handler
-from sim_hardware.daqmx_server.services.attributes.tasks import is_first_sample_stamped
-from sim_hardware.daqmx_server.services.attributes.timestamps import timestamp
+from sim_hardware.daqmx_server.services.attributes.timestamps import (
+    Event,
+    event_instant,
+    is_stamped,
+    timestamp,
+)
 from sim_hardware.daqmx_server.tasks.task import task_named
 from sim_hardware.daqmx_server.timing import triggers
 
@@ -183,32 +187,32 @@ def export_signal(bench: Bench, request: Any) -> Any:
     return pb.ExportSignalResponse()
 
 
-_EVENTS: Final = {
-    constants.TimestampEvent.START_TRIGGER.value: "START_TRIG_TIMESTAMP_ENABLE",
-    constants.TimestampEvent.REFERENCE_TRIGGER.value: "REF_TRIG_TIMESTAMP_ENABLE",
-    constants.TimestampEvent.ARM_START_TRIGGER.value: "ARM_START_TRIG_TIMESTAMP_ENABLE",
+_EVENTS: Final[dict[int, Event]] = {
+    constants.TimestampEvent.START_TRIGGER.value: "START_TRIG",
+    constants.TimestampEvent.REFERENCE_TRIGGER.value: "REF_TRIG",
+    constants.TimestampEvent.ARM_START_TRIGGER.value: "ARM_START_TRIG",
+    constants.TimestampEvent.FIRST_SAMPLE.value: "FIRST_SAMP",
 }
 
 
 def wait_for_timestamp(bench: Bench, request: Any) -> Any:
-    """UTC of an event; −209842 where its time stamp is not enabled, −200284-like time-out otherwise."""
+    """UTC of an event; −209842 where its time stamp is not enabled, −200474 when it does not come in time."""
     task = task_named(bench, request.task.name)
-    event = fields_of(request)["timestamp_event"]
-    first_sample = event == constants.TimestampEvent.FIRST_SAMPLE.value
-    if not (is_first_sample_stamped(task) if first_sample else task.trigger.get(_EVENTS[event])):
+    event = _EVENTS[fields_of(request)["timestamp_event"]]
+    if not is_stamped(task, event):
         raise DaqmxError(Code.TIMESTAMP_NOT_ENABLED)
     waits_for_edge = task.trigger.get("ARM_START_TRIG_TYPE") == triggers.DIGITAL
-    if event == constants.TimestampEvent.ARM_START_TRIGGER.value and task.run and not waits_for_edge:
+    if event == "ARM_START_TRIG" and task.run and not waits_for_edge:
         return pb.WaitForValidTimestampResponse(timestamp=timestamp(bench.utc(task.armed_s)))
     deadline = bench.clock.deadline(request.timeout)
-    while task.run is None or task.run.times is None:
+    while (instant := event_instant(task, event)) is None:
         if task.run is not None:
             task.run.look(bench.clock.now())
         elif not task.is_buffered:
             return pb.WaitForValidTimestampResponse(timestamp=timestamp(bench.utc(task.armed_s)))
-        if not bench.clock.wait(bench.changed, None, deadline):
+        if event_instant(task, event) is None and not bench.clock.wait(bench.changed, None, deadline):
             raise DaqmxError(Code.TIMED_OUT)
-    return pb.WaitForValidTimestampResponse(timestamp=timestamp(bench.utc(task.run.times.first_s)))
+    return pb.WaitForValidTimestampResponse(timestamp=timestamp(bench.utc(instant)))
 
 
 def timing_handlers() -> dict[str, Handler]:

@@ -107,6 +107,12 @@ def _check_terminals(task: ConfiguredTask) -> None:
     inventory = task.bench.inventory
     if task.timing.source_is_foreign:
         full_name(inventory, host, task.timing.source, Code.SOURCE_TERMINAL_UNKNOWN)
+    full_name(
+        inventory,
+        host,
+        str(task.timing.settings.get("SAMP_CLK_TIMEBASE_SRC", "")),
+        Code.SOURCE_TERMINAL_UNKNOWN,
+    )
     for which in _TRIGGERS:
         if triggers.waits_for_edge(task.trigger, which):
             source = triggers.source_of(task.trigger, which)

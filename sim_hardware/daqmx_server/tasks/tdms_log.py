@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import datetime as dt
+import itertools
 import sys
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from nidaqmx.constants import LoggingMode, LoggingOperation
-from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
+from nptdms import ChannelObject, GroupObject, RootObject, TdmsFile, TdmsWriter
 from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
@@ -28,6 +29,9 @@ class TdmsLog:
         self._writer: TdmsWriter | None = None
         self._part = 0
         self._written = 0
+        self._group = ""
+        self._begin: int | None = None
+        """Sample that the open file begins with: its `wf_start_offset`, which every segment repeats."""
 
     @property
     def enabled(self) -> bool:
@@ -51,18 +55,25 @@ class TdmsLog:
     def _open(self, path: Path) -> None:
         self.close()
         self._written = 0
+        self._begin = None
         operation = self._settings.get("LOGGING_TDMS_OPERATION", LoggingOperation.OPEN_OR_CREATE.value)
         if operation == LoggingOperation.CREATE.value and path.exists():
             raise _bad_path(path, "the file exists already")
         if operation == LoggingOperation.OPEN.value and not path.exists():
             raise _bad_path(path, "the file does not exist")
-        mode = "a" if operation in _OPENS_EXISTING and path.exists() else "w"
+        appends = operation in _OPENS_EXISTING and path.exists()
+        mode = "a" if appends else "w"
         try:
+            self._group = _free_group(path if appends else None, self._asked_group)
             self._writer = TdmsWriter(str(path), mode=mode)
             self._writer.open()
-        except OSError as error:
+        except (OSError, ValueError) as error:
             self._writer = None
             raise _bad_path(path, str(error)) from error
+
+    @property
+    def _asked_group(self) -> str:
+        return str(self._settings.get("LOGGING_TDMS_GROUP_NAME") or "Task")
 
     def write(
         self,
@@ -106,27 +117,37 @@ class TdmsLog:
         start: dt.datetime,
     ) -> None:
         assert self._writer is not None
-        group = str(self._settings.get("LOGGING_TDMS_GROUP_NAME") or "Task")
+        if self._begin is None:
+            self._begin = first
         channels = [
             ChannelObject(
-                group,
+                self._group,
                 name,
                 np.ascontiguousarray(row),
                 properties={
                     "unit_string": unit,
                     "wf_start_time": np.datetime64(start.replace(tzinfo=None), "us"),
                     "wf_increment": 1.0 / rate_hz,
-                    "wf_start_offset": first / rate_hz,
+                    "wf_start_offset": self._begin / rate_hz,
                 },
             )
             for name, unit, row in zip(names, units, values, strict=True)
         ]
-        self._writer.write_segment([RootObject(), GroupObject(group), *channels])
+        self._writer.write_segment([RootObject(), GroupObject(self._group), *channels])
 
     def close(self) -> None:
         if self._writer is not None:
             self._writer.close()
             self._writer = None
+
+
+def _free_group(path: Path | None, name: str) -> str:
+    """A group that a file does not have yet: ``NAME``, ``NAME #1`` …, as NI's driver appends runs."""
+    if path is None:
+        return name
+    there = {group.name for group in TdmsFile.read_metadata(path).groups()}
+    numbered = (f"{name} #{number}" for number in itertools.count(1))
+    return next(free for free in itertools.chain([name], numbered) if free not in there)
 
 
 def _bad_path(path: Path, reason: str) -> DaqmxError:

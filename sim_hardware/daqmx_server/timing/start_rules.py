@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from nidaqmx.constants import DigitalWidthUnits, Edge
+from nidaqmx.constants import Edge
 
 from sim_hardware.daqmx_server.timing import triggers
 from sim_hardware.daqmx_server.timing.acquisition import StartRule
@@ -98,15 +98,12 @@ class _OwnClock:
         triggered_s = self._trigger_instant(instant_s, now_s)
         if triggered_s is None:
             return None
-        rate = self._task.timing.rate_hz
-        delay = float(self._task.trigger.get("START_TRIG_DELAY", 0.0))
-        if self._task.trigger.get("START_TRIG_DELAY_UNITS") == DigitalWidthUnits.SAMPLE_CLOCK_PERIODS.value:
-            delay /= rate
-        first_s = triggered_s + delay
+        first_s = self._task.timing.not_before(triggered_s + self._task.timing.start_delay_s)
         for pause in self._task.timing.pauses():  # a clock that is held gives no first sample
             if pause.start_s <= first_s < pause.end_s:
                 first_s = pause.end_s
-        return None if first_s == float("inf") else self._task.timing.clock_from(first_s, rate)
+        timing = self._task.timing
+        return None if first_s == float("inf") else timing.clock_from(first_s, timing.rate_hz)
 
     def _trigger_instant(self, after_s: float, now_s: float) -> float | None:
         if triggers.digital_start(self._task.trigger) is not None:

@@ -7,7 +7,13 @@ from collections import Counter
 from typing import Any, Protocol, cast
 
 import numpy as np
-from nidaqmx.constants import AcquisitionType, Level, SampleTimingType
+from nidaqmx.constants import (
+    AcquisitionType,
+    DigitalWidthUnits,
+    Level,
+    SampleTimingType,
+    SyncPulseType,
+)
 from numpy.typing import NDArray
 
 from daq_app.config.hardware import catalogue
@@ -114,7 +120,7 @@ class TaskTiming:
         inputs = self.inputs
         if not self._task.channels or self.source_is_foreign or asked <= 0:
             return asked
-        if not inputs:
+        if not inputs or ("SAMP_CLK_TIMEBASE_RATE" in self.settings and self.timebase_hz > 0):
             rate = self.timebase_hz / max(1, math.floor(self.timebase_hz / asked * (1 + 1e-12)))
             fastest = self.max_rate_hz
             return fastest if asked <= fastest < rate else rate
@@ -146,7 +152,9 @@ class TaskTiming:
 
     @property
     def timebase_hz(self) -> float:
-        """The clock that the sample clock is divided from."""
+        """The clock that the sample clock is divided from; the client's own where it has set a rate."""
+        if "SAMP_CLK_TIMEBASE_RATE" in self.settings:
+            return float(self.settings["SAMP_CLK_TIMEBASE_RATE"])
         clocks = [c.product.delta_sigma.timebase_hz for c in self.inputs if c.product.delta_sigma]
         cards = [c.product.timebase_hz for c in self._task.channels]
         return max(clocks, default=0.0) or max(cards, default=0.0) or 80e6
@@ -164,10 +172,32 @@ class TaskTiming:
         source = triggers.source_of(self._task.trigger, which)
         return not self._task.bench.fires_at_once(self._task.hosts[0], source)
 
+    @property
+    def start_delay_s(self) -> float:
+        """Time from the start trigger to the first sample, s."""
+        delay = float(self._task.trigger.get("START_TRIG_DELAY", 0.0))
+        periods = DigitalWidthUnits.SAMPLE_CLOCK_PERIODS.value
+        in_periods = self._task.trigger.get("START_TRIG_DELAY_UNITS", periods) == periods
+        return delay / self.rate_hz if in_periods and delay else delay
+
+    def not_before(self, first_s: float) -> float:
+        """The first sample's instant, where the client has set a time of day for it or for the sync pulse."""
+        instants = [first_s]
+        if "FIRST_SAMP_CLK_WHEN" in self.settings:
+            offset_s = float(self.settings.get("FIRST_SAMP_CLK_OFFSET", 0.0))
+            instants.append(self._task.bench.instant_of(self.settings["FIRST_SAMP_CLK_WHEN"]) + offset_s)
+        by_time = self.settings.get("SYNC_PULSE_TYPE") == SyncPulseType.TIME.value
+        if by_time and "SYNC_PULSE_TIME_WHEN" in self.settings:
+            instants.append(self._task.bench.instant_of(self.settings["SYNC_PULSE_TIME_WHEN"]))
+        return max(instants)
+
     def verify(self) -> None:
         """Raise what NI-DAQmx raises for a clock that these channels cannot have."""
         if not self._task.is_buffered:
-            if self._task.trigger["START_TRIG_TYPE"] in (triggers.ANALOG, triggers.WINDOW):
+            triggered = any(
+                self._task.trigger[f"{which}_TRIG_TYPE"] != triggers.NONE for which in ("START", "REF")
+            )
+            if triggered and self._task.io in ("AI", "AO", "DI", "DO"):
                 raise DaqmxError(Code.TRIGGER_ON_DEMAND)
             return
         self.verify_count()

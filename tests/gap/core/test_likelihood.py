@@ -132,3 +132,19 @@ def test_a_fit_beside_the_place_where_the_model_diverges_ends_in_numbers() -> No
     assert all(math.isfinite(size) for size in found.sigmas.values())
     assert np.isfinite(found.u).all()
     assert found.values["D"][0] <= 1.0
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning:daq_app.gap.core.fitting.fit")
+def test_a_model_that_leaps_beyond_all_measure_beside_the_optimum_has_an_evidence_all_the_same() -> None:
+    class Wild(DecayModel):
+        def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
+            made = super().predict(run, values)
+            if values.get("kick.j", 0.0) > 0.0:
+                made.features[-1] = 1e200
+            return made
+
+    runs = make_runs(2)
+    null = fit(DecayModel(), runs)
+    found = fit(Wild(), runs, (LIBRARY["kick"],), null.known())
+    assert found.log_evidence == pytest.approx(null.log_evidence, abs=1.0)
+    assert all(local["kick.j"][0] == 0.0 for local in found.local_values)

@@ -232,3 +232,20 @@ def test_the_page_lists_the_calls_that_have_no_handler() -> None:
     said = page.read_text(encoding="utf-8")
     assert f"<!-- missing: begin -->\n{missing_table()}\n<!-- missing: end -->" in said
     assert set(missing_calls()).isdisjoint({"ReadAnalogF64", "StartTask"})
+
+
+def test_the_page_s_fixture_and_program_run_as_they_stand_there(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[3] / "docs/how-to/nidaqmx-without-hardware.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    program = next(block for block in blocks if "GrpcSessionOptions(channel" in block and "Task(" in block)
+    fixture = next(block for block in blocks if "pytest.fixture" in block)
+    body = program[program.index("with nidaqmx.Task") :].replace("grpc_options=options", "grpc_options=daq")
+    test = "def test_it(daq):\n" + "".join(f"    {line}\n" for line in body.splitlines())
+    file = tmp_path / "test_page.py"
+    file.write_text(
+        f"import subprocess, sys\nimport grpc, nidaqmx, pytest\n\n{fixture}\n{test}", encoding="utf-8"
+    )
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout
+    assert "1 passed" in done.stdout

@@ -166,6 +166,35 @@ def test_a_file_of_so_many_samples_is_followed_by_another(rig: Rig, tmp_path: Pa
     assert _is_near(np.concatenate(files), 0.0, 250)
 
 
+def test_a_file_tells_when_its_first_sample_was_taken(rig: Rig, tmp_path: Path) -> None:
+    """Whatever the reads: each file's offset is the one of the sample that it begins with."""
+    with rig.task() as task:
+        task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
+        continuous(task, RATE)
+        _log(task, tmp_path / "a.tdms", LoggingMode.LOG_AND_READ)
+        task.in_stream.logging_samps_per_file = 100
+        for _ in range(5):
+            task.read(30)
+    told = []
+    for name in ("a.tdms", "a_0001.tdms"):
+        with TdmsFile.open(tmp_path / name) as tdms:
+            told.append(tdms["g"].channels()[0].properties)
+    assert [one["wf_start_offset"] for one in told] == pytest.approx([0.0, 100 / RATE])
+    assert [one["wf_increment"] for one in told] == [1.0 / RATE] * 2
+    assert told[0]["wf_start_time"] == told[1]["wf_start_time"]
+
+
+def test_a_second_task_appends_to_a_file_in_a_group_of_its_own(rig: Rig, tmp_path: Path) -> None:
+    for _ in range(2):
+        with _voltage(rig) as task:
+            task.in_stream.configure_logging(
+                tmp_path / "a.tdms", LoggingMode.LOG_AND_READ, "g", LoggingOperation.OPEN_OR_CREATE
+            )
+            task.read(100)
+    with TdmsFile.open(tmp_path / "a.tdms") as tdms:
+        assert {group.name: len(group.channels()[0]) for group in tdms.groups()} == {"g": 100, "g #1": 100}
+
+
 def test_a_task_without_a_clock_cannot_log(rig: Rig, tmp_path: Path) -> None:
     with rig.task() as task:
         task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from nidaqmx.constants import AcquisitionType, Edge, TaskMode, UnitsPreScaled, VoltageUnits
+from nidaqmx.constants import AcquisitionType, DigitalWidthUnits, Edge, TaskMode, UnitsPreScaled, VoltageUnits
 from nidaqmx.errors import DaqError
 from nidaqmx.scale import Scale
 
@@ -173,6 +173,7 @@ def test_a_falling_edge_is_not_a_rising_one(rig: Rig) -> None:
         task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
         task.timing.cfg_samp_clk_timing(RATE, samps_per_chan=10)
         task.triggers.start_trigger.cfg_dig_edge_start_trig("/cDAQ1/PFI0", Edge.FALLING)
+        task.triggers.start_trigger.delay_units = DigitalWidthUnits.SECONDS
         task.triggers.start_trigger.delay = 0.05
         task.start()
         rig.control.command("digital_edge", terminal="/cDAQ1/PFI0")

@@ -191,7 +191,8 @@ class RealWindow:
         """Wait until the window says something."""
         with self._news:
             if not self._news.wait_for(lambda: bool(self.words) and condition(self.words), limit_s):
-                raise AssertionError(f"not said in time; the window says {self.words}")
+                told = [(words["state"], words["page"], words["notice"]) for words in self.past[-15:]]
+                raise AssertionError(f"not said in time; the window says {self.words}, after {told}")
 
     def says(self, limit_s: float = LIMIT_S, **expected: object) -> None:
         """Wait until the window says exactly this."""

@@ -16,6 +16,8 @@ from daq_app.gap.core.parameters import Parameter
 
 STEP = 1e-4
 """Half width of central differences, in prior standard deviations."""
+STEEPEST = 1e100
+"""Slope of a feature, in its unit over a prior sd, beyond which a model has left what can be squared."""
 Columns = dict[tuple[str, int | None], FloatArray]
 """Columns of Jacobians, shape (n,) each, by (key, run index)."""
 
@@ -128,7 +130,7 @@ class Problem:
         else:
             slope = (here.features - self._at(run, values, k, behind)) / (u[k] - behind)
         # Beside the place where the model diverges there is no slope to follow; value_at keeps off it.
-        return np.where(np.isfinite(slope), slope, 0.0)
+        return np.where(np.abs(slope) < STEEPEST, slope, 0.0)
 
     def _at(self, run: int, values: Mapping[str, float], k: int, coordinate: float) -> FloatArray:
         """Features with one unknown moved to a coordinate."""

@@ -30,10 +30,11 @@ _ABSENT: Final = frozenset({"AI_SENSOR_POWER_CFG", "AI_IMPEDANCE", "AI_DITHER_EN
 
 def _reading_range(channel: AnalogInput, end: int) -> float:
     """End of the input range in the unit of the reading: what AI.Max reads back once the range is known."""
+    if not channel.has_limits:
+        missing = Code.NO_MINIMUM if "AI_MAX" in channel.attributes else Code.NO_MAXIMUM
+        raise DaqmxError(missing, f"Channel Name: {channel.name}")
     volts = channel.input_range[end] / channel.volts_per_electrical
     value = volts * channel.unit_per_electrical
-    if not channel.has_limits:
-        raise DaqmxError(Code.NO_LIMITS, f"Channel Name: {channel.name}")
     return value if channel.scale is None else float(channel.scale.forward(np.array(value)))
 
 

@@ -13,7 +13,8 @@ from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory.devices import channel_list
 from sim_hardware.daqmx_server.inventory.terminals import full_name
 from sim_hardware.daqmx_server.services.attributes.settings import SettingsGroup
-from sim_hardware.daqmx_server.services.attributes.tasks import engine_terminal, first_sample_utc
+from sim_hardware.daqmx_server.services.attributes.tasks import engine_terminal
+from sim_hardware.daqmx_server.services.attributes.timestamps import event_stamp
 from sim_hardware.daqmx_server.tasks.task import Task
 from sim_hardware.daqmx_server.timing import triggers
 
@@ -41,10 +42,16 @@ TRIGGER: Final = SettingsGroup(
         "REF_TRIG_TYPE": triggers.NONE,
         "PAUSE_TRIG_TYPE": triggers.NONE,
         "ARM_START_TRIG_TYPE": triggers.NONE,
+        "ADV_TRIG_TYPE": triggers.NONE,
+        "HSHK_TRIG_TYPE": triggers.NONE,
         "START_TRIG_DELAY_UNITS": constants.DigitalWidthUnits.SAMPLE_CLOCK_PERIODS.value,
         "REF_TRIG_PRETRIG_SAMPLES": 2,
         **{f"DIG_EDGE_{which}_TRIG_EDGE": Edge.RISING.value for which in ("START", "REF")},
         **{f"ANLG_EDGE_{which}_TRIG_SLOPE": Edge.RISING.value for which in ("START", "REF")},
+        **{
+            f"ANLG_{kind}_TRIG_COUPLING": constants.Coupling.DC.value
+            for kind in ("EDGE_START", "EDGE_REF", "WIN_START", "WIN_REF", "LVL_PAUSE", "WIN_PAUSE")
+        },
         **{f"ANLG_WIN_{which}_TRIG_WHEN": 10163 for which in ("START", "REF")},
         **{
             f"{which}_TIMESCALE": constants.Timescale.USE_HOST.value
@@ -65,9 +72,9 @@ TRIGGER: Final = SettingsGroup(
             for kind in ("DIG_EDGE", "ANLG_EDGE", "ANLG_WIN")
             for which in ("START", "REF")
         },
-        "START_TRIG_TIMESTAMP_VAL": first_sample_utc,
-        "REF_TRIG_TIMESTAMP_VAL": first_sample_utc,
-        "ARM_START_TRIG_TIMESTAMP_VAL": first_sample_utc,
+        "START_TRIG_TIMESTAMP_VAL": event_stamp("START_TRIG"),
+        "REF_TRIG_TIMESTAMP_VAL": event_stamp("REF_TRIG"),
+        "ARM_START_TRIG_TIMESTAMP_VAL": event_stamp("ARM_START_TRIG"),
     },
 )
 

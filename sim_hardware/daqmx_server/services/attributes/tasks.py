@@ -10,12 +10,12 @@ from nidaqmx import constants
 from nidaqmx.constants import Edge, ReadRelativeTo, SampleTimingType
 
 from sim_hardware.daqmx_server.bench.bench import Bench
-from sim_hardware.daqmx_server.errors import Code, DaqmxError
+from sim_hardware.daqmx_server.errors import Code
 from sim_hardware.daqmx_server.inventory.devices import channel_list
 from sim_hardware.daqmx_server.inventory.terminals import full_name
 from sim_hardware.daqmx_server.services.attributes.groups import unsupported
 from sim_hardware.daqmx_server.services.attributes.settings import SettingsGroup
-from sim_hardware.daqmx_server.services.attributes.timestamps import timestamp
+from sim_hardware.daqmx_server.services.attributes.timestamps import event_stamp, is_stamped
 from sim_hardware.daqmx_server.tasks.checks import refuse_while_logging
 from sim_hardware.daqmx_server.tasks.needs import ONBOARD_OUTPUT_SAMPLES
 from sim_hardware.daqmx_server.tasks.reading import default_count
@@ -160,6 +160,14 @@ def _source(task: Task) -> str:
     return full_name(task.bench.inventory, host, task.timing.source, Code.SOURCE_TERMINAL_UNKNOWN)
 
 
+def _timebase_source(task: Task) -> str:
+    """Where the sample clock is divided from, in NI's spelling; −89120 for a terminal that no device has."""
+    given, host = str(task.timing.settings.get("SAMP_CLK_TIMEBASE_SRC", "")), task.host
+    if not given or host is None:
+        return engine_terminal("SampleClockTimebase")(task)
+    return full_name(task.bench.inventory, host, given, Code.SOURCE_TERMINAL_UNKNOWN)
+
+
 def _count(task: Task) -> int:
     task.timing.verify_count()
     return task.timing.samples_per_channel
@@ -178,20 +186,6 @@ def _convert_divisor(task: Task) -> int:
     if set_to is not None:
         return int(set_to)
     return math.floor(_convert_period(task) * task.timing.timebase_hz * (1 + 1e-12)) + 1
-
-
-def first_sample_utc(task: Task) -> Any:
-    """UTC of the first sample; −200983 before there is one."""
-    run = task.run
-    if run is None or run.times is None:
-        raise DaqmxError(Code.GET_BEFORE_RESERVED, "Property: DAQmx_FirstSampTimestamp_Val")
-    return timestamp(task.bench.utc(run.times.first_s))
-
-
-def is_first_sample_stamped(task: Task) -> bool:
-    """Whether the instant of the first sample is kept: as set, else on chassis that share their time."""
-    default = task.host is not None and task.host.networked
-    return bool(task.timing.settings.get("FIRST_SAMP_TIMESTAMP_ENABLE", default))
 
 
 def _lines(name: str) -> Callable[[Task], str]:
@@ -216,15 +210,15 @@ TIMING: Final = SettingsGroup(
         "SAMP_CLK_SRC": _source,
         "SAMP_CLK_TERM": engine_terminal("SampleClock"),
         "SAMP_CLK_TIMEBASE_RATE": lambda task: task.timing.timebase_hz,
-        "SAMP_CLK_TIMEBASE_SRC": engine_terminal("SampleClockTimebase"),
+        "SAMP_CLK_TIMEBASE_SRC": _timebase_source,
         "SAMP_CLK_TIMEBASE_DIV": lambda task: round(task.timing.timebase_hz / task.timing.rate_hz),
         "AI_CONV_RATE": lambda task: 1.0 / _convert_period(task),
         "AI_CONV_TIMEBASE_DIV": _convert_divisor,
         "AI_CONV_MAX_RATE": lambda task: max(
             (c.product.aggregate_rate_hz or c.product.max_rate_hz for c in task.timing.inputs), default=0.0
         ),
-        "FIRST_SAMP_TIMESTAMP_ENABLE": is_first_sample_stamped,
-        "FIRST_SAMP_TIMESTAMP_VAL": first_sample_utc,
+        "FIRST_SAMP_TIMESTAMP_ENABLE": lambda task: is_stamped(task, "FIRST_SAMP"),
+        "FIRST_SAMP_TIMESTAMP_VAL": event_stamp("FIRST_SAMP"),
         "CHANGE_DETECT_DI_RISING_EDGE_PHYSICAL_CHANS": _lines("CHANGE_DETECT_DI_RISING_EDGE_PHYSICAL_CHANS"),
         "CHANGE_DETECT_DI_FALLING_EDGE_PHYSICAL_CHANS": _lines(
             "CHANGE_DETECT_DI_FALLING_EDGE_PHYSICAL_CHANS"
