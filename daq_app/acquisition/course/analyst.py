@@ -99,8 +99,7 @@ class Analyst(threading.Thread):
             try:
                 item = self.inbox.get(timeout=REPEAT_S)
             except queue.Empty:
-                with contextlib.suppress(MemoryError):
-                    self._judge(force=True)
+                self.voice.repeat()
                 continue
             if item is None:
                 return
@@ -253,7 +252,8 @@ class Analyst(threading.Thread):
 
     def _on_begin(self, begin: Begin) -> None:
         assert self._opened is not None
-        self.voice.run_path, self._aborted = "", False
+        self.voice.run_path = ""
+        self._aborted = False
         if begin.kept:
             self._tell_standing()
             return
@@ -270,7 +270,8 @@ class Analyst(threading.Thread):
             self._rig.acquisition, self._opened.rate_hz, self.voice.sample, self._release_within_s
         )
         self._go(State.ARMED, f"Armed for {self.voice.test}; recording", self.voice.sample)
-        if self._live is not None and (held := self._live.held_since) is not None:
+        held = self._live.held_since if self._live is not None else None
+        if held is not None:
             self._follow(
                 self._sequence, [PhaseEvent("hold", held, self.voice.sample, 0.0, "held still already")]
             )
@@ -378,7 +379,6 @@ class Analyst(threading.Thread):
         return Situation(
             state=self.state,
             sampling=opened is not None,
-            opening=self._around.opening(),
             armed=course is not None and course.armed,
             plan=self.voice.plan,
             rotation_rad=rotation,

@@ -102,7 +102,6 @@ class Session:
                 hurry=self._hurry,
                 arm=self._begin,
                 keep=self._keep,
-                opening=lambda: self._reader is not None and self._reader.opening,
                 disk_safe=self._disk_safe,
                 free_bytes=lambda: self.watchdog.free_bytes,
             ),
