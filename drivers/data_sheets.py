@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable
 
 import nidaqmx
@@ -11,25 +12,29 @@ from nidaqmx.system.physical_channel import PhysicalChannel
 
 from daq_app.config.planning.plan import PlannedTask, TaskPlan
 from drivers.protocol import DataSheet
+from drivers.tasks import virtual_name
 
 
 def read_data_sheets(system: nidaqmx.system.System, plan: TaskPlan) -> dict[str, DataSheet]:
     """Channel id → data sheet of its sensor, for the sensors that have one.
 
-    Asked before the tasks take the modules: a module searches for sensors only while it is free. A sheet
-    that somebody gave to the terminal (a virtual one) is kept.
+    Only modules that ask their sensors are asked, before the tasks take them: a module searches for sensors
+    only while it is free. A sheet that somebody gave to the terminal (a virtual one) is kept.
     """
-    sheets: dict[str, DataSheet] = {}
-    asks: dict[str, bool] = {}
+    terminals: dict[str, list[tuple[str, str]]] = {}
     for task in plan.tasks:
         for item in task.channels:
-            name, _, terminal = item.channel.physical_channel.partition("/")
-            device = system.devices[name]
-            if name not in asks:
-                asks[name] = _asks_its_sensors(device)
-            sheet = _data_sheet(device.ai_physical_chans[terminal], search=asks[name])
+            device_name, _, terminal = item.channel.physical_channel.partition("/")
+            terminals.setdefault(device_name, []).append((item.channel.id, terminal))
+    sheets: dict[str, DataSheet] = {}
+    for device_name, places in terminals.items():
+        device = system.devices[device_name]
+        if not _asks_its_sensors(device):
+            continue
+        for channel_id, terminal in places:
+            sheet = _data_sheet(device.ai_physical_chans[terminal])
             if sheet is not None:
-                sheets[item.channel.id] = sheet
+                sheets[channel_id] = sheet
     return sheets
 
 
@@ -40,12 +45,9 @@ def _asks_its_sensors(device: nidaqmx.system.Device) -> bool:
         return False
 
 
-def _data_sheet(terminal: PhysicalChannel, *, search: bool) -> DataSheet | None:
-    try:
+def _data_sheet(terminal: PhysicalChannel) -> DataSheet | None:
+    with contextlib.suppress(ni_errors.DaqError):
         return _known_sheet(terminal)
-    except ni_errors.DaqError:
-        if not search:
-            return None
     try:
         terminal.configure_teds()
         return _known_sheet(terminal)
@@ -67,12 +69,14 @@ def read_timing_modes(tasks: Iterable[tuple[nidaqmx.Task, PlannedTask]]) -> dict
     modes: dict[str, str] = {}
     without: set[str] = set()
     for task, planned in tasks:
-        for item, created in zip(planned.channels, task.ai_channels, strict=True):
+        for item in planned.channels:
             device = item.channel.physical_channel.partition("/")[0]
             if device in without:
                 continue
             try:
-                modes[item.channel.id] = str(created.ai_adc_timing_mode.name)
+                mode = task.ai_channels[virtual_name(item.channel)].ai_adc_timing_mode
             except ni_errors.DaqError:
                 without.add(device)
+            else:
+                modes[item.channel.id] = str(mode.name)
     return modes
