@@ -256,6 +256,10 @@ _TEXT: Final[dict[int, str]] = {
         "the generation has made no room within the time-out."
     ),
     Code.NO_MORE_SPACE: "There is no room for more samples behind the last one of the generation.",
+    Code.TWO_PART_ORDER: (
+        "Specified property tells which channels or devices are concerned: ask first whether any is, with "
+        "the property that ends in Exist or Detected."
+    ),
     Code.NO_MINIMUM: "The minimum of the channel is not set, and there is no default for it: set AI.Min.",
     Code.NO_MAXIMUM: "The maximum of the channel is not set, and there is no default for it: set AI.Max.",
     Code.TRIGGER_ON_DEMAND: "A trigger needs a sample clock: the sample timing of the task is On Demand.",

@@ -46,10 +46,6 @@ LIMITS: Final = (
         "starts at that time of the machine's clock; at once where it has passed",
     ),
     (
-        "reading a `…Chans` attribute before its `…ChansExist`",
-        "is answered; NI's driver refuses it",
-    ),
-    (
         "rosettes, temperatures, other quantities that are not proportional to a voltage",
         "show a sine in their own unit; a rosette does not compute them from its gauges",
     ),

@@ -85,6 +85,8 @@ class Bench:
         """Data sheets in the memories of the sensors themselves, by physical channel."""
         self.calibration: dict[tuple[str, str], Any] = {}
         """(device, attribute) → value that a client has set."""
+        self.self_calibrated: dict[str, hightime.datetime] = {}
+        """Device → when a client has it calibrated by itself, UTC."""
         self.saved_scales: dict[str, dict[str, str]] = {}
         self.saved_channels: dict[str, dict[str, str]] = {}
         self.saved_tasks: dict[str, dict[str, str]] = {}

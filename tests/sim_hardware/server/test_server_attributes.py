@@ -215,3 +215,21 @@ def test_the_first_sample_waits_for_a_time_of_day(task: nidaqmx.Task, rig: Rig) 
     task.read(100)
     stamp = timing.first_samp_timestamp_val
     assert abs((stamp.replace(tzinfo=dt.UTC) - when).total_seconds()) < 1e-6
+
+
+def test_faulty_channels_are_named_only_after_the_question_whether_there_are_any(task: nidaqmx.Task) -> None:
+    stream = clocked(task).in_stream
+    assert refused(lambda: stream.open_chans) == -201194
+    assert not stream.open_chans_exist
+    assert (stream.open_chans, stream.open_chans_details) == ([], [])
+
+
+def test_a_self_calibration_has_its_date(rig: Rig) -> None:
+    system, card = rig.system(), rig.system().devices[CARD]
+    factory = card.self_cal_last_date_and_time
+    system._interpreter.self_cal(CARD)
+    with rig.bench.changed:
+        now = rig.bench.utc(rig.bench.clock.now())
+    assert factory < card.self_cal_last_date_and_time
+    assert abs(card.self_cal_last_date_and_time.replace(tzinfo=dt.UTC) - now) < dt.timedelta(minutes=2)
+    assert rig.system().devices["cDAQ1Mod1"].self_cal_last_date_and_time == factory

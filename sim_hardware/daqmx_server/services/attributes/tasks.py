@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from typing import Any, Final
+from weakref import WeakKeyDictionary
 
 from nidaqmx import constants
 from nidaqmx.constants import Edge, ReadRelativeTo, SampleTimingType
 
 from sim_hardware.daqmx_server.bench.bench import Bench
-from sim_hardware.daqmx_server.errors import Code
+from sim_hardware.daqmx_server.channels import metadata
+from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.inventory.devices import channel_list
 from sim_hardware.daqmx_server.inventory.terminals import full_name
 from sim_hardware.daqmx_server.services.attributes.groups import unsupported
@@ -61,8 +63,29 @@ def line_bytes(task: Task) -> int:
     return max((len(channel.lines) for channel in task.channels), default=0)
 
 
+_EXIST: Final = "_EXIST"
+
+
 class _ReadGroup(SettingsGroup):
-    """Attributes of reading; a strict driver refuses some while it logs."""
+    """Attributes of reading; a strict driver refuses some while it logs.
+
+    Which channels have a fault is told only after the question whether any has (−201194).
+    """
+
+    def __init__(self, *arguments: Any, **keywords: Any) -> None:
+        super().__init__(*arguments, **keywords)
+        self._asked: WeakKeyDictionary[Task, set[str]] = WeakKeyDictionary()
+
+    def get(self, bench: Bench, request: Any, name: str) -> Any:
+        task = task_named(bench, request.task.name)
+        known = self._asked.setdefault(task, set())
+        question = f"{name.removesuffix('_DETAILS')}{_EXIST}"
+        if question in metadata.attributes_of("Read") and question not in known:
+            raise DaqmxError(Code.TWO_PART_ORDER, f"Property: DAQmx_Read_{name}")
+        value = super().get(bench, request, name)
+        if name.endswith(_EXIST):
+            known.add(name)
+        return value
 
     def set(self, bench: Bench, request: Any, name: str, value: Any) -> None:
         if name in ("OVERWRITE", "RELATIVE_TO", "OFFSET"):

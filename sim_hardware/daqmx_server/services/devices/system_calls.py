@@ -26,7 +26,7 @@ def _device(bench: Bench, name: str) -> Device:
 
 
 def device_handler(rpc: str) -> Handler:
-    """Calls that only need the device to be there; a reset aborts its tasks."""
+    """Calls that only need the device to be there; a reset aborts its tasks, a calibration has a date."""
     reply = getattr(pb, f"{rpc}Response")
 
     def call(bench: Bench, request: Any) -> Any:
@@ -35,6 +35,8 @@ def device_handler(rpc: str) -> Handler:
             for task in tasks_of(bench):
                 if device.name in (*task.devices, *task.hosts):
                     task.abort()
+        if rpc == "SelfCal":
+            bench.self_calibrated[device.name] = bench.utc(bench.clock.now())
         return reply()
 
     return call
@@ -44,8 +46,12 @@ def _calibration_date(rpc: str) -> Handler:
     reply = getattr(pb, f"{rpc}Response")
 
     def call(bench: Bench, request: Any) -> Any:
-        _device(bench, request.device_name)
-        return reply(**_CALIBRATED)
+        device = _device(bench, request.device_name)
+        done = bench.self_calibrated.get(device.name) if rpc == "GetSelfCalLastDateAndTime" else None
+        if done is None:
+            return reply(**_CALIBRATED)
+        names = ("year", "month", "day", "hour", "minute")
+        return reply(**{name: getattr(done, name) for name in names})
 
     return call
 
