@@ -29,9 +29,12 @@ class TdmsLog:
         self._writer: TdmsWriter | None = None
         self._part = 0
         self._written = 0
+        self._was_paused = False
         self._group = ""
+        self._groups: set[str] = set()
+        """Groups that the open file has already."""
         self._begin: int | None = None
-        """Sample that the open file begins with: its `wf_start_offset`, which every segment repeats."""
+        """Sample that the group begins with: its `wf_start_offset`, which every segment repeats."""
 
     @property
     def enabled(self) -> bool:
@@ -55,7 +58,6 @@ class TdmsLog:
     def _open(self, path: Path) -> None:
         self.close()
         self._written = 0
-        self._begin = None
         operation = self._settings.get("LOGGING_TDMS_OPERATION", LoggingOperation.OPEN_OR_CREATE.value)
         if operation == LoggingOperation.CREATE.value and path.exists():
             raise _bad_path(path, "the file exists already")
@@ -64,16 +66,21 @@ class TdmsLog:
         appends = operation in _OPENS_EXISTING and path.exists()
         mode = "a" if appends else "w"
         try:
-            self._group = _free_group(path if appends else None, self._asked_group)
+            self._groups = _groups_in(path) if appends else set()
+            self._begin_group()
             self._writer = TdmsWriter(str(path), mode=mode)
             self._writer.open()
         except (OSError, ValueError) as error:
             self._writer = None
             raise _bad_path(path, str(error)) from error
 
-    @property
-    def _asked_group(self) -> str:
-        return str(self._settings.get("LOGGING_TDMS_GROUP_NAME") or "Task")
+    def _begin_group(self) -> None:
+        """A group that the file does not have yet: ``NAME``, ``NAME #1`` …, as NI's driver appends runs."""
+        name = str(self._settings.get("LOGGING_TDMS_GROUP_NAME") or "Task")
+        numbered = (f"{name} #{number}" for number in itertools.count(1))
+        self._group = next(free for free in itertools.chain([name], numbered) if free not in self._groups)
+        self._groups.add(self._group)
+        self._begin = None
 
     def write(
         self,
@@ -84,11 +91,18 @@ class TdmsLog:
         rate_hz: float,
         start: dt.datetime,
     ) -> None:
-        """Append a block (channels × samples) that begins with sample `first`; sample 0 is at `start`."""
+        """Append a block (channels × samples) that begins with sample `first`; sample 0 is at `start`.
+
+        What comes after a pause gets a group of its own.
+        """
         if self._settings.get("LOGGING_PAUSE", False):
+            self._was_paused = True
             return
         if self._writer is None:
             self.open()
+        elif self._was_paused and self._begin is not None:
+            self._begin_group()
+        self._was_paused = False
         begin = 0
         while begin < values.shape[1]:
             end = min(begin + self._room(), values.shape[1])
@@ -141,13 +155,8 @@ class TdmsLog:
             self._writer = None
 
 
-def _free_group(path: Path | None, name: str) -> str:
-    """A group that a file does not have yet: ``NAME``, ``NAME #1`` …, as NI's driver appends runs."""
-    if path is None:
-        return name
-    there = {group.name for group in TdmsFile.read_metadata(path).groups()}
-    numbered = (f"{name} #{number}" for number in itertools.count(1))
-    return next(free for free in itertools.chain([name], numbered) if free not in there)
+def _groups_in(path: Path) -> set[str]:
+    return {group.name for group in TdmsFile.read_metadata(path).groups()}
 
 
 def _bad_path(path: Path, reason: str) -> DaqmxError:

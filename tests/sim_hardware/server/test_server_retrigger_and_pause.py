@@ -195,6 +195,21 @@ def test_a_second_task_appends_to_a_file_in_a_group_of_its_own(rig: Rig, tmp_pat
         assert {group.name: len(group.channels()[0]) for group in tdms.groups()} == {"g": 100, "g #1": 100}
 
 
+def test_what_is_logged_after_a_pause_has_a_group_and_an_offset_of_its_own(rig: Rig, tmp_path: Path) -> None:
+    with rig.task() as task:
+        task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
+        continuous(task, RATE)
+        _log(task, tmp_path / "a.tdms", LoggingMode.LOG_AND_READ)
+        for paused in (False, True, False, False):
+            task.in_stream.logging_pause = paused
+            task.read(50)
+    with TdmsFile.open(tmp_path / "a.tdms") as tdms:
+        (first,), (second,) = (tdms[name].channels() for name in ("g", "g #1"))
+        assert (len(first), len(second)) == (50, 100)
+        assert second.properties["wf_start_offset"] == pytest.approx(100 / RATE)
+        assert _is_near(np.asarray(second[:]), 100 / RATE, 100)
+
+
 def test_a_task_without_a_clock_cannot_log(rig: Rig, tmp_path: Path) -> None:
     with rig.task() as task:
         task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
