@@ -2,7 +2,7 @@
 
 ``python .ci/make_folder.py FOLDER`` copies the Python that runs this script, installs the program of this
 checkout into the copy with the pinned versions, compiles the simulated wall ahead, and writes what starts it:
-``daq-app``, a shortcut, and ``add-shortcut``, which puts one into the menu. Run it on the system that the
+``daq-app``, the window by a double click, and ``add-shortcut`` for the menu. Run it on the system that the
 folder is for, Linux or Windows.
 """
 

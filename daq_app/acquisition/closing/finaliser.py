@@ -77,7 +77,7 @@ class Finaliser(threading.Thread):
         while (entry := self._jobs.get()) is not None:
             job, done = entry
             done.set_result(until_memory(partial(self._worker.do, job)))
-        self._worker.end()
+        until_memory(self._worker.end)
 
     def close(self) -> None:
         """Finish what must be saved (recovery can wait for the next start), then end the workers."""
@@ -107,7 +107,7 @@ class _Recovery:
             do = partial(Finished, True, "") if self._closing else partial(self._worker.do, job)
             done.set_result(until_memory(do))
             if self._jobs.empty():
-                self._worker.end()
+                until_memory(self._worker.end)
 
     def close(self) -> None:
         """Let the job that is being done end, but not for long: its journal is untouched all the same."""
