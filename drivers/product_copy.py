@@ -121,7 +121,7 @@ def _table(device: nidaqmx.system.Device, way: Connection) -> dict[str, Any]:
     return table | {key: part for key, part in parts.items() if part}
 
 
-def told(ask: Callable[[], Any], otherwise: Any) -> Any:
+def _told(ask: Callable[[], Any], otherwise: Any) -> Any:
     """An attribute, or something else where the device does not have it."""
     try:
         return ask()
@@ -136,9 +136,9 @@ def _inputs(device: nidaqmx.system.Device, way: Connection, bus: str) -> dict[st
     ranges = _ranges(device, "ai", _QUANTITIES)
     usages = [usage.name for usage in device.ai_meas_types]
     found = probe(way, names[0], usages, ranges)
-    simultaneous = bool(told(lambda: device.ai_simultaneous_sampling_supported, True))
-    rate = float(told(lambda: device.ai_max_single_chan_rate, 0.0))
-    slowest = float(told(lambda: device.ai_min_rate, 0.0))
+    simultaneous = bool(_told(lambda: device.ai_simultaneous_sampling_supported, True))
+    rate = float(_told(lambda: device.ai_max_single_chan_rate, 0.0))
+    slowest = float(_told(lambda: device.ai_min_rate, 0.0))
     divides = bus != "cdaq" or slowest >= _SLOWEST_DELTA_SIGMA_HZ
     table: dict[str, Any] = {
         "n": len(names),
@@ -150,19 +150,19 @@ def _inputs(device: nidaqmx.system.Device, way: Connection, bus: str) -> dict[st
         "measures": _measures(usages),
     }
     if not simultaneous:
-        table["aggregate_rate_hz"] = float(told(lambda: device.ai_max_multi_chan_rate, rate))
+        table["aggregate_rate_hz"] = float(_told(lambda: device.ai_max_multi_chan_rate, rate))
     if table["converter"] == "delta_sigma" and bus == "cdaq":
         table["delta_sigma"] = _clock(found, rate, slowest)
     elif table["converter"] != "delta_sigma" and bus != "cdaq":
         table["timebase_hz"] = found.timebase_hz
-    currents = list(map(float, told(lambda: device.ai_current_int_excit_discrete_vals, [])))
-    volts = list(map(float, told(lambda: device.ai_voltage_int_excit_range_vals, [])))
+    currents = list(map(float, _told(lambda: device.ai_current_int_excit_discrete_vals, [])))
+    volts = list(map(float, _told(lambda: device.ai_voltage_int_excit_range_vals, [])))
     optional = {"iepe_currents_a": currents, "excitation_v": volts[:2], "teds": _asks_sensors(device)}
     return table | {key: value for key, value in optional.items() if value}
 
 
 def _asks_sensors(device: nidaqmx.system.Device) -> bool:
-    return bool(told(lambda: device.hwteds_supported, False))
+    return bool(_told(lambda: device.hwteds_supported, False))
 
 
 def _ranges(
@@ -171,7 +171,7 @@ def _ranges(
     """Electrical quantity → ranges as pairs of their ends, for the quantities that the device has."""
     ranges: dict[str, list[list[float]]] = {}
     for quantity in quantities:
-        pairs = _pairs(told(partial(getattr, device, f"{io}_{quantity}_rngs"), []))
+        pairs = _pairs(_told(partial(getattr, device, f"{io}_{quantity}_rngs"), []))
         if pairs:
             ranges[quantity] = pairs
     return ranges
@@ -212,7 +212,7 @@ def _terminals(device: nidaqmx.system.Device, names: Sequence[str]) -> dict[str,
     for place, name in enumerate(names):
         number = re.search(r"/ai(\d+)$", name)
         terminal = device.ai_physical_chans[name.partition("/")[2]]
-        for config in told(partial(getattr, terminal, "ai_term_cfgs"), [TerminalConfiguration.DIFF]):
+        for config in _told(partial(getattr, terminal, "ai_term_cfgs"), [TerminalConfiguration.DIFF]):
             having.setdefault(config.name, []).append(int(number[1]) if number else place)
     return {config: _runs(numbers) for config, numbers in having.items()}
 
@@ -236,7 +236,7 @@ def _outputs(device: nidaqmx.system.Device, way: Connection) -> dict[str, Any]:
         "n": len(names),
         "bits": probe(way, names[0], [], ranges).bits,
         "ranges": ranges,
-        "max_rate_hz": float(told(lambda: device.ao_max_rate, 0.0)),
+        "max_rate_hz": float(_told(lambda: device.ao_max_rate, 0.0)),
     }
 
 
@@ -248,7 +248,7 @@ def _ports(device: nidaqmx.system.Device) -> dict[str, Any]:
         widths[port] = widths.get(port, 0) + 1
     if not widths:
         return {}
-    rates = [told(lambda: device.di_max_rate, 0.0), told(lambda: device.do_max_rate, 0.0)]
+    rates = [_told(lambda: device.di_max_rate, 0.0), _told(lambda: device.do_max_rate, 0.0)]
     return {
         "ports": list(widths.values()),
         "max_rate_hz": float(max(rates)),
@@ -263,6 +263,6 @@ def _counters(device: nidaqmx.system.Device) -> dict[str, Any]:
         return {}
     return {
         "n": count,
-        "bits": int(told(lambda: device.ci_max_size, 32)),
-        "max_rate_hz": float(told(lambda: device.ci_max_timebase, 0.0)),
+        "bits": int(_told(lambda: device.ci_max_size, 32)),
+        "max_rate_hz": float(_told(lambda: device.ci_max_timebase, 0.0)),
     }

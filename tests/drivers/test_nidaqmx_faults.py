@@ -13,56 +13,11 @@ from nidaqmx.errors import RpcError
 
 from daq_app.config import PlannedChannel
 from daq_app.config.planning.plan import PlannedTask, TaskPlan
-from drivers import Block, Driver, DriverError, open_driver
+from drivers import Driver, DriverError, open_driver
 from drivers.error_advice import BY_CODE, BY_GRPC_STATUS, advice_for, translate
-from sim_hardware.daqmx_server.services.attributes.tasks import READ
+from tests.support.driver_reads import assert_true_samples, lost, read_through, started
 
 Laboratories = Callable[..., Any]
-
-
-def started(lab: Any) -> Driver:
-    driver = open_driver(lab.connection)
-    driver.open(lab.plan)
-    driver.start()
-    return driver
-
-
-def assert_true_samples(lab: Any, block: Block) -> None:
-    """Every sample of channel 0 is the one that its index says."""
-    samples = block.first_sample + np.arange(block.n_samples)
-    expected = 0.01 + 0.01 * samples / lab.plan.rate_hz
-    assert np.abs(block.readings[0] - expected).max() < 4e-4
-
-
-def read_through(driver: Driver, lab: Any, until: int) -> tuple[list[Block], list[DriverError]]:
-    """Read as the acquisition does: keep partial data, try again, recover."""
-    blocks: list[Block] = []
-    errors: list[DriverError] = []
-    while not blocks or blocks[-1].first_sample + blocks[-1].n_samples < until:
-        try:
-            blocks.append(driver.read(2.0))
-        except DriverError as error:
-            errors.append(error)
-            assert len(errors) < 50, error
-            if error.partial is not None:
-                blocks.append(error.partial)
-            if error.recoverable:
-                driver.recover()
-            elif not error.retryable:
-                raise
-    for block in blocks:
-        assert_true_samples(lab, block)
-    return blocks, errors
-
-
-def lost(blocks: list[Block]) -> int:
-    end = 0
-    missing = 0
-    for block in blocks:
-        assert block.first_sample >= end
-        missing += block.first_sample - end
-        end = block.first_sample + block.n_samples
-    return missing
 
 
 def test_a_device_that_is_missing_is_named_with_those_that_are_there(laboratory: Laboratories) -> None:
@@ -400,83 +355,6 @@ def test_a_channel_that_the_module_lacks_is_told_as_such(laboratory: Laboratorie
     assert caught.value.code == -200170
     assert "does not exist" in str(caught.value)
     assert lab.open_tasks == 0
-    driver.close()
-
-
-def test_the_native_second_recorder_writes_only_while_asked(laboratory: Laboratories, tmp_path: Path) -> None:
-    lab = laboratory()
-    driver = open_driver(lab.connection, backup_folder=tmp_path)
-    driver.open(lab.plan)
-    driver.start()
-    driver.read(1.0)
-    (path,) = driver.start_backup("FR1-L3-2")
-    first = driver.read(1.0)
-    second = driver.read(1.0)
-    driver.stop_backup()
-    driver.read(1.0)
-    driver.close()
-    from nptdms import TdmsFile
-
-    with TdmsFile.open(path) as file:
-        (group,) = file.groups()
-        kept = group.channels()[0][:]
-    expected = np.concatenate([first.readings[0], second.readings[0]])
-    assert np.allclose(kept, expected, atol=1e-9)
-
-
-def logging_driver(lab: Any, folder: Path) -> Driver:
-    """A driver with the second recorder, over an NI-DAQmx that is strict about attributes while it logs."""
-    lab.break_something("strict_logging", "cDAQ1")
-    driver = open_driver(lab.connection, backup_folder=folder)
-    driver.open(lab.plan)
-    driver.start()
-    return driver
-
-
-def test_where_logging_excludes_seeking_a_reply_cut_short_is_a_gap(
-    laboratory: Laboratories, tmp_path: Path
-) -> None:
-    lab = laboratory()
-    driver = logging_driver(lab, tmp_path)
-    lab.break_something("reply_cut_short")
-
-    blocks, errors = read_through(driver, lab, 8000)
-
-    assert len(errors) == 1
-    assert lost(blocks) == lab.plan.read_samples
-    driver.close()
-
-
-def test_a_device_that_cannot_seek_while_it_runs_is_read_on_with_a_gap(
-    laboratory: Laboratories, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(READ, "_while_running", frozenset())  # the server refuses with −200557
-    lab = laboratory()
-    driver = started(lab)
-    lab.break_something("reply_cut_short")
-
-    blocks, errors = read_through(driver, lab, 8000)
-
-    assert len(errors) == 1
-    assert lost(blocks) == lab.plan.read_samples
-    driver.close()
-
-
-def test_where_logging_excludes_overwriting_a_full_buffer_means_a_new_start(
-    laboratory: Laboratories, tmp_path: Path
-) -> None:
-    lab = laboratory()
-    driver = logging_driver(lab, tmp_path)
-    for _ in range(30):
-        last = driver.read(1.0)
-    with lab.bench.changed:
-        lab.bench.clock.skip(60.0)
-    with pytest.raises(DriverError) as caught:
-        driver.read(1.0)
-    assert (caught.value.code, caught.value.recoverable) == (-200279, True)
-
-    assert "started again" in driver.recover()
-    assert driver.read(1.0).first_sample >= last.first_sample + last.n_samples
     driver.close()
 
 

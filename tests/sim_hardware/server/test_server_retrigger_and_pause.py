@@ -139,6 +139,17 @@ def _logged(file: Path) -> np.ndarray:
         return np.asarray(tdms["g"].channels()[0][:])
 
 
+def _log_in_files_of_100(rig: Rig, folder: Path, *, read: int) -> None:
+    """Five reads of so many samples of a continuous task that logs and reads."""
+    with rig.task() as task:
+        task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
+        continuous(task, RATE)
+        _log(task, folder / "a.tdms", LoggingMode.LOG_AND_READ)
+        task.in_stream.logging_samps_per_file = 100
+        for _ in range(5):
+            task.read(read)
+
+
 def test_in_the_mode_log_the_samples_go_to_the_file_alone(rig: Rig, tmp_path: Path) -> None:
     with _voltage(rig, 500) as task:
         _log(task, tmp_path / "a.tdms", LoggingMode.LOG)
@@ -152,13 +163,7 @@ def test_in_the_mode_log_the_samples_go_to_the_file_alone(rig: Rig, tmp_path: Pa
 
 
 def test_a_file_of_so_many_samples_is_followed_by_another(rig: Rig, tmp_path: Path) -> None:
-    with rig.task() as task:
-        task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
-        continuous(task, RATE)
-        _log(task, tmp_path / "a.tdms", LoggingMode.LOG_AND_READ)
-        task.in_stream.logging_samps_per_file = 100
-        for _ in range(5):
-            task.read(50)
+    _log_in_files_of_100(rig, tmp_path, read=50)
     names = ["a.tdms", "a_0001.tdms", "a_0002.tdms"]
     files = [_logged(tmp_path / name) for name in names]
     assert sorted(path.name for path in tmp_path.glob("*.tdms")) == names
@@ -168,13 +173,7 @@ def test_a_file_of_so_many_samples_is_followed_by_another(rig: Rig, tmp_path: Pa
 
 def test_a_file_tells_when_its_first_sample_was_taken(rig: Rig, tmp_path: Path) -> None:
     """Whatever the reads: each file's offset is the one of the sample that it begins with."""
-    with rig.task() as task:
-        task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
-        continuous(task, RATE)
-        _log(task, tmp_path / "a.tdms", LoggingMode.LOG_AND_READ)
-        task.in_stream.logging_samps_per_file = 100
-        for _ in range(5):
-            task.read(30)
+    _log_in_files_of_100(rig, tmp_path, read=30)
     told = []
     for name in ("a.tdms", "a_0001.tdms"):
         with TdmsFile.open(tmp_path / name) as tdms:
