@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 from typer.testing import CliRunner
 
 from daq_app.campaign.recorded import read_recorded
+from daq_app.campaign.result.result import NoResult, level_of
 from daq_app.campaign.status import TestVerdict
 from daq_app.campaign.verdicts import give_verdict
 from daq_app.cli.app import build_app
@@ -49,3 +52,9 @@ def test_an_armed_test_keeps_the_name_it_was_armed_for(tmp_path: Path) -> None:
     done = CliRunner().invoke(build_app(), ["campaign", "assign", str(run), "FR1-L3-2"])
     assert done.exit_code != 0
     assert str(read_recorded(tmp_path)[0].name) == "FR1-L1-1"
+
+
+def test_who_looks_for_its_result_is_told_to_give_it_a_place(tmp_path: Path) -> None:
+    run = run_file(tmp_path, kept=True)
+    with pytest.raises(NoResult, match=f"campaign assign {re.escape(str(run))} NAME"):
+        level_of(run)

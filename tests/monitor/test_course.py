@@ -132,6 +132,32 @@ def test_arming_and_release_bring_the_gauge_and_live_stays_where_it_was_chosen(l
         window._after(StateMessage(state=State.PREVIEWING))
 
 
+@pytest.mark.parametrize("state", [State.HOLDING, State.ROCKING, State.AT_REST])
+def test_a_window_that_comes_during_a_test_has_the_gauge_in_front(live_window, state):
+    live_window._after(StateMessage(state=state))
+    assert live_window.stack.currentWidget() is live_window.test
+
+
+@pytest.mark.parametrize(
+    ("name", "made", "waits"),
+    [("FR1-L1-1_1.h5", False, True), ("FR1-L1-1_1.h5", True, False), ("unarmed_1.h5", False, False)],
+)
+def test_the_result_is_waited_for_only_where_the_recorder_will_tell_of_it(
+    live_window, tmp_path, monkeypatch, name, made, waits
+):
+    opened = []
+    monkeypatch.setattr(live_window.result, "open", lambda run, *, soon: opened.append(soon))
+    monkeypatch.setattr(live_window.replay, "open", lambda run: None)
+    live_window.adoption.makes_results = True
+    run = tmp_path / name
+    run.touch()
+    if made:
+        run.with_suffix(".result.json").touch()
+    look = Judgement(call=Call.LOOK, word="Saved", do="Look", tone="good")
+    live_window._after(StateMessage(state=State.SAVED, run_path=str(run), judgement=look))
+    assert opened == [waits]
+
+
 def test_the_full_screen_opens_gives_orders_and_goes_back(qtbot, live_window, clock):
     from PySide6.QtCore import Qt
 

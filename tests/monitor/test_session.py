@@ -10,6 +10,7 @@ import pytest
 from daq_app.acquisition.messages.published import (
     BlockMessage,
     EstimateMessage,
+    EventMessage,
     HealthMessage,
     MotionMessage,
     State,
@@ -64,6 +65,31 @@ def test_arming_forgets_the_estimate_of_the_last_test(session, clock, stand_in, 
     session.feed(Published(StateMessage(state=State.ARMED, test="FR1-L3-3"), clock.now))
     assert session.estimate is None
     assert session.peak_rotation_rad == 0.0
+
+
+@pytest.mark.parametrize("comes_later", [False, True])
+def test_a_release_that_nobody_armed_counts_its_own_seconds(session, clock, comes_later):
+    """Neither what is safe on disk nor the largest rotation is that of the test before."""
+    session.adopt_past([EventMessage(kind="armed", sample=400, text="Armed for FR1-L3-3")])
+    if not comes_later:
+        session.feed(Published(StateMessage(state=State.ARMED, armed=True, since_sample=400), clock.now))
+        moved = MotionMessage(
+            first_sample=400, step=1, rate_hz=4000.0, rotation_rad=[0.1], velocity_rad_s=[0.0], judged_rad=0.1
+        )
+        session.feed(Published(moved, clock.now))
+        session.feed(Published(StateMessage(state=State.SAVED), clock.now))
+    for state in (State.RELEASED, State.ROCKING) if not comes_later else (State.ROCKING,):
+        session.feed(Published(StateMessage(state=state, since_sample=800_000), clock.now))
+    session.feed(Published(health(sample=812_000, acknowledged_sample=812_000), clock.now))
+    assert session.safe_s == pytest.approx(3.0)
+    assert session.peak_rotation_rad == 0.0
+
+
+def test_a_wall_that_is_caught_goes_on_with_the_same_run(session, clock):
+    for state, sample in ((State.ARMED, 400), (State.RELEASED, 40_000), (State.ARMED, 41_000)):
+        session.feed(Published(StateMessage(state=state, armed=True, since_sample=sample), clock.now))
+    session.feed(Published(health(sample=80_400, acknowledged_sample=80_400), clock.now))
+    assert session.safe_s == pytest.approx(20.0)
 
 
 def health(**changes):

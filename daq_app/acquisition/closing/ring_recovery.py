@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from daq_app.acquisition.closing.finaliser import Finished
 from daq_app.acquisition.course.sequence import Change, Sequence
-from daq_app.acquisition.course.unarmed import KEPT_BEFORE_S, UNARMED
+from daq_app.acquisition.course.unarmed import KEPT_BEFORE_S
 from daq_app.acquisition.course.unheld_release import UnheldReleaseWatch
 from daq_app.acquisition.messages.items import End
+from daq_app.acquisition.messages.published import UNARMED
 from daq_app.acquisition.pipeline.ring import ring_sessions
 from daq_app.config import Rig
 from daq_app.rocking import LiveAnalyser

@@ -22,7 +22,7 @@ from daq_app.acquisition.course.sequence import Change
 from daq_app.acquisition.course.sequence import Sequence as Course
 from daq_app.acquisition.course.surrounding import Surrounding
 from daq_app.acquisition.course.tare import Tare
-from daq_app.acquisition.course.unarmed import SETTLE_S, UNARMED, from_the_release, gives_way
+from daq_app.acquisition.course.unarmed import SETTLE_S, from_the_release, gives_way
 from daq_app.acquisition.course.voice.hold_clock import HoldClock
 from daq_app.acquisition.course.voice.judgement import PULLED, Situation
 from daq_app.acquisition.course.voice.state_voice import REPEAT_S, StateVoice
@@ -40,7 +40,7 @@ from daq_app.acquisition.messages.items import (
     SourceEnded,
     Started,
 )
-from daq_app.acquisition.messages.published import CheckMessage, EventMessage, State
+from daq_app.acquisition.messages.published import UNARMED, CheckMessage, EventMessage, State
 from daq_app.acquisition.messages.publisher import Publisher
 from daq_app.config.rig import Rig
 from daq_app.rocking.motion.phases import PhaseEvent
@@ -99,7 +99,8 @@ class Analyst(threading.Thread):
             try:
                 item = self.inbox.get(timeout=REPEAT_S)
             except queue.Empty:
-                self.voice.repeat()
+                with contextlib.suppress(MemoryError):
+                    self._judge(force=True)
                 continue
             if item is None:
                 return
@@ -252,8 +253,7 @@ class Analyst(threading.Thread):
 
     def _on_begin(self, begin: Begin) -> None:
         assert self._opened is not None
-        self.voice.run_path = ""
-        self._aborted = False
+        self.voice.run_path, self._aborted = "", False
         if begin.kept:
             self._tell_standing()
             return
@@ -270,8 +270,7 @@ class Analyst(threading.Thread):
             self._rig.acquisition, self._opened.rate_hz, self.voice.sample, self._release_within_s
         )
         self._go(State.ARMED, f"Armed for {self.voice.test}; recording", self.voice.sample)
-        held = self._live.held_since if self._live is not None else None
-        if held is not None:
+        if self._live is not None and (held := self._live.held_since) is not None:
             self._follow(
                 self._sequence, [PhaseEvent("hold", held, self.voice.sample, 0.0, "held still already")]
             )
@@ -379,6 +378,7 @@ class Analyst(threading.Thread):
         return Situation(
             state=self.state,
             sampling=opened is not None,
+            opening=self._around.opening(),
             armed=course is not None and course.armed,
             plan=self.voice.plan,
             rotation_rad=rotation,

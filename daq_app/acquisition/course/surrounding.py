@@ -24,6 +24,8 @@ class Surrounding:
     """Begin to record a test; raises `RequestRefused`."""
     keep: Callable[[int, Tare], None]
     """Record the release at that sample, which nobody armed, from some time before it."""
+    opening: Callable[[], bool]
+    """Whether the device is being opened and started."""
     disk_safe: Callable[[], bool]
     """Whether samples of the run reach a disk."""
     free_bytes: Callable[[], int]

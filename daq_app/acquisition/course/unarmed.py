@@ -9,8 +9,6 @@ from daq_app.acquisition.course.sequence import Sequence as Course
 from daq_app.acquisition.messages.published import State
 from daq_app.rocking.motion.phases import PhaseEvent
 
-UNARMED: Final = "unarmed"
-"""Stands for the test's name in the run of a release that nobody armed."""
 KEPT_BEFORE_S: Final = 60.0
 """How much lies before such a release in its run, as far as the rig's ring_s allows, s."""
 SETTLE_S: Final = 2.0

@@ -9,7 +9,7 @@ REQ/REP socket as one JSON frame `Command` → `Reply`.
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Literal
+from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict
 
@@ -34,6 +34,9 @@ class State(StrEnum):
 
 RECORDING = frozenset({State.ARMED, State.HOLDING, State.RELEASED, State.ROCKING, State.AT_REST})
 """States in which an armed run is written."""
+
+UNARMED: Final = "unarmed"
+"""Stands for the test's name in the run of a release that nobody armed."""
 
 
 class Message(BaseModel):

@@ -78,6 +78,8 @@ class Reader(threading.Thread):
         self._recoveries = 0
         self._loss_reason = "samples never arrived"
         self._last_arrival_s = time.monotonic()
+        self.opening = True
+        """The device is being opened and started; a simulated one takes its time."""
         self.backlog_samples = 0
         """Samples per channel that waited in the device's buffer after the last read."""
         self.buffer_samples = 0
@@ -119,6 +121,7 @@ class Reader(threading.Thread):
             if math.isfinite(self._speed):
                 self._clock_watch = ClockWatch(opened.rate_hz, self._speed)
             self._sink(Started(opened))
+            self.opening = False
             self._read_on(driver)
         except DriverError as caught:
             error = caught
@@ -131,6 +134,7 @@ class Reader(threading.Thread):
             if driver is not None:
                 _close(driver)
             self._fail_requests()
+            self.opening = False
             self._sink(SourceEnded(error))
 
     def _read_on(self, driver: Driver) -> None:

@@ -81,6 +81,8 @@ class RunRecording:
         """
         self.recorded: Recorded | None = None
         self._begin = begin
+        self._begun_s = time.perf_counter()
+        """What was read before the order could not be on its disk earlier."""
         self._spares = tuple(spares)
         self._status = status
         self._latency = latency
@@ -216,7 +218,7 @@ class RunRecording:
         now = time.perf_counter()
         for piece in self._unwritten.acknowledged(journal.acknowledged_frames):
             if isinstance(piece, Arrived):
-                self._latency.add(now - piece.arrived_s)
+                self._latency.add(now - max(piece.arrived_s, self._begun_s))
         if self._alarm and not self._unwritten.waits:
             kind, self._alarm = _kind_of(self._alarm), ""
             again = "The disk takes data again" if kind == "disk" else "Samples are written again"

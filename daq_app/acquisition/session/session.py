@@ -17,7 +17,7 @@ from daq_app.acquisition.course.header import make_header
 from daq_app.acquisition.course.preflight import check_name, check_space
 from daq_app.acquisition.course.surrounding import Surrounding
 from daq_app.acquisition.course.tare import Tare
-from daq_app.acquisition.course.unarmed import KEPT_BEFORE_S, UNARMED
+from daq_app.acquisition.course.unarmed import KEPT_BEFORE_S
 from daq_app.acquisition.messages.items import (
     Ask,
     Begin,
@@ -29,7 +29,7 @@ from daq_app.acquisition.messages.items import (
     SourceEnded,
     Started,
 )
-from daq_app.acquisition.messages.published import EventMessage, State
+from daq_app.acquisition.messages.published import UNARMED, EventMessage, State
 from daq_app.acquisition.messages.publisher import Publisher
 from daq_app.acquisition.pipeline.reader import Patience, Reader
 from daq_app.acquisition.pipeline.recent import Recent
@@ -102,6 +102,7 @@ class Session:
                 hurry=self._hurry,
                 arm=self._begin,
                 keep=self._keep,
+                opening=lambda: self._reader is not None and self._reader.opening,
                 disk_safe=self._disk_safe,
                 free_bytes=lambda: self.watchdog.free_bytes,
             ),

@@ -24,7 +24,7 @@ from daq_app.config import ConfigError
 from daq_app.extras import missing_extra
 from daq_app.rocking.analysis.plain import plain
 from daq_app.rocking.families.verdict import FamilyView, RVerdict
-from daq_app.runfile import RunFileError
+from daq_app.runfile import RunFileError, open_run
 from daq_app.runfile.durable import write_whole
 
 SUFFIX: Final = ".result.json"
@@ -119,7 +119,7 @@ def level_of(run: Path) -> tuple[RecordedTest, list[RecordedTest]]:
         raise NoResult(str(error)) from error
     this = next((test for test in recorded if test.path is not None and test.path.name == run.name), None)
     if this is None:
-        raise NoResult(f"{run.name} holds no release of a named test: there is no result to show")
+        raise NoResult(_belongs_nowhere(run))
     name: TestName = this.name
     others = [
         test
@@ -129,6 +129,21 @@ def level_of(run: Path) -> tuple[RecordedTest, list[RecordedTest]]:
         and test.verdict is not TestVerdict.LOST
     ]
     return this, sorted(others, key=lambda test: test.released_ns)
+
+
+def _belongs_nowhere(run: Path) -> str:
+    """Why a run is no test of the campaign, and what to do about it."""
+    try:
+        with open_run(run) as opened:
+            kept = opened.header.kept is not None
+    except RunFileError as error:
+        return str(error)
+    if kept:
+        return (
+            f"Nobody had armed this release: {run.name} belongs to no test yet. To give it its place: "
+            f"daq-app campaign assign {run} NAME, where NAME is the test that it is"
+        )
+    return f"{run.name} holds no release of a named test: there is no result to show"
 
 
 def load_result(run: Path) -> Result | None:

@@ -164,19 +164,25 @@ class Session:
     def _on_state(self, message: StateMessage) -> None:
         before = self.state
         self.state = message
-        if message.state is State.ARMED and (before is None or before.state is not State.ARMED):
-            self.estimate = self.last_motion = None
-            for means in self._running.values():
-                means.clear()  # the lines of the last test are not this one's
-            self._peak_rad = 0.0
-            self._rest_sample = None
-            self._armed_sample = message.since_sample
-            self.saw_arming = True
-            self.run_zeroed = self.zeroed
+        if _begins(before, message):
+            self._on_begin(message.since_sample)
+            self.saw_arming = message.state is State.ARMED
+        elif before is None and message.state in RECORDING and not message.armed:
+            self._armed_sample = message.since_sample  # the arming that was told is that of an older run
         if before is not None and before.state in RECORDING and message.state not in RECORDING:
             self._keep_motion()
         if message.state is State.AT_REST and self._rest_sample is None:
             self._rest_sample = message.since_sample
+
+    def _on_begin(self, sample: int) -> None:
+        """A run begins: figures and lines of the last one are not this one's."""
+        self.estimate = self.last_motion = None
+        for means in self._running.values():
+            means.clear()
+        self._peak_rad = 0.0
+        self._rest_sample = None
+        self._armed_sample = sample
+        self.run_zeroed = self.zeroed
 
     def _keep_motion(self) -> None:
         """The run has ended: what it showed stays, however long the window stays open."""
@@ -370,3 +376,11 @@ class Session:
             if have >= wanted > 0:
                 return np.concatenate(pieces[::-1], axis=1)[:, -wanted:]
         return None
+
+
+def _begins(before: StateMessage | None, now: StateMessage) -> bool:
+    """Whether a test is armed, or a release that nobody armed begins to be kept."""
+    recorded = before is not None and before.state in RECORDING
+    if now.state is State.ARMED:
+        return before is None or not (recorded and before.armed)
+    return before is not None and not recorded and now.state in RECORDING and not now.armed

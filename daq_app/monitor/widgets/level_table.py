@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHeaderView, QTableWidget, QTableWidgetItem, QWidget
 
 from daq_app.campaign.result.result import Result
@@ -29,8 +30,8 @@ class LevelTable(QTableWidget):
         self.setShowGrid(False)
         header = self.horizontalHeader()
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        header.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-        header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setStretchLastSection(True)
         self.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
         self._colours = DARK
         self._fit()
@@ -52,7 +53,14 @@ class LevelTable(QTableWidget):
         """As high as its rows need, up to some."""
         self.verticalHeader().setDefaultSectionSize(self._colours.px(_ROW_PX))
         rows = min(self.rowCount(), _VISIBLE_ROWS)
-        self.setFixedHeight(self._colours.px(_HEADER_PX + _ROW_PX * rows))
+        wider = self.horizontalHeader().length() > self.viewport().width()
+        bar_px = self.horizontalScrollBar().sizeHint().height() if wider else 0
+        self.setFixedHeight(self._colours.px(_HEADER_PX + _ROW_PX * rows) + bar_px)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Make room for a bar below the rows, where the columns need one."""
+        super().resizeEvent(event)
+        self._fit()
 
     def clear_rows(self) -> None:
         """Show no test."""
@@ -66,10 +74,9 @@ class LevelTable(QTableWidget):
         self._runs = tuple(test.run for test in tests)
         self.blockSignals(True)
         self.setRowCount(len(rows))
-        self._fit()
         for place, row in enumerate(rows):
             values = [DASH if row.r[name] is None else f"{row.r[name]:.4f}" for name in METHODS]
-            name = f"{row.test}   (this test)" if row.this else row.test
+            name = f"{row.test} (this)" if row.this else row.test
             verdict = "good" if row.good else "not good"
             cells = [name, f"{row.phi0:.4f}", str(row.impacts), *values, verdict]
             first = self._set_row(place, cells, bold=row.this)
@@ -78,6 +85,7 @@ class LevelTable(QTableWidget):
                 first.setCheckState(Qt.CheckState.Checked if row.good else Qt.CheckState.Unchecked)
                 first.setToolTip("Tick to lay it over the test; double click to open it")
         self.blockSignals(False)
+        self._fit()
         self.scrollTo(self.model().index(len(result.earlier), 0))
 
     def _set_row(self, place: int, cells: Sequence[str], *, bold: bool) -> QTableWidgetItem:

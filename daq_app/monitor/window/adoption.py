@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from daq_app.acquisition.messages.published import CheckMessage, EventMessage, StateMessage
+from daq_app.acquisition.messages.published import UNARMED, CheckMessage, EventMessage, StateMessage
+from daq_app.campaign.result.result import SUFFIX as RESULT_SUFFIX
 from daq_app.config import ConfigError, parse_rig
 from daq_app.config.rig import Rig
 from daq_app.monitor.data.session import Session
@@ -30,6 +31,11 @@ class Adoption:
         self.runs_folder: Path | None = None
         self.makes_results = False
         """Whether the recorder makes the result of a run."""
+
+    def awaits_result(self, run: Path) -> bool:
+        """Whether the recorder will tell when the result of a run is there: it makes that of every test."""
+        made = run.with_suffix(RESULT_SUFFIX).is_file()
+        return self.makes_results and not made and not run.stem.startswith(f"{UNARMED}_")
 
     def take_rig(self, about: Mapping[str, Any]) -> Rig | None:
         """The rig, if it is another one than before; a file that cannot be read here is told."""

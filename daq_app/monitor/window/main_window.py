@@ -48,7 +48,7 @@ from daq_app.monitor.window.adoption import Adoption
 from daq_app.monitor.window.orders import Orders
 from daq_app.monitor.window.placement import keep_on_screen
 from daq_app.monitor.window.test_display import TestDisplay
-from daq_app.monitor.window.what_to_tell import MAY_BE_REFUSED, is_told, numbers, trouble_of
+from daq_app.monitor.window.what_to_tell import MAY_BE_REFUSED, brings_gauge, is_told, numbers, trouble_of
 from daq_app.monitor.window.window_frame import WindowFrame
 
 FRAME_MS: Final = 16
@@ -285,8 +285,8 @@ class MainWindow(QMainWindow):
         looks = message.state is State.SAVED and message.judgement.call is Call.LOOK
         if message.state in (State.RELEASED, State.ROCKING, State.AT_REST) or looks:
             self._released = True
-        # The gauge is in front from the arming to the end; an operator who chose Live keeps it.
-        if message.state in (State.ARMED, State.RELEASED) and self.stack.currentWidget() is not self.live:
+        # An operator who chose Live keeps it.
+        if brings_gauge(before, message.state) and self.stack.currentWidget() is not self.live:
             self.show_page(self.test)
         if message.state is State.PREVIEWING and before in (State.IDLE, None) and self.link is not None:
             self.link.request("hello")
@@ -303,7 +303,7 @@ class MainWindow(QMainWindow):
         self.replay.open(run)
         if self._released:
             self.show_page(self.result)
-            self.result.open(run, soon=self.adoption.makes_results)
+            self.result.open(run, soon=self.adoption.awaits_result(run))
             self.gap.after_run(run)
 
     def _on_slow(self) -> None:

@@ -158,7 +158,11 @@ class Orders(QObject):
 
     def judge(self, name: str, verdict: str) -> None:
         """The operator's verdict on the result that is shown; the run itself stays as it is."""
-        run = Path(name)
+        run, shown = Path(name), self._result.result
+        if verdict == "bad" and shown is not None and not shown.test.good:
+            # Its reason is the record's: a second rejection would put another one in its place.
+            self._notices.tell("info", f"{shown.test.test} is to be repeated already: take it with F6.")
+            return
         reason = "rejected on the result page" if verdict == "bad" else ""
         try:
             with open_run(run) as opened:

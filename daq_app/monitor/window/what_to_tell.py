@@ -1,10 +1,10 @@
-"""What the window takes out of events and replies: whether to tell of it, what it is about, its numbers."""
+"""What the window takes out of events, states and replies: whether to tell or show it, and its numbers."""
 
 from __future__ import annotations
 
 from typing import Final
 
-from daq_app.acquisition.messages.published import EventMessage, State
+from daq_app.acquisition.messages.published import RECORDING, EventMessage, State
 
 _QUIET_EVENTS: Final = frozenset({"impact", "marker", "tare", "saved", "check", "result", *State})
 """Events that the pages show anyway, unless they are more than information."""
@@ -16,6 +16,11 @@ MAY_BE_REFUSED: Final = frozenset({"tare", "check", "pull", "plan"})
 def is_told(event: EventMessage) -> bool:
     """Whether the message line tells of it."""
     return event.kind not in _QUIET_EVENTS or event.severity != "info"
+
+
+def brings_gauge(before: State | None, now: State) -> bool:
+    """Whether a test begins, or this window has come (`before` None) while one is under way."""
+    return now in RECORDING if before is None else now in (State.ARMED, State.RELEASED)
 
 
 def trouble_of(event: EventMessage) -> str:

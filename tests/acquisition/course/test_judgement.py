@@ -34,6 +34,7 @@ situations = st.builds(
     held_s=st.floats(0.0, 20.0),
     disk_safe=st.booleans(),
     aborted=st.booleans(),
+    opening=st.booleans(),
 )
 
 
@@ -121,3 +122,13 @@ def test_an_aborted_arming_is_not_called_saved() -> None:
     judgement = judge(situation(armed=False, state=State.SAVED, aborted=True, rotation_rad=0.001), SETTINGS)
     assert judgement.word == "Aborted"
     assert judgement.tone != "good"
+
+
+def test_a_device_that_is_being_started_is_waited_for_without_a_key() -> None:
+    idle = {"armed": False, "sampling": False, "rotation_rad": math.nan}
+    for state in (State.IDLE, State.FAILED):
+        starting = judge(situation(**idle, state=state, opening=True), SETTINGS)
+        assert (starting.word, starting.call) == ("Starting", Call.WAIT)
+        assert "F4" not in starting.do and "wait" in starting.do
+    assert "F4" in judge(situation(**idle, state=State.IDLE), SETTINGS).do
+    assert judge(situation(**idle, state=State.SAVING, opening=True), SETTINGS).word == "Saving"

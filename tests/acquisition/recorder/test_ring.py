@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 
-from daq_app.acquisition.messages.items import End
+from daq_app.acquisition.messages.items import Arrived, End
 from daq_app.acquisition.pipeline.recent import Recent
 from daq_app.acquisition.pipeline.ring import Ring
-from tests.support.recorder.recorder_bench import Bench, Disk, contents, header
+from drivers import Block
+from tests.support.recorder.recorder_bench import Bench, Disk, contents, header, readings
 
 
 def test_a_release_that_nobody_armed_waits_in_memory_for_a_disk(
@@ -73,3 +75,16 @@ def test_a_ring_that_cannot_be_written_is_no_trouble_for_a_run(
     lab.blocks(5, 5)
     lab.end()
     assert sorted(contents(journal)) == list(range(500, 1000))
+
+
+def test_samples_from_before_a_run_do_not_make_its_disk_slow(bench: Callable[..., Bench]) -> None:
+    """They were read long before the order; what the disk takes is counted from there."""
+    lab = bench(recent=Recent(1000))
+    long_ago_s = time.perf_counter() - 3600.0
+    for n in range(10):
+        lab.recorder.inbox.put(Arrived(Block(n * 100, readings(n * 100), 0, 0), long_ago_s))
+    lab.until(lambda: lab.recorder.status.sample == 1000)
+    journal = lab.begin(before_samples=1000)
+    lab.end()
+    assert contents(journal) == {n: float(n) for n in range(1000)}
+    assert 0.0 < lab.recorder.latency.worst_ms < 3_500_000.0

@@ -232,7 +232,7 @@ def test_a_window_opened_in_mid_run_dates_the_recording_from_its_arming(window):
     ]
     window.adoption.take({"events": past})
     assert window.notices.current == ("warning", "Left by an earlier session")
-    window.session.feed(Published(StateMessage(state=State.ROCKING), window.clock.now))
+    window.session.feed(Published(StateMessage(state=State.ROCKING, armed=True), window.clock.now))
     window.session.feed(Published(recorded(60_400, safe=60_000), window.clock.now))
     window.header.refresh(window.colours)
     assert window.header.words["recording_detail"] == "5.0 s safe on disk"

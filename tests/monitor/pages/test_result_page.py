@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pyqtgraph as pg
 import pytest
 from PySide6.QtGui import QDesktopServices
@@ -57,3 +59,32 @@ def test_the_page_shows_every_family_as_its_saved_page_does(page):
     assert shown == family_rows(page.result.test)
     assert [row[0] for row in shown] == ["wires *", "LVDTs", "tiltmeters *", "accelerometers"]
     assert all(row[1] in page.run.with_suffix(".result.html").read_text(encoding="utf-8") for row in shown)
+
+
+@pytest.mark.parametrize("points", [10, 15])
+def test_columns_of_both_tables_are_whole_on_the_smallest_screen(qapp, page, points):
+    page.restyle(replace(LIGHT, points=points))
+    page.resize(900, 640)
+    qapp.processEvents()
+    for table in (page.table, page.families):
+        header = table.horizontalHeader()
+        needed = [
+            max(table.sizeHintForColumn(place), header.sectionSizeHint(place))
+            for place in range(table.columnCount())
+        ]
+        assert table.rowCount() and table.viewport().height() >= table.rowHeight(0)
+        assert [table.columnWidth(place) >= px for place, px in enumerate(needed)] == [True] * len(needed)
+
+
+def test_a_second_rejection_leaves_the_reason(qtbot, window, run_file, monkeypatch):
+    given = []
+    monkeypatch.setattr("daq_app.monitor.window.orders.give_verdict", lambda *verdict: given.append(verdict))
+    with qtbot.waitSignal(window.result.shown, timeout=120_000):
+        window.result.open(run_file)
+    result = window.result.result
+    window.result.result = replace(result, test=replace(result.test, good=False, reasons=("too far",)))
+    window.result.buttons["bad"].click()
+    assert not given and "to be repeated already" in window.notices.current[1]
+    window.result.result = result
+    window.result.buttons["bad"].click()
+    assert given[0][2] == "bad"

@@ -39,6 +39,8 @@ class Situation:
     """Since when, s."""
     disk_safe: bool
     """Samples of the run reach a disk."""
+    opening: bool = False
+    """Nothing is sampled yet: the device is being opened and started."""
     aborted: bool = False
     """The last arming was given up before its release."""
     text: str = ""
@@ -88,11 +90,16 @@ def _call(now: Situation, settings: Acquisition, ratio: float) -> Call:
         return _armed_call(now, settings, ratio)
     if now.sampling and ratio >= PULLED:
         return Call.ARM_FIRST
-    if now.state is State.SAVING:
+    if now.state is State.SAVING or _starts(now):
         return Call.WAIT
     if now.state in (State.SAVED, State.FAILED) and not now.aborted:
         return Call.LOOK
     return Call.PREPARE if now.sampling else Call.START
+
+
+def _starts(now: Situation) -> bool:
+    """Whether samples will come without anybody's order."""
+    return now.opening and not now.sampling
 
 
 def _armed_call(now: Situation, settings: Acquisition, ratio: float) -> Call:
@@ -132,6 +139,8 @@ def _word(call: Call, now: Situation) -> str:
         return "Stop"
     if now.state in _MOVING and not now.armed:
         return f"{_WORDS[now.state]}, not armed"
+    if now.state is not State.SAVING and _starts(now):
+        return "Starting"
     if now.aborted and now.state is State.SAVED:
         return "Aborted"
     return _WORDS[now.state]
@@ -166,6 +175,8 @@ def _sentence(call: Call, now: Situation, settings: Acquisition, held_s: float) 
             return "Keep clear. Nobody had armed: this release is kept from the ring."
         case Call.KEEP_CLEAR:
             return "Keep clear. The recording ends by itself."
+        case Call.WAIT if now.state is not State.SAVING and _starts(now):
+            return "The sensors are being started: wait for the live view."
         case Call.WAIT:
             return {
                 State.AT_REST: "Leave the wall alone: its rest is being recorded.",
