@@ -23,7 +23,9 @@ import psutil
 from daq_app.acquisition.course.tare import NotSteady
 from daq_app.acquisition.session.offline import Readings, record_offline
 from daq_app.campaign.plan import Campaign
+from daq_app.campaign.summaries.of_run import read_and_summarise
 from daq_app.config import ConfigError, Problem, Rig, TaskPlan, load_rig, plan_tasks
+from daq_app.rocking.analysis.options import AnalysisOptions
 from daq_app.runfile import RunFileError
 from daq_app.runfile.durable import replace_durably, write_whole
 from daq_app.runfile.folder import RUN_SUFFIX
@@ -168,6 +170,8 @@ def _write_run(test: PlannedSimulation, workshop: Path, out: Path) -> None:
             f"{test.test} cannot be recorded. {error}", advice="Choose another seed."
         ) from None
     replace_durably(workshop / name, out / name)
+    # Kept beside the run, as the recorder does when a wall has come to rest.
+    read_and_summarise(out / name, {}, AnalysisOptions())
 
 
 @contextmanager

@@ -13,7 +13,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from daq_app.rocking.analysis.analyse import AnalysisOptions, analyse_record
+    from daq_app.rocking.analysis.analyse import analyse_record
+    from daq_app.rocking.analysis.options import AnalysisOptions
     from daq_app.rocking.analysis.results import TestAnalysis
     from daq_app.rocking.estimators import RestitutionEstimate, RestitutionPoint
     from daq_app.rocking.geometry.kinematics import RotationGeometry, WireRotation
@@ -40,7 +41,8 @@ if TYPE_CHECKING:
     from daq_app.rocking.theory.housner import FreeRocking, exact_period, free_rocking
 
 _PLACES = {
-    "analysis.analyse": ("AnalysisOptions", "analyse_record"),
+    "analysis.analyse": ("analyse_record",),
+    "analysis.options": ("AnalysisOptions",),
     "analysis.results": ("TestAnalysis",),
     "estimators": ("RestitutionEstimate", "RestitutionPoint"),
     "geometry.kinematics": ("RotationGeometry", "WireRotation"),

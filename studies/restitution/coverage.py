@@ -31,12 +31,12 @@ from scipy import stats
 from daq_app.acquisition.course.tare import take_tare
 from daq_app.campaign.names import TestName
 from daq_app.campaign.plan import load_campaign
-from daq_app.campaign.report.collect import summarise
 from daq_app.campaign.report.statistics import random_effects_mean
-from daq_app.campaign.report.summary import MethodResult, TestSummary
 from daq_app.campaign.report.tables import METHODS, RestitutionRow, table_4_1
 from daq_app.campaign.simulate import CampaignTruth, PlannedSimulation, SpecimenTruth, readings_of, tests_of
 from daq_app.campaign.status import RecordedTest, TestVerdict
+from daq_app.campaign.summaries.of_run import summarise
+from daq_app.campaign.summaries.summary import MethodResult, TestSummary
 from daq_app.config import Scaling, load_rig
 from daq_app.rocking import AnalysisOptions, TestAnalysis, TestRecord, analyse_record
 from daq_app.workers import process_pool

@@ -10,7 +10,8 @@ import pytest
 from daq_app.acquisition.course.tare import take_tare
 from daq_app.config import Rig, Scaling, load_rig, plan_tasks
 from daq_app.rocking import LiveAnalyser
-from daq_app.rocking.analysis.analyse import AnalysisOptions, analyse_record
+from daq_app.rocking.analysis.analyse import analyse_record
+from daq_app.rocking.analysis.options import AnalysisOptions
 from daq_app.rocking.record import TestRecord
 from sim_hardware.direct import synthesise_test
 

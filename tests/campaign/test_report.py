@@ -10,11 +10,11 @@ import pytest
 
 from daq_app.campaign.names import TestName
 from daq_app.campaign.plan import load_campaign
-from daq_app.campaign.report.collect import Failure
-from daq_app.campaign.report.summary import MethodResult, TestSummary
 from daq_app.campaign.report.tables import mean_of_specimens, repetition_effect, table_4_1
 from daq_app.campaign.report.write import write_report
 from daq_app.campaign.status import CampaignStatus, RecordedTest, TestVerdict
+from daq_app.campaign.summaries.of_run import Failure
+from daq_app.campaign.summaries.summary import MethodResult, TestSummary
 from daq_app.rocking import amplitude_after, period_after, time_of_impact
 
 

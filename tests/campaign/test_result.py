@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 
 from daq_app.campaign.names import TestName
-from daq_app.campaign.report.summary import MethodResult, TestSummary
 from daq_app.campaign.result.family_rows import family_rows
 from daq_app.campaign.result.motions import measured_periods, period_deviation, theory_motion
 from daq_app.campaign.result.report import write_result
-from daq_app.campaign.result.result import judged, load_summary, save_summary
 from daq_app.campaign.result.words import repetition_rows, verdict_sentence
 from daq_app.campaign.status import RecordedTest, TestVerdict
+from daq_app.campaign.summaries.mark import AnalysisMark
+from daq_app.campaign.summaries.store import NotKept, kept_summary
+from daq_app.campaign.summaries.summary import MethodResult, TestSummary, judged
 from daq_app.rocking import free_rocking
+from daq_app.rocking.analysis.options import AnalysisOptions
 from daq_app.rocking.families.verdict import FamilyView, RVerdict
 
 ALPHA, P = 0.215, 2.20
@@ -134,31 +136,13 @@ def test_page_and_pdf_are_written_beside_the_run(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == [html.name, pdf.name]
 
 
-def test_a_summary_survives_the_disk_and_belongs_to_its_file_only(tmp_path: Path) -> None:
-    run = tmp_path / "run.h5"
-    run.write_bytes(b"x" * 100)
-    test = summary("FR1-L3-2", reasons=("noted",), verdict=VERDICT)
-    save_summary(run, dataclasses.replace(test, families=FAMILIES))
-    back = load_summary(run)
-    assert back is not None
-    np.testing.assert_allclose(back.rotation_rad, test.rotation_rad, atol=1e-9)
-    # Numbers that are not known are NaN, which equals nothing.
-    assert list(map(repr, back.families)) == list(map(repr, FAMILIES))
-    arrays = {name: getattr(test, name) for name in ("time_s", "rotation_rad", "velocity_rad_s")}
-    same = dataclasses.replace(back, families=(), **arrays)
-    assert {f.name: getattr(same, f.name) for f in dataclasses.fields(same)} == {
-        f.name: getattr(test, f.name) for f in dataclasses.fields(test)
-    }
-    run.write_bytes(b"x" * 101)
-    assert load_summary(run) is None
-
-
 @pytest.mark.parametrize("damage", [b"", b"{", b'{"format": 1}', b"[]", b'{"format": 9, "run_bytes": 3}'])
 def test_a_damaged_summary_is_made_anew(tmp_path: Path, damage: bytes) -> None:
     run = tmp_path / "run.h5"
     run.write_bytes(b"abc")
     run.with_suffix(".result.json").write_bytes(damage)
-    assert load_summary(run) is None
+    with pytest.raises(NotKept):
+        kept_summary(run, AnalysisMark.of(run, AnalysisOptions()))
 
 
 def test_the_verdict_that_holds_now_counts() -> None:

@@ -14,10 +14,11 @@ from typer.testing import CliRunner
 
 from daq_app.acquisition.closing.derive import derive
 from daq_app.campaign.recorded import recorded_test
-from daq_app.campaign.report.collect import collect, read_and_summarise
-from daq_app.campaign.report.summary import TestSummary
+from daq_app.campaign.report.collect import collect
 from daq_app.campaign.result.result import make_result
 from daq_app.campaign.status import TestVerdict
+from daq_app.campaign.summaries.of_run import read_and_summarise
+from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.cli.app import build_app
 from daq_app.config import load_rig, plan_tasks
 from daq_app.config.wording import plus_minus
@@ -142,7 +143,8 @@ def test_an_imported_run_is_judged_and_has_one_r(tmp_path: Path, configs: Path) 
     run = imported(tmp_path, configs)
     with open_run(run) as opened:
         stored = opened.results
-    test, summary = read_and_summarise(run, {}, AnalysisOptions(bias_runs=0, fit=False))
+    answer = read_and_summarise(run, {}, AnalysisOptions(bias_runs=0, fit=False))
+    test, summary = answer.test, answer.made
     assert stored["quality"]["verdict"] == "good"
     assert test is not None and test.verdict is TestVerdict.GOOD
     assert isinstance(summary, TestSummary)

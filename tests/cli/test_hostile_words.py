@@ -17,9 +17,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner, Result
 
-from daq_app.campaign.report.summary import MethodResult, TestSummary
 from daq_app.campaign.report.tables import write_csv
 from daq_app.campaign.result.report import write_result
+from daq_app.campaign.summaries.summary import MethodResult, TestSummary
 from daq_app.cli.app import build_app
 from daq_app.config.shown_text import csv_cell, one_line, shortened, visible
 from daq_app.runfile import JournalWriter, RunHeader, finalise, verify

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from daq_app.acquisition.closing.verdict import judge_imported, judge_run
 from daq_app.config.rig import Rig
 from daq_app.config.scaling import Scaling
-from daq_app.rocking.analysis.analyse import AnalysisOptions, analyse_record
+from daq_app.rocking.analysis.analyse import analyse_record
+from daq_app.rocking.analysis.options import AnalysisOptions
 from daq_app.rocking.analysis.results import Series
 from daq_app.rocking.live import LiveAnalyser
 from daq_app.rocking.record import TestRecord, analysed_part, tare_si

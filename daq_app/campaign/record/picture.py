@@ -8,8 +8,8 @@ from typing import Final
 import matplotlib as mpl
 
 from daq_app.campaign.record.parts import Picture
-from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.result.figures import result_figure
+from daq_app.campaign.summaries.summary import TestSummary
 
 _SIZE_IN: Final = (6.7, 4.9)
 _DPI: Final = 220

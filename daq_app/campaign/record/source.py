@@ -9,8 +9,8 @@ from typing import Any
 
 from daq_app.campaign.names import TestName
 from daq_app.campaign.recorded import verdicts_of
-from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.result.result import NoResult, load_result, make_result
+from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.campaign.verdicts import OperatorVerdict
 from daq_app.config import Rig
 from daq_app.runfile import Event, Gap, RunHeader, open_run, verify

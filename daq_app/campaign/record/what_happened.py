@@ -8,8 +8,8 @@ from daq_app.campaign.record.number_text import MISSING, figure, moment, moment_
 from daq_app.campaign.record.parts import Grid, Pairs, Part, Section, Tone, Words
 from daq_app.campaign.record.picture import record_picture
 from daq_app.campaign.record.source import RecordSource, planned_level
-from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.result.family_rows import CAPTION, HEADINGS, family_rows
+from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.config.wording import plus_minus
 from daq_app.rocking.families.verdict_words import verdict_sentence
 

@@ -11,7 +11,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from daq_app.campaign.report import figures
-from daq_app.campaign.report.summary import TestSummary
+from daq_app.campaign.summaries.summary import TestSummary
 
 PLAIN_TEXT: Final = {"text.parse_math": False}
 """Setting of matplotlib under which a dollar sign that somebody typed begins no formula."""

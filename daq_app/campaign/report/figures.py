@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from daq_app.campaign.report.summary import TestSummary
+from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.config.wording import METHOD_MARKS
 from daq_app.rocking import amplitude_after, period, period_after
 

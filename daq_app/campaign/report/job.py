@@ -26,7 +26,7 @@ def write_collected(
 ) -> list[Path]:
     """Write the report of what was collected in `folder`; raises `ValueError` where nothing was analysed."""
     made = time.strftime("%Y-%m-%d %H:%M", time.localtime())
-    footer = f"Made {made} from {len(found.recorded)} recorded tests in {folder.name}."
+    footer = f"Made {made} from {len(found.recorded)} recorded tests in {folder.name}. {found.origin}"
     status = CampaignStatus(campaign, found.recorded)
     return write_report(out, campaign.name, status, found.tests, footer, found.failures, at_once=at_once)
 

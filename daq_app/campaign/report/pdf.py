@@ -19,9 +19,9 @@ from matplotlib.transforms import Bbox
 
 from daq_app.campaign.report import tables
 from daq_app.campaign.report.captioned import PLAIN_TEXT, campaign_figures
-from daq_app.campaign.report.collect import Failure
 from daq_app.campaign.report.number_words import interval, number, signed
-from daq_app.campaign.report.summary import TestSummary
+from daq_app.campaign.summaries.of_run import Failure
+from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.config.shown_text import one_line
 
 _ROWS = 40

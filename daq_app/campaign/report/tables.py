@@ -13,8 +13,8 @@ from typing import Final
 from scipy.special import stdtrit
 
 from daq_app.campaign.report.statistics import GroupMean, random_effects_mean
-from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.status import CampaignStatus
+from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.config.shown_text import csv_cell
 from daq_app.runfile.durable import write_whole
 

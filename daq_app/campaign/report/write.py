@@ -14,10 +14,10 @@ from jinja2 import Environment
 
 from daq_app.campaign.pages import page_environment
 from daq_app.campaign.report import tables
-from daq_app.campaign.report.collect import Failure
 from daq_app.campaign.report.number_words import interval, number, signed
-from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.status import CampaignStatus
+from daq_app.campaign.summaries.of_run import Failure
+from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.runfile.durable import write_whole
 from daq_app.workers import process_pool
 

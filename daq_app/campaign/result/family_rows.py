@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from daq_app.campaign.report.summary import TestSummary
+from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.config.wording import plus_minus
 from daq_app.rocking.families.verdict import FamilyView
 

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from daq_app.campaign.report.figures import METHOD_COLOURS
-from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.result.motions import measured_periods, theory_motion
+from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.config.wording import METHOD_MARKS, plus_minus
 from daq_app.rocking import period
 

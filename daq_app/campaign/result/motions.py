@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.campaign.report.summary import TestSummary
+from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.rocking.theory.classic import period
 from daq_app.rocking.theory.housner import free_rocking
 

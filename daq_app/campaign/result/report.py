@@ -14,12 +14,12 @@ from matplotlib.figure import Figure
 
 from daq_app.campaign.pages import page_environment
 from daq_app.campaign.report.captioned import PLAIN_TEXT, CaptionedFigure
-from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.result.family_rows import CAPTION, HEADINGS, family_rows
 from daq_app.campaign.result.figures import result_figure
 from daq_app.campaign.result.motions import period_deviation
 from daq_app.campaign.result.words import METHODS, RepetitionRow, repetition_rows, verdict_sentence
 from daq_app.campaign.status import NO_FACTS, TestFacts
+from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.config.wording import plus_minus
 from daq_app.rocking.families.verdict_words import verdict_sentence as restitution_sentence
 from daq_app.runfile.durable import write_whole

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from daq_app.campaign.report.summary import TestSummary
+from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.config.shown_text import one_line
 
 METHODS: Final = ("EAV", "CRT")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,7 +18,7 @@ from daq_app.runfile import RunFileError
 from daq_app.workers import warm_up
 
 if TYPE_CHECKING:
-    from daq_app.campaign.report.summary import TestSummary
+    from daq_app.campaign.report.collect import Collected
     from daq_app.campaign.report.tables import RestitutionRow
 
 
@@ -36,10 +35,14 @@ def report(
         bool,
         typer.Option("--overwrite", help="Write into an --out that holds files."),
     ] = False,
+    anew: Annotated[
+        bool, typer.Option("--anew", help="Analyse every run anew, whatever is kept beside it.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print Table 4.1 as JSON.")] = False,
 ) -> None:
     """Analyse every run of a campaign: HTML and PDF report, figures as SVG, every number as CSV.
 
+    An analysis kept beside its run is taken where run, program and options are those it was made with.
     Runs with a bad verdict are shown and left out of the means. Exit code 1 when a run that nobody had
     flagged bad could not be analysed.
     """
@@ -47,14 +50,17 @@ def report(
         campaign = open_plan(plan_file)
         if out is not None and not overwrite and out.is_dir() and any(out.iterdir()):
             raise RunFileError(f"{out} holds files", advice="Choose another folder, or say --overwrite.")
-        # Imported here: `--help` should not load SciPy.
+        # Imported here: `--help` should load none of it.
+        from daq_app.campaign.summaries.store import some_have_none
+
         drawing = ("daq_app.campaign.report.captioned", "daq_app.campaign.report.pdf")
         # The program itself too: each worker imports it anew otherwise.
-        warm_up("daq_app.campaign.report.collect", *drawing, "daq_app.cli.app")
+        analysis = ("daq_app.rocking.analysis.analyse",) if anew or some_have_none(folder) else ()
+        warm_up("daq_app.campaign.report.collect", *analysis, *drawing, "daq_app.cli.app")
         from daq_app.campaign.report import collect as gathering
         from daq_app.campaign.report.job import write_collected
         from daq_app.campaign.report.tables import mean_of_specimens, table_4_1
-        from daq_app.rocking.analysis.analyse import AnalysisOptions
+        from daq_app.rocking.analysis.options import AnalysisOptions
 
         with progress_bar("analysing") as advance:
             options = AnalysisOptions(bias_runs=bias_runs)
@@ -63,6 +69,7 @@ def report(
                 options=options,
                 workers=scheduler or workers,
                 progress=advance,
+                anew=anew,
             )
         tests, failures = found.tests, found.failures
         for failure in failures:
@@ -76,7 +83,7 @@ def report(
         say_other_name(target / "report.html", page)
         say_other_name(target / "report.pdf", next(path for path in written if path.suffix == ".pdf"))
         rows = table_4_1(tests)
-        _print(rows + mean_of_specimens(rows), tests, page, as_json)
+        _print(rows + mean_of_specimens(rows), found, page, as_json)
     if any(not failure.flagged_bad for failure in failures):
         raise typer.Exit(EXIT_FAILED)
 
@@ -86,7 +93,7 @@ def _known(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
-def _print(rows: list[RestitutionRow], tests: Sequence[TestSummary], page: Path, as_json: bool) -> None:
+def _print(rows: list[RestitutionRow], found: Collected, page: Path, as_json: bool) -> None:
     if as_json:
         document = [
             {
@@ -105,7 +112,7 @@ def _print(rows: list[RestitutionRow], tests: Sequence[TestSummary], page: Path,
             }
             for row in rows
         ]
-        echo_json({"report": str(page), "table_4_1": document}, indent=1)
+        echo_json({"report": str(page), "analyses": found.origin, "table_4_1": document}, indent=1)
         return
     console = Console()
     if not console.is_terminal:
@@ -121,7 +128,8 @@ def _print(rows: list[RestitutionRow], tests: Sequence[TestSummary], page: Path,
         cells = (str(row.mean.tests), f"{row.mean.mean:.4f}", intervals[0], f"{row.ratio:.3f}")
         table.add_row(row.specimen, row.method, *cells, f"{row.corrected.mean:.4f}", intervals[1])
     console.print(table)
-    left_out = [test.test for test in tests if not test.good]
+    left_out = [test.test for test in found.tests if not test.good]
     if left_out:
         console.print(f"Left out of the means: {', '.join(left_out)}", highlight=False, markup=False)
+    console.print(found.origin, highlight=False, markup=False)
     console.print(f"Report: {page}", highlight=False, markup=False, soft_wrap=True)

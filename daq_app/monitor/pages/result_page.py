@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QComboBox, QFrame, QHBoxLayout, QPushButton, QScro
 
 from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.result.motions import period_deviation
-from daq_app.campaign.result.result import NoResult, Result, load_result
+from daq_app.campaign.result.result import NoResult, Result, load_result, page_is_current
 from daq_app.campaign.result.words import METHODS, verdict_sentence
 from daq_app.campaign.status import NO_FACTS, RecordedTest, TestFacts
 from daq_app.config import ConfigError
@@ -35,7 +35,7 @@ _NOTES_SHOWN = 240
 def analyse(run: Path) -> Result:
     """The saved result of a run, else a new one made in a process of its own. Raises `NoResult`."""
     saved = load_result(run)
-    if saved is not None and run.with_suffix(".result.pdf").exists():
+    if saved is not None and page_is_current(run):
         return saved
     ok, said = said_by("daq_app.campaign.result.result", [str(run)])
     if not ok:

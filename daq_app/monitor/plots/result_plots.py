@@ -10,9 +10,9 @@ import pyqtgraph as pg
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
-from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.result.motions import measured_periods, theory_motion
 from daq_app.campaign.result.result import Result
+from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.config.wording import METHOD_MARKS
 from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.plot_base import Plot, line_pen

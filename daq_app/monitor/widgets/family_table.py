@@ -6,8 +6,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHeaderView, QTableWidget, QTableWidgetItem, QWidget
 
-from daq_app.campaign.report.summary import TestSummary
 from daq_app.campaign.result.family_rows import CAPTION, HEADINGS, family_rows
+from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.monitor.look.theme import DARK, Colours
 
 _HEADER_PX, _ROW_PX, _ROWS = 38, 23, 4

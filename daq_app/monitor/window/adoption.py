@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from daq_app.acquisition.messages.published import UNARMED, CheckMessage, EventMessage, StateMessage
-from daq_app.campaign.result.result import SUFFIX as RESULT_SUFFIX
+from daq_app.campaign.summaries.store import SUFFIX as RESULT_SUFFIX
 from daq_app.config import ConfigError, parse_rig
 from daq_app.config.rig import Rig
 from daq_app.monitor.data.session import Session

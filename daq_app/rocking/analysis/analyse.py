@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from daq_app.rocking.analysis.bias import BiasSettings, method_bias
 from daq_app.rocking.analysis.families_table import families_of, verdict_of
 from daq_app.rocking.analysis.half_cycles import half_cycles_of
 from daq_app.rocking.analysis.joint_summary import summarise_joint
+from daq_app.rocking.analysis.options import AnalysisOptions
 from daq_app.rocking.analysis.preparation.fusion import Fused
 from daq_app.rocking.analysis.preparation.instruments import Instruments, prepare
 from daq_app.rocking.analysis.preparation.signals import Signals
@@ -41,24 +42,6 @@ _GEOMETRY_SHARE_P = 2e-4
 """Relative standard uncertainty of the fitted p from sensor places that are known to a millimetre (assumed)
 and bend the rotation's scale between small and large angles."""
 _NO_ESTIMATE = RestitutionEstimate("none", ())
-
-
-@dataclass(frozen=True, slots=True)
-class AnalysisOptions:
-    """What may be chosen."""
-
-    velocity_cutoff_hz: float | None = None
-    """Cut-off of the stated filter; the rig's if None."""
-    zero_at_rest: bool | None = None
-    """Take the zero of every sensor from the rest after the test. None: where the record has no tare."""
-    fit: bool = True
-    """Fit the whole motion."""
-    bias_runs: int = 6
-    """Simulated tests behind the methods' bias; 0 leaves it out."""
-    seed: int | None = None
-    """Seed of the noise in the simulated tests. None: the record's label decides, so that the corrections of
-    a campaign's tests share no error, and one record has one bias however it is analysed."""
-    keep_series: bool = True
 
 
 def analyse_record(record: TestRecord, options: AnalysisOptions | None = None) -> TestAnalysis:

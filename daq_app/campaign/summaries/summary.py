@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.rocking.families.verdict import FamilyView, RVerdict
 
 Floats = NDArray[np.float64]
@@ -82,3 +83,22 @@ class TestSummary:
     def phi0(self) -> float:
         """θ0/α of the release, from the tiltmeters."""
         return abs(self.theta0_rad) / self.alpha_rad
+
+
+def judged(summary: TestSummary, test: RecordedTest) -> TestSummary:
+    """The summary under the name and the verdict that hold now: the operator may have changed both since.
+
+    A test that was rejected has that for its reason; what the analysis remarks no longer matters.
+    """
+    name, good = test.name, test.verdict is not TestVerdict.BAD
+    rejected = (test.reason,) if test.reason else ()
+    return replace(
+        summary,
+        test=str(name),
+        specimen=name.specimen,
+        level=name.level,
+        repetition=name.repetition,
+        run=summary.run if test.path is None else test.path.name,
+        good=good,
+        reasons=summary.reasons if good else rejected,
+    )

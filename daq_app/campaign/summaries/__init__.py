@@ -1,0 +1,1 @@
+"""What an analysed run comes to, kept beside it and taken only where a fresh one would agree."""

@@ -1,0 +1,109 @@
+"""The summary of an analysis, beside its run as ``RUN.result.json``: read back to the last digit."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields, is_dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from daq_app.campaign.summaries.mark import AnalysisMark
+from daq_app.campaign.summaries.summary import MethodResult, TestSummary
+from daq_app.rocking.families.verdict import FamilyView, RVerdict
+from daq_app.runfile.durable import write_whole
+from daq_app.runfile.folder import find_runs
+
+SUFFIX: Final = ".result.json"
+_FORMAT: Final = 3
+_ARRAYS: Final = ("time_s", "rotation_rad", "velocity_rad_s")
+
+
+class NotKept(Exception):
+    """No kept analysis stands for a fresh one: why, in words."""
+
+
+def keep_summary(run: Path, mark: AnalysisMark, summary: TestSummary) -> Path:
+    """Write the summary beside its run. Raises `OSError`."""
+    document = {"format": _FORMAT, "mark": asdict(mark), "summary": _encoded(summary)}
+    return write_whole(run.with_suffix(SUFFIX), json.dumps(document, allow_nan=False))
+
+
+def kept_summary(run: Path, mark: AnalysisMark) -> TestSummary:
+    """The summary kept beside a run, if it has just this mark. Raises `NotKept`."""
+    try:
+        document = json.loads(run.with_suffix(SUFFIX).read_text(encoding="utf-8"))
+        if document["format"] != _FORMAT:
+            raise NotKept("it was analysed by another version of the program or of its libraries")
+        difference = mark.difference(AnalysisMark(**document["mark"]))
+        if difference:
+            raise NotKept(difference)
+        return _summary(document["summary"])
+    except OSError:
+        raise NotKept("no analysis is kept beside it") from None
+    except (ValueError, KeyError, TypeError):
+        raise NotKept("the analysis kept beside it cannot be read") from None
+
+
+def some_have_none(folder: Path) -> bool:
+    """Whether a run in a folder or below has nothing kept beside it: an analysis will be needed."""
+    return not all(run.with_suffix(SUFFIX).exists() for run in find_runs(folder))
+
+
+def _encoded(value: object) -> Any:
+    """As JSON; it knows no NaN and no infinity, which become words that `float` reads."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {f.name: _encoded(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): _encoded(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_encoded(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value
+
+
+def _summary(content: dict[str, Any]) -> TestSummary:
+    arrays = {name: np.asarray(content[name], dtype=np.float64) for name in _ARRAYS}
+    numbers = {name: tuple(map(float, content[name])) for name in ("impacts_s", "peaks_rad", "periods_s")}
+    parts = {
+        "methods": {name: _method(method) for name, method in content["methods"].items()},
+        "families": tuple(map(_view, content["families"])),
+        "verdict": _verdict(content["verdict"]),
+        "reasons": tuple(content["reasons"]),
+    }
+    return TestSummary(**{**content, **_floats(TestSummary, content), **arrays, **numbers, **parts})
+
+
+def _method(content: dict[str, Any]) -> MethodResult:
+    points = tuple((int(impact), float(r)) for impact, r in content["points"])
+    return MethodResult(**{**content, **_floats(MethodResult, content), "points": points})
+
+
+def _view(content: dict[str, Any]) -> FamilyView:
+    intervals = {name: _pair(content[name]) for name in ("interval95_eav", "interval95_crt")}
+    remarks = tuple(content["remarks"])
+    return FamilyView(**{**content, **_floats(FamilyView, content), **intervals, "remarks": remarks})
+
+
+def _verdict(content: dict[str, Any] | None) -> RVerdict | None:
+    if content is None:
+        return None
+    tuples = {name: tuple(content[name]) for name in ("used", "left_out", "reasons")}
+    numbers = _floats(RVerdict, content)
+    return RVerdict(**{**content, **numbers, **tuples, "interval95": _pair(content["interval95"])})
+
+
+def _floats(kind: type, content: dict[str, Any]) -> dict[str, float | None]:
+    """Numbers of a dataclass, with those that are no finite number put back."""
+    names = [f.name for f in fields(kind) if f.type in ("float", "float | None")]
+    return {name: None if content[name] is None else float(content[name]) for name in names}
+
+
+def _pair(values: Sequence[float | str] | None) -> tuple[float, float] | None:
+    return None if values is None else (float(values[0]), float(values[1]))
