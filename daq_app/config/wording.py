@@ -20,3 +20,13 @@ def plus_minus(error: float | None, decimals: int = 4) -> str:
     if float(f"{abs(error):.{decimals}f}") == 0.0:
         return f"± < {least:.{decimals}f}"
     return f"± {abs(error):.{decimals}f}"
+
+
+def signed(value: float, spec: str = "g") -> str:
+    """A number in the format `spec`, with a true minus sign."""
+    return true_minus(f"{value:{spec}}")
+
+
+def true_minus(text: str) -> str:
+    """A number or a direction (``-x``) as people read it; not for names, in which a hyphen is one."""
+    return text.replace("-", "−")

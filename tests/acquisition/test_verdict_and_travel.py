@@ -79,19 +79,60 @@ def test_a_check_that_was_overruled_or_left_out_is_noted(judged: Judged) -> None
 
 
 def test_a_sensor_at_the_end_of_its_travel_is_called_so_and_not_stuck(rig: Any) -> None:
-    ranges = {channel.id: channel.input_range_v for channel in rig.channels}
-    si = np.random.default_rng(1).normal(size=(len(rig.channels), 8000))
-    si *= np.array([channel.noise_si for channel in rig.channels])[:, None]
     row = next(n for n, channel in enumerate(rig.channels) if channel.family == "lvdt")
-    si[row, 2000:] = rig.channels[row].range_si[1]
+    channel = rig.channels[row]
+    si = at_rest(rig, 8000)
+    si[row, 2000:] = channel.range_si[1]
+    ranges = {channel.id: channel.input_range_v for channel in rig.channels}
+    watch = ChannelWatch(rig, 4000.0, ranges)
+    told, at_end = told_of(rig, si)
     readings = Scaling.of(rig.channels).to_readings(si)
-    travel, watch = OverloadWatch(rig.channels, ranges), ChannelWatch(rig, 4000.0, ranges)
-    told, doubts = [], []
-    for first in range(0, 8000, 400):
+    doubts = []
+    for first, ends in zip(range(0, 8000, 400), at_end, strict=True):
         block = Block(first, readings[:, first : first + 400], 0, 0)
-        travel.check(block)
-        told += travel.news()
-        doubts += watch.check(block, moving=False, at_end=travel.at_end)
-    assert [kind for kind, _ in told] == ["travel"]
-    assert told[0][1].startswith(f"End of travel: {rig.channels[row].id}")
+        doubts += watch.check(block, moving=False, at_end=ends)
+    low, high = (f"{1e3 * end:g}".replace("-", "−") for end in channel.range_si)
+    assert [(news.kind, news.severity) for news in told] == [("travel", "warning")]
+    assert told[0].text.startswith(f"End of travel: {channel.id} ({low} to {high} mm)")
     assert not [doubt for doubt in doubts if doubt.name == "stuck"]
+
+
+def test_a_sensor_that_is_back_within_its_travel_is_told_so_once_it_stays_there(rig: Any) -> None:
+    """A wall that rocks brings it to its stop again and again: one warning, and one end of it."""
+    row = next(n for n, channel in enumerate(rig.channels) if channel.family == "wire")
+    channel = rig.channels[row]
+    si = at_rest(rig, 40_000)
+    for stop in range(4000, 16_000, 4000):
+        si[row, stop : stop + 2000] = channel.range_si[0]
+    told, _ = told_of(rig, si)
+    assert [(news.kind, news.severity) for news in told] == [("travel", "warning"), ("travel", "info")]
+    assert channel.id in told[1].text and "-" not in told[0].text.replace(channel.id, "")
+
+
+def test_a_new_run_says_again_who_stands_at_the_end_of_its_travel(rig: Any) -> None:
+    row = next(n for n, channel in enumerate(rig.channels) if channel.family == "lvdt")
+    si = at_rest(rig, 8000)
+    si[row] = rig.channels[row].range_si[1]
+    told, _ = told_of(rig, si, forget_at=4000)
+    assert [news.severity for news in told] == ["warning", "warning"]
+
+
+def at_rest(rig: Any, n_samples: int) -> Any:
+    """Noise of every channel, SI."""
+    si = np.random.default_rng(1).normal(size=(len(rig.channels), n_samples))
+    return si * np.array([channel.noise_si for channel in rig.channels])[:, None]
+
+
+def told_of(rig: Any, si: Any, forget_at: int = -1) -> tuple[list[Any], list[Any]]:
+    """What the watch tells of these quantities, and who is at its end in each block of 400 samples."""
+    ranges = {channel.id: channel.input_range_v for channel in rig.channels}
+    watch = OverloadWatch(rig.channels, ranges, 4000.0)
+    readings = Scaling.of(rig.channels).to_readings(si)
+    told, at_end = [], []
+    for first in range(0, si.shape[1], 400):
+        if first == forget_at:
+            watch.forget()
+        watch.check(Block(first, readings[:, first : first + 400], 0, 0))
+        told += watch.news()
+        at_end.append(watch.at_end)
+    return told, at_end

@@ -7,6 +7,7 @@ import pytest
 from daq_app.acquisition.messages.published import Call, EventMessage, Judgement, State, StateMessage
 from daq_app.monitor.course.course_view import CourseView
 from daq_app.monitor.course.cues import Cue, CueWatch
+from daq_app.monitor.course.gauge_words import target_words
 from daq_app.monitor.course.sounds import PATTERNS_MS, Sounds
 from daq_app.monitor.data.session import Published
 from daq_app.monitor.pages.messages_page import MessagesPage
@@ -75,6 +76,33 @@ def test_figures_that_are_not_live_are_dashes(qtbot, window, stand_in, play):
     view.grab()
     assert "The rotation is not live" in view.texts
     assert view.texts.count("–") == 5
+
+
+LOOK = Judgement(call=Call.LOOK, word="Saved", do="Look", tone="good", target=0.25, low=0.2375, high=0.2625)
+
+
+def test_after_a_test_its_motion_stays_and_the_next_target_is_called_the_next(
+    qtbot, window, stand_in, play, clock
+):
+    session = window.session
+    view = CourseView(session)
+    qtbot.addWidget(view)
+    play(session, clock, stand_in, stand_in.end_s)
+    clock.now += 0.6  # the disk has the last of it
+    plan = TestPlan(test="FR1-L3-1", theta0_over_alpha=0.25)
+    saved = StateMessage(state=State.SAVED, test="FR1-L3-1", plan=plan, judgement=LOOK)
+    session.feed(Published(saved, clock.now))
+    view.grab()
+    assert {"since release", "FR1-L3-1   checked and closed"} <= set(view.texts)
+    assert target_words(session) == "target 0.25  (0.237 to 0.263)"
+    session.feed(Published(saved.model_copy(update={"plan": TestPlan(test="FR1-L2-1")}), clock.now))
+    assert target_words(session).startswith("next test FR1-L2-1: target 0.25")
+
+    # The wall is pulled again: what counts now is how far.
+    arm = LOOK.model_copy(update={"call": Call.ARM_FIRST, "gauge": "Not armed", "alarm": "arm"})
+    session.feed(Published(saved.model_copy(update={"judgement": arm}), clock.now))
+    view.grab()
+    assert "since release" not in view.texts and "θ/α" in view.texts
 
 
 def test_each_change_is_heard_once_and_danger_until_it_is_over(window, clock):

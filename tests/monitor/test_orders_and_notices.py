@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from daq_app.acquisition.checks.check_model import ChannelCheck, Finding, SensorCheck, Verdict
+from daq_app.acquisition.course.tare import UNZEROED
 from daq_app.acquisition.messages.published import CheckMessage, EventMessage, Judgement, Reply, State
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.look.state_look import SHAPES, look_of
@@ -105,16 +106,33 @@ def test_a_no_go_must_be_overruled_on_purpose_and_in_time(qtbot, window, monkeyp
     assert asked[-1][1]["overrule"] == 0.0, "what has run out must be asked for again"
 
 
-def test_a_warning_leaves_when_its_trouble_is_over_and_stays_in_the_log(window):
-    begins = EventMessage(
-        kind="alarm", sample=1, text="no samples", severity="error", data={"alarm": "silence"}
-    )
+@pytest.mark.parametrize(
+    ("kind", "data"), [("alarm", {"alarm": "silence"}), ("travel", {}), ("overload", {})]
+)
+def test_a_warning_leaves_when_its_trouble_is_over_and_stays_in_the_log(window, kind, data):
+    begins = EventMessage(kind=kind, sample=1, text="no samples", severity="error", data=data)
     window._after(begins)
     assert window.notices.current == ("error", "no samples")
     window._after(begins.model_copy(update={"text": "samples again", "severity": "info"}))
     assert ("error", "no samples") not in window.notices._queue
     told = next(told for told in window.notices.log if told.text == "no samples")
     assert told.over is not None and told.over >= told.at
+
+
+def test_a_refusal_leaves_once_the_order_is_obeyed(window, monkeypatch):
+    """ "Not armed" beside "Armed" would be one word too many."""
+    monkeypatch.setattr(window.orders, "request", lambda name, more=None: None)
+    window.session.set_zeroed(False)
+    window.prepare.card.propose("FR1-L3-1", 0.35)
+    window.orders.arm()
+    window._on_reply("arm", Reply(ok=False, text="Not armed: the sensor check says no-go."))
+    window.orders._on_overrule_over()
+    assert window.notices.current[1].startswith("Not armed: F5 was not pressed again")
+    window._on_reply("arm", Reply(ok=True, text="Armed and recording"))
+    assert not [text for _, text in window.notices._queue if text.startswith("Not armed")]
+    assert window.notices.current == ("warning", UNZEROED)
+    window._on_reply("tare", Reply(ok=True, text="The zero has been taken", data={"tare": {"WP-1": 0.1}}))
+    assert window.notices.current[0] == "info"
 
 
 def test_a_note_is_typed_in_a_line_not_in_a_box(qtbot, window, monkeypatch):

@@ -100,5 +100,8 @@ def _prepared(contents: JournalContents) -> list[str]:
 def _told(
     contents: JournalContents, kind: str, which: Callable[[dict[str, Any]], bool] = lambda data: True
 ) -> list[str]:
-    """What was said of that kind while the run was recorded, each sentence once."""
-    return sorted({event.text for event in contents.events if event.kind == kind and which(event.data)})
+    """What was warned of in that kind while the run was recorded, each sentence once."""
+    told = (event for event in contents.events if event.kind == kind)
+    return sorted(
+        {event.text for event in told if which(event.data) and event.data.get("severity") != "info"}
+    )

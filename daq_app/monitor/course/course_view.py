@@ -13,9 +13,9 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
-from daq_app.acquisition.messages.published import MotionMessage, State
+from daq_app.acquisition.messages.published import Call, MotionMessage, State
 from daq_app.monitor.course.fitted_text import FittedText
-from daq_app.monitor.course.gauge_words import countdown_s, gauge_words
+from daq_app.monitor.course.gauge_words import countdown_s, gauge_words, target_words
 from daq_app.monitor.course.recording_light import recording_light
 from daq_app.monitor.course.target_bar import paint_target_bar
 from daq_app.monitor.data.session import Session
@@ -28,7 +28,7 @@ from daq_app.monitor.widgets.counters import TileText, tile_texts
 
 TRACE_S: Final = 12.0
 _MOVED: Final = frozenset({State.RELEASED, State.ROCKING, State.AT_REST})
-"""States in which the motion is drawn in place of the gauge."""
+_AFTERWARDS: Final = frozenset({State.SAVING, State.SAVED, State.FAILED})
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _CENTRE = Qt.AlignmentFlag.AlignCenter
 
@@ -43,6 +43,13 @@ def figures(session: Session) -> dict[str, TileText]:
         "r by EAV": tiles["eav"],
         "r by CRT": tiles["crt"],
     }
+
+
+def shows_motion(session: Session) -> bool:
+    """Whether the motion is drawn in place of the gauge: from the release until the wall is pulled again."""
+    state, call = session.current_state, session.judgement.call
+    just_recorded = state in _AFTERWARDS and call in (Call.WAIT, Call.LOOK)
+    return state in _MOVED or (just_recorded and session.last_motion is not None)
 
 
 class CourseView(QWidget):
@@ -97,7 +104,7 @@ class CourseView(QWidget):
         parts = _rows(whole, (0.17, 0.15, 0.40, 0.28), gap)
         self._paint_state(painter, parts[0])
         self._paint_order(painter, parts[1])
-        if self._session.current_state in _MOVED:
+        if shows_motion(self._session):
             self._paint_motion(painter, self._card(painter, parts[2]))
         else:
             self._paint_gauge(painter, self._card(painter, parts[2]))
@@ -169,7 +176,7 @@ class CourseView(QWidget):
         bar = QRectF(lower.left(), lower.top() + 0.1 * lower.height(), lower.width(), 0.45 * lower.height())
         alarm = session.rig.acquisition.alarm_ratio if session.rig is not None else math.inf
         full = max(1.08 * alarm if math.isfinite(alarm) else 0.5, 1.25 * (judgement.high or 0.0))
-        paint_target_bar(painter, bar, full, judgement, (colours, label), alarm)
+        paint_target_bar(painter, bar, full, judgement, target_words(session), (colours, label), alarm)
 
     def _paint_motion(self, painter: QPainter, box: QRectF) -> None:
         """The rotation since the release, and beside it how long and how many impacts."""
@@ -194,22 +201,32 @@ class CourseView(QWidget):
             painter.drawPolyline(line)
 
     def _motion_line(self, box: QRectF) -> QPolygonF | None:
-        """θ(t) of the last seconds in `box`; None while nothing is known."""
+        """θ(t) of the last seconds, after the test of all of it, in `box`; None while nothing is known."""
         session = self._session
-        if session.rate_hz <= 0 or not len(session.trace):
+        if session.rate_hz <= 0:
             return None
-        released = (
-            session.estimate.release_sample if session.estimate is not None else session.trace.last_sample
-        )
-        elapsed_s = (session.trace.last_sample - released) / session.rate_hz
-        first = released + (max(0.0, elapsed_s - TRACE_S + 1.0) - 1.0) * session.rate_hz
-        samples, rotation, _ = session.trace.window(first)
+        if session.current_state not in _MOVED and session.last_motion is not None:
+            samples, rotation, _ = session.last_motion
+            first, span = samples[0], max(samples[-1] - samples[0], 1.0)
+        elif len(session.trace):
+            first, span = self._latest(), TRACE_S * session.rate_hz
+            samples, rotation, _ = session.trace.window(first)
+        else:
+            return None
         known = ~np.isnan(rotation)
         x, y = envelope(samples[known], rotation[known], max(100, int(box.width() / 2)))
         largest = max(float(np.max(np.abs(y), initial=0.0)), 0.02 * session.alpha_rad)
-        px = box.left() + (x - first) / (TRACE_S * session.rate_hz) * box.width()
+        px = box.left() + (x - first) / span * box.width()
         py = box.center().y() - y / largest * 0.46 * box.height()
         return QPolygonF([QPointF(a, b) for a, b in zip(px.tolist(), py.tolist(), strict=True)])
+
+    def _latest(self) -> float:
+        """First sample of the time axis: a second before the release, later `TRACE_S` ago."""
+        session = self._session
+        last = session.trace.last_sample
+        released = session.estimate.release_sample if session.estimate is not None else last
+        elapsed_s = (last - released) / session.rate_hz
+        return released + (max(0.0, elapsed_s - TRACE_S + 1.0) - 1.0) * session.rate_hz
 
     def _paint_figures(self, painter: QPainter, box: QRectF, gap: float) -> None:
         colours = self._colours

@@ -1,4 +1,4 @@
-"""What stands beside every gauge: the recorder's words, and the seconds that are still to be held."""
+"""What stands beside every gauge: the recorder's words, the target, and the seconds still to be held."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 
 from daq_app.acquisition.messages.published import Call, MotionMessage
 from daq_app.monitor.data.session import Session
+from daq_app.monitor.look.state_look import name_of_test
 
 
 def countdown_s(session: Session) -> int | None:
@@ -19,3 +20,16 @@ def countdown_s(session: Session) -> int | None:
 def gauge_words(session: Session) -> str:
     """The recorder's words, or that the rotation is not live."""
     return session.judgement.gauge if session.fresh(MotionMessage) else "The rotation is not live"
+
+
+def target_words(session: Session) -> str:
+    """The target of the plan with its band, empty without one; it says so if it is the next test's.
+
+    After a test the plan is already that of the next one, while state and name are still of the last.
+    """
+    message, judgement = session.state, session.judgement
+    if message is None or judgement.target is None or judgement.low is None or judgement.high is None:
+        return ""
+    words = f"target {judgement.target:.2f}  ({judgement.low:.3f} to {judgement.high:.3f})"
+    of_the_next = message.plan.test and message.plan.test != name_of_test(message)
+    return f"next test {message.plan.test}: {words}" if of_the_next else words

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 
 from daq_app.acquisition.messages.published import MotionMessage
 from daq_app.monitor.course.fitted_text import FittedText
-from daq_app.monitor.course.gauge_words import countdown_s, gauge_words
+from daq_app.monitor.course.gauge_words import countdown_s, gauge_words, target_words
 from daq_app.monitor.course.target_bar import paint_target_bar
 from daq_app.monitor.data.session import Session
 from daq_app.monitor.look.labels import DASH, number
@@ -69,7 +69,7 @@ class PullGauge(QWidget):
         label = colours.font(9, bold=True)
         label.setPixelSize(max(9, int(min(1.25 * colours.points, 0.12 * height))))
         full = max(0.5, 1.25 * (session.judgement.high or 0.0))
-        paint_target_bar(painter, bar, full, session.live_judgement, (colours, label))
+        paint_target_bar(painter, bar, full, session.live_judgement, target_words(session), (colours, label))
         below = QRectF(0, bar.bottom() + 0.16 * height, width, height - bar.bottom() - 0.16 * height)
         tone = session.judgement.tone if live else "muted"
         colour = str(getattr(colours, tone))

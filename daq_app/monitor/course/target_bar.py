@@ -16,12 +16,13 @@ def paint_target_bar(
     bar: QRectF,
     full: float,
     judgement: Judgement,
+    target_words: str,
     look: tuple[Colours, QFont],
     alarm_ratio: float = math.inf,
 ) -> None:
-    """Draw the bar from 0 to `full`; the rotation is `judgement.ratio`, the target is named below the bar.
+    """Draw the bar from 0 to `full`; the rotation is `judgement.ratio`, `target_words` stand below the bar.
 
-    `look`: colours, and the font of the target's name. From `alarm_ratio` on the ground is that of danger.
+    `look`: colours, and the font of those words. From `alarm_ratio` on the ground is that of danger.
     """
     colours, label = look
     ratio = judgement.ratio
@@ -53,9 +54,8 @@ def paint_target_bar(
     painter.setPen(QPen(QColor(colours.good), max(2.0, 0.04 * bar.height())))
     painter.drawLine(int(x), int(bar.top() - over), int(x), int(bar.bottom() + over))
     painter.setFont(label)
-    text = f"target {judgement.target:.2f}  ({judgement.low:.3f} to {judgement.high:.3f})"
     metrics = QFontMetricsF(label)
-    wide = metrics.horizontalAdvance(text) + 4
+    wide = metrics.horizontalAdvance(target_words) + 4
     left = max(bar.left(), min(x - wide / 2, bar.right() - wide))
     box = QRectF(left, bar.bottom() + over + 1, wide, metrics.height())
-    painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+    painter.drawText(box, Qt.AlignmentFlag.AlignCenter, target_words)

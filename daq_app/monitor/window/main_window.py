@@ -48,7 +48,7 @@ from daq_app.monitor.window.adoption import Adoption
 from daq_app.monitor.window.orders import Orders
 from daq_app.monitor.window.placement import keep_on_screen
 from daq_app.monitor.window.test_display import TestDisplay
-from daq_app.monitor.window.what_to_tell import MAY_BE_REFUSED, brings_gauge, is_told, numbers, trouble_of
+from daq_app.monitor.window.what_to_tell import brings_gauge, is_told, numbers, trouble_of
 from daq_app.monitor.window.window_frame import WindowFrame
 
 FRAME_MS: Final = 16
@@ -363,7 +363,6 @@ class MainWindow(QMainWindow):
     def _on_reply(self, name: str, reply: Reply) -> None:
         self.orders.on_reply(name, reply)
         if not reply.ok:
-            self.notices.tell("error" if name not in MAY_BE_REFUSED else "warning", reply.text)
             return
         if name == "hello":
             self._adopt(reply.data)

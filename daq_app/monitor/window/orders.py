@@ -21,6 +21,7 @@ from daq_app.monitor.pages.campaign_page import CampaignPage
 from daq_app.monitor.pages.prepare_page import PreparePage
 from daq_app.monitor.pages.result_page import ResultPage
 from daq_app.monitor.widgets.notices import NoticeLine
+from daq_app.monitor.window.what_to_tell import MAY_BE_REFUSED
 from daq_app.runfile import RunFileError, open_run
 
 ARM_AGAIN_WITHIN_S: Final = 10.0
@@ -99,28 +100,31 @@ class Orders(QObject):
         choice = self._prepare.card.choice
         if not choice.name:
             self._show_page(self._prepare)
-            self._notices.tell("warning", "Give the test a name before arming.")
+            self._notices.tell("warning", "Give the test a name before arming.", _order("arm"))
             return
         self._plan_timer.stop()
         overrule = self._overrule_timer.isActive()
         self._overrule_timer.stop()
         if self._session.zeroed is False:
-            self._notices.tell("warning", UNZEROED)
+            self._notices.tell("warning", UNZEROED, _order("tare"))
         self.request("arm", {**choice.as_order(), "overrule": float(overrule)})
 
     def on_reply(self, name: str, reply: Reply) -> None:
-        """What became of an order."""
+        """What became of an order; a refusal stands until the order is obeyed."""
         if name == "plan":
             self._plan_sent = False
+        if reply.ok:
+            self._notices.settle(_order(name))
+        else:
+            self._notices.tell("warning" if name in MAY_BE_REFUSED else "error", reply.text, _order(name))
         no_go = self._prepare.check is not None and self._prepare.check.verdict is Verdict.NO_GO
         if name == "arm" and not reply.ok and no_go:
             self._show_page(self._prepare)
             self._overrule_timer.start()
 
     def _on_overrule_over(self) -> None:
-        self._notices.tell(
-            "warning", f"Not armed: F5 was not pressed again within {ARM_AGAIN_WITHIN_S:.0f} s."
-        )
+        text = f"Not armed: F5 was not pressed again within {ARM_AGAIN_WITHIN_S:.0f} s."
+        self._notices.tell("warning", text, _order("arm"))
 
     # -- the campaign ----------------------------------------------------------------------------
 
@@ -173,6 +177,11 @@ class Orders(QObject):
             return
         self._result.open(run)
         self._campaign.scan()
+
+
+def _order(name: str) -> str:
+    """What a message about an order is about."""
+    return f"order {name}"
 
 
 def _single_shot(parent: QObject, after_ms: int, call: Callable[[], None]) -> QTimer:

@@ -9,6 +9,9 @@ from daq_app.acquisition.messages.published import RECORDING, EventMessage, Stat
 _QUIET_EVENTS: Final = frozenset({"impact", "marker", "tare", "saved", "check", "result", *State})
 """Events that the pages show anyway, unless they are more than information."""
 
+_END_IS_TOLD: Final = frozenset({"disk", "memory", "recorder", "travel", "overload"})
+"""Kinds of trouble whose end is an event of the same kind that only informs."""
+
 MAY_BE_REFUSED: Final = frozenset({"tare", "check", "pull", "plan"})
 """Orders whose refusal is no error: the wall was not still, or the test is locked."""
 
@@ -27,7 +30,7 @@ def trouble_of(event: EventMessage) -> str:
     """What a warning is about, where its end is told as well; empty for others."""
     if event.kind == "alarm":
         return f"alarm {event.data.get('alarm', '')}"
-    return event.kind if event.kind in ("disk", "memory", "recorder") else ""
+    return event.kind if event.kind in _END_IS_TOLD else ""
 
 
 def numbers(value: object) -> dict[str, float]:

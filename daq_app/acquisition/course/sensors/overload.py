@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,7 @@ from numpy.typing import NDArray
 from daq_app.config.families import AUXILIARY
 from daq_app.config.rig import Channel
 from daq_app.config.scaling import Scaling
+from daq_app.config.wording import signed
 from drivers import Block
 
 _RAIL_SHARE = 0.9995
@@ -20,6 +23,8 @@ _TRAVEL_SHARE = 0.001
 """Within this share of its travel from either end a sensor stands at its stop: 0.1 mm of 100 mm. Assumed."""
 _BEYOND_SHARE = 0.01
 """A reading further than this share of the travel beyond its end comes from the line, not from the sensor."""
+_OVER_S: Final = 2.0
+"""A channel that has followed for so long follows again, s: longer than a half-cycle of a rocking wall."""
 TRAVELLING = ("lvdt", "wire", "tiltmeter", *(name for name, family in AUXILIARY.items() if family.travels))
 """Families with a mechanical or stated end of travel."""
 
@@ -39,11 +44,24 @@ def travel_in_readings(channels: Sequence[Channel]) -> tuple[NDArray[np.float64]
     return low, high
 
 
-class OverloadWatch:
-    """Remembers which channels can follow no further, so that each is told once."""
+@dataclass(frozen=True, slots=True)
+class RangeNews:
+    """What is told of channels that follow no further, or follow again."""
 
-    def __init__(self, channels: Sequence[Channel], ranges: dict[str, tuple[float, float]]) -> None:
-        self._channels = tuple(channels)
+    kind: str
+    """travel or overload"""
+    severity: str
+    """warning, and info at its end"""
+    text: str
+
+
+class OverloadWatch:
+    """Remembers which channels can follow no further, so that each is told once, and when that is over."""
+
+    def __init__(
+        self, channels: Sequence[Channel], ranges: dict[str, tuple[float, float]], rate_hz: float
+    ) -> None:
+        self._by_id = {channel.id: channel for channel in channels}
         self._ids = tuple(channel.id for channel in channels)
         low = np.array([ranges[name][0] for name in self._ids])
         high = np.array([ranges[name][1] for name in self._ids])
@@ -52,8 +70,12 @@ class OverloadWatch:
         self._travel_low, self._travel_high = travel_in_readings(channels)
         beyond = _BEYOND_SHARE * (self._travel_high - self._travel_low)
         self._lowest, self._highest = self._travel_low - beyond, self._travel_high + beyond
-        self._now: frozenset[str] = frozenset()
-        self._news: tuple[str, ...] = ()
+        self._over_samples = _OVER_S * rate_hz
+        self._last_out: dict[str, dict[str, int]] = {"travel": {}, "overload": {}}
+        """By kind: the channels that were told, and the sample up to which each could not follow."""
+        self._untold: set[str] = set()
+        """Channels that a new run has not told yet."""
+        self._news: list[RangeNews] = []
         self.at_end: frozenset[str] = frozenset()
         """Channels at the end of their travel in the last block."""
 
@@ -67,34 +89,51 @@ class OverloadWatch:
         flags = zip(self._ids, railed | ended, strict=True)
         overloaded = tuple(name for name, flag in flags if flag or name in reported)
         self.at_end = frozenset(name for name, end in zip(self._ids, ended, strict=True) if end)
-        self._news = tuple(name for name in overloaded if name not in self._now)
-        self._now = frozenset(overloaded)
+        now = {
+            "travel": [name for name in overloaded if name in self.at_end],
+            "overload": [name for name in overloaded if name not in self.at_end],
+        }
+        self._news = [news for kind, names in now.items() for news in self._changes(kind, names, block)]
+        self._untold -= set(overloaded)
         return overloaded
+
+    def _changes(self, kind: str, names: Sequence[str], block: Block) -> Iterator[RangeNews]:
+        """Who follows no further since this block, and that all follow again."""
+        last_out = self._last_out[kind]
+        end = block.first_sample + block.n_samples
+        new = [name for name in names if name not in last_out or name in self._untold]
+        last_out.update(dict.fromkeys(names, end))
+        if new:
+            yield RangeNews(kind, "warning", _warning(kind, [self._by_id[name] for name in new]))
+        if last_out and end - max(last_out.values()) >= self._over_samples:
+            yield RangeNews(kind, "info", _END[kind].format(names=", ".join(last_out)))
+            last_out.clear()
 
     def forget(self) -> None:
         """Tell everything again that is still so."""
-        self._now = frozenset()
+        self._untold = {name for names in self._last_out.values() for name in names}
 
-    def news(self) -> list[tuple[str, str]]:
-        """(kind, sentence) on channels that were within their range in the block before."""
-        ended = [
-            channel for channel in self._channels if channel.id in self._news and channel.id in self.at_end
-        ]
-        railed = ", ".join(name for name in self._news if name not in self.at_end)
-        told = []
-        if ended:
-            names = ", ".join(_with_end(channel) for channel in ended)
-            advice = "What lies beyond is not measured; set the sensors back or use longer ones"
-            told.append(("travel", f"End of travel: {names}. {advice}"))
-        if railed:
-            text = f"Overloaded: {railed}. Check range, excitation and plug; the readings there are cut off"
-            told.append(("overload", text))
-        return told
+    def news(self) -> list[RangeNews]:
+        """What is new with the last block."""
+        return self._news
+
+
+_END: Final = {
+    "travel": "Within their travel again: {names}",
+    "overload": "Within their input range again: {names}",
+}
+
+
+def _warning(kind: str, channels: Sequence[Channel]) -> str:
+    if kind == "travel":
+        names = ", ".join(_with_end(channel) for channel in channels)
+        advice = "What lies beyond is not measured; set the sensors back or use longer ones"
+        return f"End of travel: {names}. {advice}"
+    railed = ", ".join(channel.id for channel in channels)
+    return f"Overloaded: {railed}. Check range, excitation and plug; the readings there are cut off"
 
 
 def _with_end(channel: Channel) -> str:
     """A channel with its travel, in the units of a bench."""
-    low, high = channel.range_si
-    if channel.family == "tiltmeter":
-        return f"{channel.id} ({1e3 * low:g} to {1e3 * high:g} mrad)"
-    return f"{channel.id} ({1e3 * low:g} to {1e3 * high:g} mm)"
+    low, high = (signed(1e3 * end) for end in channel.range_si)
+    return f"{channel.id} ({low} to {high} {'mrad' if channel.family == 'tiltmeter' else 'mm'})"
