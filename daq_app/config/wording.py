@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Final
+
+_MINUS: Final = re.compile(r"(?<![\w\-)])-(?=\.?\d|[xyz]\b)")
 
 METHOD_MARKS: Final = {"EAV": "o", "CRT": "s", "fit": "D"}
 """Mark of each method for r in every figure, as matplotlib and pyqtgraph both spell circle and square."""
@@ -28,5 +31,5 @@ def signed(value: float, spec: str = "g") -> str:
 
 
 def true_minus(text: str) -> str:
-    """A number or a direction (``-x``) as people read it; not for names, in which a hyphen is one."""
-    return text.replace("-", "−")
+    """The text with true minus signs before numbers and axes (``-3.2``, ``-x``); hyphens in names stay."""
+    return _MINUS.sub("−", text)

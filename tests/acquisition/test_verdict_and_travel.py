@@ -59,7 +59,7 @@ def test_a_test_as_planned_is_good(judged: Judged) -> None:
     [
         (TestPlan(theta0_over_alpha=0.15), "planned 0.150 within 5 %"),
         (TestPlan(theta0_over_alpha=0.38), "planned 0.380 within 5 %"),
-        (TestPlan(theta0_over_alpha=0.35, side="-x"), "planned towards -x"),
+        (TestPlan(theta0_over_alpha=0.35, side="-x"), "planned towards −x"),
     ],
 )
 def test_another_test_than_was_planned_is_repeated_with_the_reason(

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from daq_app.config.wording import plus_minus
+from daq_app.config.wording import plus_minus, true_minus
 
 
 @pytest.mark.parametrize(
@@ -23,3 +23,16 @@ from daq_app.config.wording import plus_minus
 )
 def test_an_error_never_reads_as_certainty(error, decimals, text):
     assert plus_minus(error, decimals) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("held steady at -77.8 mrad", "held steady at −77.8 mrad"),
+        ("planned towards -x", "planned towards −x"),
+        ("WP-1 (-10 to -.5 mm) of FR1-L1-1, 2026-11-25", "WP-1 (−10 to −.5 mm) of FR1-L1-1, 2026-11-25"),
+        ("AC-x of 1e-05, no-go", "AC-x of 1e-05, no-go"),
+    ],
+)
+def test_a_minus_sign_is_one_and_a_hyphen_stays(text, shown):
+    assert true_minus(text) == shown

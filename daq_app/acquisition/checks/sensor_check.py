@@ -19,6 +19,7 @@ from daq_app.acquisition.checks.check_model import ChannelCheck, Finding, Sensor
 from daq_app.config.families import AUXILIARY
 from daq_app.config.rig import Channel, Rig
 from daq_app.config.scaling import Scaling
+from daq_app.config.wording import signed
 
 Floats = NDArray[np.float64]
 
@@ -170,7 +171,7 @@ def _signal(channel: Channel, untared: Floats, readings: Floats, overloaded: boo
     if channel.auxiliary:  # a rope that hangs loose reads zero, which may be the end of the range
         beyond = _AUXILIARY_BEYOND * (largest - smallest)
         smallest, largest = smallest - beyond, largest + beyond
-    dead = f"reads {float(np.median(readings)):.3g} {channel.reading_unit} at rest"
+    dead = f"reads {signed(float(np.median(readings)), '.3g')} {channel.reading_unit} at rest"
     if not smallest <= centre <= largest:
         text = (
             f"Out of range: it {dead}, which no quantity within its range gives. Check wiring and mounting."

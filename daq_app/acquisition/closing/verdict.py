@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
+from daq_app.config.wording import true_minus
 from daq_app.rocking.analysis.results import TestAnalysis
 from daq_app.runfile import JournalContents, TestPlan
 from daq_app.runfile.source import RunSource
@@ -37,7 +38,11 @@ def judge_run(contents: JournalContents, analysis: TestAnalysis) -> dict[str, An
     ]
     channels = sorted({str(e.data["channel"]) for e in contents.events if e.kind == "channel"})
     verdict = "bad" if hard else "repeat" if missed else "good"
-    return {"verdict": verdict, "reasons": hard + missed + notes, "doubtful_channels": channels}
+    return {
+        "verdict": verdict,
+        "reasons": [true_minus(reason) for reason in hard + missed + notes],
+        "doubtful_channels": channels,
+    }
 
 
 def judge_imported(run: RunSource, analysis: TestAnalysis) -> dict[str, Any]:
@@ -50,7 +55,11 @@ def judge_imported(run: RunSource, analysis: TestAnalysis) -> dict[str, Any]:
         hard.append("no release and impact were found")
     notes = [note.text for note in analysis.notes if note.severity == "warning"]
     channels = sorted({name for finding in analysis.findings for name in finding.channels})
-    return {"verdict": "bad" if hard else "good", "reasons": hard + notes, "doubtful_channels": channels}
+    return {
+        "verdict": "bad" if hard else "good",
+        "reasons": [true_minus(reason) for reason in hard + notes],
+        "doubtful_channels": channels,
+    }
 
 
 def _spoilt(contents: JournalContents, analysis: TestAnalysis, outcome: str) -> list[str]:

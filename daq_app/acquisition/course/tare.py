@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from daq_app.config.rig import Channel, Rig
 from daq_app.config.scaling import Scaling
+from daq_app.config.wording import true_minus
 
 Floats = NDArray[np.float64]
 
@@ -65,8 +66,8 @@ def take_tare(rig: Rig, readings: Floats, first_sample: int, resolution: Floats 
     reasons += _leaning(rig, mean)
     if reasons:
         raise NotSteady(
-            f"The zero cannot be taken: {'; '.join(reasons)}. The wall must stand upright, untouched, with "
-            "every sensor connected"
+            f"The zero cannot be taken: {true_minus('; '.join(reasons))}. The wall must stand upright, "
+            "untouched, with every sensor connected"
         )
     # The certificate's offset is subtracted anyway: the tare is what remains.
     beyond = readings.mean(axis=1) - scaling.zero[:, 0]

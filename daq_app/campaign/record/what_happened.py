@@ -10,7 +10,7 @@ from daq_app.campaign.record.picture import record_picture
 from daq_app.campaign.record.source import RecordSource, planned_level
 from daq_app.campaign.result.family_rows import CAPTION, HEADINGS, family_rows
 from daq_app.campaign.summaries.summary import TestSummary
-from daq_app.config.wording import plus_minus
+from daq_app.config.wording import plus_minus, true_minus
 from daq_app.rocking.families.verdict_words import verdict_sentence
 
 _METHODS = {
@@ -87,7 +87,7 @@ def plan_section(source: RecordSource) -> Section:
     else:
         rows += [
             ("θ0/α planned", _target(source)),
-            ("Side planned", plan.side or "either"),
+            ("Side planned", true_minus(plan.side) or "either"),
         ]
     analysis = source.results.get("analysis")
     analysis = analysis if isinstance(analysis, dict) else {}

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.config.rig import Rig
+from daq_app.config.wording import true_minus
 from daq_app.rocking.motion.release import locate_release
 from daq_app.rocking.motion.rolling import RollingArray
 from daq_app.rocking.theory.housner import exact_amplitude
@@ -202,7 +203,8 @@ class PhaseDetector:
 
     def _say(self, kind: str, sample: float, text: str) -> None:
         detected = int(self._sample(self._frames.end))
-        self._events.append(PhaseEvent(kind, sample, detected, float(self._frames.last(1)[0, 0]), text))
+        rotation = float(self._frames.last(1)[0, 0])
+        self._events.append(PhaseEvent(kind, sample, detected, rotation, true_minus(text)))
 
     # -- hold ------------------------------------------------------------------------------------
 

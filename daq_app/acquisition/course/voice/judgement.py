@@ -12,6 +12,7 @@ from typing import Final
 
 from daq_app.acquisition.messages.published import Call, Judgement, State, Tone
 from daq_app.config.rig import Acquisition
+from daq_app.config.wording import true_minus
 from daq_app.runfile import TestPlan
 
 PULLED: Final = 0.03
@@ -160,7 +161,7 @@ _SENTENCES: Final[dict[Call, str]] = {
 def _sentence(call: Call, now: Situation, settings: Acquisition, held_s: float) -> str:
     match call:
         case Call.OTHER_SIDE:
-            return f"Wrong side: this test is planned towards {now.plan.side}. Lower the wall."
+            return f"Wrong side: this test is planned towards {true_minus(now.plan.side)}. Lower the wall."
         case Call.PULL if now.plan.band is None:
             return "Pull the wall as far as this test asks: no target is planned."
         case Call.PULL:
