@@ -376,4 +376,4 @@ class PhaseDetector:
         self.phase = Phase.AT_REST
         upright = abs(level) < 0.05 * self.settings.alpha_rad
         where = "" if upright else ", not upright: was the wall caught?"
-        self._say("rest", self._sample(quiet), f"at rest at {level * 1e3:.2f} mrad{where}")
+        self._say("rest", self._sample(quiet), f"at rest at {round(level * 1e3, 2) + 0.0:.2f} mrad{where}")
