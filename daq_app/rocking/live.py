@@ -112,6 +112,9 @@ class LiveAnalyser:
         self._frame = settings.frame_samples
         self.geometry = RotationGeometry.from_rig(rig, frame_samples=self._frame)
         settings = PhaseSettings.from_rig(rig, rate_hz, self.geometry.rotation_noise_rad())
+        if not tare:
+            # Without a zero wires and tiltmeters have offsets of their own: a hold is one all the same.
+            settings = replace(settings, level_rad=settings.smallest_hold * settings.alpha_rad)
         self.velocity_filter = VelocityFilter(rate_hz, rig.acquisition.velocity_cutoff_hz)
         index = {channel_id: row for row, channel_id in enumerate(rig.channel_ids)}
         self._families = LiveFamilies(rig, rate_hz)

@@ -49,9 +49,12 @@ def judged(tmp_path: Path, rig: Any, rig_text: str, wall_test: Any) -> Judged:
 
 def test_a_test_as_planned_is_good(judged: Judged) -> None:
     check = CheckRecord(verdict="go")
-    found = judged(TestPlan(test="FR1-L3-1", theta0_over_alpha=0.35, side="+x", check=check))
+    zero = "2026-11-25T09:00:00+00:00"
+    plan = TestPlan(test="FR1-L3-1", theta0_over_alpha=0.35, side="+x", check=check, zero_utc=zero)
+    found = judged(plan)
     assert found["verdict"] == "good"
-    assert not any("planned" in reason or "checked" in reason for reason in found["reasons"])
+    left_out = ("planned", "checked", "no zero")
+    assert not any(word in reason for reason in found["reasons"] for word in left_out)
 
 
 @pytest.mark.parametrize(
@@ -70,12 +73,13 @@ def test_another_test_than_was_planned_is_repeated_with_the_reason(
     assert reason in found["reasons"][0]
 
 
-def test_a_check_that_was_overruled_or_left_out_is_noted(judged: Judged) -> None:
+def test_a_check_or_zero_that_was_overruled_or_left_out_is_noted(judged: Judged) -> None:
     no_go = CheckRecord(verdict="no-go", summary="2 of 41 channels must be mended.", overruled=True)
     found = judged(TestPlan(theta0_over_alpha=0.35, check=no_go))
     assert found["verdict"] == "good"
     assert any("in spite of" in reason and "2 of 41" in reason for reason in found["reasons"])
-    assert any("not checked" in reason for reason in judged(TestPlan())["reasons"])
+    left_out = " ".join(judged(TestPlan())["reasons"])
+    assert "not checked" in left_out and "no zero was taken" in left_out
 
 
 def test_a_sensor_at_the_end_of_its_travel_is_called_so_and_not_stuck(rig: Any) -> None:

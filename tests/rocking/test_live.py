@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from daq_app.acquisition.messages.published import EstimateMessage
+from daq_app.config import Scaling
 from daq_app.rocking import LiveAnalyser, Phase
 from daq_app.rocking.live_families import LiveFamilies
 
@@ -68,6 +69,20 @@ def test_phases_in_order(made):
     assert kinds[:2] == ["hold", "release"] and kinds[-1] == "rest"
     assert set(kinds[2:-1]) == {"impact"}
     assert results[-1].phase is Phase.AT_REST
+
+
+@pytest.mark.parametrize("zeroed", [True, False])
+def test_a_wall_is_held_before_a_zero_whatever_its_tiltmeters_are_off_by(made, zeroed):
+    """They sit a fraction of a degree off: beside a zero such a difference is a doubt, without one none."""
+    test = made(phi=0.15, r=0.895, side=1, seed=3)
+    readings = test.readings.copy()
+    for row, channel in enumerate(test.rig.channels):
+        if channel.family == "tiltmeter":
+            gain = np.ptp(Scaling.of([channel]).to_readings(np.array([[0.0, 1.0]])))
+            readings[row] += 4.5e-3 * gain
+    results = run_live(test, readings=readings, tare={"AX-1": 0.0} if zeroed else {})
+    kinds = [event.kind for result in results for event in result.events]
+    assert ("hold" in kinds) is not zeroed
 
 
 def test_rotation_and_velocity_belong_to_the_same_samples(made):

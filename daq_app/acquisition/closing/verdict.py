@@ -101,6 +101,8 @@ def _prepared(contents: JournalContents) -> list[str]:
         notes.append("the sensors were not checked before the test")
     if plan is not None and plan.check is not None and plan.check.verdict == "no-go":
         notes.append(f"armed in spite of a sensor check that said no-go: {plan.check.summary}")
+    if plan is not None and not plan.zero_utc:
+        notes.append("no zero was taken before the test: it is that of the wall at rest after it")
     if contents.header.kept is not None:
         notes.append("nobody had armed: kept from the ring")
     return notes

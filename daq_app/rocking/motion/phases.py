@@ -63,6 +63,8 @@ class PhaseSettings:
     """Smallest |θ|/α that counts as pulled."""
     steady_rad: float = 1.5e-3
     """Range of 50 ms means within the window of a steady hold."""
+    level_rad: float = 3e-3
+    """How far a tiltmeter may differ from the rotation of a hold that it confirms."""
     quiet_rad: float = 4e-4
     """Range of the frames within the window of a wall at rest."""
     quiet_rad_s: float = 0.03
@@ -225,7 +227,7 @@ class PhaseDetector:
         if not tilts.size or not np.isfinite(tilts).all(axis=1).any():
             return True
         first, last = tilts[:, : 2 * _TICK].mean(axis=1), tilts[:, -2 * _TICK :].mean(axis=1)
-        near = np.abs(last - level) < max(2 * self.settings.steady_rad, 0.08 * abs(level))
+        near = np.abs(last - level) < max(self.settings.level_rad, 0.08 * abs(level))
         still = np.abs(last - first) < self.settings.steady_rad
         return bool(np.any(near & still))
 
