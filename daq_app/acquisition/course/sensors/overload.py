@@ -106,7 +106,8 @@ class OverloadWatch:
         if new:
             yield RangeNews(kind, "warning", _warning(kind, [self._by_id[name] for name in new]))
         if last_out and end - max(last_out.values()) >= self._over_samples:
-            yield RangeNews(kind, "info", _END[kind].format(names=", ".join(last_out)))
+            back = ", ".join(name for name in self._ids if name in last_out)
+            yield RangeNews(kind, "info", _END[kind].format(names=back))
             last_out.clear()
 
     def forget(self) -> None:
@@ -126,14 +127,17 @@ _END: Final = {
 
 def _warning(kind: str, channels: Sequence[Channel]) -> str:
     if kind == "travel":
-        names = ", ".join(_with_end(channel) for channel in channels)
+        by_travel: dict[str, list[str]] = {}
+        for channel in channels:
+            by_travel.setdefault(_travel(channel), []).append(channel.id)
+        names = "; ".join(f"{', '.join(ids)} ({travel})" for travel, ids in by_travel.items())
         advice = "What lies beyond is not measured; set the sensors back or use longer ones"
         return f"End of travel: {names}. {advice}"
     railed = ", ".join(channel.id for channel in channels)
     return f"Overloaded: {railed}. Check range, excitation and plug; the readings there are cut off"
 
 
-def _with_end(channel: Channel) -> str:
-    """A channel with its travel, in the units of a bench."""
+def _travel(channel: Channel) -> str:
+    """From where to where a channel can follow, in the units of a bench."""
     low, high = (signed(1e3 * end) for end in channel.range_si)
-    return f"{channel.id} ({low} to {high} {'mrad' if channel.family == 'tiltmeter' else 'mm'})"
+    return f"{low} to {high} {'mrad' if channel.family == 'tiltmeter' else 'mm'}"
