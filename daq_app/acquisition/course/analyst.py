@@ -113,8 +113,7 @@ class Analyst(threading.Thread):
                 self.voice.repeat()
 
     def _tell_fault(self, error: Exception) -> None:
-        fault = f"{type(error).__name__}: {error}"
-        if fault == self._fault:
+        if (fault := f"{type(error).__name__}: {error}") == self._fault:
             return
         self._fault = fault
         self._note(
@@ -379,6 +378,7 @@ class Analyst(threading.Thread):
             state=self.state,
             sampling=opened is not None,
             opening=self._around.opening(),
+            silent=self._around.silent(),
             armed=course is not None and course.armed,
             plan=self.voice.plan,
             rotation_rad=rotation,

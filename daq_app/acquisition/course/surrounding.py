@@ -26,6 +26,8 @@ class Surrounding:
     """Record the release at that sample, which nobody armed, from some time before it."""
     opening: Callable[[], bool]
     """Whether the device is being opened and started."""
+    silent: Callable[[], bool]
+    """Whether samples should come in, and none has for a second."""
     disk_safe: Callable[[], bool]
     """Whether samples of the run reach a disk."""
     free_bytes: Callable[[], int]

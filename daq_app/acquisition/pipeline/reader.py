@@ -21,6 +21,8 @@ from daq_app.acquisition.pipeline.clock_watch import ClockWatch
 from daq_app.config.planning.plan import TaskPlan
 from drivers import Block, Driver, DriverError
 
+SILENCE_S: Final = 0.8
+"""Looked at five times a second: the operator hears of it within one second."""
 _OVERDUE_S: Final = 0.4
 """Several read periods: from then on a read that has found nothing is told."""
 _READ_TIMEOUT_S: Final = 0.5
@@ -93,6 +95,11 @@ class Reader(threading.Thread):
     def silent_for_s(self) -> float:
         """Since the last samples came."""
         return time.monotonic() - self._last_arrival_s
+
+    @property
+    def silent(self) -> bool:
+        """Whether the device runs, and no samples have come for so long that the operator must hear of it."""
+        return self.is_alive() and self.buffer_samples > 0 and self.silent_for_s > SILENCE_S
 
     def ask(self, call: Callable[[Driver], Any]) -> Future[Any]:
         """Have `call(driver)` made between two reads, on the driver's own thread."""

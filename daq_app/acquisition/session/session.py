@@ -103,6 +103,7 @@ class Session:
                 arm=self._begin,
                 keep=self._keep,
                 opening=lambda: self._reader is not None and self._reader.opening,
+                silent=lambda: self._reader is not None and self._reader.silent,
                 disk_safe=self._disk_safe,
                 free_bytes=lambda: self.watchdog.free_bytes,
             ),

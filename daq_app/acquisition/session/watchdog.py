@@ -11,12 +11,10 @@ from typing import Final
 
 from daq_app.acquisition.course.preflight import LOW_SPACE_BYTES
 from daq_app.acquisition.messages.published import EventMessage, HealthMessage
-from daq_app.acquisition.pipeline.reader import Reader
+from daq_app.acquisition.pipeline.reader import SILENCE_S, Reader
 from daq_app.acquisition.pipeline.recorder import Recorder
 from daq_app.acquisition.session.machine_watch import MachineWatch
 
-SILENCE_S: Final = 0.8
-"""Looked at five times a second: the operator hears of it within one second."""
 _SPACE_EVERY_S: Final = 0.5
 
 
@@ -44,7 +42,7 @@ class Watchdog:
         if reader is not None and reader.is_alive() and reader.buffer_samples:
             self._alarm(
                 "silence",
-                reader.silent_for_s > SILENCE_S,
+                reader.silent,
                 "No samples for a second. Check chassis, network and sample clock; reading is tried again",
                 "Samples arrive again",
             )

@@ -35,6 +35,7 @@ situations = st.builds(
     disk_safe=st.booleans(),
     aborted=st.booleans(),
     opening=st.booleans(),
+    silent=st.booleans(),
 )
 
 
@@ -70,7 +71,7 @@ def test_no_two_words_contradict_each_other(now: Situation) -> None:
         assert not re.search(r"\b(pull|hold|ease)\b", said)
         assert not judgement.gauge
     if told_to_release:
-        assert now.armed and now.disk_safe and now.steady and not moving
+        assert now.armed and now.disk_safe and now.steady and not moving and not now.silent
         assert now.held_s >= SETTINGS.hold_s
         assert not judgement.alarm and "stop" not in said and "not armed" not in said
         if now.plan.band is not None and math.isfinite(ratio):
@@ -84,7 +85,8 @@ def test_no_two_words_contradict_each_other(now: Situation) -> None:
         assert "pull" not in said and "ease back" not in said
     if now.plan.band is None:
         assert "target rotation" not in said
-    if not now.armed and now.sampling and now.state in (State.PREVIEWING, State.SAVED) and ratio >= PULLED:
+    pulled = now.sampling and not now.silent and ratio >= PULLED
+    if not now.armed and now.state in (State.PREVIEWING, State.SAVED) and pulled:
         assert judgement.alarm, "a wall in the air that nobody armed is always an alarm"
     assert (judgement.target, judgement.low) == (
         now.plan.theta0_over_alpha,
@@ -105,6 +107,8 @@ def test_a_wall_held_on_its_target_long_enough_is_released() -> None:
         ({"rotation_rad": 0.42 * ALPHA}, Call.EASE_BACK),
         ({"rotation_rad": 0.7 * ALPHA}, Call.STOP),
         ({"disk_safe": False}, Call.DO_NOT_RELEASE),
+        ({"silent": True}, Call.DO_NOT_RELEASE),
+        ({"silent": True, "armed": False, "state": State.PREVIEWING}, Call.WAIT),
         ({"armed": False, "state": State.SAVED}, Call.ARM_FIRST),
         ({"armed": False, "state": State.SAVED, "rotation_rad": 0.0}, Call.LOOK),
         (
@@ -122,6 +126,14 @@ def test_an_aborted_arming_is_not_called_saved() -> None:
     judgement = judge(situation(armed=False, state=State.SAVED, aborted=True, rotation_rad=0.001), SETTINGS)
     assert judgement.word == "Aborted"
     assert judgement.tone != "good"
+
+
+def test_without_samples_no_old_rotation_is_judged() -> None:
+    armed = judge(situation(silent=True), SETTINGS)
+    assert armed.ratio is None and "no samples" in armed.alarm.lower() and "target" not in says(armed)
+    idle = judge(situation(silent=True, armed=False, state=State.PREVIEWING), SETTINGS)
+    assert (idle.word, idle.ratio) == ("No samples", None)
+    assert judge(situation(silent=True, armed=False, state=State.SAVING), SETTINGS).word == "Saving"
 
 
 def test_a_device_that_is_being_started_is_waited_for_without_a_key() -> None:

@@ -7,7 +7,7 @@ written from the call, so that no two of them can contradict each other.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from daq_app.acquisition.messages.published import Call, Judgement, State, Tone
@@ -42,6 +42,8 @@ class Situation:
     """Samples of the run reach a disk."""
     opening: bool = False
     """Nothing is sampled yet: the device is being opened and started."""
+    silent: bool = False
+    """Samples should come in, and none has for a second: the rotation is an old one."""
     aborted: bool = False
     """The last arming was given up before its release."""
     text: str = ""
@@ -56,6 +58,8 @@ class Situation:
 
 def judge(situation: Situation, settings: Acquisition) -> Judgement:
     """The judgement of a situation."""
+    if situation.silent:
+        situation = replace(situation, rotation_rad=math.nan)
     ratio = abs(situation.rotation_rad) / situation.alpha_rad
     call = _call(situation, settings, ratio)
     band = situation.plan.band
@@ -88,13 +92,15 @@ def _call(now: Situation, settings: Acquisition, ratio: float) -> Call:
     if now.sampling and ratio >= settings.alarm_ratio:
         return Call.STOP
     if now.armed:
-        return _armed_call(now, settings, ratio)
+        return Call.DO_NOT_RELEASE if now.silent else _armed_call(now, settings, ratio)
     if now.sampling and ratio >= PULLED:
         return Call.ARM_FIRST
     if now.state is State.SAVING or _starts(now):
         return Call.WAIT
     if now.state in (State.SAVED, State.FAILED) and not now.aborted:
         return Call.LOOK
+    if now.silent:
+        return Call.WAIT
     return Call.PREPARE if now.sampling else Call.START
 
 
@@ -133,6 +139,14 @@ _WORDS: Final[dict[State, str]] = {
 }
 
 
+_WAITS: Final[dict[State, str]] = {
+    State.AT_REST: "Leave the wall alone: its rest is being recorded.",
+    State.SAVING: "The record is being checked and written.",
+}
+"""States that end by themselves."""
+_LOOK_AT: Final = "Look at the chassis, its power and its network."
+
+
 def _word(call: Call, now: Situation) -> str:
     if call is Call.ARM_FIRST:
         return "Not armed"
@@ -142,6 +156,8 @@ def _word(call: Call, now: Situation) -> str:
         return f"{_WORDS[now.state]}, not armed"
     if now.state is not State.SAVING and _starts(now):
         return "Starting"
+    if call is Call.WAIT and now.silent and now.state not in _WAITS:
+        return "No samples"
     if now.aborted and now.state is State.SAVED:
         return "Aborted"
     return _WORDS[now.state]
@@ -178,11 +194,12 @@ def _sentence(call: Call, now: Situation, settings: Acquisition, held_s: float) 
             return "Keep clear. The recording ends by itself."
         case Call.WAIT if now.state is not State.SAVING and _starts(now):
             return "The sensors are being started: wait for the live view."
+        case Call.WAIT if now.state in _WAITS:
+            return _WAITS[now.state]
         case Call.WAIT:
-            return {
-                State.AT_REST: "Leave the wall alone: its rest is being recorded.",
-                State.SAVING: "The record is being checked and written.",
-            }.get(now.state, "Wait.")
+            return f"No samples come in. {_LOOK_AT}"
+        case Call.DO_NOT_RELEASE if now.silent:
+            return f"Do not release: no samples come in. {_LOOK_AT}"
         case Call.LOOK:
             return now.text or "Look at the result, then take the next test (F6)."
     return _SENTENCES[call]
