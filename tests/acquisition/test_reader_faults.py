@@ -9,7 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from daq_app.acquisition.messages.published import EventMessage, HealthMessage, State
+from daq_app.acquisition.messages.published import (
+    Call,
+    EventMessage,
+    HealthMessage,
+    State,
+    StateMessage,
+)
 from daq_app.acquisition.pipeline.reader import Patience
 from daq_app.runfile import open_run, verify
 from drivers import Block, DriverError
@@ -62,6 +68,20 @@ def test_a_network_that_comes_back_costs_nothing_and_is_told(live: Lives, wall_t
         texts = [event.text for event in run.events if event.kind == "driver"]
     assert "cannot be reached" in texts[0]
     assert "Reading goes on" in texts[1]
+
+
+def test_an_armed_wall_is_not_to_be_released_while_no_samples_come(live: Lives, wall_test: Any) -> None:
+    """The last rotation is an old one: it tells nobody how far to pull."""
+    lab = live(patience=Patience(read_timeout_s=0.05))
+    lab.zero_and_arm()
+    lab.driver.let(wall_test.release_sample - 400)
+    lab.wait_for_state(State.HOLDING)
+    silent = lab.wait_for(
+        lambda m: isinstance(m, StateMessage) and m.judgement.call is Call.DO_NOT_RELEASE and m.armed
+    )
+    assert "no samples" in silent.judgement.do and silent.judgement.ratio is None
+    lab.driver.let(wall_test.n_samples)
+    assert lab.wait_for_state(State.SAVED, State.FAILED).state is State.SAVED
 
 
 @pytest.mark.parametrize("way", ["fatal", "never comes back"])
