@@ -172,7 +172,7 @@ def test_the_acquisition_is_killed(start: Start, bench: SimControl, rig: Rig, ro
     second.told("Left by an earlier session")
     facts = look_at(journal.with_suffix(".h5"), rig)
     assert facts.lost == 0 and facts.end >= safe, "what was acknowledged is there"
-    assert facts.verdict == "bad" and "it was cut off" in facts.reasons
+    assert facts.verdict == "bad" and "it was cut off" in " ".join(facts.reasons)
     row("acquisition killed (kill −9)", told, facts)
     second.arm("FR1-L3-2")
     second.stop()

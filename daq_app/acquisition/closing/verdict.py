@@ -13,6 +13,14 @@ from daq_app.runfile.source import RunSource
 _SPOILS_TIME: Final = ("stood_still", "rate")
 """News of the sample clock after which times within the run are wrong."""
 
+_UNFINISHED: Final = {
+    "timeout": "the wall did not come to rest in time",
+    "stopped": "it was stopped before the wall had come to rest",
+    "failed": "the acquisition failed before the wall had come to rest",
+    "cut off": "it was cut off: the recorder did not end it",
+}
+"""Why a run with that outcome is no whole test."""
+
 
 def judge_run(contents: JournalContents, analysis: TestAnalysis) -> dict[str, Any] | None:
     """``{"verdict", "reasons", "doubtful_channels"}``; None for an aborted arming.
@@ -68,7 +76,7 @@ def _spoilt(contents: JournalContents, analysis: TestAnalysis, outcome: str) -> 
     if contents.gaps:
         hard.append(f"{contents.lost_samples} samples are missing in {len(contents.gaps)} gap(s)")
     if outcome != "complete":
-        hard.append({"timeout": "the wall did not come to rest in time"}.get(outcome, f"it was {outcome}"))
+        hard.append(_UNFINISHED.get(outcome, f"it was {outcome}"))
     if contents.damage:
         hard.append(f"the journal is damaged: {contents.damage[0]}")
     hard += _told(contents, "clock", lambda data: data.get("clock") in _SPOILS_TIME)

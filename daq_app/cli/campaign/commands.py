@@ -157,7 +157,10 @@ def assign(
     run_file: Annotated[Path, typer.Argument(help="Run file (.h5).", metavar="RUN")],
     test: Annotated[str, typer.Argument(help="The test that it is, for instance FR1-L3-2.", metavar="TEST")],
 ) -> None:
-    """Give a release that nobody had armed its place in the campaign. The run itself is not changed."""
+    """Give a release that nobody had armed its place in the campaign, and make its result.
+
+    The run itself is not changed.
+    """
     with reported():
         try:
             name = TestName.parse(test)
@@ -172,3 +175,10 @@ def assign(
                 )
         give_place(run_file.parent, run_id, str(name))
         echo(f"{run_file.name} counts as {name}")
+        from daq_app.campaign.result.result import NoResult, make_result
+
+        try:
+            make_result(run_file)
+            echo(f"Its result: {run_file.with_suffix('.result.html')} and .pdf")
+        except (NoResult, OSError) as error:
+            echo(f"No result: {error}")
