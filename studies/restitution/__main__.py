@@ -132,8 +132,8 @@ def deviations(test: LaboratoryTest, analysis: TestAnalysis) -> list[tuple[str, 
 
 
 def coverage(tests: Iterable[LaboratoryTest]) -> list[str]:
-    """Lines of the table of intervals."""
-    inside: dict[str, list[bool]] = {}
+    """Lines of the table of intervals: of all tests, and of those that are not called doubtful."""
+    inside: dict[str, list[tuple[bool, bool]]] = {}
     analysed, warned, lost = 0, 0, 0
     for test in tests:
         analysis = analyse_record(test.record(), _OPTIONS)
@@ -141,17 +141,21 @@ def coverage(tests: Iterable[LaboratoryTest]) -> list[str]:
             lost += 1
             continue
         analysed += 1
+        trusted = analysis.verdict.trust != "doubtful"
         warned += analysis.verdict.trust != "good"
         r = test.truth["restitution"]
         intervals = {name: analysis.estimates[name].interval95() for name in ("eav", "crt")}
         intervals["verdict"] = analysis.verdict.interval95
         intervals["fit"] = None if analysis.fit is None else analysis.fit.interval95()
-        for name, interval in intervals.items():
-            if interval is not None:
-                inside.setdefault(f"r {name}", []).append(interval[0] <= r <= interval[1])
-        for name, ratio in deviations(test, analysis):
-            inside.setdefault(name, []).append(abs(ratio) <= 1.96)
-    lines = [f"{name:20s} {np.mean(held):6.1%} of {len(held)}" for name, held in inside.items()]
+        held = [(f"r {name}", i[0] <= r <= i[1]) for name, i in intervals.items() if i is not None]
+        held += [(name, abs(ratio) <= 1.96) for name, ratio in deviations(test, analysis)]
+        for name, holds in held:
+            inside.setdefault(name, []).append((holds, trusted))
+    lines = [f"{'':20s} all tests         not doubtful"]
+    for name, pairs in inside.items():
+        sure = [holds for holds, trusted in pairs if trusted]
+        share = f"{np.mean(sure):6.1%} of {len(sure)}" if sure else ""
+        lines.append(f"{name:20s} {np.mean([holds for holds, _ in pairs]):6.1%} of {len(pairs):<6d} {share}")
     return [*lines, f"{warned} of {analysed} tests are not called good; {lost} not found"]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from functools import cache
 from pathlib import Path
 
@@ -143,3 +144,36 @@ def test_friction_is_said_while_the_wall_still_rocks():
     estimates = [result.estimate for result in results if result.estimate is not None]
 
     assert any("friction" in doubt for doubt in estimates[-1].doubts), estimates[-1].doubts
+
+
+def test_a_slow_release_does_not_count_in_the_level_that_the_wall_was_held_at():
+    test = draw_test(RIG, SEED, effects={"slow_release": {"tau": 0.7}})
+    analysis = analyse_record(test.record(), AnalysisOptions(bias_runs=0, fit=False))
+    time_s = analysis.series.time_s - analysis.release_s
+    held_rad = analysis.series.rotation_rad[(time_s > -1.0) & (time_s < -0.5)].mean()
+
+    assert analysis.theta0_by_family["wires"].value == pytest.approx(held_rad, rel=4e-4)
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameters"),
+    [("restitution_asymmetry", {"d": 0.02}), ("coulomb", {"mu": 0.02}), ("winkler", {"theta_c": 9e-4})],
+)
+def test_p_and_alpha_of_a_wall_that_is_no_rigid_block_have_no_stated_error(effect, parameters):
+    test = draw_test(RIG, SEED, effects={effect: parameters})
+    fit = analyse_record(test.record(), AnalysisOptions(bias_runs=0, keep_series=False)).fit
+
+    assert math.isnan(fit.sigma_alpha_rad) and math.isnan(fit.sigma_p_rad_s)
+
+
+@pytest.mark.parametrize("method", ["eav", "crt"])
+@pytest.mark.parametrize(
+    ("effect", "parameters"), [("coulomb", {"mu": 0.02}), ("restitution_asymmetry", {"d": 0.02})]
+)
+def test_the_interval_of_each_method_holds_the_r_of_the_impacts_as_the_verdict_does(
+    effect, parameters, method
+):
+    test, analysis = drawn({effect: parameters})
+    low, high = analysis.estimates[method].interval95()
+
+    assert low <= test.truth["restitution"] <= high

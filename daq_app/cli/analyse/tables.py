@@ -194,14 +194,12 @@ def _base_table(analysis: TestAnalysis) -> Table:
     table = _table("Wall and base joint", "quantity", "value", "theory")
     theory, fit, joint, left = analysis.theory, analysis.fit, analysis.joint, analysis.residuals
     if fit is not None:
-        table.add_row(
-            "p fitted, rad/s", f"{fit.p_rad_s:.4f} {plus_minus(fit.sigma_p_rad_s)}", f"{theory.p_rad_s:.4f}"
-        )
-        table.add_row(
-            "α fitted, rad",
-            f"{fit.alpha_rad:.4f} {plus_minus(fit.sigma_alpha_rad)}",
-            f"{theory.alpha_rad:.4f}",
-        )
+        for name, value, sigma, survey in (
+            ("p fitted, rad/s", fit.p_rad_s, fit.sigma_p_rad_s, theory.p_rad_s),
+            ("α fitted, rad", fit.alpha_rad, fit.sigma_alpha_rad, theory.alpha_rad),
+        ):
+            error = plus_minus(sigma) or "(nearest block; no error is known)"
+            table.add_row(name, f"{value:.4f} {error}", f"{survey:.4f}")
         table.add_row(
             "misfit of the fit, mrad rms", f"{fit.residual_rad * 1e3:.4f}", f"noise {fit.noise_rad * 1e3:.4f}"
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +25,9 @@ from daq_app.rocking.analysis.results import Bias, Series, TestAnalysis, Theory
 from daq_app.rocking.analysis.tracks import decay_series, estimates_of, follow_families
 from daq_app.rocking.analysis.wall_checks import pattern_of, wall_findings
 from daq_app.rocking.estimators import RestitutionEstimate
-from daq_app.rocking.families.verdict import judge, with_change_by_speed
+from daq_app.rocking.families.block_checks import NO_RIGID_BLOCK
+from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.families.verdict import judge, with_change_by_speed, with_findings
 from daq_app.rocking.geometry.joint import JointMotion
 from daq_app.rocking.motion.filtered_peaks import filtered_peaks
 from daq_app.rocking.motion.motion_fit import MotionFit, fit_motion
@@ -85,9 +87,11 @@ def _analyse(
     change = pattern.change_with_speed
     further += wall_findings(instruments, tracks, joint, further, pattern)
     verdict, findings = verdict_of(instruments, tracks, series, estimates, further, change)
-    estimates = {name: with_change_by_speed(estimate, change) for name, estimate in estimates.items()}
-    if fit is not None:
-        fit = replace(fit, standard_error=math.hypot(fit.standard_error, 0.5 * change))
+    estimates = {
+        name: with_findings(with_change_by_speed(estimate, change), findings)
+        for name, estimate in estimates.items()
+    }
+    fit = None if fit is None else _for_this_wall(fit, findings, change)
     headline = theta0.get("tiltmeters", theta0["wires"])
     bias = _bias(record, signals, track, estimates, velocity_filter, options)
     residuals = residuals_after(signals, times.rest)
@@ -118,6 +122,17 @@ def _analyse(
         series=_series(signals, velocity) if options.keep_series else None,
     )
     return replace(analysis, notes=quality_notes(record, signals, times, track, analysis, onsets, findings))
+
+
+def _for_this_wall(fit: MotionFit, findings: Sequence[FamilyFinding], change: float) -> MotionFit:
+    """The fit with errors that hold for r at any impact; p and α have none where the wall is no rigid block.
+
+    They are then those of the nearest block, and no property of the wall.
+    """
+    fit = replace(fit, standard_error=math.hypot(fit.standard_error, 0.5 * change))
+    if fit.explains_the_motion and not any(finding.kind in NO_RIGID_BLOCK for finding in findings):
+        return fit
+    return replace(fit, sigma_p_rad_s=math.nan, sigma_alpha_rad=math.nan)
 
 
 def _onsets(record: TestRecord, signals: Signals, track: MotionTrack) -> list[Onset | None]:

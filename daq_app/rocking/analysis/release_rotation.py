@@ -17,8 +17,8 @@ _NAMES = {"tiltmeters": "tiltmeters", "wires": "wires", "lvdts": "LVDTs"}
 
 
 def theta0_by_family(signals: Signals, track: MotionTrack, gains: FamilyGains) -> dict[str, ValueWithSigma]:
-    """θ0 over the last half second of the hold (slow tiltmeters have settled), and the best."""
-    hold, rate = hold_samples(signals, track.release.time_s), signals.record.rate_hz
+    """θ0 over the last half second of the still hold (slow tiltmeters have settled), and the best."""
+    hold, rate = hold_samples(signals, track.held_until_s), signals.record.rate_hz
     zero = signals.settings.zero_sigma_rad
     theta0: dict[str, ValueWithSigma] = {}
     tilts = signals.tilts_rad[:, hold]

@@ -120,9 +120,19 @@ def with_change_by_speed(estimate: RestitutionEstimate, change: float) -> Restit
 
     The r of a decay is that of its middle impacts: the others' are up to half the change away.
     """
+    return _widened(estimate, 0.5 * change)
+
+
+def with_findings(estimate: RestitutionEstimate, findings: Sequence[FamilyFinding]) -> RestitutionEstimate:
+    """The estimate for r at the impacts, where the wall does what is in `findings`: as in the verdict."""
+    shares = [_share_of_r(finding, estimate.r) for finding in findings] if estimate.r is not None else []
+    return _widened(estimate, *shares)
+
+
+def _widened(estimate: RestitutionEstimate, *errors: float) -> RestitutionEstimate:
     if estimate.standard_error is None:
         return estimate
-    return replace(estimate, standard_error=math.hypot(estimate.standard_error, 0.5 * change))
+    return replace(estimate, standard_error=math.hypot(estimate.standard_error, *errors))
 
 
 def judge(

@@ -54,6 +54,7 @@ class MotionFit:
     standard_error: float
     p_rad_s: float
     sigma_p_rad_s: float
+    """NaN, as that of α, in the analysis of a wall that is no rigid block with one r."""
     alpha_rad: float
     sigma_alpha_rad: float
     theta0_rad: float

@@ -23,6 +23,13 @@ The walking zeros of drawn laboratories (0.15 of a channel's noise in a record) 
 widens the stated errors of impact times, half-cycles and peaks."""
 _HOLD_S = 0.3
 _HOLD_POINT_S = 0.02
+_REFERENCE_S = (1.0, 0.5)
+"""Before a release that was no clean one, the hold is taken to be still over this span."""
+_LEFT_SIGMAS = 4.0
+"""Means of 20 ms that are further from the level of the still hold, in their scatter, belong to the fall."""
+_SLOW_RELEASE_SHARE = 0.003
+"""Misfit of hold and free fall, as a share of θ0, above which the end of the still hold is looked for: clean
+releases stay below 0.001."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +64,8 @@ class MotionTrack:
     theta0_rad: float
     """Rotation just before the release, from the same signal as the peaks."""
     sigma_theta0_rad: float
+    held_until_s: float
+    """End of the still hold: the release, or earlier where the wall was let go slowly."""
     crossings_s: list[float] = field(default_factory=list)
     """Impacts as detected."""
     arcs: list[Arc | None] = field(default_factory=list)
@@ -78,10 +87,13 @@ class MotionTrack:
         release = locate_release(t[inside], y[inside], hold_rad, settings.p_rad_s, settings.alpha_rad)
         if release is None or abs(release.time_s - release_s) > 0.3:
             release = Release(release_s, hold_rad, math.nan)
-        level, sigma = hold_level(time_s, rotation_rad, release.time_s, settings)
+        held_until_s = release.time_s
+        if release.residual_rad > _SLOW_RELEASE_SHARE * abs(hold_rad):
+            held_until_s = _end_of_hold(time_s, rotation_rad, release.time_s, settings.rate_hz)
+        level, sigma = hold_level(time_s, rotation_rad, held_until_s, settings)
         if not math.isfinite(level):
             level, sigma = release.rotation_rad, max(abs(release.rotation_rad - hold_rad), ZERO_SIGMA_RAD)
-        return cls(settings, release, level, sigma)
+        return cls(settings, release, level, sigma, held_until_s)
 
     def add_impact(self, crossing_s: float, time_s: Floats, rotation_rad: Floats) -> Arc | None:
         """Impact at about `crossing_s` ends a half-cycle, which is fitted and returned."""
@@ -110,7 +122,7 @@ class MotionTrack:
     ) -> MotionTrack:
         """The same half-cycles fitted with another p and α; `time_s`, `rotation_rad` (n,) cover them."""
         settings = replace(self.settings, p_rad_s=p_rad_s, alpha_rad=alpha_rad)
-        again = MotionTrack(settings, self.release, self.theta0_rad, self.sigma_theta0_rad)
+        again = replace(self, settings=settings, crossings_s=[], arcs=[])
         again.add_impacts(self.crossings_s, time_s, rotation_rad)
         return again
 
@@ -201,6 +213,28 @@ class MotionTrack:
         return crt_series(self.peaks_rad, self.sigma_peaks_rad, alpha, exact=True, method=method)
 
 
+def _end_of_hold(time_s: Floats, rotation_rad: Floats, release_s: float, rate_hz: float) -> float:
+    """When the rotation was last at the level of the still hold; the release where no hold is known."""
+    size = max(1, round(_HOLD_POINT_S * rate_hz))
+    still = slice(*np.searchsorted(time_s, [release_s - before for before in _REFERENCE_S]))
+    after = slice(still.stop, int(np.searchsorted(time_s, release_s)))
+    reference, points = _means(rotation_rad[still], size), _means(rotation_rad[after], size)
+    if np.count_nonzero(np.isfinite(reference)) < 3:
+        return release_s
+    level, scatter = np.nanmedian(reference), np.nanstd(reference, ddof=1)
+    held = np.flatnonzero(np.abs(points - level) < _LEFT_SIGMAS * scatter)
+    if not held.size:
+        return float(time_s[still.stop])
+    left = points.size - 1 - held[-1]
+    return release_s - float(left) * size / rate_hz
+
+
+def _means(signal: Floats, size: int) -> Floats:
+    """Means of `size` samples each, up to the last sample."""
+    count = signal.size // size
+    return np.asarray(signal[signal.size - count * size :].reshape(count, size).mean(axis=1))
+
+
 def hold_level(
     time_s: Floats, rotation_rad: Floats, release_s: float, settings: MotionSettings
 ) -> tuple[float, float]:
@@ -216,10 +250,7 @@ def steady_level(signal: Floats, rate_hz: float) -> tuple[float, float]:
     NaN for both with fewer than three such means.
     """
     size = max(1, round(_HOLD_POINT_S * rate_hz))
-    count = signal.size // size
-    if count < 3:
-        return math.nan, math.nan
-    points = signal[signal.size - count * size :].reshape(count, size).mean(axis=1)
+    points = _means(signal, size)
     points = points[np.isfinite(points)]
     if points.size < 3:
         return math.nan, math.nan
