@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from PySide6.QtWidgets import QApplication
 
+from daq_app.acquisition.messages.published import Judgement, State, StateMessage
 from daq_app.monitor.data.session import Published
 from daq_app.monitor.plots.plot_base import Axis
 from daq_app.monitor.window.main_window import MainWindow
@@ -47,6 +48,32 @@ def test_every_text_is_whole_on_every_page(rocking_window, theme, width, height,
             QApplication.processEvents()
         assert (window.width(), window.height()) == (width, height), f"{name} is larger than the screen"
         assert clipped_texts(window) == [], name
+
+
+@pytest.mark.parametrize(
+    ("word", "do"),
+    [
+        (
+            "Live view",
+            "Nothing is recorded but the ring of the last minutes. Choose, zero, check, then arm (F5).",
+        ),
+        ("Armed", "Do not release: no samples come in. Look at the chassis, its power and its network."),
+        ("Rocking, not armed", "Keep clear. Nobody had armed: this release is kept from the ring."),
+    ],
+)
+def test_what_to_do_next_is_whole_in_the_largest_type(rocking_window, clock, word, do):
+    """Cut off it ended before "then arm"."""
+    window = rocking_window
+    for _ in range(4):
+        window.change_type_size(1)
+    judgement = Judgement(word=word, do=do, tone="text")
+    window.session.feed(Published(StateMessage(state=State.PREVIEWING, judgement=judgement), clock.now))
+    window.resize(1366, 743)
+    window._on_slow()
+    for _ in range(3):
+        QApplication.processEvents()
+    assert window.header.words["sentence"] == do
+    assert clipped_texts(window.header) == []
 
 
 def test_axes_and_strips_grow_with_the_type(rocking_window):

@@ -35,6 +35,47 @@ def tip_text(text: str) -> str:
     return "<qt>" + shown.replace("\n", "<br>") + "</qt>" if shown else ""
 
 
+class FittedLabel(PlainLabel):
+    """A line that stays whole: in smaller type where there is too little room for it."""
+
+    def __init__(self, role: str, parent: QWidget | None = None) -> None:
+        super().__init__("", parent)
+        self._tenths = 0
+        self.setProperty("role", role)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+
+    def setText(self, text: str) -> None:
+        """Show a text as large as it fits."""
+        if text != self.text():
+            super().setText(text)
+            self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Another room."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Another type size."""
+        super().changeEvent(event)
+        if event.type() is QEvent.Type.FontChange:
+            self._fit()
+
+    def _fit(self) -> None:
+        # Letters are drawn on whole pixels: a line of them may be a little wider than its type says.
+        room = 0.97 * self.width()
+        tenths = fitting_tenths(self.text(), QApplication.font().pointSizeF(), room, bold=False)
+        if getattr(self, "_tenths", tenths) != tenths:
+            self._tenths = tenths
+            self.setStyleSheet(f"font-size: {tenths / 10:.1f}pt;")
+
+
+def fitting_tenths(text: str, points: float, room: float, *, bold: bool) -> int:
+    """Tenths of a point at which a text is no wider than its room, those of the usual size at most."""
+    needs = QFontMetricsF(font(points, bold=bold)).horizontalAdvance(text)
+    return round(10 * points * min(1.0, room / needs if needs > 0 and room > 0 else 1.0) - 0.5)
+
+
 def role_label(text: str, role: str, parent: QWidget | None = None) -> QLabel:
     """A label that the style sheet knows by its role."""
     label = PlainLabel(text, parent)
@@ -118,9 +159,7 @@ class Tile(QFrame):
 
     def _fit(self, label: QLabel, points: float, *, bold: bool) -> None:
         """The usual size, or less where the text would be wider than the tile."""
-        room = self.width() - 30
-        needs = QFontMetricsF(font(points, bold=bold)).horizontalAdvance(label.text())
-        tenths = round(10 * points * min(1.0, room / needs if needs > 0 and room > 0 else 1.0) - 0.5)
+        tenths = fitting_tenths(label.text(), points, self.width() - 33, bold=bold)
         if self._tenths.get(label) != tenths:
             self._tenths[label] = tenths
             label.setStyleSheet(f"font-size: {tenths / 10:.1f}pt;")

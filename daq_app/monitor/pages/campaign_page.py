@@ -13,6 +13,8 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QPlainTextEdit,
     QPushButton,
+    QScrollArea,
+    QSizePolicy,
     QTableView,
     QVBoxLayout,
     QWidget,
@@ -100,6 +102,8 @@ class CampaignPage(QWidget):
         self.take_button.setProperty("role", "primary")
         self._chosen = QPlainTextEdit("Choose a row to see its runs.")
         self._chosen.setReadOnly(True)
+        # It takes what is left: on a small screen no more than two lines.
+        self._chosen.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self._reason = QLineEdit()
         self._reason.setPlaceholderText("Why (needed to reject)")
         self.accept_button = keyed_button(self, "Good", "Ctrl+G", lambda: self._judge("good"))
@@ -155,23 +159,32 @@ class CampaignPage(QWidget):
         right.addWidget(following)
         right.addWidget(chosen, 1)
         right.addWidget(self.report_button)
-        holder = QWidget()
-        holder.setLayout(right)
+        content = QWidget()
+        content.setLayout(right)
         right.setContentsMargins(0, 0, 0, 0)
+        # A long reason in large type needs more than the smallest screen has.
+        holder = QScrollArea()
+        holder.setWidget(content)
+        holder.setWidgetResizable(True)
+        holder.setFrameShape(QFrame.Shape.NoFrame)
+        holder.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._holder = holder
         layout = QHBoxLayout(self)
         layout.setContentsMargins(10, 8, 10, 8)
-        layout.setSpacing(12)
+        layout.setSpacing(8)
         layout.addLayout(left, 1)
         layout.addWidget(holder)
 
     def restyle(self, colours: Colours) -> None:
         """Take over a theme."""
         self._delegate.colours = colours
-        self._holder.setFixedWidth(colours.side_px(400))
+        bar_px = self._holder.verticalScrollBar().sizeHint().width()
+        self._holder.setFixedWidth(colours.side_px(400) + bar_px)
+        self._chosen.setMinimumHeight(colours.px(56))
         self.table.verticalHeader().setDefaultSectionSize(colours.px(24))
         for column, width in enumerate(_WIDTHS_PX):
             self.table.setColumnWidth(column, colours.px(width))
+        self.table.setColumnWidth(2, self._delegate.width)
         self.table.viewport().update()
 
     def set_campaign(self, campaign: Campaign, folder: Path, specimen: str = "") -> None:

@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QListWidget,
     QListWidgetItem,
     QPushButton,
-    QSizePolicy,
     QSplitter,
     QTreeWidget,
     QTreeWidgetItem,
@@ -27,7 +26,7 @@ from PySide6.QtWidgets import (
 from daq_app.config.families import AUXILIARY
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.replay_data import ROTATION, VELOCITY, ReplayRun
-from daq_app.monitor.look.labels import PlainLabel, number, role_label, tip_text
+from daq_app.monitor.look.labels import FittedLabel, PlainLabel, number, role_label, tip_text
 from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.replay_plots import ReplayPlots, shade
 from daq_app.monitor.plots.strip_panel import FAMILY_TITLES
@@ -52,7 +51,8 @@ class ReplayPage(QWidget):
         self.run: ReplayRun | None = None
         self.plots = ReplayPlots()
         self._title = role_label("No run is open", "title")
-        self._facts = role_label("Open a run to look at it.", "muted")
+        self._facts = FittedLabel("muted")
+        self._facts.setText("Open a run to look at it.")
         self.tree = QTreeWidget()
         self.tree.setHeaderLabels(["Signal", "At the cursor"])
         self.tree.header().setStretchLastSection(False)
@@ -74,8 +74,6 @@ class ReplayPage(QWidget):
         }
         for name, key in (("png", "Ctrl+P"), ("svg", "Ctrl+G"), ("csv", "Ctrl+E")):
             self.buttons[name].setToolTip(f"Save what is on screen  ({key})")
-        # A long name of a run must not make the window wider than the screen.
-        self._facts.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._build()
         self.plots.cursor_moved.connect(self._on_cursor)
         self.buttons["open"].clicked.connect(self.choose_file)
@@ -101,11 +99,7 @@ class ReplayPage(QWidget):
 
     def _build(self) -> None:
         top = QHBoxLayout()
-        words = QVBoxLayout()
-        words.setSpacing(0)
-        words.addWidget(self._title)
-        words.addWidget(self._facts)
-        top.addLayout(words, 1)
+        top.addWidget(self._title, 1)
         for button in self.buttons.values():
             top.addWidget(button)
         side = QSplitter(Qt.Orientation.Vertical)
@@ -130,8 +124,9 @@ class ReplayPage(QWidget):
         self.splitter.setStretchFactor(1, 1)
         whole = QVBoxLayout(self)
         whole.setContentsMargins(10, 8, 10, 8)
-        whole.setSpacing(8)
+        whole.setSpacing(6)
         whole.addLayout(top)
+        whole.addWidget(self._facts)
         whole.addWidget(self.splitter, 1)
 
     def restyle(self, colours: Colours) -> None:

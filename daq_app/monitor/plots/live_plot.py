@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from pyqtgraph.Qt import internals
 from PySide6.QtCore import QRect, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPixmap, QResizeEvent
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPixmap, QResizeEvent
 
 from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.plot_base import Array, Plot
@@ -170,8 +170,12 @@ class LivePlot(Plot):
         painter.drawRects(*self._bars.drawargs())
 
     def _paint_notice(self, painter: QPainter) -> None:
-        painter.setFont(self.font())
-        painter.setPen(self._notice_colour)
         box = QRect(self._viewed)
+        font = self.font()
+        needs = QFontMetricsF(font).horizontalAdvance(self._notice)
+        if needs > box.width() > 0:  # in one line, that it lies above the middle of the smallest plot
+            font.setPointSizeF(font.pointSizeF() * 0.98 * box.width() / needs)
+        painter.setFont(font)
+        painter.setPen(self._notice_colour)
         box.setHeight(round(2 * _NOTICE_AT * box.height()))
-        painter.drawText(box, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap, self._notice)
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, self._notice)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from PySide6.QtCore import QAbstractTableModel, QDateTime, QObject, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QPainter
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter
 from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem
 
 from daq_app.campaign.status import CampaignStatus, Place, PlaceState, RecordedTest, TestVerdict
@@ -19,6 +19,8 @@ HEADINGS = ("Test", "θ0/α", "State", "Measured", "r CRT", "Verdict", "Released
 SHAPES = {PlaceState.DONE: "tick", PlaceState.TO_REPEAT: "triangle", PlaceState.MISSING: "ring"}
 TONES = {PlaceState.DONE: "good", PlaceState.TO_REPEAT: "warning", PlaceState.MISSING: "muted"}
 _STATE_ROLE = Qt.ItemDataRole.UserRole + 1
+_SIDE_PX = 14
+"""Side of a sign."""
 
 
 class CampaignModel(QAbstractTableModel):
@@ -136,13 +138,23 @@ class StateDelegate(QStyledItemDelegate):
         state = PlaceState(told)
         rect = QRectF(option.rect)
         colour = QColor(str(getattr(self.colours, TONES[state])))
-        side = min(14.0, rect.height() - 8)
+        side = min(_SIDE_PX, rect.height() - 8)
         draw_shape(
             painter, SHAPES[state], QRectF(rect.left() + 8, rect.center().y() - side / 2, side, side), colour
         )
         painter.setPen(colour)
-        painter.setFont(self.colours.font(10, bold=True))
+        painter.setFont(self._font)
         painter.drawText(rect.adjusted(16 + side, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, state.value)
 
+    @property
+    def width(self) -> int:
+        """Room for the widest state with its sign, px."""
+        metrics = QFontMetricsF(self._font)
+        return round(max(metrics.horizontalAdvance(state.value) for state in PlaceState)) + 2 * _SIDE_PX + 12
+
+    @property
+    def _font(self) -> QFont:
+        return self.colours.font(10, bold=True)
+
     def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:
-        return super().sizeHint(option, index).expandedTo(QSize(130, 24))
+        return super().sizeHint(option, index).expandedTo(QSize(self.width, 24))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from daq_app.monitor.course.recording_light import recording_light
 from daq_app.monitor.data.session import Session
-from daq_app.monitor.look.labels import PlainLabel, role_label, set_role, tip_text
+from daq_app.monitor.look.labels import FittedLabel, PlainLabel, role_label, set_role, tip_text
 from daq_app.monitor.look.shapes import Sign
 from daq_app.monitor.look.state_look import look_of, name_of_test
 from daq_app.monitor.look.theme import Colours
@@ -24,8 +24,7 @@ class Header(QFrame):
         self._word.setProperty("scale", "state")
         self._test = PlainLabel()
         self._test.setProperty("scale", "name")
-        self._sentence = role_label("", "muted")
-        self._sentence.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._sentence = FittedLabel("muted")
         self._light = Sign(22)
         self._light_word = PlainLabel()
         self._light_word.setProperty("scale", "name")
