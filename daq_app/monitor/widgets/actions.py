@@ -86,6 +86,8 @@ class ActionBar(QWidget):
     """The name of an order that was given."""
     refused = Signal(str)
     """The text of an order whose key was pressed while it makes no sense."""
+    told = Signal(str, str)
+    """Severity and text: an order that is asked for twice was asked for once."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -112,7 +114,7 @@ class ActionBar(QWidget):
             enabled = may_command and state in action.states and action.sampling in (None, sampling)
             self.buttons[action.name].setEnabled(enabled)
             if action.name in self._asked and not self._is_asked(action):
-                self._withdraw(action)
+                self._lapse(action)
 
     def press(self, action: Action) -> None:
         """The key of an action was pressed."""
@@ -129,14 +131,21 @@ class ActionBar(QWidget):
         if action.confirm and not self._is_asked(action):
             self._asked[action.name] = self._clock()
             self.buttons[action.name].setText(f"{action.key} again: {action.text.lower()}")
+            asks = f"{action.text}: press {action.key} again within {CONFIRM_WITHIN_S:g} s."
+            self.told.emit("info", asks)
             QTimer.singleShot(int(1000 * CONFIRM_WITHIN_S) + 50, self, lambda: self._withdraw_if_old(action))
             return
         self._withdraw(action)
         self.ordered.emit(action.name)
 
     def _withdraw_if_old(self, action: Action) -> None:
-        if not self._is_asked(action):
-            self._withdraw(action)
+        if action.name in self._asked and not self._is_asked(action):
+            self._lapse(action)
+
+    def _lapse(self, action: Action) -> None:
+        """It was not asked for again: said, for whoever believes that it was obeyed."""
+        self._withdraw(action)
+        self.told.emit("info", f"{action.text}: {action.key} was not pressed again, so nothing was done.")
 
     def _withdraw(self, action: Action) -> None:
         self._asked.pop(action.name, None)

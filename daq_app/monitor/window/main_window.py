@@ -148,6 +148,7 @@ class MainWindow(QMainWindow):
     def _connect(self) -> None:
         self.actions_bar.ordered.connect(self._on_order)
         self.actions_bar.refused.connect(self._on_refused)
+        self.actions_bar.told.connect(self.notices.tell)
         self.rail.page_wanted.connect(lambda place: self.show_page(list(self.pages.values())[place]))
         self.rail.theme_wanted.connect(self.toggle_theme)
         self.rail.size_wanted.connect(self.change_type_size)
