@@ -244,6 +244,20 @@ def test_a_key_that_makes_no_sense_now_is_answered(qtbot, live_window, clock):
 
     live_window.actions_bar.press(next(action for action in ACTIONS if action.name == "next"))
     assert live_window.notices.current == ("info", f"Next test: not now. {HOLD.do}")
+    clock.now += 10.0
+    live_window.actions_bar.press(next(action for action in ACTIONS if action.name == "arm"))
+    assert "Arm: not now. Nothing is heard from the recorder" in live_window.notices.current[1]
+
+
+def test_a_key_of_a_page_that_has_nothing_to_do_it_with_is_answered(qtbot, live_window):
+    from PySide6.QtCore import Qt
+
+    with qtbot.waitActive(live_window):
+        live_window.show()
+        live_window.activateWindow()
+    live_window.show_page(live_window.result)
+    qtbot.keyClick(live_window.result, Qt.Key.Key_O, Qt.KeyboardModifier.ControlModifier)
+    assert live_window.notices.current == ("info", "Page: there is nothing to do it with yet.")
 
 
 def test_the_log_keeps_what_was_told_and_when_it_was_over(qtbot):

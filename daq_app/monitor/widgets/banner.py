@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Protocol, cast
 
-from PySide6.QtCore import QEvent, Qt, QUrl
+from PySide6.QtCore import QEvent, Qt, QUrl, SignalInstance
 from PySide6.QtGui import QDesktopServices, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QApplication,
@@ -69,11 +70,29 @@ class Banner(QFrame):
             self._grid.addWidget(button, *divmod(place, columns))
 
 
+class TellingPage(Protocol):
+    """A page that can say something in the message line."""
+
+    @property
+    def told(self) -> SignalInstance:
+        """Severity and text."""
+
+
 def keyed_button(page: QWidget, text: str, key: str, act: Callable[[], object]) -> QPushButton:
-    """A button that names its key, which presses it as long as `page` is in front."""
+    """A button that names its key, which presses it as long as `page` is in front.
+
+    `page` is a `TellingPage` as well: silence after a key would look as if it had been obeyed.
+    """
     button = QPushButton(f"{text}  {key}")
     button.clicked.connect(lambda _checked=False: act())
-    QShortcut(QKeySequence(key), page).activated.connect(button.click)
+
+    def press() -> None:
+        if button.isEnabled():
+            button.click()
+        else:
+            cast("TellingPage", page).told.emit("info", f"{text}: there is nothing to do it with yet.")
+
+    QShortcut(QKeySequence(key), page).activated.connect(press)
     return button
 
 

@@ -48,7 +48,7 @@ from daq_app.monitor.window.adoption import Adoption
 from daq_app.monitor.window.orders import Orders
 from daq_app.monitor.window.placement import keep_on_screen
 from daq_app.monitor.window.test_display import TestDisplay
-from daq_app.monitor.window.what_to_tell import brings_gauge, is_told, numbers, trouble_of
+from daq_app.monitor.window.what_to_tell import brings_gauge, is_told, numbers, refusal, trouble_of
 from daq_app.monitor.window.window_frame import WindowFrame
 
 FRAME_MS: Final = 16
@@ -337,10 +337,8 @@ class MainWindow(QMainWindow):
 
     def _on_refused(self, text: str) -> None:
         """A key was pressed whose order makes no sense now: silence would look as if it had been obeyed."""
-        if self.link is None or not self.link.may_command:
-            self.notices.tell("info", f"{text}: this window may watch, not command.")
-        else:
-            self.notices.tell("info", f"{text}: not now. {self.session.judgement.do}".strip())
+        may_command = self.link is not None and self.link.may_command
+        self.notices.tell("info", refusal(text, self.session, may_command=may_command))
 
     def _on_order(self, name: str) -> None:
         if name == "note":

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from daq_app.acquisition.messages.published import RECORDING, EventMessage, State
+from daq_app.monitor.data.session import Session
+from daq_app.monitor.look.state_look import look_of
 
 _QUIET_EVENTS: Final = frozenset({"impact", "marker", "tare", "saved", "check", "result", *State})
 """Events that the pages show anyway, unless they are more than information."""
@@ -31,6 +33,13 @@ def trouble_of(event: EventMessage) -> str:
     if event.kind == "alarm":
         return f"alarm {event.data.get('alarm', '')}"
     return event.kind if event.kind in _END_IS_TOLD else ""
+
+
+def refusal(order: str, session: Session, *, may_command: bool) -> str:
+    """What is said of an order whose key was pressed while it makes no sense."""
+    if not may_command:
+        return f"{order}: this window may watch, not command."
+    return f"{order}: not now. {look_of(session.current_state, session.judgement).sentence}".strip()
 
 
 def numbers(value: object) -> dict[str, float]:
