@@ -16,8 +16,8 @@ from daq_app.runfile.seal.format import Seal
 from daq_app.runfile.seal.signing import made_here, signature_is_good
 from daq_app.runfile.seal.trust import trusted_as
 
-_QUIET: Final = frozenset({"impact", "note", "marker"})
-"""Events that have a table of their own."""
+_QUIET: Final = frozenset({"impact", "note", "marker", "result"})
+"""Events that have a table of their own, or that tell of the test before."""
 _DEVIATIONS: Final = frozenset(
     {"clock", "channel", "travel", "overload", "alarm", "disk", "gap", "backup", "rate"}
 )
