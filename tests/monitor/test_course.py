@@ -249,6 +249,23 @@ def test_a_key_that_makes_no_sense_now_is_answered(qtbot, live_window, clock):
     assert "Arm: not now. Nothing is heard from the recorder" in live_window.notices.current[1]
 
 
+@pytest.mark.parametrize("may_command", [True, False])
+def test_a_watching_window_gives_no_orders(qtbot, settings, configs, clock, stand_in, play, may_command):
+    from daq_app.monitor.window.main_window import MainWindow
+
+    window = MainWindow(QuietLink(configs / "fr1.toml", may_command=may_command), settings)
+    qtbot.addWidget(window)
+    window._frame_timer.stop()
+    window._slow_timer.stop()
+    window.session.clock = clock
+    play(window.session, clock, stand_in, 2.0)
+    window._on_slow()
+    window.prepare.refresh()
+    given = [*window.actions_bar.buttons.values(), window.prepare.tare_button, window.prepare.check_button]
+    assert any(button.isEnabled() for button in given) is may_command
+    assert window.prepare.tare_button.isEnabled() is window.prepare.check_button.isEnabled() is may_command
+
+
 def test_a_key_of_a_page_that_has_nothing_to_do_it_with_is_answered(qtbot, live_window):
     from PySide6.QtCore import Qt
 

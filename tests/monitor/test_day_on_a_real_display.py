@@ -143,7 +143,8 @@ def test_a_whole_day(day_at, width, height, theme):
     day.wall("pull", theta0_over_alpha=0.15)
     window.until(lambda words: "more" in words["gauge"])
     day.shoot(window, "pull")
-    window.says(state="Holding")
+    window = day.reopen(window)
+    window.says(state="Holding", page="Test", test="FR1-L1-1", target=0.15)
     window = day.reopen(window)
     window.until(lambda words: words["gauge"] == "Release" and words["page"] == "Test")
     day.shoot(window, "release")
@@ -187,6 +188,8 @@ def test_a_whole_day(day_at, width, height, theme):
     day.wall("release")
     window.until(lambda words: "not armed" in words["state"] and words["page"] == "Test")
     window.says(state="Saved")
+    window.until(lambda words: "campaign assign" in words["notice"] and words["page"] == "Result")
+    day.shoot(window, "unarmed-saved")
     assert verify(day.run_of("unarmed_*.h5")).ok
     assert not window.clipped
     spoken = [(words["state"], words["gauge"]) for words in window.past]

@@ -48,6 +48,8 @@ class PreparePage(QWidget):
         self._colours = DARK
         self.zero = Zero()
         self.planned_rate_hz = 0.0
+        self.may_command = True
+        """Whether this window may zero and check."""
         self.check: SensorCheck | None = None
         self.card = TestCard()
         self.gauge = PullGauge(session)
@@ -158,10 +160,11 @@ class PreparePage(QWidget):
     def refresh(self) -> None:
         """Bring buttons and gauge up to date; several times a second."""
         state = self._session.current_state
-        between = state in BETWEEN_TESTS and self._session.sampling
+        sampling = self._session.sampling and self.may_command
+        between = state in BETWEEN_TESTS and sampling
         self.check_button.setEnabled(between)
         self.tare_button.setEnabled(between)
-        may_pull = between or (state in RECORDING and self._session.sampling)
+        may_pull = between or (state in RECORDING and sampling)
         self.pull_button.setEnabled(self.check is not None and may_pull)
         self.gauge.update()
 

@@ -23,7 +23,8 @@ class Adoption:
     def __init__(
         self, session: Session, prepare: PreparePage, gap: GapPage, notices: NoticeLine, *, may_command: bool
     ) -> None:
-        """`may_command`: whether this window may work a simulated wall."""
+        """`may_command`: whether this window may give orders, and work a simulated wall."""
+        prepare.may_command = may_command
         self._session, self._prepare, self._gap, self._notices = session, prepare, gap, notices
         self._may_command = may_command
         self._rig_text = ""
