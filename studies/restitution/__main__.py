@@ -44,24 +44,26 @@ class Answer:
     standard_error: float
     """Of the verdict."""
     trust: str
-    warnings: tuple[str, ...]
-    """First channel, family and kind of each warning."""
+    said: tuple[str, ...]
+    """First channel, family and kind of each warning; what is told of the wall without one is in brackets."""
 
 
 def answer_of(record: TestRecord, true_r: float) -> Answer:
     """Analyse one recording."""
     analysis = analyse_record(record, _OPTIONS)
-    warnings = tuple(
+    said = tuple(
         " ".join([*finding.channels[:1], finding.family, finding.kind])
-        for finding in analysis.findings
         if finding.severity == "warning"
+        else f"({finding.family} {finding.kind})"
+        for finding in analysis.findings
+        if finding.severity == "warning" or finding.family == "wall"
     )
     if not analysis.found:
-        return Answer((math.nan,) * len(_METHODS), math.nan, "not found", warnings)
+        return Answer((math.nan,) * len(_METHODS), math.nan, "not found", said)
     values = [analysis.estimates["eav"].r, analysis.estimates["crt"].r, analysis.verdict.r]
     values.append(None if analysis.fit is None else analysis.fit.r)
     errors = tuple(math.nan if r is None else r - true_r for r in values)
-    return Answer(errors, analysis.verdict.standard_error or math.nan, analysis.verdict.trust, warnings)
+    return Answer(errors, analysis.verdict.standard_error or math.nan, analysis.verdict.trust, said)
 
 
 def fault_row(fault: Fault, tests: Sequence[LaboratoryTest], sound: Sequence[Answer]) -> str:
@@ -79,7 +81,7 @@ def fault_row(fault: Fault, tests: Sequence[LaboratoryTest], sound: Sequence[Ans
     table = np.array([answer.errors for answer in answers])
     numbers = " ".join(f"{value:8.4f}" for value in np.nanmax(np.abs(table), axis=0, initial=0.0))
     trusts = Counter(answer.trust for answer in answers)
-    said = Counter(warning for answer in answers for warning in answer.warnings)
+    said = Counter(what for answer in answers for what in answer.said)
     what = f"{fault.family}{'' if fault.single is None else f' {fault.single}'} {fault.kind} {fault.size:g}"
     return f"{what:28s} {numbers} {quiet:6d}  {dict(trusts)}  {dict(said)}"
 
@@ -97,7 +99,7 @@ def wall_row(wall: Wall, tests: Sequence[LaboratoryTest]) -> str:
     table = np.abs(np.array([answer.errors for answer in answers]))
     numbers = " ".join(f"{value:8.4f}" for value in np.nanmax(table, axis=0, initial=0.0))
     trusts = Counter(answer.trust for answer in answers)
-    said = Counter(warning for answer in answers for warning in answer.warnings)
+    said = Counter(what for answer in answers for what in answer.said)
     return f"{wall.name:28s} {numbers} {quiet:6d}  {dict(trusts)}  {dict(said)}"
 
 

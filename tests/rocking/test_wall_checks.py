@@ -89,6 +89,23 @@ def test_r_that_changes_with_speed_by_less_than_is_named_is_in_the_stated_error_
         assert changing.estimates[method].standard_error > sound.estimates[method].standard_error
 
 
+def test_a_large_change_of_r_with_speed_is_named_where_chance_seldom_makes_it():
+    _, analysis = drawn({"restitution_slope": {"k": 0.05}}, 6203)
+
+    assert "speed" in kinds(analysis)
+    assert analysis.verdict.trust == "doubtful"
+
+
+def test_a_change_of_r_with_speed_that_scatter_may_make_is_told_and_in_the_stated_error():
+    test, analysis = drawn({"restitution_slope": {"k": 0.05}}, 6202)
+    (told,) = [finding for finding in analysis.findings if finding.kind == "speed"]
+    error = analysis.verdict.r - test.truth["restitution"]
+
+    assert told.severity == "info" and told.text in {note.text for note in analysis.notes}
+    assert analysis.verdict.trust == "good"
+    assert 0.002 < abs(error) < 2.0 * analysis.verdict.standard_error
+
+
 def test_a_wall_that_is_let_go_slowly_is_fitted_from_its_first_impact_on():
     test = draw_test(RIG, SEED, effects={"slow_release": {"tau": 0.3}})
     analysis = analyse_record(test.record(), AnalysisOptions(bias_runs=0, keep_series=False))

@@ -25,7 +25,7 @@ from daq_app.rocking.analysis.results import Bias, Series, TestAnalysis, Theory
 from daq_app.rocking.analysis.tracks import decay_series, estimates_of, follow_families
 from daq_app.rocking.analysis.wall_checks import pattern_of, wall_findings
 from daq_app.rocking.estimators import RestitutionEstimate
-from daq_app.rocking.families.block_checks import NO_RIGID_BLOCK
+from daq_app.rocking.families.block_checks import is_rigid_block
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.verdict import judge, with_change_by_speed, with_findings
 from daq_app.rocking.geometry.joint import JointMotion
@@ -130,7 +130,7 @@ def _for_this_wall(fit: MotionFit, findings: Sequence[FamilyFinding], change: fl
     They are then those of the nearest block, and no property of the wall.
     """
     fit = replace(fit, standard_error=math.hypot(fit.standard_error, 0.5 * change))
-    if fit.explains_the_motion and not any(finding.kind in NO_RIGID_BLOCK for finding in findings):
+    if fit.explains_the_motion and is_rigid_block(findings):
         return fit
     return replace(fit, sigma_p_rad_s=math.nan, sigma_alpha_rad=math.nan)
 

@@ -13,7 +13,12 @@ from daq_app.rocking.analysis.families_table import LEADS, body_of, other_is_bla
 from daq_app.rocking.analysis.preparation.instruments import Instruments
 from daq_app.rocking.analysis.results import JointSummary
 from daq_app.rocking.analysis.tracks import FamilyTracks
-from daq_app.rocking.families.block_checks import duration_findings, pattern_findings, pivot_findings
+from daq_app.rocking.families.block_checks import (
+    duration_findings,
+    pattern_findings,
+    pivot_findings,
+    weaker_change_by_speed,
+)
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.motion.impact_pattern import ImpactPattern, impact_pattern
 from daq_app.rocking.motion.swings import MotionTrack
@@ -74,6 +79,8 @@ def wall_findings(
         families[LEADS[other]] = tracks.other
     bodies = {name: body_of(track, 0.0) for name, track in families.items()}
     found = [*pattern_findings(pattern), *duration_findings(bodies)]
+    if not any(finding.kind == "speed" for finding in found):
+        found += weaker_change_by_speed(pattern)
     if any(f.kind == "drift" and f.treatment == "none" and LEADS[lead] in f.family for f in findings):
         found = [finding for finding in found if finding.kind not in _MADE_BY_A_DRIFT]
     if joint is not None:

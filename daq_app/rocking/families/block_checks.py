@@ -8,7 +8,7 @@ half-cycles and the scatter of r that the test itself shows.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Final
 
 from daq_app.rocking.families import words
@@ -20,15 +20,24 @@ from daq_app.rocking.theory.block import RigidBlock
 R_TOLERANCE: Final = 0.002
 """What r may be off by with nothing said. Changes of r within a test count from twice this on, for the r of
 the whole lies between its ends."""
-NO_RIGID_BLOCK: Final = frozenset({"speed", "side", "loss", "pause", "hop", "duration"})
+_NO_RIGID_BLOCK: Final = frozenset({"speed", "side", "loss", "pause", "hop", "duration"})
 """Kinds of finding by which the wall is no rigid block with one r, so that a fit finds no p and α of it."""
 _CHANCE: Final = 0.001
 """Probability by which scatter alone may name a change: four are looked for, and of sound tests fewer than
 2 % shall be doubted for whatever reason. Raising it names walls whose r scatters."""
+_CHANCE_OF_LARGE: Final = 0.01
+"""The same for a change of r with speed of more than `_LARGE_CHANGE` in a finished test. While the wall rocks
+it is looked for at every impact, and chance has many turns. One of 440 sound tests is named by it."""
+_LARGE_CHANGE: Final = 0.012
 _DURATION_SIGMAS: Final = 4.0
 """rms by which durations deviate from the block's, in their own errors, that is named; sound ones reach 2."""
 _FEWEST_DURATIONS: Final = 6
 """Half-cycles below which α and p take up what deviates."""
+
+
+def is_rigid_block(findings: Iterable[FamilyFinding]) -> bool:
+    """Whether no warning says that the wall is no rigid block with one r."""
+    return not any(f.kind in _NO_RIGID_BLOCK and f.severity == "warning" for f in findings)
 
 
 def pattern_findings(pattern: ImpactPattern) -> list[FamilyFinding]:
@@ -54,6 +63,20 @@ def pattern_findings(pattern: ImpactPattern) -> list[FamilyFinding]:
         elif share > R_TOLERANCE:
             findings.append(words.pause_at_impacts(pause.value, share))
     return findings
+
+
+def weaker_change_by_speed(pattern: ImpactPattern) -> list[FamilyFinding]:
+    """A change of r with speed in a finished test that `pattern_findings` does not name.
+
+    A large one is named where chance seldom makes it; any that widens the stated error of r by more than what
+    may go unsaid is told.
+    """
+    change, speed = pattern.r_slow - pattern.r_fast, pattern.by_speed
+    if speed is None or 0.5 * pattern.change_with_speed <= R_TOLERANCE:
+        return []
+    if speed.chance < _CHANCE_OF_LARGE and abs(change) > _LARGE_CHANGE:
+        return [words.r_by_speed(pattern.r_fast, pattern.r_slow)]
+    return [words.r_perhaps_by_speed(pattern.r_fast, pattern.r_slow, speed.sigma)]
 
 
 def _named(coefficient: Coefficient | None) -> bool:
