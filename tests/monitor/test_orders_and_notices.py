@@ -121,6 +121,21 @@ def test_a_warning_leaves_when_its_trouble_is_over_and_stays_in_the_log(window, 
     assert told.over is not None and told.over >= told.at
 
 
+def test_a_doubted_channel_is_settled_by_a_check_that_finds_it_good(window):
+    """Its plug was mended: no event says so, the next check does."""
+    for name in ("LV-A04", "LV-A05"):
+        doubt = {"channel": name, "doubt": "stuck"}
+        text = f"{name} does not change any more"
+        window._after(EventMessage(kind="channel", sample=1, text=text, severity="warning", data=doubt))
+    bad = Finding("stuck", Verdict.NO_GO, "Stuck")
+    channels = tuple(
+        ChannelCheck(name, "lvdt", findings, 0.0, 1e-5, 1e-5, 0.0)
+        for name, findings in (("LV-A04", ()), ("LV-A05", (bad,)))
+    )
+    window._after(CheckMessage(check=SensorCheck(channels)))
+    assert [text[:6] for _, text in window.notices._queue] == ["LV-A05"]
+
+
 def test_a_refusal_leaves_once_the_order_is_obeyed(window, monkeypatch):
     """ "Not armed" beside "Armed" would be one word too many."""
     monkeypatch.setattr(window.orders, "request", lambda name, more=None: None)

@@ -95,9 +95,12 @@ class NoticeLine(QFrame):
             self._queue.appendleft((severity, text))
         self._show()
 
-    def settle(self, trouble: str) -> None:
-        """That trouble is over: its warnings leave; the log keeps them."""
-        for told in [told for told in self.log if told.trouble == trouble and told.over is None]:
+    def settle(self, *troubles: str) -> None:
+        """These troubles are over: their warnings leave; the log keeps them."""
+        lasting = [told for told in self.log if told.trouble in troubles and told.over is None]
+        if not lasting:
+            return
+        for told in lasting:
             told.over = dt.datetime.now()
             if (told.severity, told.text) in self._queue:
                 self._queue.remove((told.severity, told.text))

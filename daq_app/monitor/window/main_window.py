@@ -44,11 +44,11 @@ from daq_app.monitor.pages.replay_page import ReplayPage
 from daq_app.monitor.pages.result_page import ResultPage
 from daq_app.monitor.pages.test_page import TestPage
 from daq_app.monitor.widgets.notices import NoticeLine
+from daq_app.monitor.window import what_to_tell
 from daq_app.monitor.window.adoption import Adoption
 from daq_app.monitor.window.orders import Orders
 from daq_app.monitor.window.placement import keep_on_screen
 from daq_app.monitor.window.test_display import TestDisplay
-from daq_app.monitor.window.what_to_tell import brings_gauge, is_told, numbers, refusal, trouble_of
 from daq_app.monitor.window.window_frame import WindowFrame
 
 FRAME_MS: Final = 16
@@ -264,15 +264,16 @@ class MainWindow(QMainWindow):
                 self.prepare.gauge.update()
             case CheckMessage():
                 self.prepare.show_check(message.check)
+                self.notices.settle(*what_to_tell.found_good(message.check))
             case EventMessage():
                 if message.kind == "tare" and self.link is not None:
                     self.link.request("hello")
                 if message.kind == "result" and self.result.run is not None:
                     self.result.open_if_shown(Path(str(message.data.get("run", ""))))
-                trouble = trouble_of(message)
+                trouble = what_to_tell.trouble_of(message)
                 if trouble and message.severity == "info":
                     self.notices.settle(trouble)
-                if is_told(message):
+                if what_to_tell.is_told(message):
                     self.notices.tell(message.severity, message.text, trouble)
 
     def _on_state(self, message: StateMessage) -> None:
@@ -287,7 +288,7 @@ class MainWindow(QMainWindow):
         if message.state in (State.RELEASED, State.ROCKING, State.AT_REST) or looks:
             self._released = True
         # An operator who chose Live keeps it.
-        if brings_gauge(before, message.state) and self.stack.currentWidget() is not self.live:
+        if what_to_tell.brings_gauge(before, message.state) and self.stack.currentWidget() is not self.live:
             self.show_page(self.test)
         if message.state is State.PREVIEWING and before in (State.IDLE, None) and self.link is not None:
             self.link.request("hello")
@@ -338,7 +339,7 @@ class MainWindow(QMainWindow):
     def _on_refused(self, text: str) -> None:
         """A key was pressed whose order makes no sense now: silence would look as if it had been obeyed."""
         may_command = self.link is not None and self.link.may_command
-        self.notices.tell("info", refusal(text, self.session, may_command=may_command))
+        self.notices.tell("info", what_to_tell.refusal(text, self.session, may_command=may_command))
 
     def _on_order(self, name: str) -> None:
         if name == "note":
@@ -367,7 +368,7 @@ class MainWindow(QMainWindow):
             self._adopt(reply.data)
         elif name == "tare":
             self.notices.tell("info", reply.text)
-            self.prepare.set_zero(Zero(numbers(reply.data.get("tare")), {}))
+            self.prepare.set_zero(Zero(what_to_tell.numbers(reply.data.get("tare")), {}))
             self.session.set_zeroed(True)
             self.orders.request("hello")
         elif name in ("marker", "note"):

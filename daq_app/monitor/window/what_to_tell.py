@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from daq_app.acquisition.checks.check_model import SensorCheck, Verdict
 from daq_app.acquisition.messages.published import RECORDING, EventMessage, State
 from daq_app.monitor.data.session import Session
 from daq_app.monitor.look.state_look import look_of
@@ -32,7 +33,15 @@ def trouble_of(event: EventMessage) -> str:
     """What a warning is about, where its end is told as well; empty for others."""
     if event.kind == "alarm":
         return f"alarm {event.data.get('alarm', '')}"
+    if event.kind == "channel":
+        return f"channel {event.data.get('channel', '')}"
     return event.kind if event.kind in _END_IS_TOLD else ""
+
+
+def found_good(check: SensorCheck | None) -> list[str]:
+    """What no longer holds once these sensors were checked: the doubts of channels that are good again."""
+    channels = check.channels if check is not None else ()
+    return [f"channel {channel.channel_id}" for channel in channels if channel.verdict is Verdict.GO]
 
 
 def refusal(order: str, session: Session, *, may_command: bool) -> str:
