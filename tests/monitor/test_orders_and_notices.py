@@ -56,13 +56,12 @@ def test_an_abort_must_be_ordered_twice_within_seconds(qtbot, clock):
     button = bar.buttons["abort"]
     button.click()
     assert orders == [] and button.text() == "F8 again: abort"
-    assert "press F8 again within 2.5 s" in told[-1]
     clock.now += 3.0
     bar.refresh(State.ARMED, sampling=True, may_command=True)
     assert button.text() == "Abort  F8" and "was not pressed again, so nothing was done" in told[-1]
     button.click()
     button.click()
-    assert orders == ["abort"] and len(told) == 3
+    assert orders == ["abort"] and len(told) == 1
 
 
 def test_orders_have_keys(qtbot):

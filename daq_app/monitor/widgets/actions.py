@@ -87,7 +87,7 @@ class ActionBar(QWidget):
     refused = Signal(str)
     """The text of an order whose key was pressed while it makes no sense."""
     told = Signal(str, str)
-    """Severity and text: an order that is asked for twice was asked for once."""
+    """Severity and text: an order that must be asked for twice was asked for once only."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -131,8 +131,6 @@ class ActionBar(QWidget):
         if action.confirm and not self._is_asked(action):
             self._asked[action.name] = self._clock()
             self.buttons[action.name].setText(f"{action.key} again: {action.text.lower()}")
-            asks = f"{action.text}: press {action.key} again within {CONFIRM_WITHIN_S:g} s."
-            self.told.emit("info", asks)
             QTimer.singleShot(int(1000 * CONFIRM_WITHIN_S) + 50, self, lambda: self._withdraw_if_old(action))
             return
         self._withdraw(action)
