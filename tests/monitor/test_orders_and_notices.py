@@ -108,7 +108,8 @@ def test_a_no_go_must_be_overruled_on_purpose_and_in_time(qtbot, window, monkeyp
 
 
 @pytest.mark.parametrize(
-    ("kind", "data"), [("alarm", {"alarm": "silence"}), ("travel", {}), ("overload", {})]
+    ("kind", "data"),
+    [("alarm", {"alarm": "silence"}), ("travel", {}), ("overload", {}), ("check", {})],
 )
 def test_a_warning_leaves_when_its_trouble_is_over_and_stays_in_the_log(window, kind, data):
     begins = EventMessage(kind=kind, sample=1, text="no samples", severity="error", data=data)

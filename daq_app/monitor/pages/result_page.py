@@ -135,7 +135,7 @@ class ResultPage(QWidget):
         """Plots and tables; in large type on a small screen there is more of them than fits."""
         tables = QHBoxLayout()
         tables.setSpacing(6)
-        for table, share in ((self.table, 3), (self.families, 4)):
+        for table, share in ((self.table, 5), (self.families, 7)):
             tables.addWidget(table, share, Qt.AlignmentFlag.AlignTop)
         content = QWidget()
         layout = QVBoxLayout(content)

@@ -150,7 +150,7 @@ class StateDelegate(QStyledItemDelegate):
     def width(self) -> int:
         """Room for the widest state with its sign, px."""
         metrics = QFontMetricsF(self._font)
-        return round(max(metrics.horizontalAdvance(state.value) for state in PlaceState)) + 2 * _SIDE_PX + 12
+        return round(max(metrics.horizontalAdvance(state.value) for state in PlaceState)) + 2 * _SIDE_PX + 8
 
     @property
     def _font(self) -> QFont:

@@ -12,7 +12,7 @@ from daq_app.monitor.look.state_look import look_of
 _QUIET_EVENTS: Final = frozenset({"impact", "marker", "tare", "saved", "check", "result", *State})
 """Events that the pages show anyway, unless they are more than information."""
 
-_END_IS_TOLD: Final = frozenset({"disk", "memory", "recorder", "travel", "overload"})
+_END_IS_TOLD: Final = frozenset({"disk", "memory", "recorder", "travel", "overload", "check"})
 """Kinds of trouble whose end is an event of the same kind that only informs."""
 
 MAY_BE_REFUSED: Final = frozenset({"tare", "check", "pull", "plan"})
