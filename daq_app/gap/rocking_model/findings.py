@@ -90,7 +90,7 @@ def _words(kind: str, target: str, finding: RunFinding, size: float, unit: str) 
         case "dropout":
             return f"{who} stands still for {100 * size:.2g} % of the time"
         case "spikes":
-            return f"{who} has {size:.2g} lone samples a second"
+            return f"{size:.2g} lone samples a second in {who}"
         case "saturation":
             return f"{who} goes no further than {amount}"
         case "polarity" | "swap" | "disagreement":

@@ -18,18 +18,21 @@ from scipy.signal import butter, sosfiltfilt
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
+from daq_app.gap.rocking_model.inspection.spikes import (
+    AROUND_S,
+    REST_S,
+    Mask,
+    lone_samples_per_s,
+    shaken_samples,
+)
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.rocking.geometry.noise import white_noise
 
 MAINS_HZ = 50.0
 _SLOW_S = 0.1
 """Means over which a record that is turned back by the mains frequency keeps 0.6 Hz to a per cent."""
-REST_S = 0.45
-"""Rest at the end of a record from which noise is read, s."""
 LOUD = 4.0
 """Size beyond that of noise and hum together from which a sample belongs to an impact …"""
-AROUND_S = 0.03
-"""… and so do those around it."""
 FEWEST_STEPS = 0.004
 """Share of samples at which a quantised reading goes on by a step."""
 SMALLEST_STEP = 5e-4
@@ -38,8 +41,6 @@ USUAL_HUM = 0.45
 """Amplitude of hum, over the rms of a sample's noise, up to which it is no fault."""
 FROZEN_S = 0.008
 """Equal readings in a row for longer than this are no chance."""
-SPIKE_SIZE = 9.0
-"""A sample this many noise sd off its neighbours is a spike."""
 SPIKY_PER_S = 0.3
 """Lone samples a second, on the mean of all runs, that no ordinary channel has (assumed: 0.2 at most)."""
 STANDS_OUT = 2.0
@@ -68,8 +69,11 @@ class Condition:
     """Rms noise of one reading: that of this record or the declared one, whichever is larger."""
 
 
-def inspect_channel(run: GapRun, index: int) -> Condition:
-    """Examine one channel of one run; NaN anywhere means that nothing is examined."""
+def inspect_channel(run: GapRun, index: int, shaken: Mask | None = None) -> Condition:
+    """Examine one channel of one run; NaN anywhere means that nothing is examined.
+
+    `shaken`: samples, (n,), around impacts, where an accelerometer is not looked at for lone samples.
+    """
     values = run.channels[index]
     if not np.all(np.isfinite(values)):
         return Condition(0.0, 1.0, None, 0.0, 1.0, 0.0, 1e-3, 0.0)
@@ -77,13 +81,14 @@ def inspect_channel(run: GapRun, index: int) -> Condition:
     noise = white_noise(values[-int(REST_S * rate) :]) + 1e-15
     hum, hum_sd, wave = _hum(values, rate)
     usual = max(noise, run.sensors[index].noise_si)
-    if accelerometer:
-        return Condition(hum, hum_sd, wave, 0.0, 1.0, 0.0, 1e-3, 0.0, usual)
     clean = values if wave is None else values - wave
+    if accelerometer:
+        spikes = 0.0 if shaken is None else lone_samples_per_s(clean, usual, rate, ~shaken)
+        return Condition(hum, hum_sd, wave, 0.0, 1.0, 0.0, 1e-3, spikes, usual)
     step, step_sd = _quantisation_step(values, run.sensors[index].noise_si)
     frozen, frozen_sd = _frozen(values, rate, step, run.sensors[index].range_si)
     # A channel that rests at the end of its range shows no noise there.
-    spikes = _spikes(clean, usual, rate) if step == 0.0 and frozen == 0.0 else 0.0
+    spikes = lone_samples_per_s(clean, usual, rate) if step == 0.0 and frozen == 0.0 else 0.0
     return Condition(hum, hum_sd, wave, step, step_sd, frozen, frozen_sd, spikes, usual)
 
 
@@ -201,24 +206,19 @@ def _resolution(values: FloatArray) -> float:
     return _quantile(change, 0.01) if change.size > 1 else 0.0
 
 
-def _spikes(values: FloatArray, noise: float, rate_hz: float) -> float:
-    """Samples per second that stand alone: far from the mean of both neighbours, which agree."""
-    middle = values[1:-1] - 0.5 * (values[2:] + values[:-2])
-    apart = np.abs(values[2:] - values[:-2])
-    alone = (np.abs(middle) > SPIKE_SIZE * 1.22 * noise) & (apart < 0.5 * np.abs(middle))
-    return float(np.sum(alone)) / values.size * rate_hz
-
-
 def conditions_of(runs: Sequence[GapRun]) -> list[dict[str, Condition]]:
     """Conditions of every LVDT, wire and accelerometer, by id, run by run."""
-    return [
-        {
-            sensor.id: inspect_channel(run, i)
-            for i, sensor in enumerate(run.sensors)
-            if sensor.family in _FAMILIES and sensor.id not in run.excluded
-        }
-        for run in runs
-    ]
+    found = []
+    for run in runs:
+        shaken = shaken_samples(run)
+        found.append(
+            {
+                sensor.id: inspect_channel(run, i, shaken)
+                for i, sensor in enumerate(run.sensors)
+                if sensor.family in _FAMILIES and sensor.id not in run.excluded
+            }
+        )
+    return found
 
 
 def without_hum(run: GapRun, conditions: dict[str, Condition]) -> GapRun:
@@ -255,7 +255,7 @@ def findings_per_run(
             ],
         }
         for name, cells in table.items():
-            if family == "accelerometer" and name != "hum":
+            if family == "accelerometer" and name not in ("hum", "spikes"):
                 continue
             rms = noise if name in ("hum", "quantisation") else math.nan
             for key, chosen in _attribute_condition(family, ids, cells):
@@ -275,7 +275,7 @@ _WORDS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "quantisation": {"lvdt": ("step of the reading", "m"), "wire": ("step of the reading", "m")},
     "dropout": {"lvdt": ("share of frozen samples", "1"), "wire": ("share of frozen samples", "1")},
-    "spikes": {"lvdt": ("lone samples", "1/s"), "wire": ("lone samples", "1/s")},
+    "spikes": dict.fromkeys(_FAMILIES, ("lone samples", "1/s")),
 }
 
 
