@@ -53,10 +53,12 @@ RULES = (
     Rule("nothing"),
     Rule("a share that remains", replace(POLICY, unknown_share=NEVER)),
     Rule("a group that is off by far", replace(POLICY, unknown_misfit=NEVER)),
+    Rule("a gap beyond noise and scatter", replace(POLICY, unknown_gap=NEVER)),
     Rule("a free form that gains on top", replace(POLICY, form_nats=NEVER)),
     Rule("another form as a hypothesis", other_forms=False),
     Rule("both of these", replace(POLICY, form_nats=NEVER), other_forms=False),
     Rule("what no effect does to an instrument", findings=False),
+    Rule("what nobody foresees", replace(POLICY, unforeseen=0.0)),
 )
 
 
@@ -77,9 +79,11 @@ def concluded(result: dict[str, Any], rule: Rule) -> dict[str, Any]:
         decision = "none_of_these"
     elif decision == "none_of_these":
         decision = _named(named, measured, rule.policy)
-    which = [{**e, "probability": (1.0 - unknown) * e["probability"]} for e in raw]
+    known = (1.0 - unknown) * (1.0 - rule.policy.unforeseen)
+    which = [{**e, "probability": known * e["probability"]} for e in raw]
     found = {**result, "which": which, "set95": _set(raw, rule.policy), "decision": decision}
-    return {**found, "p_unknown": unknown}
+    forms = (e["probability"] for e in which if probes.intersection(e["effects"]))
+    return {**found, "p_unknown": min(unknown + math.fsum(forms), 1.0)}
 
 
 def _unknown(result: dict[str, Any], named: Sequence[dict[str, Any]], policy: Policy) -> float:
@@ -89,6 +93,7 @@ def _unknown(result: dict[str, Any], named: Sequence[dict[str, Any]], policy: Po
     share = policy.chance(rest["share"], policy.unknown_share)
     known = 1.0 - share * policy.chance(rest["nats"], policy.unknown_nats)
     known *= 1.0 - policy.chance(largest, policy.unknown_misfit)
+    known *= 1.0 - policy.chance(rest["after"] ** 2 - 1.0, policy.unknown_gap)
     gain = max((form["excess"] for form in result["free_forms"]), default=0.0)
     best = named[0]["log_evidence"]
     explained = max(best - next(_nulls(result), best), 0.0)

@@ -141,6 +141,13 @@ class Diagnosis:
         first = next(entry.effects for entry in self.which if not probes.intersection(entry.effects))
         return tuple(name for name in first if name not in measured)
 
+    @property
+    def p_unknown(self) -> float:
+        """Probability of something that is not in the library: unknown, or another form of a law."""
+        probes = {name for probe in self.probes for name in probe.effects}
+        forms = (entry.probability for entry in self.which if probes.intersection(entry.effects))
+        return min(self.rest.unknown + math.fsum(forms), 1.0)
+
     def in_words(self, effects: tuple[str, ...]) -> str:
         """A hypothesis as people read it: a probe stands for another form of its family."""
         families = {name: probe.family for probe in self.probes for name in probe.effects}
@@ -153,7 +160,7 @@ class Diagnosis:
         data["format"] = FORMAT_VERSION
         data["decision_detail"] = data["decision"]
         data["decision"] = self.decision.verdict
-        data["p_unknown"] = self.rest.unknown
+        data["p_unknown"] = self.p_unknown
         for key in ("which", "set95", "probes"):
             for entry in data[key]:
                 entry["effects"] = list(entry["effects"])

@@ -129,3 +129,47 @@ def test_three_causes_are_found_together() -> None:
     assert result.decision.verdict == "several"
     assert result.decision.effects == ("late", "shift", "slope")
     assert diagnose(LateModel(), runs, library, Options(causes=2)).decision.verdict != "several"
+
+
+def test_what_the_first_explains_elsewhere_does_not_count_against_a_second() -> None:
+    """A twentieth of all that is explained, and all that is explained in the heights of the peaks."""
+    result = diagnose(DecayModel(), make_runs(4, slope_k=0.02, shift_s=0.3), LIBRARY, Options())
+    alone = {entry.effects: entry.log_evidence for entry in result.which}
+    both, first = alone["shift", "slope"], alone["shift",]
+    assert both - first < 0.06 * (both - alone[()])
+    assert result.decision.effects == ("shift", "slope")
+
+
+@pytest.mark.parametrize(("late_s", "named"), [(0.004, ("shift",)), (0.012, ("late", "shift"))])
+def test_a_second_that_only_mends_the_form_of_the_first_is_none(late_s: float, named: tuple[str]) -> None:
+    """Ten nats and more, but less than a tenth of what the first explains in the same durations."""
+    runs = make_runs(4, shift_s=0.5)
+    for run in runs:
+        run.features.values[PEAKS:] += late_s * np.linspace(0, 1, PEAKS) ** 4
+    late = Effect("late", "wear", (signed("c", 0.1, "s"),), "D + c n⁴", "test")
+    result = diagnose(LateModel(), runs, Library([*LIBRARY.values(), late]), Options())
+    assert result.decision.effects == named
+
+
+class UnevenModel(DecayModel):
+    """The toy with the shift once more, in the first four durations alone."""
+
+    def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
+        found = super().predict(run, values)
+        measured = run.features.values[:4]  # type: ignore[attr-defined]
+        found.features[PEAKS : PEAKS + 4] += values.get("shift@first.s", 0.0) * measured**2
+        return found
+
+
+def test_a_law_on_a_family_and_on_one_of_its_channels_are_no_two_causes() -> None:
+    """The first durations are late by more than the others: that is one delay, unevenly."""
+    runs = make_runs(4, shift_s=0.05)
+    for run in runs:
+        run.features.values[PEAKS : PEAKS + 4] += 0.04 * run.features.values[:4] ** 2
+    apart = replace(LIBRARY["shift"], name="shift@first")
+    two = diagnose(UnevenModel(), runs, Library([*LIBRARY.values(), apart]), Options())
+    assert two.decision.effects == ("shift", "shift@first")
+    part = replace(apart, part_of="shift")
+    one = diagnose(UnevenModel(), runs, Library([*LIBRARY.values(), part]), Options())
+    assert one.which[0].effects == ("shift",)
+    assert not any({"shift", "shift@first"} <= set(entry.effects) for entry in one.which)

@@ -41,6 +41,8 @@ class Fit:
     log_likelihood: float
     log_evidence: float
     residuals: tuple[FloatArray, ...]
+    by_group: FloatArray
+    """Log posterior of each group of features and, last, of the model's own unknowns, shape (group + 1,)."""
     converged: bool = True
     columns: Columns = field(default_factory=dict, repr=False)
     """Jacobian at the end, where it was worked out exactly."""
@@ -184,6 +186,7 @@ def finish(search: Search, converged: bool, exact: bool) -> Fit:
         log_likelihood=linear.log_likelihood,
         log_evidence=evidence,
         residuals=tuple(line.residual for line in linear.lines),
+        by_group=linear.by_group,
         converged=converged,
         columns=problem.columns_of(linear.lines) if exact else {},
         values=shared,

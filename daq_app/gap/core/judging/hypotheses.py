@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from daq_app.gap.core.effects import Effect, Library
 from daq_app.gap.core.fitting.experiment import Experiment
 from daq_app.gap.core.fitting.fit import Fit, effects_of
@@ -15,7 +17,6 @@ from daq_app.gap.core.fitting.screen import Screened, Step
 from daq_app.gap.core.fitting.tasks import FitTask, FormsTask, ScreenTask
 from daq_app.gap.core.judging.evidence import NULL, Hypothesis, Ranked, rank
 from daq_app.gap.core.judging.other_forms import FreeForm
-from daq_app.gap.core.judging.remainder import misfit_nats
 from daq_app.gap.core.policy import POLICY, Policy
 
 REFITTED = 6
@@ -23,8 +24,8 @@ REFITTED = 6
 LEADS = 2
 LEAD_SHARE = 0.5
 """A second cause is sought to the two best single ones, to the second of them if it explains half as much."""
-IMPROVED_NATS = 1.0
-"""What a cause must take off the misfit of a group of features for that group to be one that it improves."""
+IMPROVED_NATS = 0.5
+"""What a cause must add to the log likelihood of a group of features for that group to be one it improves."""
 POLISHED = 3
 POLISH_REACH = 12.0
 """The best three hypotheses within 12 in log evidence are fitted to the end with exact Jacobians."""
@@ -110,7 +111,12 @@ class Hypotheses:
         """Screen every further effect on top of a hypothesis, and refit the most promising."""
         fit = self.fits[base]
         taken = set(self.library.class_of(base))
-        further = [e for e in self.library.named if not taken & set(self.library.class_of([e.name]))]
+        taken |= {self.library[name].part_of for name in base}
+        further = [
+            e
+            for e in self.library.named
+            if not taken & {*self.library.class_of([e.name]), e.name} and e.part_of not in base
+        ]
         probes = list(self.library.probes) if with_probes else []
         screened = self._screened(base, [*further, *probes], text)
         if with_probes:
@@ -191,29 +197,26 @@ class Hypotheses:
         return rank(kept, self.library, self.policy, measured=self.measured)
 
     def _worth_it(self, hypothesis: Hypothesis) -> bool:
-        """Whether the last of several causes explains enough; what was measured directly counts as one."""
-        if len(hypothesis) + self.measured < 2 or not hypothesis:
+        """Whether the last of several causes explains enough of what it takes part in.
+
+        Where another cause accounts for a group of features, a further one mends that one's form there; where
+        no other does, it need not rival what they explain elsewhere. That the survey is strained less counts
+        as one more group.
+        """
+        if len(hypothesis) < 2 or hypothesis not in self.fits:
             return True
-        evidence = self.evidence[hypothesis]
         without = {
             left: self.evidence.get(tuple(name for name in hypothesis if name != left), -math.inf)
             for left in hypothesis
         }
-        explained = evidence - self.evidence[NULL]
         last = max(without, key=lambda name: without[name])
-        gained = evidence - without[last]
-        return gained >= self.policy.further_share * explained or self._clears(hypothesis, last)
-
-    def _clears(self, hypothesis: Hypothesis, last: str) -> bool:
-        """Whether a cause leaves next to nothing of the misfit in the groups of features that it improves."""
-        before = self.fits.get(tuple(name for name in hypothesis if name != last))
-        after = self.fits.get(hypothesis)
-        if before is None or after is None:
-            return False
-        misfits = [misfit_nats(self.experiment, fit.sizes, self.policy) for fit in (before, after)]
-        improved = misfits[0] - misfits[1] > IMPROVED_NATS
-        left, had = float(misfits[1][improved].sum()), float(misfits[0][improved].sum())
-        return had > 0.0 and left <= self.policy.further_leaves * had
+        rest = tuple(name for name in hypothesis if name != last)
+        if rest not in self.fits:
+            return True
+        whole, part, nothing = (self.fits[h].by_group for h in (hypothesis, rest, NULL))
+        improved = whole - part > IMPROVED_NATS
+        explained = float(np.maximum(whole - nothing, 0.0)[improved].sum())
+        return self.evidence[hypothesis] - without[last] >= self.policy.further_share * explained
 
     def free_forms(self, best: Hypothesis) -> list[FreeForm]:
         """What each probe of the families of the best hypothesis, and each departure from the forms of its
