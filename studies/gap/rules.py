@@ -53,7 +53,6 @@ RULES = (
     Rule("nothing"),
     Rule("a share that remains", replace(POLICY, unknown_share=NEVER)),
     Rule("a group that is off by far", replace(POLICY, unknown_misfit=NEVER)),
-    Rule("a gap beyond noise and scatter", replace(POLICY, unknown_gap=NEVER)),
     Rule("a free form that gains on top", replace(POLICY, form_nats=NEVER)),
     Rule("another form as a hypothesis", other_forms=False),
     Rule("both of these", replace(POLICY, form_nats=NEVER), other_forms=False),
@@ -93,7 +92,6 @@ def _unknown(result: dict[str, Any], named: Sequence[dict[str, Any]], policy: Po
     share = policy.chance(rest["share"], policy.unknown_share)
     known = 1.0 - share * policy.chance(rest["nats"], policy.unknown_nats)
     known *= 1.0 - policy.chance(largest, policy.unknown_misfit)
-    known *= 1.0 - policy.chance(rest["after"] ** 2 - 1.0, policy.unknown_gap)
     gain = max((form["excess"] for form in result["free_forms"]), default=0.0)
     best = named[0]["log_evidence"]
     explained = max(best - next(_nulls(result), best), 0.0)

@@ -78,10 +78,6 @@ class Policy:
     """Discrepancy of one group, in nominal sd, that is as likely something unknown as the model's own. In
     development laboratories known causes leave 11 at most, unknown ones of that kind 45 or more; raising it
     hides what a strong cause outshines."""
-    unknown_gap: float = 1.0
-    """Excess of the mean square of what remains, over noise and scatter, that is as likely something unknown
-    as the model's own. In development laboratories known causes leave 0.3 at most, unknown ones of that kind
-    1.4 or more; raising it hides what many groups share."""
     unknown_steepness: float = 4.0
     """Slope of the logistic in the logarithm of each; raising it makes the gate a step."""
     form_nats: float = 6.0

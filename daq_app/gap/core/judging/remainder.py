@@ -88,7 +88,7 @@ def remainder(
     explained = max(best.log_evidence - null.log_evidence, 0.0)
     share = nats / max(nats + explained, 1e-9)
     largest = max((group.discrepancy for group in groups), default=0.0)
-    rest, form = _unknown(share, nats, largest, after, policy), ""
+    rest, form = _unknown(share, nats, largest, policy), ""
     gain = max((f.excess for f in forms), default=0.0)
     if gain > 0.0 and best.effects:
         bar = max(policy.form_nats, policy.form_share * explained)
@@ -98,17 +98,15 @@ def remainder(
     return Remainder(nominal, before, after, nats, share, groups, rest, form)
 
 
-def _unknown(share: float, nats: float, largest: float, after: float, policy: Policy) -> float:
+def _unknown(share: float, nats: float, largest: float, policy: Policy) -> float:
     """Probability of something unknown behind a remainder of that share and size.
 
-    A share that matters, one group whose discrepancy (`largest`) is more than any model is wrong by, or a gap
-    (`after`) that is more than noise and scatter.
+    A share that matters, or one group whose discrepancy (`largest`) is more than any model is wrong by.
     """
     counts = policy.chance(share, policy.unknown_share)
     matters = policy.chance(nats, policy.unknown_nats)
     gross = policy.chance(largest, policy.unknown_misfit)
-    spread = policy.chance(after**2 - 1.0, policy.unknown_gap)
-    return 1.0 - (1.0 - counts * matters) * (1.0 - gross) * (1.0 - spread)
+    return 1.0 - (1.0 - counts * matters) * (1.0 - gross)
 
 
 def _white(
