@@ -54,7 +54,8 @@ class Policy:
     unforeseen: float = 0.05
     """Probability that an answer is wrong although nothing says so: a further cause too weak to show, a form
     so near one of the library that it leaves nothing. Without it three answers of 62 development cases were
-    sure and wrong, and five of 120 of left-out laboratories (page of scores); raising it makes no answer sure."""
+    sure and wrong, and five of 120 of left-out laboratories (page of scores). Raising it makes no answer
+    sure."""
     name_probability: float = 0.90
     """Probability from which an answer is named alone; raising it says "cannot tell" more often."""
     set_content: float = 0.95
