@@ -27,7 +27,7 @@ def plus_minus(error: float | None, decimals: int = 4) -> str:
 
 def signed(value: float, spec: str = "g") -> str:
     """A number in the format `spec`, with a true minus sign."""
-    return true_minus(f"{value:{spec}}")
+    return f"{value:{spec}}".replace("-", "−")
 
 
 def true_minus(text: str) -> str:

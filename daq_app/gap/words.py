@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
+from daq_app.config.wording import signed
+
 _SENSORS: Final = {
     "lvdt": "the LVDTs",
     "wire": "the wires",
@@ -115,12 +117,8 @@ def with_interval(value: float, low: float, high: float, unit: str) -> str:
     value, half = factor * value, factor * (high - low) / 2.0
     space = "" if unit == "" else " "
     if not math.isfinite(half) or half <= 0.0:
-        return f"{_signed(f'{value:.3g}')}{space}{unit}"
+        return f"{signed(value, '.3g')}{space}{unit}"
     # Two digits of the half interval where it begins with a 1, else one.
     leading = math.floor(math.log10(half))
     digits = max(0, -leading + (1 if half / 10.0**leading < 2.0 else 0))
-    return f"{_signed(f'{value:.{digits}f}')} ± {half:.{digits}f}{space}{unit}"
-
-
-def _signed(text: str) -> str:
-    return text.replace("-", "−")
+    return f"{signed(value, f'.{digits}f')} ± {half:.{digits}f}{space}{unit}"

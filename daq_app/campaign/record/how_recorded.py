@@ -12,6 +12,7 @@ from daq_app.campaign.record.parts import Grid, Pairs, Part, Section, Signatures
 from daq_app.campaign.record.source import RecordSource
 from daq_app.config import Rig
 from daq_app.config.rig import Channel
+from daq_app.config.wording import signed
 from daq_app.runfile.seal.format import Seal
 from daq_app.runfile.seal.signing import made_here, signature_is_good
 from daq_app.runfile.seal.trust import trusted_as
@@ -175,8 +176,8 @@ def _sensor_row(
     return (
         channel.id,
         channel.physical_channel,
-        f"{channel.polarity * channel.sensitivity:g} {channel.sensitivity_unit}".replace("-", "−"),
-        f"{low:g} … {high:g} {channel.si_unit}".replace("-", "−"),
+        f"{signed(channel.polarity * channel.sensitivity)} {channel.sensitivity_unit}",
+        f"{signed(low)} … {signed(high)} {channel.si_unit}",
         certificate.number,
         f"{certificate.due}" + (" ✗" if certificate.due < day else ""),
         f"{figure(tare.get(channel.id), 4)} {channel.reading_unit}",

@@ -6,6 +6,8 @@ import datetime as dt
 import math
 from typing import Final
 
+from daq_app.config.wording import signed
+
 MISSING: Final = "–"
 
 
@@ -13,9 +15,7 @@ def figure(value: object, decimals: int, unit: str = "") -> str:
     """With so many decimals and a true minus sign; a dash for what is not known."""
     if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
         return MISSING
-    text = f"{round(value, decimals) + 0.0:.{decimals}f}".replace(
-        "-", "−"
-    )  # what rounds to nothing has no sign
+    text = signed(round(value, decimals) + 0.0, f".{decimals}f")  # what rounds to nothing has no sign
     return f"{text} {unit}" if unit else text
 
 
@@ -23,7 +23,7 @@ def significant(value: object, digits: int = 3) -> str:
     """With so many significant digits; a dash for what is not known."""
     if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
         return MISSING
-    return f"{value:.{digits}g}".replace("-", "−")
+    return signed(value, f".{digits}g")
 
 
 def moment(utc: dt.datetime) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from daq_app.campaign.report.statistics import GroupMean
+from daq_app.config import wording
 
 
 def number(value: float, digits: int) -> str:
@@ -14,7 +15,7 @@ def number(value: float, digits: int) -> str:
 
 def signed(value: float) -> str:
     """A change, always with its sign."""
-    return f"{value:+.4f}".replace("-", "−")
+    return wording.signed(value, "+.4f")
 
 
 def interval(group: GroupMean) -> str:

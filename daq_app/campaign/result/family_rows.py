@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from daq_app.campaign.summaries.summary import TestSummary
-from daq_app.config.wording import plus_minus
+from daq_app.config.wording import plus_minus, signed
 from daq_app.rocking.families.verdict import FamilyView
 
 HEADINGS: Final = ("Family", "θ0, mrad", "r EAV", "r CRT", "Impacts", "Late, ms", "Remarks")
@@ -44,4 +44,4 @@ def _number(value: float, digits: int) -> str:
     if not math.isfinite(value):
         return _DASH
     # A sum with zero has no negative zero.
-    return f"{round(value, digits) + 0.0:.{digits}f}".replace("-", "−")
+    return signed(round(value, digits) + 0.0, f".{digits}f")

@@ -20,7 +20,7 @@ from daq_app.campaign.result.motions import period_deviation
 from daq_app.campaign.result.words import METHODS, RepetitionRow, repetition_rows, verdict_sentence
 from daq_app.campaign.status import NO_FACTS, TestFacts
 from daq_app.campaign.summaries.summary import TestSummary
-from daq_app.config.wording import plus_minus
+from daq_app.config.wording import plus_minus, signed
 from daq_app.rocking.families.verdict_words import verdict_sentence as restitution_sentence
 from daq_app.runfile.durable import write_whole
 
@@ -78,7 +78,7 @@ def _pdf(test: TestSummary, figure: Figure, rows: Sequence[RepetitionRow]) -> by
 
 def _bias(value: float) -> str:
     """With its sign; none where it rounds to nothing."""
-    return f"{value:+.4f}".replace("-", "−") if abs(value) >= 5e-5 else "0.0000"
+    return signed(value, "+.4f") if abs(value) >= 5e-5 else "0.0000"
 
 
 def _table_page(test: TestSummary, rows: Sequence[RepetitionRow]) -> Figure:
@@ -103,8 +103,9 @@ def _table_page(test: TestSummary, rows: Sequence[RepetitionRow]) -> Figure:
         _table(page, (0.05, 0.62, 0.9, 0.22), header, estimates)
     deviation = period_deviation(test)
     if deviation is not None:
-        sentence = f"The measured periods deviate from theory (4.1) by {100 * deviation:+.1f} % on average."
-        page.text(0.05, 0.65, sentence.replace("-", "−"), fontsize=10)
+        share = signed(100 * deviation, "+.1f")
+        sentence = f"The measured periods deviate from theory (4.1) by {share} % on average."
+        page.text(0.05, 0.65, sentence, fontsize=10)
     cells = [
         [
             row.test + ("  (this test)" if row.this else ""),

@@ -10,6 +10,7 @@ from PySide6.QtGui import QFontMetricsF, QResizeEvent
 from PySide6.QtWidgets import QApplication, QFrame, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from daq_app.config.shown_text import visible
+from daq_app.config.wording import signed
 from daq_app.monitor.look.theme import font
 
 DASH = "–"
@@ -38,9 +39,11 @@ def tip_text(text: str) -> str:
 class FittedLabel(PlainLabel):
     """A line that stays whole: in smaller type where there is too little room for it."""
 
+    _tenths = 0
+    """Tenths of a point in which the line is shown; 0 before it was fitted."""
+
     def __init__(self, role: str, parent: QWidget | None = None) -> None:
         super().__init__("", parent)
-        self._tenths = 0
         self.setProperty("role", role)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
 
@@ -65,7 +68,7 @@ class FittedLabel(PlainLabel):
         # Letters are drawn on whole pixels: a line of them may be a little wider than its type says.
         room = 0.97 * self.width()
         tenths = fitting_tenths(self.text(), QApplication.font().pointSizeF(), room, bold=False)
-        if getattr(self, "_tenths", tenths) != tenths:
+        if self._tenths != tenths:
             self._tenths = tenths
             self.setStyleSheet(f"font-size: {tenths / 10:.1f}pt;")
 
@@ -95,7 +98,7 @@ def number(value: float | None, digits: int, unit: str = "") -> str:
     """A number with fixed decimals and a true minus sign; a dash when there is none."""
     if value is None or not math.isfinite(value):
         return DASH
-    text = f"{value:.{digits}f}".replace("-", "−")
+    text = signed(value, f".{digits}f")
     if text.strip("−0.") == "":
         text = text.lstrip("−")
     return f"{text} {unit}" if unit else text
