@@ -94,7 +94,7 @@ class _Study(Hypotheses):
         gap, alone = self._held_out(best)
         if not fit.converged:
             limits.append(f"The fit of {' + '.join(best) or 'nothing missing'} has not settled.")
-        known = (1.0 - rest.unknown) * (1.0 - self.policy.unforeseen)
+        known = rest.known(self.policy)
         scales = self._scales(fit)
         return Diagnosis(
             model=self.experiment.model.name,

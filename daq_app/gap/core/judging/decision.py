@@ -49,7 +49,7 @@ def decide(evidence: Evidence, policy: Policy) -> tuple[Decision, str]:
         return Decision("none_of_these", (), "unknown", words, rest.unknown), advice
     if not best.effects:
         return _null(evidence, policy)
-    sure = best.probability * (1.0 - rest.unknown) * (1.0 - policy.unforeseen)
+    sure = best.probability * rest.known(policy)
     words = describe(best, library)
     weakest = min(best.effects, key=lambda name: strength(evidence.fit, library[name]))
     sd = strength(evidence.fit, library[weakest])
@@ -113,8 +113,7 @@ def _another_form(evidence: Evidence) -> tuple[Decision, str]:
 
 
 def _null(evidence: Evidence, policy: Policy) -> tuple[Decision, str]:
-    known = (1.0 - evidence.rest.unknown) * (1.0 - policy.unforeseen)
-    probability = evidence.best.probability * known
+    probability = evidence.best.probability * evidence.rest.known(policy)
     rivals = [a for a in evidence.answers if a.effects and not is_other_form(a.effects, evidence.library)]
     if evidence.best.probability < policy.null_probability and rivals:
         weak = rivals[0]

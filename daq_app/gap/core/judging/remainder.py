@@ -55,6 +55,10 @@ class Remainder:
     form: str = ""
     """Family of which another form gains most on top of the best hypothesis, where that matters."""
 
+    def known(self, policy: Policy) -> float:
+        """Probability that the answer is among the hypotheses, which share it."""
+        return (1.0 - self.unknown) * (1.0 - policy.unforeseen)
+
     @property
     def words(self) -> str:
         """The remainder with its place."""

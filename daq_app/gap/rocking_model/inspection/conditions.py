@@ -20,13 +20,12 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.inspection.spikes import (
     AROUND_S,
-    REST_S,
     Mask,
     lone_samples_per_s,
+    reading_noise,
     shaken_samples,
 )
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.rocking.geometry.noise import white_noise
 
 MAINS_HZ = 50.0
 _SLOW_S = 0.1
@@ -78,9 +77,8 @@ def inspect_channel(run: GapRun, index: int, shaken: Mask | None = None) -> Cond
     if not np.all(np.isfinite(values)):
         return Condition(0.0, 1.0, None, 0.0, 1.0, 0.0, 1e-3, 0.0)
     rate, accelerometer = run.rate_hz, run.sensors[index].family == "accelerometer"
-    noise = white_noise(values[-int(REST_S * rate) :]) + 1e-15
     hum, hum_sd, wave = _hum(values, rate)
-    usual = max(noise, run.sensors[index].noise_si)
+    usual = reading_noise(run, index)
     clean = values if wave is None else values - wave
     if accelerometer:
         spikes = 0.0 if shaken is None else lone_samples_per_s(clean, usual, rate, ~shaken)

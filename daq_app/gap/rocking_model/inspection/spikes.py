@@ -11,7 +11,7 @@ from daq_app.gap.rocking_model.records import GapRun
 from daq_app.rocking.geometry.noise import white_noise
 
 Mask = NDArray[np.bool_]
-REST_S = 0.45
+_REST_S = 0.45
 """Rest at the end of a record from which noise is read, s."""
 AROUND_S = 0.03
 """Samples so near to a loud one belong to the same impact."""
@@ -23,6 +23,12 @@ _BEND_NOISE = 1.22
 """Rms, over that of white noise, of a sample's distance from the mean of its neighbours: √1.5."""
 _TOGETHER = 3
 """Accelerometers that are loud together at an impact; spikes of single channels do not meet."""
+
+
+def reading_noise(run: GapRun, index: int) -> float:
+    """Rms noise of one reading of a channel, SI: that at rest or the declared one, whichever is larger."""
+    rest = white_noise(run.channels[index][-int(_REST_S * run.rate_hz) :]) + 1e-15
+    return max(rest, run.sensors[index].noise_si)
 
 
 def lone_samples_per_s(values: FloatArray, noise: float, rate_hz: float, where: Mask | None = None) -> float:
@@ -42,11 +48,9 @@ def shaken_samples(run: GapRun) -> Mask | None:
     """
     loud: list[Mask] = []
     for index in run.indices("accelerometer"):
-        bend, sensor = _bend(run.channels[index]), run.sensors[index]
-        if not np.all(np.isfinite(bend)) or sensor.id in run.excluded:
-            continue
-        rest = white_noise(run.channels[index][-int(REST_S * run.rate_hz) :]) + 1e-15
-        loud.append(np.pad(np.abs(bend) > _LOUD * _BEND_NOISE * max(rest, sensor.noise_si), 1))
+        bend = _bend(run.channels[index])
+        if np.all(np.isfinite(bend)) and run.sensors[index].id not in run.excluded:
+            loud.append(np.pad(np.abs(bend) > _LOUD * _BEND_NOISE * reading_noise(run, index), 1))
     if len(loud) < _TOGETHER:
         return None
     width = 2 * round(AROUND_S * run.rate_hz) + 1
