@@ -274,7 +274,7 @@ def test_a_key_of_a_page_that_has_nothing_to_do_it_with_is_answered(qtbot, live_
         live_window.activateWindow()
     live_window.show_page(live_window.result)
     qtbot.keyClick(live_window.result, Qt.Key.Key_O, Qt.KeyboardModifier.ControlModifier)
-    assert live_window.notices.current == ("info", "Page: there is nothing to do it with yet.")
+    assert live_window.notices.current == ("info", "Page: not yet. There is nothing that it could act on.")
 
 
 def test_the_log_keeps_what_was_told_and_when_it_was_over(qtbot):

@@ -88,7 +88,7 @@ class TestSummary:
 def judged(summary: TestSummary, test: RecordedTest) -> TestSummary:
     """The summary under the name and the verdict that hold now: the operator may have changed both since.
 
-    A test that was rejected has that for its reason; what the analysis remarks no longer matters.
+    The reasons of a rejected test are why it was rejected; what the analysis remarked is left out.
     """
     name, good = test.name, test.verdict is not TestVerdict.BAD
     rejected = (test.reason,) if test.reason else ()

@@ -90,7 +90,9 @@ def keyed_button(page: QWidget, text: str, key: str, act: Callable[[], object]) 
         if button.isEnabled():
             button.click()
         else:
-            cast("TellingPage", page).told.emit("info", f"{text}: there is nothing to do it with yet.")
+            cast("TellingPage", page).told.emit(
+                "info", f"{text}: not yet. There is nothing that it could act on."
+            )
 
     QShortcut(QKeySequence(key), page).activated.connect(press)
     return button

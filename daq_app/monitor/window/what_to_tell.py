@@ -39,7 +39,7 @@ def trouble_of(event: EventMessage) -> str:
 
 
 def found_good(check: SensorCheck | None) -> list[str]:
-    """What no longer holds once these sensors were checked: the doubts of channels that are good again."""
+    """The troubles that a check ends: those of the channels that it finds good."""
     channels = check.channels if check is not None else ()
     return [f"channel {channel.channel_id}" for channel in channels if channel.verdict is Verdict.GO]
 
