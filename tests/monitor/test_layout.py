@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import datetime as dt
+
 import pytest
 from PySide6.QtWidgets import QApplication
 
 from daq_app.acquisition.messages.published import Judgement, State, StateMessage
+from daq_app.campaign.names import TestName
+from daq_app.campaign.plan import Campaign, Step
+from daq_app.campaign.status import CampaignStatus, RecordedTest, TestFacts, TestVerdict
 from daq_app.monitor.data.session import Published
 from daq_app.monitor.plots.plot_base import Axis
+from daq_app.monitor.widgets.campaign_table import HEADINGS
 from daq_app.monitor.window.main_window import MainWindow
 from tests.support.window.clipped_text import clipped_texts
 from tests.support.window.quiet_link import QuietLink
@@ -108,6 +114,23 @@ def test_the_headings_of_the_campaign_are_whole(rocking_window):
         if header.sectionSizeHint(place) > header.sectionSize(place)
     ]
     assert cut == []
+
+
+@pytest.mark.parametrize("larger", [0, 4])
+def test_what_was_measured_in_a_campaign_is_whole(rocking_window, larger):
+    """The time of a release had ended in "25 Nov …"."""
+    window = rocking_window
+    for _ in range(larger):
+        window.change_type_size(1)
+    plan = Campaign(name="c", levels={"L1": 0.15}, sequence=(Step(specimen="FR1", level="L1", tests=2),))
+    facts = TestFacts(0.1499, {"CRT": 0.895}, "", ())
+    released_ns = int(dt.datetime(2026, 11, 30, 20, 48).timestamp() * 1e9)
+    test = RecordedTest(TestName.parse("FR1-L1-1"), TestVerdict.UNCHECKED, released_ns, None, "", facts)
+    window.show_page(window.campaign)
+    table = window.campaign.table
+    table.model().show_status(CampaignStatus(plan, [test]), "")
+    short = [place for place, heading in enumerate(HEADINGS) if heading not in ("Operator", "Notes")]
+    assert [HEADINGS[c] for c in short if table.sizeHintForColumn(c) > table.columnWidth(c)] == []
 
 
 def test_figures_below_zero_have_a_true_minus_sign(rocking_window):

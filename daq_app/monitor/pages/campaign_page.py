@@ -33,7 +33,7 @@ from daq_app.monitor.widgets.banner import keyed_button, open_outside
 from daq_app.monitor.widgets.campaign_table import CampaignModel, StateDelegate, release_text
 from daq_app.runfile import RunFileError, open_run
 
-_WIDTHS_PX = (146, 54, 108, 96, 60, 76, 98, 90)
+_WIDTHS_PX = (138, 52, 108, 92, 60, 89, 106, 87)
 """Widths of the columns before the notes, pixels."""
 _REPORT_LIMIT_S = 3600.0
 

@@ -74,7 +74,7 @@ class CampaignModel(QAbstractTableModel):
         if role != Qt.ItemDataRole.DisplayRole:
             return None
         heading = (
-            f"{place.planned.name}" + ("   ◀ next" if is_next else ""),
+            f"{place.planned.name}" + (" ◀ next" if is_next else ""),
             f"{place.planned.theta0_over_alpha:.2f}",
             place.state.value,
         )
