@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 import subprocess
@@ -19,6 +18,7 @@ from daq_app.acquisition.closing import finaliser as closing
 from daq_app.acquisition.closing.finaliser import Finaliser, Finished
 from daq_app.guarded import end_guarded
 from daq_app.runfile import JournalWriter, RunHeader, open_run
+from tests.support.recorder.processes import makers_of_runs
 
 
 @pytest.fixture
@@ -35,16 +35,6 @@ def _journal(path: Path) -> Path:
     with JournalWriter(path, header) as writer:
         writer.append_block(0, np.ones((1, 50)))
     return path
-
-
-def _workers() -> list[psutil.Process]:
-    """The processes that make run files; children of other tests may have ended and wait to be reaped."""
-    found = []
-    for child in psutil.Process().children():
-        with contextlib.suppress(psutil.Error):
-            if "finalise_worker" in " ".join(child.cmdline()):
-                found.append(child)
-    return found
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs something that a reader waits at for ever")
@@ -80,7 +70,7 @@ def test_a_killed_worker_has_a_successor(finaliser: Finaliser, tmp_path: Path) -
         job | {"journal": str(_journal(tmp_path / "a.journal")), "out": f"{tmp_path}/a.h5"}
     )
     assert first.result(120.0).ok
-    for child in _workers():
+    for child in makers_of_runs(psutil.Process()):
         child.send_signal(signal.SIGKILL)
     second = finaliser.submit(
         job | {"journal": str(_journal(tmp_path / "b.journal")), "out": f"{tmp_path}/b.h5"}
@@ -120,7 +110,7 @@ def test_a_worker_that_cannot_even_be_ended_for_want_of_memory_is_tried_again(
     assert save("a").result(120.0).ok
     monkeypatch.setattr(closing, "end_guarded", end)
     monkeypatch.setattr(closing, "_AGAIN_AFTER_S", 0.0)
-    for child in _workers():
+    for child in makers_of_runs(psutil.Process()):
         child.kill()
         child.wait()
     assert save("b").result(120.0).ok

@@ -19,6 +19,7 @@ from daq_app.acquisition.messages.published import State
 from daq_app.config import Rig
 from daq_app.runfile import recover
 from tests.support.recorder.fault_bench import LIMIT_S, Acquisition, Row, another_process, look_at
+from tests.support.recorder.processes import makers_of_runs
 
 if sys.platform != "linux":
     pytest.skip("needs Linux's prlimit", allow_module_level=True)
@@ -50,9 +51,8 @@ def limit(shared: Acquisition) -> Iterator[Limit]:
 
 def kill_the_maker_of_runs(shared: Acquisition) -> None:
     """The process that is kept warm to make run files: the next one has to be started."""
-    for child in psutil.Process(shared.process.pid).children():
-        if any("finalise_worker" in word for word in child.cmdline()):
-            child.kill()
+    for maker in makers_of_runs(psutil.Process(shared.process.pid)):
+        maker.kill()
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import sys
 from multiprocessing.context import ForkServerContext, SpawnContext
 
 import grpc
+import psutil
 import session_pb2
 import session_pb2_grpc
 
@@ -25,6 +26,16 @@ def quick_context() -> ForkServerContext | SpawnContext:
         ]
     )
     return context
+
+
+def makers_of_runs(of: psutil.Process) -> list[psutil.Process]:
+    """The living processes that make run files for `of`; an ended one that waits to be reaped is none."""
+    found = []
+    for child in of.children():
+        with contextlib.suppress(psutil.Error):
+            if "finalise_worker" in " ".join(child.cmdline()):
+                found.append(child)
+    return found
 
 
 def free_the_hardware(connection: str) -> None:
