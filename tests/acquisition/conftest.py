@@ -212,7 +212,7 @@ class Live:
         assert isinstance(message, EventMessage)
         return message
 
-    def zero_and_arm(self, test: str = "FR1-L3-1") -> Path:
+    def zero_and_arm(self, test: str = "FR1-L3-1", **plan: float) -> Path:
         """Take the zero upright, arm, and return the journal's path."""
         self.driver.let(3200)
         taken: list[Reply] = []
@@ -222,7 +222,7 @@ class Live:
             self.driver.let(self.driver._allowed + 400)
             asking.join(0.02)
         assert taken[0].ok, taken[0].text
-        reply = self.ask("arm", test=test)
+        reply = self.ask("arm", test=test, **plan)
         assert reply.ok, reply.text
         return Path(str(reply.data["journal"]))
 

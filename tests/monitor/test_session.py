@@ -58,6 +58,23 @@ def test_the_figures_of_a_test_agree_with_the_motion(session, clock, stand_in, p
     assert session.overturning_margin == pytest.approx(1 - abs(theta) / rig.specimen.alpha0_rad)
 
 
+def test_before_a_zero_every_figure_is_made_from_the_same_rotation(session, clock, rig):
+    """The wires alone, without a zero, stand 3 mrad beside the tiltmeters' level."""
+    session.feed(Published(StateMessage(state=State.ARMED, armed=True), clock.now))
+    motion = {"first_sample": 0, "step": 1, "rate_hz": 4000.0, "velocity_rad_s": [0.0]}
+    moved = MotionMessage(**motion, rotation_rad=[0.033], judged_rad=0.030)
+    session.feed(Published(moved, clock.now))
+    texts = tile_texts(session)
+    assert texts["rotation"].value == "30.0 mrad"
+    assert session.judged_ratio == pytest.approx(0.030 / rig.specimen.alpha0_rad)
+    assert session.overturning_margin == pytest.approx(1 - session.judged_ratio)
+    assert session.peak_rotation_rad == pytest.approx(0.030)
+
+    session.feed(Published(MotionMessage(**motion, rotation_rad=[0.033], judged_rad=math.nan), clock.now))
+    texts = tile_texts(session)
+    assert (texts["rotation"].value, texts["rotation"].detail) == (DASH, "not known")
+
+
 def test_arming_forgets_the_estimate_of_the_last_test(session, clock, stand_in, play):
     play(session, clock, stand_in, stand_in.release_s + 2.0)
     session.feed(Published(StateMessage(state=State.SAVED), clock.now))

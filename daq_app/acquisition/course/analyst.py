@@ -371,9 +371,8 @@ class Analyst(threading.Thread):
         course, live, opened = self._sequence, self._live, self._opened
         rotation = live.rotation_rad if live is not None else math.nan
         alpha = self._rig.specimen.alpha0_rad
-        held_since = live.held_since if live is not None and opened is not None else None
+        held_since = live.held_since if live is not None else None
         self._hold.look(self.voice.sample, abs(rotation) / alpha, self.voice.plan.band)
-        held_s = self._hold.held_s(held_since, opened.rate_hz) if opened is not None else 0.0
         return Situation(
             state=self.state,
             sampling=opened is not None,
@@ -384,7 +383,8 @@ class Analyst(threading.Thread):
             rotation_rad=rotation,
             alpha_rad=alpha,
             steady=held_since is not None,
-            held_s=held_s,
+            inwards_rad_s=live.inwards_rad_s if live is not None else 0.0,
+            held_s=self._hold.held_s(held_since, opened.rate_hz) if opened is not None else 0.0,
             disk_safe=self._around.disk_safe(),
             aborted=self._aborted,
             text=self.voice.text,

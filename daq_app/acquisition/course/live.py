@@ -35,6 +35,8 @@ class LiveView:
         self._judged = JudgedRotation(rig)
         self.rotation_rad = math.nan
         """The rotation that a pull is judged by, after the last block."""
+        self.inwards_rad_s = 0.0
+        """Speed towards upright at that instant."""
         self.held_since: int | None = None
         """Sample from which on the wall has been held still; None while it is not."""
         self.estimate: Estimate | None = None
@@ -75,6 +77,7 @@ class LiveView:
     def _judge(self, result: LiveResult) -> float:
         if not result.rotation_rad.size:
             return self.rotation_rad
+        self.inwards_rad_s = -float(result.velocity_rad_s[-1] * np.sign(result.rotation_rad[-1]))
         return self._judged.of_block(
             float(result.rotation_rad[-1]),
             float(np.max(np.abs(result.velocity_rad_s))),

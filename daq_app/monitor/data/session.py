@@ -93,7 +93,9 @@ class Session:
         """Mean of each channel over the newest block, SI."""
         self.overloaded: frozenset[str] = frozenset()
         self.judged_rad = math.nan
+        """The rotation that every figure of this moment is made from."""
         self.rotation_rad = math.nan
+        """The wires' alone, as the plots draw it."""
         self.velocity_rad_s = math.nan
         self._running: dict[str, dict[int, tuple[float, float]]] = {"eav": {}, "crt": {}}
         self.revision: dict[type[BaseModel], int] = {}
@@ -233,7 +235,8 @@ class Session:
         self.trace.append(samples, rotation, velocity)
         self.rotation_rad, self.velocity_rad_s = float(rotation[-1]), float(velocity[-1])
         if self.state is not None and self.state.state in RECORDING:
-            self._peak_rad = max(self._peak_rad, float(np.nanmax(np.abs(rotation), initial=0.0)))
+            judged = rotation + (message.judged_rad - self.rotation_rad)
+            self._peak_rad = max(self._peak_rad, float(np.nanmax(np.abs(judged), initial=0.0)))
 
     def _forget_data(self) -> None:
         if self.strips is not None:
@@ -340,15 +343,13 @@ class Session:
     @property
     def peak_rotation_rad(self) -> float:
         """Largest |θ| since arming."""
-        peaks = self.estimate.peaks_rad if self.estimate is not None else []
-        return max([self._peak_rad, *(abs(peak) for peak in peaks)])
+        released_rad = abs(self.estimate.theta0_rad) if self.estimate is not None else 0.0
+        return max(self._peak_rad, released_rad)
 
     @property
     def overturning_margin(self) -> float:
         """1 − |θ|/α now: 0 is the point of no return. NaN when θ is not live."""
-        if not self.fresh(MotionMessage):
-            return math.nan
-        return 1.0 - abs(self.rotation_rad) / self.alpha_rad
+        return 1.0 - self.judged_ratio
 
     @property
     def since_release_s(self) -> float:

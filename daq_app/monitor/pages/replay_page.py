@@ -35,6 +35,8 @@ from daq_app.runfile.durable import written_whole
 from daq_app.runfile.folder import require_replaceable
 
 _NAME = Qt.ItemDataRole.UserRole
+_WIDEST_VALUE = "−0000.000 mrad  "
+"""No value at the cursor is wider."""
 _FAMILIES = ("lvdt", "wire", "accelerometer", "tiltmeter")
 
 
@@ -57,7 +59,7 @@ class ReplayPage(QWidget):
         self.tree.setHeaderLabels(["Signal", "At the cursor"])
         self.tree.header().setStretchLastSection(False)
         self.tree.header().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        self.tree.header().setSectionResizeMode(1, QHeaderView.ResizeMode.ResizeToContents)
+        self.tree.header().setSectionResizeMode(1, QHeaderView.ResizeMode.Fixed)
         self.tree.setIndentation(14)
         self.tree.itemChanged.connect(self._on_item)
         self.events = QListWidget()
@@ -134,6 +136,7 @@ class ReplayPage(QWidget):
         self._colours = colours
         self.plots.restyle(colours)
         self._colour_tree()
+        self._widen_tree()
 
     # -- opening ---------------------------------------------------------------------------------
 
@@ -202,6 +205,16 @@ class ReplayPage(QWidget):
             parent.setExpanded(family in ("motion", "accelerometer"))
         self.tree.blockSignals(False)
         self._colour_tree()
+        self._widen_tree()
+
+    def _widen_tree(self) -> None:
+        """Names and values are whole, whatever the size of the type; values may change without a jump."""
+        metrics = self.tree.fontMetrics()
+        heading = self.tree.header().sectionSizeHint(1)
+        value = max(heading, metrics.horizontalAdvance(_WIDEST_VALUE))
+        self.tree.header().resizeSection(1, value)
+        frame = 2 * self.tree.frameWidth() + self.tree.verticalScrollBar().sizeHint().width()
+        self.tree.setMinimumWidth(self.tree.sizeHintForColumn(0) + value + frame)
 
     def _fill_events(self) -> None:
         assert self.run is not None

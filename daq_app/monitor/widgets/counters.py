@@ -39,14 +39,15 @@ def tile_texts(session: Session) -> dict[str, TileText]:
     alpha = session.alpha_rad
     live = session.fresh(MotionMessage)
     texts: dict[str, TileText] = {}
-    rotation = session.rotation_rad if live else math.nan
+    rotation = session.judged_rad if live else math.nan
     ratio = rotation / alpha
+    unknown = "not known" if live else "not live"
     texts["rotation"] = TileText(
-        number(rotation * 1e3, 1, "mrad"), f"θ/α = {number(ratio, 3)}" if math.isfinite(ratio) else "not live"
+        number(rotation * 1e3, 1, "mrad"), f"θ/α = {number(ratio, 3)}" if math.isfinite(ratio) else unknown
     )
     margin = session.overturning_margin
     if session.rig is None or not math.isfinite(margin):
-        texts["margin"] = TileText(DASH, "not live")
+        texts["margin"] = TileText(DASH, unknown)
     else:
         used, limits = 1.0 - margin, session.rig.acquisition
         role = "bad" if used >= limits.alarm_ratio else "warning" if used >= limits.warning_ratio else "good"

@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 import pytest
+from PySide6.QtWidgets import QApplication, QTreeWidgetItemIterator
 
-# qtbot: this module needs Qt; tests/monitor/conftest.py skips it where Qt cannot start.
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.replay_data import ROTATION, VELOCITY, ReplayRun
 from daq_app.monitor.pages.campaign_page import CampaignPage
@@ -160,3 +160,29 @@ def test_picking_channels_leaves_the_cursor_and_the_view(page):
     page.choose([ROTATION, "WP-1"])
     assert page.plots.cursor_s == pytest.approx(0.46)
     assert page.plots.view_s == pytest.approx((0.0, 3.0))
+
+
+@pytest.mark.parametrize("larger", [0, 4])
+def test_every_signal_has_its_whole_name(qtbot, page, larger):
+    """With values beside them, in the largest type: "Accelerometers" had ended in dots."""
+    window = page.window()
+    window.show_page(page)
+    for _ in range(larger):
+        window.change_type_size(1)
+    window.resize(1366, 743)
+    tree = page.tree
+    tree.expandAll()
+    page.choose([ROTATION, VELOCITY, "AC-1", "LV-A01", "WP-1", "TL-1X"])
+    page.plots.set_cursor(0.5)
+    for _ in range(3):
+        QApplication.processEvents()
+    cut = []
+    walk = QTreeWidgetItemIterator(tree)
+    while (item := walk.value()) is not None:
+        for column in (0, 1):
+            index = tree.indexFromItem(item, column)
+            if item.text(column) and tree.sizeHintForIndex(index).width() > tree.visualRect(index).width():
+                cut.append(item.text(column))
+        walk += 1
+    assert cut == []
+    assert window.width() == 1366

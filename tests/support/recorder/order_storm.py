@@ -42,6 +42,8 @@ from tests.support.recorder.storm_parts import (
 )
 
 _ORDERS = ("tare", "check", "pull", "plan", "arm", "arm", "abort", "stop", "marker", "nonsense", "preview")
+_FALLING = (800, 1600)
+"""Samples after a release in which every wall falls, and has fallen fast enough to be seen."""
 _AROUND_RELEASE = (RATE_HZ, 2 * RATE_HZ)
 """Samples before and after a release that must be in a run."""
 
@@ -86,7 +88,7 @@ class Storm:
             disk.trouble = 0
             self._end(session, listener)
         self._check_runs(wall, [*self._runs_in(self.folder), *self._runs_in(self._spare)])
-        self._check_words(listener.states)
+        self._check_words(listener.states, wall)
         for kill in kills:
             self._check_kill(wall, kill)
         return self.broken
@@ -181,7 +183,7 @@ class Storm:
         if not np.array_equal(run.readings(), wall.readings[:, first:end]):
             self.broken.append(f"{path.name}: readings differ from what was measured")
 
-    def _check_words(self, states: list[StateMessage]) -> None:
+    def _check_words(self, states: list[StateMessage], wall: Wall) -> None:
         armed_plan, before = None, State.IDLE
         for message in states:
             judgement = message.judgement
@@ -201,6 +203,9 @@ class Storm:
                     self.broken.append(f"told to hold while nobody had armed: {said}")
             if message.state in (State.RELEASED, State.ROCKING) and re.search(r"\b(pull|ease|hold)\b", said):
                 self.broken.append(f"told to pull a wall that moves: {said}")
+            falls = any(_FALLING[0] <= message.sample - release <= _FALLING[1] for release in wall.releases)
+            if falls and "mrad more" in said:
+                self.broken.append(f"told to pull a wall that falls: {said}")
             if "stop:" in said and re.search(r"\b(pull|on target)\b", said):
                 self.broken.append(f"contradicting words: {said}")
 

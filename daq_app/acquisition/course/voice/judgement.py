@@ -17,6 +17,9 @@ from daq_app.runfile import TestPlan
 
 PULLED: Final = 0.03
 """|θ|/α from which a wall counts as pulled: a zeroed wall leans by less than a hundredth of α."""
+_GOES_BACK_RAD_S: Final = 0.01
+"""Speed towards upright from which nobody is told to pull: the wall is let go or lowered. Assumed: ten times
+the noise of the speed, reached within 50 ms of a release; raising it shows "pull" as a fall begins."""
 _MOVING: Final = frozenset({State.RELEASED, State.ROCKING})
 _BEFORE_RELEASE: Final = frozenset(
     {State.PREVIEWING, State.ARMED, State.HOLDING, State.SAVED, State.SAVING, State.FAILED}
@@ -42,6 +45,8 @@ class Situation:
     """Samples of the run reach a disk."""
     opening: bool = False
     """Nothing is sampled yet: the device is being opened and started."""
+    inwards_rad_s: float = 0.0
+    """Speed towards upright; below zero while the wall is pulled further."""
     silent: bool = False
     """Samples should come in, and none has for a second: the rotation is an old one."""
     aborted: bool = False
@@ -117,7 +122,8 @@ def _armed_call(now: Situation, settings: Acquisition, ratio: float) -> Call:
     if ratio >= PULLED and not now.plan.side_of(now.rotation_rad):
         return Call.OTHER_SIDE
     if ratio < (band[0] if band else PULLED):
-        return Call.PULL
+        # A fall is known to be a release only after a third of it; it is no wall to be pulled before.
+        return Call.KEEP_CLEAR if now.inwards_rad_s > _GOES_BACK_RAD_S else Call.PULL
     if band and ratio > band[1]:
         return Call.EASE_BACK
     if not now.disk_safe:
@@ -152,6 +158,8 @@ def _word(call: Call, now: Situation) -> str:
         return "Not armed"
     if call is Call.STOP:
         return "Stop"
+    if call is Call.KEEP_CLEAR and now.state not in _MOVING:
+        return "Going back"
     if now.state in _MOVING and not now.armed:
         return f"{_WORDS[now.state]}, not armed"
     if now.state is not State.SAVING and _starts(now):
@@ -188,6 +196,8 @@ def _sentence(call: Call, now: Situation, settings: Acquisition, held_s: float) 
             return f"{hold}{f', {left_s} s more' if now.steady and left_s else ''}."
         case Call.RELEASE:
             return "Held still on target. Release." if now.on_target else "Held still. Release."
+        case Call.KEEP_CLEAR if now.state not in _MOVING:
+            return "The wall goes back: keep clear until it stands."
         case Call.KEEP_CLEAR if not now.armed:
             return "Keep clear. Nobody had armed: this release is kept from the ring."
         case Call.KEEP_CLEAR:
@@ -249,4 +259,6 @@ def _gauge(call: Call, now: Situation, ratio: float) -> str:
             return f"{-missing_mrad:.1f} mrad too far: ease back"
         case Call.HOLD:
             return "On target: hold" if now.on_target else "Hold still"
+        case Call.KEEP_CLEAR if now.state not in _MOVING:
+            return "Going back"
     return _GAUGE_WORDS.get(call, "")
