@@ -66,13 +66,12 @@ def answer_of(record: TestRecord, true_r: float) -> Answer:
     return Answer(errors, analysis.verdict.standard_error or math.nan, analysis.verdict.trust, said)
 
 
-def fault_row(fault: Fault, tests: Sequence[LaboratoryTest], sound: Sequence[Answer]) -> str:
-    """One line of the table of faults, beside what the same tests say without it (`sound`).
+def row_of(what: str, answers: Sequence[Answer], sound: Sequence[Answer]) -> str:
+    """One line of the table of faults or walls, beside what the same tests say as sound ones (`sound`).
 
-    Counted are tests that are called good although the fault moves r, by any method by more than `_OFF_R` or
-    the verdict by more than `_OFF_SIGMAS` of its standard errors.
+    Counted are tests that are called good although what was put in moves r: by any method by more than
+    `_OFF_R`, or the verdict by more than `_OFF_SIGMAS` of its standard errors.
     """
-    answers = [answer_of(fault.record(test), test.truth["restitution"]) for test in tests]
     quiet = 0
     for answer, before in zip(answers, sound, strict=True):
         moved = np.abs(np.subtract(answer.errors, before.errors))
@@ -82,25 +81,25 @@ def fault_row(fault: Fault, tests: Sequence[LaboratoryTest], sound: Sequence[Ans
     numbers = " ".join(f"{value:8.4f}" for value in np.nanmax(np.abs(table), axis=0, initial=0.0))
     trusts = Counter(answer.trust for answer in answers)
     said = Counter(what for answer in answers for what in answer.said)
-    what = f"{fault.family}{'' if fault.single is None else f' {fault.single}'} {fault.kind} {fault.size:g}"
     return f"{what:28s} {numbers} {quiet:6d}  {dict(trusts)}  {dict(said)}"
 
 
-def wall_row(wall: Wall, tests: Sequence[LaboratoryTest]) -> str:
-    """One line of the table of walls: error of r at the impacts, and what was said.
+def fault_row(fault: Fault, tests: Sequence[LaboratoryTest], sound: Sequence[Answer]) -> str:
+    """The line of a fault that is put into tests."""
+    answers = [answer_of(fault.record(test), test.truth["restitution"]) for test in tests]
+    single = "" if fault.single is None else f" {fault.single}"
+    return row_of(f"{fault.family}{single} {fault.kind} {fault.size:g}", answers, sound)
 
-    Counted are tests that are called good although the verdict is off by more than `_OFF_R` and by more than
-    `_OFF_SIGMAS` of its standard errors.
-    """
-    answers = [answer_of(test.record(), test.truth["restitution"]) for test in tests]
-    place = _METHODS.index("verdict")
-    off = [max(_OFF_R, _OFF_SIGMAS * answer.standard_error) for answer in answers]
-    quiet = sum(a.trust == "good" and abs(a.errors[place]) > o for a, o in zip(answers, off, strict=True))
-    table = np.abs(np.array([answer.errors for answer in answers]))
-    numbers = " ".join(f"{value:8.4f}" for value in np.nanmax(table, axis=0, initial=0.0))
-    trusts = Counter(answer.trust for answer in answers)
-    said = Counter(what for answer in answers for what in answer.said)
-    return f"{wall.name:28s} {numbers} {quiet:6d}  {dict(trusts)}  {dict(said)}"
+
+def wall_row(wall: Wall, seeds: Sequence[int], sound: Sequence[Answer]) -> str:
+    """The line of a wall in the laboratories of `seeds`; the errors are those of r at its impacts."""
+    return row_of(wall.name, [wall_answer(wall, seed) for seed in seeds], sound)
+
+
+def wall_answer(wall: Wall, seed: int) -> Answer:
+    """What the analysis says of a wall in the laboratory of `seed`."""
+    test = wall.test(load_rig(RIG), seed)
+    return answer_of(test.record(), wall.true_r(test))
 
 
 def deviations(test: LaboratoryTest, analysis: TestAnalysis) -> list[tuple[str, float]]:
@@ -184,9 +183,10 @@ def main() -> None:
     head = f"largest |error| of r:       {' '.join(f'{name:>8s}' for name in _METHODS)}  quiet  trust, said"
     if options.table == "walls":
         seeds = range(options.first_seed, options.first_seed + options.tests)
+        sound = [wall_answer(WALLS[0], seed) for seed in seeds]
         print(head)
         for wall in WALLS:
-            print(wall_row(wall, [wall.test(load_rig(RIG), seed) for seed in seeds]), flush=True)
+            print(wall_row(wall, seeds, sound), flush=True)
         return
     tests = list(tests)
     sound = [answer_of(test.record(), test.truth["restitution"]) for test in tests]

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
 
 from daq_app.config import Rig
 from studies.restitution.laboratory import LaboratoryTest, draw_test
+
+_SLOWEST_RAD_S: Final = 0.02
+"""Slower impacts are lost in the noise: r of a test is not theirs."""
+_CHANGES_R: Final = ("restitution_slope", "restitution_wear", "restitution_scatter")
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +26,16 @@ class Wall:
     def test(self, rig: Rig, seed: int) -> LaboratoryTest:
         """The laboratory of `seed` with this wall."""
         return draw_test(rig, seed, effects={self.effect: self.parameters} if self.effect else {})
+
+    def true_r(self, test: LaboratoryTest) -> float:
+        """r of the test: where the effect changes it from impact to impact, the mean of its impacts."""
+        r = float(test.truth["restitution"])
+        if self.effect not in _CHANGES_R:
+            return r
+        before = np.abs(test.truth["velocity_before_rad_s"])
+        after = np.abs(test.truth["velocity_after_rad_s"])
+        counted = before > _SLOWEST_RAD_S
+        return float(np.mean(after[counted] / before[counted]))
 
     @property
     def name(self) -> str:

@@ -63,6 +63,15 @@ def test_what_no_rigid_block_does_is_named_and_r_doubted(effect, parameters, kin
     assert any(word in reason for reason in analysis.verdict.reasons)
 
 
+def test_a_hop_is_named_where_pauses_that_fall_with_the_speed_scatter_widely_about_their_mean():
+    test, analysis = drawn({"bounce": {"tau": 0.008}}, 6202)
+    low, high = analysis.verdict.interval95
+
+    assert "hop" in kinds(analysis)
+    assert analysis.verdict.trust == "doubtful"
+    assert low <= test.truth["restitution"] <= high
+
+
 @pytest.mark.parametrize(
     ("effect", "parameters"),
     [

@@ -19,7 +19,7 @@ them alike, and the crossings by 10 to 30 µs.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
@@ -68,7 +68,9 @@ class ImpactPattern:
     between: Coefficient | None
     """Mean of ln of the speed that a half-cycle keeps from one impact to the next."""
     pause: Coefficient | None
-    """Mean time from the zero crossing before an impact to the one after it, s; negative where it hops."""
+    """Time from the zero crossing before an impact to the one after it at the mean speed, s; negative where
+    it hops. Joints yield for about as long at every impact, hops last in proportion to its speed: of these
+    two shapes the one that chance makes more seldom, and its chance counts twice."""
     slowed_1_s: float
     """What gravity changes the speed by in a second, as a share of the mean speed; NaN where not known."""
     r_fast: float
@@ -125,12 +127,10 @@ def _impacts(track: MotionTrack) -> tuple[Coefficient | None, Coefficient | None
     centred = log_speed - log_speed.mean()
     side = np.sign(-before[usable])
     design = np.column_stack([np.ones(centred.size), centred, side / 2.0])
-    solution, errors = _regress(ratio[usable], design, covariance[np.ix_(usable, usable)])
+    level, slope, by_side = _regress(ratio[usable], design, covariance[np.ix_(usable, usable)])
     fall = float(centred.min() - centred.max())
-    freedom = centred.size - design.shape[1]
-    by_speed = _coefficient(float(solution[1]) * fall, float(errors[1]) * abs(fall), freedom)
-    by_side = _coefficient(float(solution[2]), float(errors[2]), freedom)
-    r_fast, r_slow = np.exp(solution[0] + solution[1] * np.array([centred.max(), centred.min()]))
+    by_speed = Coefficient(slope.value * fall, slope.sigma * abs(fall), slope.chance)
+    r_fast, r_slow = np.exp(level.value + slope.value * np.array([centred.max(), centred.min()]))
     return by_speed, by_side, float(r_fast), float(r_slow)
 
 
@@ -152,8 +152,7 @@ def _between(track: MotionTrack) -> Coefficient | None:
     if np.count_nonzero(usable) < _FEWEST_HALF_CYCLES:
         return None
     kept, sigma = kept[usable], sigma[usable]
-    solution, errors = _regress(kept, np.ones((kept.size, 1)), np.diag(sigma**2))
-    return _coefficient(float(solution[0]), float(errors[0]), kept.size - 1)
+    return _multiple(kept, np.ones(kept.size), sigma)
 
 
 def _pause(track: MotionTrack) -> tuple[Coefficient | None, float]:
@@ -170,34 +169,64 @@ def _pause(track: MotionTrack) -> tuple[Coefficient | None, float]:
         speeds.append(speed)
     if len(pauses) < _FEWEST_IMPACTS:
         return None, math.nan
-    solution, errors = _regress(np.array(pauses), np.ones((len(pauses), 1)), np.diag(np.square(sigmas)))
     weights = 1.0 / np.square(sigmas)
     mean_speed = float(weights @ speeds / weights.sum())
-    pause = _coefficient(float(solution[0]), float(errors[0]), len(pauses) - 1)
+    shapes = np.ones(len(pauses)), np.array(speeds) / mean_speed
+    found = [_multiple(np.array(pauses), shape, np.array(sigmas)) for shape in shapes]
+    likelier = min(found, key=lambda pause: pause.chance)
+    pause = replace(likelier, chance=min(len(found) * likelier.chance, 1.0))
     return pause, _pull(track) / mean_speed
 
 
-def _coefficient(value: float, sigma: float, freedom: int) -> Coefficient:
+def _coefficient(value: float, sigma: float, freedom: float) -> Coefficient:
     return Coefficient(value, sigma, 2.0 * float(stdtr(freedom, -abs(value) / sigma)))
 
 
-def _regress(values: Floats, design: Floats, covariance: Floats) -> tuple[Floats, Floats]:
-    """Generalised least squares: solution and standard uncertainties, (columns,) each.
+def _multiple(values: Floats, shape: Floats, sigmas: Floats) -> Coefficient:
+    """How many times `shape` the values are, by weighted least squares.
+
+    For what a block does not do at all, so that it cannot scatter: where the values leave more than their
+    errors, all errors count as too small by the same factor (Birge, 1932).
+    """
+    scaled, freedom = shape / sigmas, values.size - 1
+    squares = float(scaled @ scaled)
+    value = float(scaled @ (values / sigmas)) / squares
+    left = values / sigmas - value * scaled
+    return _coefficient(value, math.sqrt(max(float(left @ left) / freedom, 1.0) / squares), freedom)
+
+
+def _regress(values: Floats, design: Floats, covariance: Floats) -> list[Coefficient]:
+    """Generalised least squares: the coefficient of each column of `design`.
 
     A scatter that is alike for all values comes to their own errors, just so large that the weighted
-    residuals are as many as the degrees of freedom (Paule and Mandel, 1982); none where they are fewer.
+    residuals are as many as the degrees of freedom (Paule and Mandel, 1982); none where they are fewer. A few
+    values that are known well may be all that tell how large it is: chance is Student's with the degrees of
+    freedom that this leaves of a coefficient's variance (Satterthwaite; Giesbrecht and Burns, 1985).
     """
     freedom = values.size - design.shape[1]
-    low, high = 0.0, 4.0 * float(values.var()) + 1e-8
-    solution, normal, misfit = _solve(values, design, covariance)
+    low, high, scatter = 0.0, 4.0 * float(values.var()) + 1e-8, 0.0
+    misfit = _solve(values, design, covariance)[2]
     if misfit > freedom:
         for _ in range(_ROUNDS):
             scatter = 0.5 * (low + high)
-            solution, normal, misfit = _solve(values, design, covariance + scatter * np.eye(values.size))
+            misfit = _solve(values, design, covariance + scatter * np.eye(values.size))[2]
             low, high = (scatter, high) if misfit > freedom else (low, scatter)
             if high - low < 1e-4 * high:
                 break
-    return solution, np.sqrt(np.diag(np.linalg.inv(normal)))
+    total = covariance + scatter * np.eye(values.size)
+    solution, normal, _ = _solve(values, design, total)
+    inverse, weights = np.linalg.inv(normal), np.linalg.inv(total)
+    carried = inverse @ design.T @ weights
+    projector = weights - weights @ design @ carried
+    by_scatter = np.einsum("ij,ij->i", carried, carried)
+    variances = np.diag(inverse)
+    known = variances**2 * np.einsum("ij,ij->", projector, projector) / by_scatter**2
+    return [
+        _coefficient(value, sigma, min(own, float(freedom)))
+        for value, sigma, own in zip(
+            solution.tolist(), np.sqrt(variances).tolist(), known.tolist(), strict=True
+        )
+    ]
 
 
 def _solve(values: Floats, design: Floats, covariance: Floats) -> tuple[Floats, Floats, float]:
