@@ -16,21 +16,27 @@ PRIOR_WEIGHT = 7.0
 standard deviations lie anywhere between 0.1 and 0.3 %."""
 
 
-def single_gain_share(deviations: Floats, freedom: float) -> tuple[float, float]:
+def single_gain_share(
+    deviations: Floats, freedom: float, prior: float = CALIBRATION_SHARE
+) -> tuple[float, float]:
     """Scale of one sensor's gain error and its degrees of freedom, the prior's included.
 
     `deviations` (sensors,): relative, from what all say together; `freedom`: how many of them are free.
     """
     total = PRIOR_WEIGHT + freedom
-    squares = PRIOR_WEIGHT * CALIBRATION_SHARE**2 + float(deviations @ deviations)
+    squares = PRIOR_WEIGHT * prior**2 + float(deviations @ deviations)
     return math.sqrt(squares / total), total
 
 
-def gain_sigma_of_mean(deviations: Floats, weights: Floats, freedom: float) -> float:
+def gain_sigma_of_mean(
+    deviations: Floats, weights: Floats, freedom: float, prior: float = CALIBRATION_SHARE
+) -> float:
     """Standard uncertainty of the gain of a weighted mean, a share; `weights` (sensors,) as it has them.
+
+    `prior`: of one sensor, before its deviation is seen.
 
     A scale of ν degrees of freedom makes the error Student's, whose standard deviation is √(ν/(ν − 2)) of it
     (JCGM 101:2008, 6.4.9).
     """
-    single, total = single_gain_share(deviations, freedom)
+    single, total = single_gain_share(deviations, freedom, prior)
     return single * math.sqrt(total / (total - 2.0)) * float(np.sqrt(np.sum(weights**2)))

@@ -102,13 +102,14 @@ def fit_stack(x: Floats, y: Floats, present: Bools, kappa: Floats, noise_rad: Fl
         left = left - np.einsum("apk,ak->ap", q[..., done:wide], projected[:, done:wide])
         squares[:, candidate] = np.einsum("ap,ap->a", left, left)
         done = wide
-    apart = _may_gain(squares, count)
+    variance = np.maximum(squares[:, -1] / (count - _COLUMNS), noise_rad**2)
+    apart = _may_gain(squares, count, variance)
     alone: tuple[Floats, Floats] | None = None
     if apart.any():
         columns = [*range(STIFF), STIFF + ALL_POWERS.index(4)]
         alone = _separate(table[apart][..., columns], y[apart])
         squares[apart, 1] = _left(table[apart][..., columns], alone[0], y[apart])
-    best = _best(squares, count)
+    best = _best(squares, count, variance)
     coefficients = np.zeros((count.size, _COLUMNS))
     covariance = np.zeros((count.size, _COLUMNS, _COLUMNS))
     for candidate in _NESTED:
@@ -150,27 +151,31 @@ def _left(table: Floats, coefficients: Floats, y: Floats) -> Floats:
     return np.asarray(np.einsum("ap,ap->a", left, left))
 
 
-def _scores(squares: Floats, count: NDArray[np.intp]) -> Floats:
-    """(arcs, candidates) BIC; infinite where an arc has too few points for the candidate."""
+def _scores(squares: Floats, count: NDArray[np.intp], variance: Floats) -> Floats:
+    """(arcs, candidates) BIC; infinite where an arc has too few points for the candidate.
+
+    `variance` (arcs,) of a point is that of the stated errors: by what points scatter about a curve, noise that
+    is slower than a point would be taken for motion.
+    """
     widths = np.array([STIFF + len(powers) for powers in POWERS])
     n = count[:, None]
-    scores = n * np.log(np.maximum(squares, 1e-300) / n) + widths * np.log(n)
+    scores = squares / np.maximum(variance, 1e-300)[:, None] + widths * np.log(n)
     return np.where(n >= 3 * widths, scores, np.inf)
 
 
-def _may_gain(squares: Floats, count: NDArray[np.intp]) -> Bools:
+def _may_gain(squares: Floats, count: NDArray[np.intp], variance: Floats) -> Bools:
     """Whether the candidate that is not nested can be clearly better than the stiffest.
 
     It leaves at least what the freest leaves, which holds its power too: often it cannot.
     """
-    scores = _scores(squares, count)
+    scores = _scores(squares, count, variance)
     spared = (len(ALL_POWERS) - 1) * np.log(count)
     known = np.isfinite(scores[:, -1])
     return np.asarray(~known | (scores[:, -1] - spared < scores[:, 0] - _CLEARLY))
 
 
-def _best(squares: Floats, count: NDArray[np.intp]) -> NDArray[np.intp]:
-    scores = _scores(squares, count)
+def _best(squares: Floats, count: NDArray[np.intp], variance: Floats) -> NDArray[np.intp]:
+    scores = _scores(squares, count, variance)
     best = np.argmin(scores, axis=1)
     clearly = scores[np.arange(best.size), best] < scores[:, 0] - _CLEARLY
     return np.where(clearly, best, 0)
