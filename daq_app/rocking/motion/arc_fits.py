@@ -154,8 +154,8 @@ def _left(table: Floats, coefficients: Floats, y: Floats) -> Floats:
 def _scores(squares: Floats, count: NDArray[np.intp], variance: Floats) -> Floats:
     """(arcs, candidates) BIC; infinite where an arc has too few points for the candidate.
 
-    `variance` (arcs,) of a point is that of the stated errors: by what points scatter about a curve, noise that
-    is slower than a point would be taken for motion.
+    `variance` (arcs,) of a point is that of the stated errors: by what points scatter about a curve, noise
+    that is slower than a point would be taken for motion.
     """
     widths = np.array([STIFF + len(powers) for powers in POWERS])
     n = count[:, None]
