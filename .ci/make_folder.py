@@ -118,7 +118,7 @@ def copy_python(folder: Path) -> Path:
 def install(python: Path, extras: str, options: list[str]) -> None:
     """The program of this checkout, with the pinned versions, into that Python."""
     wheels = python.parents[0 if WINDOWS else 1] / "wheel"
-    uv = [sys.executable, "-m", "uv"]
+    uv = _uv()
     subprocess.run([*uv, "build", "-q", "--wheel", "--out-dir", str(wheels), str(REPOSITORY)], check=True)
     (wheel,) = wheels.glob("*.whl")
     pins = ["--constraint", str(REPOSITORY / "constraints.txt")]
@@ -148,6 +148,12 @@ def write_starters(folder: Path) -> None:
         (folder / name).write_text(text, encoding="utf-8")
         (folder / name).chmod(0o755)
     (folder / "python" / "shortcut.desktop").write_text(_DESKTOP, encoding="utf-8")
+
+
+def _uv() -> list[str]:
+    """The uv that runs this script, else the one of the PATH, else that of this Python."""
+    program = os.environ.get("UV") or shutil.which("uv")
+    return [program] if program else [sys.executable, "-m", "uv"]
 
 
 def _said(python: Path, code: str) -> str:
