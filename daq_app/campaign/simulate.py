@@ -107,7 +107,7 @@ def simulate_campaign(
     if isinstance(workers, str):  # other machines do not know where this process stands
         todo = [replace(test, rig=str(Path(test.rig).resolve())) for test in todo]
     with _workshop(out) as workshop:
-        run_all(partial(_write_run, workshop=workshop, out=out), todo, workers, done)
+        run_all(partial(write_test, workshop=workshop, out=out), todo, workers, done)
     return [out / f"{test.test}{RUN_SUFFIX}" for test in tests]
 
 
@@ -159,7 +159,8 @@ def readings_of(test: PlannedSimulation) -> tuple[Rig, TaskPlan, Readings]:
     return rig, plan, Readings(made.readings, "simulated")
 
 
-def _write_run(test: PlannedSimulation, workshop: Path, out: Path) -> None:
+def write_test(test: PlannedSimulation, workshop: Path, out: Path) -> None:
+    """Simulate a test and save it in `out` with its analysis beside it; `workshop` holds it until then."""
     rig, plan, readings = readings_of(test)
     name = f"{test.test}{RUN_SUFFIX}"
     text = Path(test.rig).read_text(encoding="utf-8")

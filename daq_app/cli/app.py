@@ -78,7 +78,7 @@ _COMMANDS: Final[Mapping[str, _Entry]] = {
         ("run_file_commands",),
         "Write a run, or a part of it, as CSV, MATLAB, TDMS, Parquet, netCDF or NumPy file.",
     ),
-    "import": _Entry(("run_file_commands",), "Turn recordings of another program into runs."),
+    "import": _Entry(("import_command",), "Turn recordings of another program into runs."),
     "gap": _Entry(
         ("gap.commands", "gap.blind_commands"),
         "Where simulator and recordings differ, which effect explains it, how far it shrinks.",

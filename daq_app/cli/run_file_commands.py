@@ -1,9 +1,8 @@
-"""`daq-app verify`, `recover`, `export`, `import`: runs and journals on disk, and foreign files."""
+"""`daq-app verify`, `recover`, `export`: runs and journals on disk."""
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,21 +13,17 @@ from rich.table import Table
 from rich.text import Text
 
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported, say_other_name
+from daq_app.cli.output_place import file_or_folder
 from daq_app.cli.terminal import Console, echo, echo_json
-from daq_app.config import parse_rig
-from daq_app.config.toml_file import read_text
 from daq_app.runfile import (
     DerivedData,
     JournalContents,
     Recovery,
-    RunFileError,
     VerifyReport,
     recover,
     verify,
 )
 from daq_app.runfile.exporters import Decimal, ExportFormat, export_run
-from daq_app.runfile.importers import ImportMap, ImportReport, import_file, load_import_map, propose_map
-from daq_app.runfile.source import RunSource
 
 
 def register(app: typer.Typer) -> None:
@@ -38,10 +33,6 @@ def register(app: typer.Typer) -> None:
     app.command("export", epilog="Example: daq-app export runs/FR1-L3-2.h5 --format mat --out exported/")(
         export_command
     )
-    app.command(
-        "import",
-        epilog="Example: daq-app import old/test7.lvm --rig configs/fr1.toml --map old/map.toml --out runs",
-    )(import_command)
 
 
 def verify_command(
@@ -173,12 +164,6 @@ def _derived(contents: JournalContents) -> DerivedData | None:
     return derive(contents)[0]
 
 
-def _derived_of_import(run: RunSource) -> DerivedData | None:
-    from daq_app.acquisition.closing.derive import derive_imported  # loads the analysis
-
-    return derive_imported(run)
-
-
 def _recovery_dict(result: Recovery) -> dict[str, Any]:
     return {
         "journal": str(result.journal),
@@ -228,7 +213,7 @@ def export_command(
 
     with (
         reported(),
-        _file_or_folder(out) as place,
+        file_or_folder(out) as place,
         Progress(console=Console(stderr=True), transient=True) as progress,
     ):
         task = progress.add_task(escape(f"{run.name} → {format_}"), total=1.0)
@@ -247,102 +232,3 @@ def export_command(
     if not place.is_dir():
         say_other_name(place, path)
     echo(f"{path}: written, {path.stat().st_size / 1e6:.1f} MB")
-
-
-def import_command(
-    files: Annotated[list[Path], typer.Argument(help="TDMS, LVM, CSV, MAT or NPZ files.", metavar="FILE…")],
-    rig: Annotated[Path, typer.Option("--rig", help="Rig file of the tests.")],
-    map_: Annotated[
-        Path | None,
-        typer.Option("--map", help="Which column is which channel (TOML); without it, names must agree."),
-    ] = None,
-    out: Annotated[
-        Path,
-        typer.Option("--out", help="Folder of runs (made if need be), or the run file, named with .h5."),
-    ] = Path(),
-    propose: Annotated[
-        bool,
-        typer.Option(
-            "--propose-map", help="Import nothing; print a map for the first file, guessed from its contents."
-        ),
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object for each file.")] = False,
-) -> None:
-    """Turn recordings of another program into runs.
-
-    What a file says that cannot be true (units, increments, lengths) is reported and not believed;
-    where it matters, the import is refused and says what to put into the map. One file that is refused
-    does not stop the others.
-    """
-    with reported():
-        rig_text = read_text(rig)
-        import_map = load_import_map(map_) if map_ else ImportMap()
-        parsed = parse_rig(rig_text, str(rig))
-        if propose:
-            with Console(stderr=True).status(f"comparing {files[0].name} with {parsed.name} …"):
-                proposal = propose_map(files[0], parsed, import_map.source)
-            for line in proposal.text(files[0].name).splitlines():
-                echo(line)
-            return
-        if len(files) > 1 and import_map.run.test:
-            raise RunFileError(
-                f"{map_} names the test {import_map.run.test}, and {len(files)} files are given",
-                advice="Leave `test` out: each run is then called as its file.",
-            )
-        if len(files) > 1 and out.suffix:
-            raise RunFileError(f"{out} is one file, and {len(files)} are given", advice="Name a folder.")
-    refused = 0
-    for file in files:
-        try:
-            working = Console(stderr=True).status(f"importing {file.name} …")
-            with reported(), _file_or_folder(out) as place, working:
-                report = import_file(file, parsed, rig_text, place, import_map, _derived_of_import)
-        except typer.Exit:
-            if len(files) == 1:
-                raise
-            refused += 1
-            continue
-        _print_import(report, as_json)
-    if refused:
-        print_paragraph("Incomplete", f"{refused} of {len(files)} files were not imported")
-        raise typer.Exit(EXIT_FAILED)
-
-
-def _print_import(report: ImportReport, as_json: bool) -> None:
-    if as_json:
-        document = {
-            "run": str(report.run),
-            "n_samples": report.n_samples,
-            "rate_hz": report.rate_hz,
-            "channels": list(report.channel_ids),
-            "doubts": list(report.doubts),
-            "quality": dict(report.quality) or None,
-        }
-        echo_json(document)
-        return
-    for doubt in report.doubts:
-        print_paragraph("Doubtful", doubt, style="bold yellow")
-    size = f"{len(report.channel_ids)} channels, {report.n_samples} samples at {report.rate_hz:g} Hz"
-    echo(f"{report.run}: {size}")
-    if report.quality:
-        echo("Verdict: " + "; ".join([report.quality["verdict"], *report.quality["reasons"]]))
-
-
-@contextlib.contextmanager
-def _file_or_folder(out: Path) -> Iterator[Path]:
-    """A name without a suffix is a folder, and is made: no file would be found again without one."""
-    made = not out.suffix and not out.exists()
-    if made:
-        try:
-            out.mkdir(parents=True)
-        except OSError as error:
-            raise RunFileError(
-                f"the folder {out} cannot be made ({error.strerror or error})", advice="Choose another place."
-            ) from error
-    try:
-        yield out
-    except BaseException:
-        if made:
-            with contextlib.suppress(OSError):
-                out.rmdir()
-        raise

@@ -1,4 +1,4 @@
-"""`daq-app gap diagnose`, `gap effects` and `gap apply`."""
+"""`daq-app gap diagnose`, `gap starter`, `gap effects` and `gap apply`; the group of all gap commands."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from daq_app.cli.errors import (
     reported,
     say_other_name,
 )
+from daq_app.cli.gap.many import campaigns
 from daq_app.cli.help_page import command_group
 from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.config import load_rig
@@ -41,6 +42,9 @@ def register(app: typer.Typer) -> None:
         "diagnose",
         epilog="Example: daq-app gap diagnose FR1-*.h5 --rig fr1.toml --report gap.html --json gap.json",
     )(diagnose)
+    group.command("campaigns", epilog="Example: daq-app gap campaigns march-runs april-runs --out diagnoses")(
+        campaigns
+    )
     group.command("starter", epilog="Example: daq-app gap starter my_model.py")(starter)
     group.command("effects", epilog="Example: daq-app gap effects --family dissipation")(effects)
     group.command(

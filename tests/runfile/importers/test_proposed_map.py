@@ -89,3 +89,14 @@ def test_one_file_that_is_refused_does_not_stop_the_others(rig: Rig, configs: Pa
     assert done.exit_code == 1
     assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == ["t1.h5", "t2.h5"]
     assert "1 of 3 files" in done.stderr
+
+
+def test_two_files_that_would_become_one_run_are_refused(rig: Rig, configs: Path, tmp_path: Path) -> None:
+    first = _tdms(tmp_path / "t1.tdms", _rocking(rig), list(OF_WALL))
+    (tmp_path / "again").mkdir()
+    second = _tdms(tmp_path / "again" / "T1.tdms", _rocking(rig), list(OF_WALL))
+    words = ["import", str(first), str(second), "--rig", str(configs / "fr1.toml")]
+    done = CliRunner().invoke(build_app(), [*words, "--out", str(tmp_path / "runs")])
+    assert done.exit_code == 2
+    assert "would both become" in done.stderr and "two folders" in done.stderr
+    assert not (tmp_path / "runs").exists()
