@@ -67,18 +67,18 @@ _COMMANDS: Final[Mapping[str, _Entry]] = {
         "p, α, r_max (both forms), periods T(φ), the decay T_n and φ_n, and the semi-rigid joint.",
     ),
     "verify": _Entry(
-        ("run_file_commands",),
+        ("runs.commands",),
         "Say of each run and journal that every sample is there or known to be missing, or what is wrong.",
     ),
     "recover": _Entry(
-        ("run_file_commands",),
+        ("runs.commands",),
         "Make a run of every journal that has none yet, or whose run is damaged. Safe to repeat.",
     ),
     "export": _Entry(
-        ("run_file_commands",),
+        ("runs.commands",),
         "Write a run, or a part of it, as CSV, MATLAB, TDMS, Parquet, netCDF or NumPy file.",
     ),
-    "import": _Entry(("import_command",), "Turn recordings of another program into runs."),
+    "import": _Entry(("runs.import_command",), "Turn recordings of another program into runs."),
     "gap": _Entry(
         ("gap.commands", "gap.blind_commands"),
         "Where simulator and recordings differ, which effect explains it, how far it shrinks.",

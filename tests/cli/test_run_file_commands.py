@@ -10,7 +10,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from daq_app.cli import import_command, run_file_commands
+from daq_app.cli.runs import commands as run_commands
+from daq_app.cli.runs import import_command
 from daq_app.runfile import JournalWriter, RunHeader
 
 HEADER = RunHeader(run_id="r", test="FR1-L1-1", channel_ids=("a",), reading_units=("V",), rate_hz=100.0)
@@ -19,7 +20,7 @@ HEADER = RunHeader(run_id="r", test="FR1-L1-1", channel_ids=("a",), reading_unit
 @pytest.fixture
 def app() -> typer.Typer:
     root = typer.Typer()
-    run_file_commands.register(root)
+    run_commands.register(root)
     import_command.register(root)
     return root
 

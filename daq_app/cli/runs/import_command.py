@@ -11,7 +11,7 @@ import typer
 
 from daq_app.cli.campaign.progress import progress_bar
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported
-from daq_app.cli.output_place import file_or_folder
+from daq_app.cli.runs.output_place import file_or_folder
 from daq_app.cli.scheduler_option import SchedulerOption
 from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.config import ConfigError, Rig, parse_rig

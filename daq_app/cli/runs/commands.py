@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported, say_other_name
-from daq_app.cli.output_place import file_or_folder
+from daq_app.cli.runs.output_place import file_or_folder
 from daq_app.cli.terminal import Console, echo, echo_json
 from daq_app.runfile import (
     DerivedData,
