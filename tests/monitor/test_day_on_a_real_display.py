@@ -167,7 +167,10 @@ def test_a_whole_day(day_at, width, height, theme):
     with open_run(run) as opened:
         assert not opened.gaps and opened.header.test_plan.theta0_over_alpha == 0.15
     day.shoot(window, "result")
-    window.press("ctrl+r")
+    window.press("ctrl+o")
+    window.until(lambda words: "Install a browser" in words["notice"] and ".result.html" in words["notice"])
+    day.shoot(window, "no-browser")
+    window.press("ctrl+d", "ctrl+r")
     window.press("F6")
     window.says(page="Prepare", chosen="FR1-L1-6")
     for key, page in (("3", "Live"), ("4", "Campaign"), ("6", "Replay"), ("7", "Gap"), ("8", "Messages")):

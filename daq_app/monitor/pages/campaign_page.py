@@ -29,8 +29,9 @@ from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.child import said_by
 from daq_app.monitor.look.labels import PlainLabel, Tile, role_label
 from daq_app.monitor.look.theme import Colours
-from daq_app.monitor.widgets.banner import keyed_button, open_outside
+from daq_app.monitor.widgets.banner import keyed_button
 from daq_app.monitor.widgets.campaign_table import CampaignModel, StateDelegate, release_text
+from daq_app.monitor.widgets.opening import open_outside
 from daq_app.runfile import RunFileError, open_run
 
 _WIDTHS_PX = (138, 52, 108, 92, 60, 89, 106, 87)
@@ -291,8 +292,8 @@ class CampaignPage(QWidget):
         elif isinstance(made, Exception):
             raise made
         else:
-            opened = "" if open_outside(made) else "; no program on this computer opens pages"
-            self.told.emit("info", f"The campaign report is saved as {made}{opened}")
+            self.told.emit("info", f"The campaign report is saved as {made}")
+            open_outside(self, made)
             self.reported.emit(str(made))
 
     # -- one place -------------------------------------------------------------------------------

@@ -31,7 +31,8 @@ from daq_app.monitor.look.labels import number, role_label, set_role, tip_text
 from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.gap_traces import GapTraces
 from daq_app.monitor.plots.gap_views import BarRows, GapMapView, closure_bars, evidence_bars, map_cells
-from daq_app.monitor.widgets.banner import Banner, keyed_button, open_outside
+from daq_app.monitor.widgets.banner import Banner, keyed_button
+from daq_app.monitor.widgets.opening import open_outside
 from daq_app.runfile import RunFileError
 
 _PATH = Qt.ItemDataRole.UserRole
@@ -309,9 +310,7 @@ class GapPage(QWidget):
 
     def _open_page(self) -> None:
         if self._result_file is not None:
-            page = self._result_file.with_suffix(".html")
-            if not open_outside(page):
-                self.told.emit("warning", f"No program on this computer opens pages: {page}")
+            open_outside(self, self._result_file.with_suffix(".html"))
 
 
 def gap_in_words(gap: dict[str, Any]) -> str:

@@ -22,9 +22,10 @@ from daq_app.monitor.data.child import said_by
 from daq_app.monitor.look.labels import DASH, Tile, number, set_role, tip_text
 from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.result_plots import ResultPlots
-from daq_app.monitor.widgets.banner import Banner, keyed_button, open_outside
+from daq_app.monitor.widgets.banner import Banner, keyed_button
 from daq_app.monitor.widgets.family_table import FamilyTable
 from daq_app.monitor.widgets.level_table import LevelTable
+from daq_app.monitor.widgets.opening import open_outside
 from daq_app.runfile import RunFileError
 from daq_app.runfile.folder import RUN_SUFFIX
 
@@ -269,8 +270,8 @@ class ResultPage(QWidget):
         elif isinstance(made, Exception):
             raise made
         else:
-            opened = "" if open_outside(made) else "; no program on this computer opens PDF files"
-            self.told.emit("info", f"The test record is saved as {made}{opened}")
+            self.told.emit("info", f"The test record is saved as {made}")
+            open_outside(self, made)
 
     def _show_verdict(self) -> None:
         if self.result is None:
@@ -297,6 +298,4 @@ class ResultPage(QWidget):
 
     def _open_page(self) -> None:
         if self.run is not None:
-            page = self.run.with_suffix(".result.html")
-            if not open_outside(page):
-                self.told.emit("warning", f"No program on this computer opens pages: {page}")
+            open_outside(self, self.run.with_suffix(".result.html"))

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Protocol, cast
 
-from PySide6.QtCore import QEvent, Qt, QUrl, SignalInstance
-from PySide6.QtGui import QDesktopServices, QKeySequence, QShortcut
+from PySide6.QtCore import QEvent, Qt, SignalInstance
+from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QApplication,
     QFrame,
@@ -96,8 +95,3 @@ def keyed_button(page: QWidget, text: str, key: str, act: Callable[[], object]) 
 
     QShortcut(QKeySequence(key), page).activated.connect(press)
     return button
-
-
-def open_outside(path: Path) -> bool:
-    """Show a saved page with what this computer shows such files with; False where there is nothing."""
-    return QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))

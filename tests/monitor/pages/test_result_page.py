@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import pyqtgraph as pg
@@ -40,14 +41,39 @@ def test_eav_and_crt_have_the_same_marks_in_the_window_and_on_paper(page):
     assert [drawn[name] for name in in_legend] == ["o", "s"]
 
 
-def test_a_page_that_nothing_here_opens_is_told_with_its_place(qtbot, page, monkeypatch):
+@pytest.fixture
+def openers(tmp_path, monkeypatch):
+    """A folder that alone is searched for the program that opens files."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    return tmp_path
+
+
+def _told_of_the_page(qtbot, page):
+    with qtbot.waitSignal(page.told, timeout=60_000) as told:
+        page.buttons["page"].click()
+    return told.args
+
+
+def test_a_page_that_nothing_here_opens_is_told_with_what_to_do(qtbot, page, openers, monkeypatch):
     monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: False)
-    told = []
-    page.told.connect(lambda severity, text: told.append((severity, text)))
-    page.buttons["page"].click()
-    assert told == [
-        ("warning", f"No program on this computer opens pages: {page.run.with_suffix('.result.html')}")
-    ]
+    severity, text = _told_of_the_page(qtbot, page)
+    assert severity == "warning" and "Install a browser" in text
+    assert text.endswith(str(page.run.with_suffix(".result.html")))
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="xdg-open is Linux's")
+def test_an_opener_that_finds_no_program_does_not_pass_for_success(qtbot, page, openers):
+    """xdg-open starts well, and ends with 3 where no program is known for pages."""
+    opener = openers / "xdg-open"
+    opener.write_text("#!/bin/sh\nexit 3\n")
+    opener.chmod(0o755)
+    assert "Install a browser" in _told_of_the_page(qtbot, page)[1]
+
+    shown = openers / "shown"
+    opener.write_text(f'#!/bin/sh\necho "$1" > {shown}\n')
+    with qtbot.assertNotEmitted(page.told, wait=0):
+        page.buttons["page"].click()
+        qtbot.waitUntil(lambda: shown.exists() and shown.read_text().endswith("html\n"), timeout=60_000)
 
 
 def test_the_page_shows_every_family_as_its_saved_page_does(page):

@@ -150,9 +150,11 @@ class RealWindow:
     ) -> None:
         environment = {**os.environ, "DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
         environment["PYTHONPATH"] = str(Path(__file__).parents[3])
+        # No browser: what a key would show outside must not cover the display, and the window has to say so.
+        environment |= {"PATH": str(ini.parent), "BROWSER": ""}
         arguments = [str(rig), str(out), str(ini), theme, "yes" if may_command else "no"]
         arguments.append("maximised" if maximised else "usual")
-        self._environment = environment
+        self._display = {**os.environ, "DISPLAY": display}
         self.process = subprocess.Popen(
             [sys.executable, "-c", _WINDOW, *arguments],
             env=environment,
@@ -200,7 +202,7 @@ class RealWindow:
 
     def press(self, *keys: str) -> None:
         """Press keys, as the operator does."""
-        subprocess.run(["xdotool", "key", "--delay", "120", *keys], env=self._environment, check=True)
+        subprocess.run(["xdotool", "key", "--delay", "120", *keys], env=self._display, check=True)
 
     def picture(self, path: Path) -> None:
         """Save what the display shows, once its windows have their size and are painted."""
@@ -215,7 +217,7 @@ class RealWindow:
             assert self._news.wait_for(lambda: text in self._places, 60), f"there is no button {text}"
             x, y = self._places.pop(text)
         move = ["xdotool", "mousemove", str(x), str(y), "click", "1"]
-        subprocess.run(move, env=self._environment, check=True)
+        subprocess.run(move, env=self._display, check=True)
 
     def _ask(self, line: str) -> None:
         assert self.process.stdin is not None
