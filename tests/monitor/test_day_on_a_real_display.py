@@ -14,8 +14,10 @@ from pathlib import Path
 
 import pytest
 
+from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.acquisition.viewers.client import AcquisitionClient, AcquisitionUnreachable
 from daq_app.acquisition.viewers.session_file import read_session_file
+from daq_app.campaign.result.result import load_result
 from daq_app.runfile import open_run, verify
 from sim_hardware.control import SimControl
 from tests.support.window.real_display import RealWindow, missing_packages, real_display
@@ -102,12 +104,10 @@ def day_at(tmp_path, configs):
     days: list[Day] = []
     stack = contextlib.ExitStack()
 
-    def begin(width: int, height: int, theme: str) -> Day:
+    def begin(width: int, height: int, theme: str, rig: Path = configs / "fr1.toml") -> Day:
         display = stack.enter_context(real_display(width, height))
         look = f"{theme}-{width}x{height}"
-        day = Day(
-            display, tmp_path / "day", configs / "fr1.toml", look, theme, maximised=(width, height) > SMALLEST
-        )
+        day = Day(display, tmp_path / "day", rig, look, theme, maximised=(width, height) > SMALLEST)
         days.append(day)
         return day
 
@@ -260,3 +260,35 @@ def test_wrong_clicks_and_keys_while_armed_change_nothing(day_at):
     with open_run(day.run_of("FR1-L1-1_*.h5")) as opened:
         assert opened.header.test_plan.theta0_over_alpha == 0.35 and not opened.gaps
     assert not [words for words in window.past if words["state"] == "Armed" and words["target"] != 0.35]
+
+
+def test_a_family_that_disagrees_is_in_the_verdict_on_screen_and_on_paper(day_at, configs, tmp_path):
+    """The wires of this wall follow like an instrument of 20 ms; its rig file knows nothing of it."""
+    lab = shutil.copytree(configs, tmp_path / "lab")
+    real, believed = lab / "real.toml", lab / "fr1.toml"
+    text = believed.read_text(encoding="utf-8")
+    heading = "[channel_defaults.wire]"
+    real.write_text(text.replace(heading, f"{heading}\ntime_constant_s = 0.02\n#"), encoding="utf-8")
+    with SimulatedServer(real, ["--wall", "commanded", "--speed", "2"]) as server:
+        believed.write_text(text.replace('"simulated"', f'"{server.connection}"', 1), encoding="utf-8")
+        day = day_at(1366, 768, "dark", rig=believed)
+        window = day.open()
+        window.says(state="Live view")
+        window.press("F6", "ctrl+0")
+        window.says(zeroed=True)
+        window.press("F2")
+        window.says(check="Go")
+        window.press("F5")
+        window.says(state="Armed", page="Test", test="FR1-L1-1")
+        day.wall("pull", theta0_over_alpha=0.15)
+        window.says(state="Holding", gauge="Release")
+        day.wall("release")
+        window.says(state="Saved", page="Result", result="FR1-L1-1")
+        assert "wires are slow" in window.words["verdict"]
+        assert "r is taken from the other family" in window.words["verdict"]
+        day.shoot(window, "a-family-disagrees")
+        run = day.run_of("FR1-L1-1_*.h5")
+        assert "wires are slow" in run.with_suffix(".result.html").read_text(encoding="utf-8")
+        result = load_result(run)
+        assert result is not None and result.test.methods["CRT"].r == pytest.approx(0.895, abs=0.003)
+        day.end()

@@ -237,14 +237,15 @@ def _entry_rules(c: Colours) -> str:
     QLineEdit, QComboBox, QPlainTextEdit, QTextBrowser, QListWidget, QTreeWidget {{ background: {c.surface};
         border: 1px solid {c.line}; border-radius: 5px; padding: 4px 6px; }}
     QLineEdit:focus, QComboBox:focus, QPlainTextEdit:focus {{ border-color: {c.accent}; }}
-    QListWidget::item, QTreeWidget::item {{ min-height: {c.px(20)}px; }}
-    QTreeWidget::indicator {{ width: 13px; height: 13px; border: 1px solid {c.muted}; border-radius: 3px; }}
-    QTreeWidget::indicator:checked {{ background: {c.accent}; border-color: {c.accent}; }}
-    QTreeWidget::indicator:indeterminate {{ background: {c.line}; }}
-    QListWidget::indicator, QCheckBox::indicator {{ width: 13px; height: 13px; border: 1px solid {c.muted};
-        border-radius: 3px; }}
-    QListWidget::indicator:checked, QCheckBox::indicator:checked {{ background: {c.accent};
+    QListWidget::item, QTreeWidget::item, QComboBox QAbstractItemView::item {{ min-height: {c.px(20)}px; }}
+    QComboBox {{ combobox-popup: 0; }}
+    QComboBox QAbstractItemView {{ background: {c.surface}; border: 1px solid {c.line};
+        selection-background-color: {c.accent}; selection-color: {c.on_accent}; }}
+    QAbstractItemView::indicator, QCheckBox::indicator {{ width: 13px; height: 13px; border-radius: 3px;
+        border: 1px solid {c.muted}; }}
+    QAbstractItemView::indicator:checked, QCheckBox::indicator:checked {{ background: {c.accent};
         border-color: {c.accent}; }}
+    QAbstractItemView::indicator:indeterminate {{ background: {c.line}; }}
     """
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QDateTime, Qt, Signal
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QComboBox, QFrame, QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from daq_app.campaign.recorded import read_recorded
@@ -82,6 +83,8 @@ class ResultPage(QWidget):
         self._colours = DARK
         self._making = False
         """A record is being made."""
+        self._folder: Path | None = None
+        """The one whose tests are offered."""
         self.run: Path | None = None
         self.result: Result | None = None
         self.banner = Banner("No test yet", "The result appears here after a test.", "", points=22)
@@ -104,6 +107,7 @@ class ResultPage(QWidget):
         self.table.opened.connect(self._open_sibling)
         self.chooser = QComboBox()
         self.chooser.setToolTip("Any test of this folder, the newest first")
+        self.chooser.setPlaceholderText("Choose a test of this folder")
         self.chooser.activated.connect(self._open_chosen)
         self.buttons = {
             "record": keyed_button(self, "Record", "Ctrl+J", self._make_record),
@@ -158,6 +162,12 @@ class ResultPage(QWidget):
         self.families.restyle(colours)
         self.plots.restyle(colours)
         self._show_verdict()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """The page comes to the front with the tests that are in the folder now."""
+        super().showEvent(event)
+        if self._folder is not None:
+            self.list_tests(self._folder)
 
     def open(self, run: Path, *, soon: bool = False) -> None:
         """Show the result of a run; it is analysed in another process if it has none yet.
@@ -227,6 +237,7 @@ class ResultPage(QWidget):
 
     def list_tests(self, folder: Path) -> None:
         """Offer every recorded test of a folder, the newest first."""
+        self._folder = folder
         self._background.run(
             lambda: read_recorded(folder) if folder.is_dir() else [], self._on_listed, self._on_trouble
         )

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
+import shutil
 import sys
+from collections import Counter
 from dataclasses import replace
 
 import pyqtgraph as pg
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QTableWidgetItem
 
 from daq_app.campaign.result.family_rows import family_rows
 from daq_app.campaign.result.figures import result_figure
 from daq_app.monitor.data.background import Background
-from daq_app.monitor.look.theme import LIGHT
+from daq_app.monitor.look.theme import DARK, LIGHT, apply_theme
 from daq_app.monitor.pages.result_page import ResultPage
 
 
@@ -39,6 +44,58 @@ def test_eav_and_crt_have_the_same_marks_in_the_window_and_on_paper(page):
     circle, square = page.plots.legend.text().index("●"), page.plots.legend.text().index("■")
     in_legend = ("EAV", "CRT") if circle < square else ("CRT", "EAV")
     assert [drawn[name] for name in in_legend] == ["o", "s"]
+
+
+def test_the_tests_on_offer_are_those_of_the_folder_now(qtbot, run_file, tmp_path):
+    """Runs come from elsewhere as well: another window, a colleague's copy."""
+    page = ResultPage(Background())
+    qtbot.addWidget(page)
+    shutil.copy(run_file, tmp_path / "first.h5")
+    page.list_tests(tmp_path)
+    qtbot.waitUntil(lambda: page.chooser.count() == 1, timeout=60_000)
+    shutil.copy(run_file, tmp_path / "second.h5")
+    page.show()
+    qtbot.waitUntil(lambda: page.chooser.count() == 2, timeout=60_000)
+    assert page.chooser.currentIndex() == -1 and "Choose" in page.chooser.placeholderText()
+
+
+@pytest.mark.parametrize("colours", [DARK, LIGHT], ids=["dark", "light"])
+def test_the_chosen_test_in_the_list_and_an_empty_tick_can_be_seen(qapp, page, colours):
+    """The name that the list opens on was dark on dark; an unticked repetition had no box."""
+    apply_theme(qapp, page, colours, 10.0)
+    page.chooser.addItem("FR1-L1-1")
+    page.chooser.setCurrentIndex(0)
+    page.chooser.showPopup()
+    qapp.processEvents()
+    rows = page.chooser.view()
+    picture = rows.viewport().grab(rows.visualRect(rows.model().index(0, 0))).toImage()
+    assert contrast(picture) > 4.0
+    page.chooser.hidePopup()
+
+    page.table.setRowCount(1)
+    unticked = QTableWidgetItem("FR1-L1-2")
+    unticked.setCheckState(Qt.CheckState.Unchecked)
+    page.table.setItem(0, 0, unticked)
+    box = page.table.visualItemRect(unticked)
+    box.setWidth(24)
+    assert contrast(page.table.viewport().grab(box).toImage()) > 4.0
+
+
+def contrast(picture):
+    """The contrast of a picture's ground with what stands out most on it, as WCAG 2 defines it."""
+    where = itertools.product(range(picture.width()), range(picture.height()))
+    grey = Counter(luminance(picture.pixelColor(x, y)) for x, y in where)
+    ground = grey.most_common(1)[0][0]
+    return max((max(one, ground) + 0.05) / (min(one, ground) + 0.05) for one in grey)
+
+
+def luminance(colour):
+    """Relative luminance of sRGB."""
+    linear = [
+        part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4
+        for part in (colour.redF(), colour.greenF(), colour.blueF())
+    ]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
 @pytest.fixture

@@ -83,6 +83,7 @@ def look():
         "notice": (window.notices.current or ("", ""))[1], "chosen": card.name, "target": card.target_ratio,
         "zeroed": bool(window.prepare.zero.readings), "check": window.prepare.verdict_text,
         "result": window.result.result.test.test if window.result.result is not None else "",
+        "verdict": window.result.banner.sentences[0].text(),
         "full_screen": window.display.full_screen is not None,
         "whole": window.screen().availableGeometry().contains(window.frameGeometry()),
     }
