@@ -117,7 +117,8 @@ def test_the_headings_of_the_campaign_are_whole(rocking_window):
 
 
 @pytest.mark.parametrize("larger", [0, 4])
-def test_what_was_measured_in_a_campaign_is_whole(rocking_window, larger):
+@pytest.mark.parametrize("repeated_next", [False, True])
+def test_what_was_measured_in_a_campaign_is_whole(rocking_window, larger, repeated_next):
     """The time of a release had ended in "25 Nov …"."""
     window = rocking_window
     for _ in range(larger):
@@ -125,10 +126,12 @@ def test_what_was_measured_in_a_campaign_is_whole(rocking_window, larger):
     plan = Campaign(name="c", levels={"L1": 0.15}, sequence=(Step(specimen="FR1", level="L1", tests=2),))
     facts = TestFacts(0.1499, {"CRT": 0.895}, "", ())
     released_ns = int(dt.datetime(2026, 11, 30, 20, 48).timestamp() * 1e9)
-    test = RecordedTest(TestName.parse("FR1-L1-1"), TestVerdict.UNCHECKED, released_ns, None, "", facts)
+    verdict = TestVerdict.BAD if repeated_next else TestVerdict.UNCHECKED
+    test = RecordedTest(TestName.parse("FR1-L1-1"), verdict, released_ns, None, "", facts)
     window.show_page(window.campaign)
     table = window.campaign.table
     table.model().show_status(CampaignStatus(plan, [test]), "")
+    assert ("next" in table.model().index(0, 0).data()) is repeated_next
     short = [place for place, heading in enumerate(HEADINGS) if heading not in ("Operator", "Notes")]
     assert [HEADINGS[c] for c in short if table.sizeHintForColumn(c) > table.columnWidth(c)] == []
 

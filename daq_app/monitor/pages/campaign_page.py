@@ -35,7 +35,9 @@ from daq_app.monitor.widgets.opening import open_outside
 from daq_app.runfile import RunFileError, open_run
 
 _WIDTHS_PX = (138, 52, 108, 92, 60, 89, 106, 87)
-"""Widths of the columns before the notes, pixels."""
+"""Least widths of the columns before the notes, pixels."""
+_OPERATOR = 7
+"""The column of the operator's name, which may be of any length."""
 _REPORT_LIMIT_S = 3600.0
 
 
@@ -77,6 +79,7 @@ class CampaignPage(QWidget):
         self.table = QTableView()
         self.table.setModel(self._model)
         self.table.setItemDelegateForColumn(2, self._delegate)
+        self._model.modelReset.connect(self._fit_columns)
         self.table.verticalHeader().hide()
         self.table.verticalHeader().setDefaultSectionSize(24)
         self.table.setShowGrid(False)
@@ -183,10 +186,15 @@ class CampaignPage(QWidget):
         self._holder.setFixedWidth(colours.side_px(400) + bar_px)
         self._chosen.setMinimumHeight(colours.px(56))
         self.table.verticalHeader().setDefaultSectionSize(colours.px(24))
-        for column, width in enumerate(_WIDTHS_PX):
-            self.table.setColumnWidth(column, colours.px(width))
-        self.table.setColumnWidth(2, self._delegate.width)
+        self._fit_columns()
         self.table.viewport().update()
+
+    def _fit_columns(self) -> None:
+        """What is measured is whole in any type; operator and notes share what is left."""
+        colours = self._delegate.colours
+        for column, width in enumerate(_WIDTHS_PX):
+            needed = self.table.sizeHintForColumn(column) if column < _OPERATOR else 0
+            self.table.setColumnWidth(column, max(colours.px(width), needed))
 
     def set_campaign(self, campaign: Campaign, folder: Path, specimen: str = "") -> None:
         """Follow a campaign whose runs lie in `folder`; `specimen` is the one on the rig."""
@@ -221,6 +229,8 @@ class CampaignPage(QWidget):
             recorded = read_recorded(folder) if folder.is_dir() else []
             return CampaignStatus(campaign, recorded)
 
+        if self.status is None:
+            self._chosen.setPlainText("The runs of the folder are being read …")
         self._scans_under_way += 1
         self._background.run(read, self._on_status, self._on_trouble)
 

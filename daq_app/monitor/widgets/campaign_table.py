@@ -65,7 +65,7 @@ class CampaignModel(QAbstractTableModel):
         is_next = str(place.planned.name) == self._next
         if role == _STATE_ROLE and index.column() == 2:
             return place.state.value
-        if role == Qt.ItemDataRole.FontRole and is_next:
+        if role == Qt.ItemDataRole.FontRole and is_next and index.column() in (0, 1):
             bold = QFont()
             bold.setBold(True)
             return bold
