@@ -144,6 +144,12 @@ class CampaignStatus:
     def _of(self, specimen: str) -> Iterator[Place]:
         return (place for place in self.places if specimen in ("", place.planned.name.specimen))
 
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of all releases, of those without a place as well."""
+        placed = (test for place in self.places for test in place.tests)
+        return frozenset(str(test.name) for test in (*placed, *self.extra))
+
     def name_for(self, place: Place) -> TestName:
         """Name that a release for this place gets now: the planned one, or the next free number."""
         name = place.planned.name

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
+
 import pytest
 
 from daq_app.acquisition.checks.check_model import ChannelCheck, Finding, SensorCheck, Verdict
 from daq_app.acquisition.course.tare import UNZEROED
 from daq_app.acquisition.messages.published import CheckMessage, EventMessage, Judgement, Reply, State
+from daq_app.campaign.plan import load_campaign
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.look.state_look import SHAPES, look_of
 from daq_app.monitor.widgets.actions import ActionBar
@@ -81,6 +84,25 @@ def test_orders_have_keys(qtbot):
 def test_arming_without_a_name_is_refused_with_what_to_do(window):
     window.orders.arm()
     assert window.notices.current == ("warning", "Give the test a name before arming.")
+
+
+def test_the_next_test_is_taken_once_the_runs_are_read_and_its_notes_stay_until_it_is_taken(
+    qtbot, window, configs, tmp_path, run_file
+):
+    """F6 had said that no campaign was open while it was being read; pressed again it lost what was typed."""
+    shutil.copy(run_file, tmp_path)
+    card = window.prepare.card
+    card._notes.setPlainText("rain since noon")
+    window.orders.set_campaign(load_campaign(configs / "campaigns" / "costa.toml"), tmp_path)
+    window.orders.next_test()
+    assert window.notices.current is None
+    qtbot.waitUntil(lambda: card.choice.name == "FR1-L1-2", timeout=120_000)
+    window.orders.next_test()
+    assert (card.choice.name, card.choice.notes) == ("FR1-L1-2", "rain since noon")
+
+    card._name.setText("FR1-L1-1")  # has been taken: its notes are not the next one's
+    window.orders.next_test()
+    assert (card.choice.name, card.choice.notes) == ("FR1-L1-2", "")
 
 
 def test_a_no_go_must_be_overruled_on_purpose_and_in_time(qtbot, window, monkeypatch):

@@ -278,6 +278,9 @@ class CampaignPage(QWidget):
         if self._scans_under_way:
             self._take_after_scan = True
             return
+        if self.status is None:
+            self.told.emit("warning", "The runs cannot be read: type the name of the next test.")
+            return
         proposal = self.proposal
         if proposal is None:
             self.told.emit("info", "Every planned test is done; type a name for a further one.")

@@ -134,10 +134,11 @@ class TestCard(QFrame):
         for part in (self._name, self._operator, self._side, self._notes, *self._buttons.values()):
             part.blockSignals(False)
 
-    def propose(self, name: str, target_ratio: float = math.nan) -> None:
-        """Fill in the next test. Notes of the last test are not carried over."""
+    def propose(self, name: str, target_ratio: float = math.nan, *, keep_notes: bool = False) -> None:
+        """Fill in the next test; `keep_notes` where they are not those of a test that has been taken."""
         self._name.setText(name)
-        self._notes.clear()
+        if not keep_notes:
+            self._notes.clear()
         self._check_level(name, target_ratio)
         self.changed.emit()
 

@@ -141,24 +141,29 @@ class Orders(QObject):
 
     def next_test(self) -> None:
         """Take the next test of the campaign."""
-        if self._campaign.status is None:
+        if self._campaign.campaign is None:
             self._show_page(self._prepare)
             self._notices.tell("info", "No campaign is open: type the name of the next test.")
             return
         self._campaign.take_next()
 
     def _take(self, name: str, ratio: float) -> None:
-        self._prepare.card.propose(name, ratio)
+        self._propose(name, ratio)
         self._show_page(self._prepare)
+
+    def _propose(self, name: str, ratio: float) -> None:
+        """Fill in a test; notes stay until the test that they were typed for has been taken."""
+        card, status = self._prepare.card, self._campaign.status
+        taken = status is not None and card.choice.name in status.names
+        card.propose(name, ratio, keep_notes=not taken)
 
     def _propose_after_scan(self) -> None:
         """A name that has been used is replaced by the next one, so that no test is armed under it again."""
         proposal, status = self._campaign.proposal, self._campaign.status
         if proposal is None or status is None or self._session.current_state in RECORDING:
             return
-        used = {str(test.name) for place in status.places for test in place.tests}
-        if self._prepare.card.choice.name in used | {""}:
-            self._prepare.card.propose(str(proposal.name), proposal.theta0_over_alpha)
+        if self._prepare.card.choice.name in status.names | {""}:
+            self._propose(str(proposal.name), proposal.theta0_over_alpha)
 
     def judge(self, name: str, verdict: str) -> None:
         """The operator's verdict on the result that is shown; the run itself stays as it is."""
