@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 
 import pytest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QPushButton, QTableView
 
 from daq_app.acquisition.messages.published import Judgement, State, StateMessage
 from daq_app.campaign.names import TestName
@@ -80,6 +80,17 @@ def test_what_to_do_next_is_whole_in_the_largest_type(rocking_window, clock, wor
         QApplication.processEvents()
     assert window.header.words["sentence"] == do
     assert clipped_texts(window.header) == []
+
+
+@pytest.mark.parametrize("points", [10.0, 15.0])
+def test_a_window_opens_in_the_type_that_was_chosen(qtbot, settings, points):
+    """Buttons and tables had opened in the system's size, beside figures in the chosen one."""
+    settings.type_size = points
+    window = MainWindow(None, settings)
+    qtbot.addWidget(window)
+    window.show()
+    parts = [*window.findChildren(QPushButton), *window.findChildren(QTableView)]
+    assert {part.font().pointSizeF() for part in parts} == {points}
 
 
 def test_axes_and_strips_grow_with_the_type(rocking_window):

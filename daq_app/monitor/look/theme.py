@@ -154,6 +154,8 @@ def apply_theme(app: QApplication, window: QWidget, colours: Colours, base_point
     if app.style().name() != "fusion":
         app.setStyle("Fusion")
     app.setFont(font(base_points))
+    # The application's font reaches a window that is not shown yet only in part, once it has a style sheet.
+    window.setFont(font(base_points))
     palette = QPalette()
     roles = QPalette.ColorRole
     for role, colour in {
