@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 
 import pytest
-from PySide6.QtWidgets import QApplication, QPushButton, QTableView
+from PySide6.QtWidgets import QApplication, QHeaderView, QLineEdit, QPushButton, QTableView
 
 from daq_app.acquisition.messages.published import Judgement, State, StateMessage
 from daq_app.campaign.names import TestName
@@ -89,7 +89,8 @@ def test_a_window_opens_in_the_type_that_was_chosen(qtbot, settings, points):
     window = MainWindow(None, settings)
     qtbot.addWidget(window)
     window.show()
-    parts = [*window.findChildren(QPushButton), *window.findChildren(QTableView)]
+    kinds = (QPushButton, QTableView, QHeaderView, QLineEdit)
+    parts = [part for kind in kinds for part in window.findChildren(kind)]
     assert {part.font().pointSizeF() for part in parts} == {points}
 
 

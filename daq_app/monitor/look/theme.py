@@ -181,7 +181,7 @@ def apply_theme(app: QApplication, window: QWidget, colours: Colours, base_point
 
 
 def _stylesheet(c: Colours, base: float) -> str:
-    return _text_rules(c, base) + _button_rules(c, base) + _entry_rules(c) + _bar_rules(c)
+    return _text_rules(c, base) + _button_rules(c, base) + _entry_rules(c, base) + _bar_rules(c)
 
 
 def _text_rules(c: Colours, base: float) -> str:
@@ -227,12 +227,13 @@ def _button_rules(c: Colours, base: float) -> str:
     """
 
 
-def _entry_rules(c: Colours) -> str:
+def _entry_rules(c: Colours, base: float) -> str:
     """Tables, lists, trees, and fields to type in."""
     return f"""
     QTableView {{ background: {c.surface}; border: 1px solid {c.line}; border-radius: 6px;
         gridline-color: {c.line}; selection-background-color: {c.raised}; selection-color: {c.text}; }}
     QTableView::item {{ padding: 0 6px; }}
+    QHeaderView {{ font-size: {base:.1f}pt; }}
     QHeaderView::section {{ background: {c.surface}; color: {c.muted}; border: none;
         border-bottom: 1px solid {c.line}; padding: 5px 8px; font-weight: 600; }}
     QTableView QTableCornerButton::section {{ background: {c.surface}; border: none; }}
