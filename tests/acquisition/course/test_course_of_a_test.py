@@ -110,11 +110,11 @@ def test_health_tells_what_is_on_disk(live: Lives, wall_test: Any) -> None:
     lab.driver.let(24_000)
 
     def all_safe(message: Any) -> bool:
-        return isinstance(message, HealthMessage) and message.acknowledged_sample == 24_000
+        return isinstance(message, HealthMessage) and message.acknowledged_sample >= 24_000
 
     health = lab.wait_for(all_safe)
     assert health.recording
-    assert health.sample == 24_000
+    assert health.sample >= 24_000
     assert health.lost_samples == 0
     assert health.free_bytes > 0
     assert health.file_bytes > 41 * 8 * 10_000
@@ -125,7 +125,7 @@ def test_an_aborted_arming_is_kept_and_burns_no_test(live: Lives) -> None:
     lab = live()
     lab.zero_and_arm("FR1-L1-1")
     lab.driver.let(16_000)
-    lab.wait_for(lambda m: isinstance(m, HealthMessage) and m.acknowledged_sample == 16_000)
+    lab.wait_for(lambda m: isinstance(m, HealthMessage) and m.acknowledged_sample >= 16_000)
     assert lab.ask("abort").ok
     saved = lab.wait_for_state(State.SAVED, State.FAILED)
     with open_run(Path(saved.run_path)) as run:
@@ -136,7 +136,7 @@ def test_an_aborted_arming_is_kept_and_burns_no_test(live: Lives) -> None:
     again = lab.ask("arm", test="FR1-L1-1")
     assert again.ok, again.text
     lab.driver.let(18_000)
-    lab.wait_for(lambda m: isinstance(m, HealthMessage) and m.acknowledged_sample == 18_000)
+    lab.wait_for(lambda m: isinstance(m, HealthMessage) and m.acknowledged_sample >= 18_000)
     assert lab.ask("abort").ok
     other = lab.wait_for_state(State.SAVED)
     assert other.run_path != saved.run_path
@@ -160,7 +160,7 @@ def test_the_next_test_can_be_armed_while_the_last_is_still_being_saved(live: Li
     lab = live()
     lab.zero_and_arm("FR1-L1-1")
     lab.driver.let(12_000)
-    lab.wait_for(lambda m: isinstance(m, HealthMessage) and m.acknowledged_sample == 12_000)
+    lab.wait_for(lambda m: isinstance(m, HealthMessage) and m.acknowledged_sample >= 12_000)
     assert lab.ask("stop").ok
     lab.wait_for_state(State.SAVING)
     reply = lab.ask("arm", test="FR1-L1-2")
@@ -213,7 +213,7 @@ def test_markers_and_notes_are_in_the_run(live: Lives) -> None:
     assert lab.ask("marker", text="cable checked").ok
     assert lab.ask("note", text="wind from the door").ok
     lab.driver.let(12_000)
-    lab.wait_for(lambda m: isinstance(m, HealthMessage) and m.acknowledged_sample == 12_000)
+    lab.wait_for(lambda m: isinstance(m, HealthMessage) and m.acknowledged_sample >= 12_000)
     lab.ask("abort")
     saved = lab.wait_for_state(State.SAVED)
     with open_run(Path(saved.run_path)) as run:
@@ -226,7 +226,7 @@ def test_the_zero_and_what_was_subtracted_are_in_the_run(live: Lives, wall_test:
     lab = live()
     lab.zero_and_arm()
     lab.driver.let(12_000)
-    lab.wait_for(lambda m: isinstance(m, HealthMessage) and m.acknowledged_sample == 12_000)
+    lab.wait_for(lambda m: isinstance(m, HealthMessage) and m.acknowledged_sample >= 12_000)
     lab.ask("abort")
     saved = lab.wait_for_state(State.SAVED)
     with open_run(Path(saved.run_path)) as run:
@@ -302,4 +302,4 @@ def test_a_second_recorder_that_fails_is_told_and_costs_the_first_nothing(live: 
     lab.driver.let(16_000)
     told = lab.wait_for_event("backup")
     assert told.severity == "error" and "No such folder" in told.text
-    lab.wait_for(lambda m: isinstance(m, HealthMessage) and m.acknowledged_sample == 16_000)
+    lab.wait_for(lambda m: isinstance(m, HealthMessage) and m.acknowledged_sample >= 16_000)
