@@ -233,9 +233,10 @@ def _entry_rules(c: Colours, base: float) -> str:
     QTableView {{ background: {c.surface}; border: 1px solid {c.line}; border-radius: 6px;
         gridline-color: {c.line}; selection-background-color: {c.raised}; selection-color: {c.text}; }}
     QTableView::item {{ padding: 0 6px; }}
-    QHeaderView {{ font-size: {base:.1f}pt; }}
-    QHeaderView::section {{ background: {c.surface}; color: {c.muted}; border: none;
-        border-bottom: 1px solid {c.line}; padding: 5px 8px; font-weight: 600; }}
+    QHeaderView {{ font-size: {base:.1f}pt; background: {c.surface}; border: none;
+        border-bottom: 1px solid {c.line}; }}
+    QHeaderView::section {{ background: {c.surface}; color: {c.muted}; border: none; padding: 5px 6px;
+        font-weight: 600; }}
     QTableView QTableCornerButton::section {{ background: {c.surface}; border: none; }}
     QLineEdit, QComboBox, QPlainTextEdit, QTextBrowser, QListWidget, QTreeWidget {{ background: {c.surface};
         border: 1px solid {c.line}; border-radius: 5px; padding: 4px 6px; }}

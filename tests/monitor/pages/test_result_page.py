@@ -159,6 +159,16 @@ def test_columns_of_both_tables_are_whole_on_the_smallest_screen(qapp, page, poi
         assert [table.columnWidth(place) >= px for place, px in enumerate(needed)] == [True] * len(needed)
 
 
+def test_neither_table_needs_a_bar_on_the_smallest_screen(qapp, page):
+    """The last column had kept 100 pixels where its heading needs 70."""
+    apply_theme(qapp, page, LIGHT, 10.0)
+    page.restyle(LIGHT)
+    page.resize(1268, 648)
+    qapp.processEvents()
+    for table in (page.table, page.families):
+        assert table.horizontalHeader().length() <= table.viewport().width()
+
+
 def test_a_second_rejection_leaves_the_reason(qtbot, window, run_file, monkeypatch):
     given = []
     monkeypatch.setattr("daq_app.monitor.window.orders.give_verdict", lambda *verdict: given.append(verdict))
