@@ -126,6 +126,13 @@ def test_a_wall_that_is_let_go_slowly_is_fitted_from_its_first_impact_on():
     assert fit.alpha_rad == pytest.approx(test.truth["alpha_rad"], abs=3 * fit.sigma_alpha_rad)
 
 
+def test_the_fit_of_a_wall_whose_r_scatters_widely_has_the_mean_of_its_impacts():
+    test = draw_test(RIG, 52404, effects={"restitution_scatter": {"sigma": 0.02}})
+    analysis = analyse_record(test.record(), AnalysisOptions(bias_runs=0, keep_series=False))
+
+    assert analysis.fit.r == pytest.approx(analysis.estimates["eav"].r, abs=0.003)
+
+
 def test_pivots_inside_the_edges_change_the_largest_r_and_not_the_trust_in_r():
     test, analysis = drawn({"pivot_shift": {"a": 0.02}})
     pivot = next(finding for finding in analysis.findings if finding.kind == "pivot")

@@ -276,7 +276,10 @@ def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: floa
         return None
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     motion = problem.motion(x, count)
-    r = math.exp(problem.log_r + 0.01 * float(x[5]))
+    # The level that suits deviations of equal weight is their mean: a search may end before it finds that,
+    # for the motion is the same with another level and deviations to match.
+    deviation = 0.0 if problem.spread is None else problem.spread * float(np.mean(x[FIXED:]))
+    r = math.exp(problem.log_r + 0.01 * float(x[5]) + deviation)
     return MotionFit(
         r=r,
         standard_error=r * 0.01 * float(deviations[5]),
