@@ -115,6 +115,17 @@ def test_a_change_of_r_with_speed_that_scatter_may_make_is_told_and_in_the_state
     assert 0.002 < abs(error) < 2.0 * analysis.verdict.standard_error
 
 
+def test_a_hop_that_noise_may_make_is_told_and_in_the_stated_error_of_every_r():
+    test, analysis = drawn({"bounce": {"tau": 0.002}}, 52402)
+    (told,) = [finding for finding in analysis.findings if finding.kind == "hop"]
+    error = analysis.verdict.r - test.truth["restitution"]
+
+    assert told.severity == "info" and told.text in {note.text for note in analysis.notes}
+    assert analysis.verdict.trust == "good"
+    assert 0.005 < error < 2.0 * analysis.verdict.standard_error
+    assert error < 2.0 * analysis.estimates["crt"].standard_error
+
+
 def test_a_wall_that_is_let_go_slowly_is_fitted_from_its_first_impact_on():
     test = draw_test(RIG, SEED, effects={"slow_release": {"tau": 0.3}})
     analysis = analyse_record(test.record(), AnalysisOptions(bias_runs=0, keep_series=False))

@@ -18,6 +18,7 @@ from daq_app.rocking.families.block_checks import (
     pattern_findings,
     pivot_findings,
     weaker_change_by_speed,
+    weaker_hop,
 )
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.motion.impact_pattern import ImpactPattern, impact_pattern
@@ -81,6 +82,8 @@ def wall_findings(
     found = [*pattern_findings(pattern), *duration_findings(bodies)]
     if not any(finding.kind == "speed" for finding in found):
         found += weaker_change_by_speed(pattern)
+    if not any(finding.kind == "hop" for finding in found):
+        found += weaker_hop(pattern)
     if any(f.kind == "drift" and f.treatment == "none" and LEADS[lead] in f.family for f in findings):
         found = [finding for finding in found if finding.kind not in _MADE_BY_A_DRIFT]
     if joint is not None:

@@ -174,7 +174,7 @@ def judge(
     error = math.hypot(math.sqrt(float(weights @ covariance @ weights)), _MODEL_R)
     if disagreements and values.size > 1:
         error = math.hypot(error, 0.5 * float(np.ptp(values)))
-    error = math.hypot(error, *(_share_of_r(finding, r) for finding in open_findings))
+    error = math.hypot(error, *(_share_of_r(f, r) for f in findings if f.treatment == "none"))
     freedom = min(e.degrees_of_freedom for e in known)
     reach = float(scipy.special.stdtrit(freedom, 0.975)) * error
     return RVerdict(r, error, (r - reach, r + reach), trust, (lead,), left_out, reasons)
