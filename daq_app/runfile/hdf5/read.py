@@ -64,7 +64,8 @@ class Run:
                 self.rig: Rig | None = rig_of(self.header)
                 """The rig of the run; None if the file holds none that this version understands."""
                 self._raw = self._channels()
-                self._checks = self._chunk_checks()
+                self._group(layout.CHECKS)
+                self._checks: dict[str, list[int]] = {}
                 self.events = self._read_events()
                 self.gaps = self._read_gaps()
         except BaseException:
@@ -123,7 +124,7 @@ class Run:
     def _read_proven(self, channel_id: str, low: int, high: int, out: NDArray[np.float64]) -> None:
         """Fill `out` with columns low … high, reading whole chunks and proving each by its CRC."""
         dataset = self._raw[channel_id]
-        checks = self._checks[channel_id]
+        checks = self._checks_of(channel_id)
         chunk = dataset.chunks[0]
         for index in range(low // chunk, (high - 1) // chunk + 1):
             first = index * chunk
@@ -277,15 +278,14 @@ class Run:
             raise RunFileError(f"{self.path}: its readings are not stored in chunks")
         return datasets
 
-    def _chunk_checks(self) -> dict[str, list[int]]:
-        group = self._group(layout.CHECKS)
-        checks_by_channel = {
-            channel_id: read_column(self.path, group, channel_id) for channel_id in self._raw
-        }
-        for channel_id, checks in checks_by_channel.items():
+    def _checks_of(self, channel_id: str) -> list[int]:
+        """The CRC of each chunk of a channel, read with its readings: often only the header is asked for."""
+        if channel_id not in self._checks:
+            checks = read_column(self.path, self._group(layout.CHECKS), channel_id)
             if len(checks) != -(-self.n_samples // self._raw[channel_id].chunks[0]):
                 raise RunFileError(f"{self.path}: the table of checks of {channel_id} is not complete")
-        return checks_by_channel
+            self._checks[channel_id] = checks
+        return self._checks[channel_id]
 
     def _json(self, group: h5py.Group, name: str) -> dict[str, Any]:
         try:
