@@ -383,7 +383,7 @@ class Analyst(threading.Thread):
             rotation_rad=rotation,
             alpha_rad=alpha,
             steady=held_since is not None,
-            inwards_rad_s=live.inwards_rad_s if live is not None else 0.0,
+            goes_back=live is not None and live.goes_back,
             held_s=self._hold.held_s(held_since, opened.rate_hz) if opened is not None else 0.0,
             disk_safe=self._around.disk_safe(),
             aborted=self._aborted,

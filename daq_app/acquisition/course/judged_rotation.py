@@ -7,7 +7,7 @@ from typing import Final
 
 from daq_app.config.rig import Rig
 
-_STILL_RAD_S: Final = 2e-3
+STILL_RAD_S: Final = 2e-3
 """Below this speed the wall stands still for a tiltmeter; raising it lets a slow pull shift the level."""
 _SETTLED_TIME_CONSTANTS: Final = 4.0
 """A first-order tiltmeter has come within 2 % of a step after four of its time constants."""
@@ -41,7 +41,7 @@ class JudgedRotation:
             return tilt_rad
         if not math.isfinite(tilt_rad):
             return wires_rad
-        still = not free and abs(fastest_rad_s) < _STILL_RAD_S
+        still = not free and abs(fastest_rad_s) < STILL_RAD_S
         self._still_s = self._still_s + duration_s if still else 0.0
         if self._still_s > self._settles_s:
             share = -math.expm1(-duration_s / _FOLLOWS_S)

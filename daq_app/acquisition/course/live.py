@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from daq_app.acquisition.course.judged_rotation import JudgedRotation
+from daq_app.acquisition.course.judged_rotation import STILL_RAD_S, JudgedRotation
 from daq_app.acquisition.course.unheld_release import UnheldReleaseWatch
 from daq_app.acquisition.messages.published import BlockMessage, EstimateMessage, MotionMessage
 from daq_app.acquisition.messages.publisher import Publisher
@@ -20,6 +20,14 @@ from drivers import Block
 
 _MOTION_RATE_HZ: Final = 500.0
 """Rotation and velocity are shown at about this rate: fine enough for the shape of an impact."""
+_LEFT_SHARE: Final = 0.98
+"""Share of the rotation of a hold below which the wall has left it; lowering it sees a release later."""
+_LEAVES_RAD_S: Final = 0.01
+"""Speed towards upright with which a wall leaves its hold: ten times the noise of the speed, and what a fall
+has after 50 ms."""
+_FALLS_RAD_S: Final = 0.06
+"""The same of a wall that was not held: simulated pulls sway back with up to 0.05 rad/s, a fall is as fast
+after a tenth of a second. Assumed; lowering it stops a jerky pull again and again."""
 
 
 class LiveView:
@@ -35,8 +43,10 @@ class LiveView:
         self._judged = JudgedRotation(rig)
         self.rotation_rad = math.nan
         """The rotation that a pull is judged by, after the last block."""
-        self.inwards_rad_s = 0.0
+        self._inwards_rad_s = 0.0
         """Speed towards upright at that instant."""
+        self._held_rad = 0.0
+        """Where the wall was held still last."""
         self.held_since: int | None = None
         """Sample from which on the wall has been held still; None while it is not."""
         self.estimate: Estimate | None = None
@@ -72,12 +82,20 @@ class LiveView:
                 self.held_since = round(event.sample)
             elif event.kind in ("hold_lost", "release"):
                 self.held_since = None
+        if self.held_since is not None and abs(self._inwards_rad_s) < STILL_RAD_S:
+            self._held_rad = self.rotation_rad
         return events
+
+    @property
+    def goes_back(self) -> bool:
+        """Whether the wall moves back from its hold, or faster than one sways that is being pulled."""
+        left = self.held_since is not None and abs(self.rotation_rad) < _LEFT_SHARE * abs(self._held_rad)
+        return self._inwards_rad_s > (_LEAVES_RAD_S if left else _FALLS_RAD_S)
 
     def _judge(self, result: LiveResult) -> float:
         if not result.rotation_rad.size:
             return self.rotation_rad
-        self.inwards_rad_s = -float(result.velocity_rad_s[-1] * np.sign(result.rotation_rad[-1]))
+        self._inwards_rad_s = -float(result.velocity_rad_s[-1] * np.sign(result.rotation_rad[-1]))
         return self._judged.of_block(
             float(result.rotation_rad[-1]),
             float(np.max(np.abs(result.velocity_rad_s))),

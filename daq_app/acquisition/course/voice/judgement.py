@@ -17,9 +17,6 @@ from daq_app.runfile import TestPlan
 
 PULLED: Final = 0.03
 """|θ|/α from which a wall counts as pulled: a zeroed wall leans by less than a hundredth of α."""
-_GOES_BACK_RAD_S: Final = 0.01
-"""Speed towards upright from which nobody is told to pull: the wall is let go or lowered. Assumed: ten times
-the noise of the speed, reached within 50 ms of a release; raising it shows "pull" as a fall begins."""
 _MOVING: Final = frozenset({State.RELEASED, State.ROCKING})
 _BEFORE_RELEASE: Final = frozenset(
     {State.PREVIEWING, State.ARMED, State.HOLDING, State.SAVED, State.SAVING, State.FAILED}
@@ -45,8 +42,8 @@ class Situation:
     """Samples of the run reach a disk."""
     opening: bool = False
     """Nothing is sampled yet: the device is being opened and started."""
-    inwards_rad_s: float = 0.0
-    """Speed towards upright; below zero while the wall is pulled further."""
+    goes_back: bool = False
+    """The wall moves back towards upright as one that is let go or lowered."""
     silent: bool = False
     """Samples should come in, and none has for a second: the rotation is an old one."""
     aborted: bool = False
@@ -123,7 +120,7 @@ def _armed_call(now: Situation, settings: Acquisition, ratio: float) -> Call:
         return Call.OTHER_SIDE
     if ratio < (band[0] if band else PULLED):
         # A fall is known to be a release only after a third of it; it is no wall to be pulled before.
-        return Call.KEEP_CLEAR if now.inwards_rad_s > _GOES_BACK_RAD_S else Call.PULL
+        return Call.KEEP_CLEAR if now.goes_back else Call.PULL
     if band and ratio > band[1]:
         return Call.EASE_BACK
     if not now.disk_safe:
