@@ -58,6 +58,8 @@ class Storm:
     rng: np.random.Generator
     log: list[str] = field(default_factory=list)
     broken: list[str] = field(default_factory=list)
+    sick_until: int = 0
+    """The newest sample that was read while the disk took nothing."""
 
     def run(self) -> list[str]:
         """What did not hold, in words; empty when everything did."""
@@ -82,6 +84,7 @@ class Storm:
                 self._break(disk)
                 driver.allow(min(end, driver.allowed + int(self.rng.integers(1, 10)) * 400))
                 listener.until(lambda: session.analyst.voice.sample >= driver.allowed - 400)
+                self.sick_until = driver.allowed if disk.trouble else self.sick_until
                 session.tick()
                 if self.rng.random() < 0.03 and not disk.trouble:
                     kills.append(self._kill(session, driver.allowed, len(kills)))
@@ -124,7 +127,7 @@ class Storm:
         finished = tuple(find_runs(self.folder))
         _copy_as_it_stands(self.folder, copy)
         self.log.append(f"{sample}: killed (copy {number}), safe up to {safe}")
-        return _Kill(copy, finished, safe, sample)
+        return _Kill(copy, finished, safe, sample, self.sick_until)
 
     @staticmethod
     def _end(session: Session, listener: Listener) -> None:
@@ -222,9 +225,10 @@ class Storm:
                 spans.append((run.first_sample, run.first_sample + run.n_samples))
         if safe > max(ends):
             self.broken.append(f"{copy.name}: safe up to {safe}, recovered up to {max(ends)}")
-        # A release that lies a second back had been noticed: the kill must not cost it.
+        # A release that lies a second back had been noticed: the kill must not cost it, if there was a disk
+        # that took it. The recorder tries a full one again in seconds of the clock, not of samples.
         for release in wall.releases:
-            known = release + RATE_HZ < sample <= release + 2 * RATE_HZ
+            known = kill.sick_until <= release and release + RATE_HZ < sample <= release + 2 * RATE_HZ
             if known and not any(first <= release - 400 and end > release for first, end in spans):
                 self.broken.append(
                     f"{copy.name}: killed at {sample}, the release at {release} is lost: {spans}"
@@ -242,6 +246,8 @@ class _Kill:
     """Samples that had been called safe."""
     sample: int
     """The newest one that had been read."""
+    sick_until: int
+    """The newest one before which the disk had taken nothing for a while."""
 
 
 def _copy_as_it_stands(folder: Path, copy: Path) -> None:
