@@ -159,14 +159,14 @@ class BaseJoint:
             whole = valid[good].all(axis=0)
             if not whole.any():
                 break
-            design, openings = self._design(good), openings_m[np.ix_(good, whole)]
-            hat = design @ np.linalg.pinv(design)
+            design, openings = self._design(good), openings_m[good][:, slice(None) if whole.all() else whole]
+            moments = openings @ openings.T / openings.shape[1]
             # Each beside what the others alone make of it.
-            off = _rms(openings - hat @ openings) / np.maximum(1.0 - np.diag(hat), 1e-9)
+            left = _rms_left(design, moments)
+            off = left / np.maximum(1.0 - np.diag(design @ np.linalg.pinv(design)), 1e-9)
             worst = int(np.argmax(off))
             others = np.delete(np.arange(good.size), worst)
-            plane = np.linalg.pinv(design[others]) @ openings[others]
-            usual = float(np.median(_rms(openings[others] - design[others] @ plane)))
+            usual = float(np.median(_rms_left(design[others], moments[np.ix_(others, others)])))
             if off[worst] <= max(_OUTLIER_RATIO * usual, tolerated[good[worst]]):
                 break
             found.append(int(good[worst]))
@@ -178,8 +178,10 @@ class BaseJoint:
         return np.column_stack([np.ones_like(x), -x, -x * y])
 
 
-def _rms(rows: Floats) -> Floats:
-    return np.asarray(np.sqrt(np.mean(rows**2, axis=1)))
+def _rms_left(design: Floats, moments: Floats) -> Floats:
+    """(k,) rms of what the plane through k openings leaves of each; `moments` (k, k): their mean products."""
+    leaves = np.eye(design.shape[0]) - design @ np.linalg.pinv(design)
+    return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", leaves, moments, leaves).clip(min=0.0)))
 
 
 def at_range_end(readings: Floats, low: Floats | float, high: Floats | float) -> Bools:

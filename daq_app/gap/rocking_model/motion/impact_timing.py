@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
@@ -15,8 +16,9 @@ MOST = 14
 """Impacts used: the first ones are the loudest."""
 WINDOW_S = 0.11
 REACH_S = 0.065
-_SLOW_SHAPES = 5
-"""Powers of time that are free around each impact: as much as a wall does that rings below 7 Hz."""
+_SLOW_SHAPES = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, 2 * round(WINDOW_S * GRID_HZ)), 5))[0]
+"""Powers of time that are free around each impact, an orthonormal base of them over a window, (samples, 5):
+as much as a wall does that rings below 7 Hz."""
 _SHARP_S = 8e-3
 """Half width of the misfit's dip up to which it is that of impacts, whatever their form."""
 _NEAR_S = 3e-3
@@ -49,7 +51,9 @@ def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
     def misfit(delay: float) -> FloatArray:
         edges = np.append(grid.time_s - 0.5 / GRID_HZ, grid.time_s[-1] + 0.5 / GRID_HZ) - delay
         expected = np.diff(np.interp(edges, fine, velocity)) * GRID_HZ
-        return np.array([_left(measured[part] - expected[part], basis) for part, basis in windows])
+        difference = (measured - expected)[windows]
+        slow = (difference @ _SLOW_SHAPES) @ _SLOW_SHAPES.T
+        return np.asarray(np.sum((difference - slow) ** 2, axis=1))
 
     delays = np.arange(-REACH_S, REACH_S, 1e-3)
     curve = np.array([misfit(float(d)).sum() for d in delays])
@@ -65,28 +69,22 @@ def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
     return shift, 1.57 * spread**2 / len(windows) + MODEL_ERROR_S**2 + form**2
 
 
-def _windows(grid: Grid) -> list[tuple[slice, FloatArray]]:
-    """Samples around each impact that stands alone, with the slow shapes that are free there."""
+def _windows(grid: Grid) -> NDArray[np.intp]:
+    """Samples of the grid around each impact that stands alone, (impacts, samples of a window)."""
     windows = []
+    half = round(WINDOW_S * GRID_HZ)
     gaps = np.diff(grid.impact_s, append=grid.impact_s[-1] + 0.5)
     for k, (time, gap) in enumerate(zip(grid.impact_s, gaps, strict=True)):
         before = time - grid.impact_s[k - 1] if k else 1.0
         if min(gap, before) < 1.6 * WINDOW_S:
             break
         centre = int(np.searchsorted(grid.time_s, time))
-        part = slice(centre - round(WINDOW_S * GRID_HZ), centre + round(WINDOW_S * GRID_HZ))
-        if part.start < 0 or part.stop > grid.time_s.size:
+        if centre < half or centre + half > grid.time_s.size:
             continue
-        x = np.linspace(-1.0, 1.0, part.stop - part.start)
-        windows.append((part, np.linalg.qr(np.vander(x, _SLOW_SHAPES))[0]))
+        windows.append(np.arange(centre - half, centre + half))
         if len(windows) == MOST:
             break
-    return windows
-
-
-def _left(difference: FloatArray, basis: FloatArray) -> float:
-    left = difference - basis @ (basis.T @ difference)
-    return float(left @ left)
+    return np.array(windows, dtype=np.intp)
 
 
 @dataclass(frozen=True, slots=True)
