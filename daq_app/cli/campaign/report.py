@@ -50,13 +50,8 @@ def report(
         campaign = open_plan(plan_file)
         if out is not None and not overwrite and out.is_dir() and any(out.iterdir()):
             raise RunFileError(f"{out} holds files", advice="Choose another folder, or say --overwrite.")
+        _warm_up(folder, anew=anew)
         # Imported here: `--help` should load none of it.
-        from daq_app.campaign.summaries.store import some_have_none
-
-        drawing = ("daq_app.campaign.report.captioned", "daq_app.campaign.report.pdf")
-        # The program itself too: each worker imports it anew otherwise.
-        analysis = ("daq_app.rocking.analysis.analyse",) if anew or some_have_none(folder) else ()
-        warm_up("daq_app.campaign.report.collect", *analysis, *drawing, "daq_app.cli.app")
         from daq_app.campaign.report import collect as gathering
         from daq_app.campaign.report.job import write_collected
         from daq_app.campaign.report.tables import mean_of_specimens, table_4_1
@@ -86,6 +81,15 @@ def report(
         _print(rows + mean_of_specimens(rows), found, page, as_json)
     if any(not failure.flagged_bad for failure in failures):
         raise typer.Exit(EXIT_FAILED)
+
+
+def _warm_up(folder: Path, *, anew: bool) -> None:
+    """Workers begin to import what they need; the program itself too, which each would import anew."""
+    from daq_app.campaign.summaries.store import some_have_none
+
+    drawing = ("daq_app.campaign.report.captioned", "daq_app.campaign.report.pdf")
+    analysis = ("daq_app.rocking.analysis.analyse",) if anew or some_have_none(folder) else ()
+    warm_up("daq_app.campaign.report.collect", *analysis, *drawing, "daq_app.cli.app")
 
 
 def _known(value: float) -> float | None:

@@ -108,53 +108,71 @@ def fit_motion(
     count = _span(peaks_rad, len(impacts_s))
     if count < 2 or not 0.0 < r <= 1.0:
         return None
-    stop = impacts_s[count - 1] + 0.5 * (
+    stop_s = impacts_s[count - 1] + 0.5 * (
         impacts_s[count] - impacts_s[count - 1] if count < len(impacts_s) else 0.0
     )
-    side = 1.0 if theta0_rad > 0 else -1.0
-
-    def fit_from(
-        first_s: float,
-        begin_s: float,
-        amplitude_rad: float,
-        log_r: float,
-        scatter: float | None,
-        *,
-        thorough: bool,
-    ) -> MotionFit | None:
-        t, y, sigma = _points(time_s, rotation_rad, first_s, stop, noise_rad)
-        if t.size < 4 * FIXED:
-            return None
-        spread = None if scatter is None else max(scatter, 3e-4)
-        start = np.zeros(0) if spread is None else _deviations(speeds_rad_s, count, log_r) / spread
-        problem = MotionModel(t, y, sigma, begin_s, amplitude_rad, side, p_rad_s, alpha_rad, log_r, spread)
-        return _stepwise(problem, start, impacts_s, count, stop, thorough=thorough)
-
-    def fit_whole(*, thorough: bool) -> MotionFit | None:
-        start = abs(theta0_rad)
-        return fit_from(release_s - 0.1, release_s, start, math.log(r), scatter, thorough=thorough)
-
-    whole = fit_whole(thorough=False)
+    side, log_r = 1.0 if theta0_rad > 0 else -1.0, math.log(r)
+    known = (impacts_s, speeds_rad_s, p_rad_s, alpha_rad)
+    record = _Record(time_s, rotation_rad, noise_rad, *known, count, stop_s, side)
+    at_release = _Start(release_s - 0.1, release_s, abs(theta0_rad), log_r, scatter)
+    whole = record.fit(at_release, thorough=False)
     if whole is None or whole.residual_rad < _NO_CLEAN_FALL * whole.noise_rad:
         poor = whole is not None and whole.residual_rad > _POOR * whole.noise_rad
-        return fit_whole(thorough=True) if poor else whole
+        return record.fit(at_release, thorough=True) if poor else whole
     amplitude, begin_s, own = _fall_to_first_impact(
-        impacts_s[0],
-        peaks_rad[1],
-        _deviations(speeds_rad_s[1:], count, math.log(r)),
-        math.log(r),
-        p_rad_s,
-        alpha_rad,
+        impacts_s[0], peaks_rad[1], _deviations(speeds_rad_s[1:], count, log_r), log_r, p_rad_s, alpha_rad
     )
     spread = scatter if scatter_of_speeds is None else scatter_of_speeds
-    begin = (impacts_s[0] + POINT_S, begin_s, amplitude, own, spread)
+    at_impact = _Start(impacts_s[0] + POINT_S, begin_s, amplitude, own, spread)
     later: MotionFit | None = None
     for thorough in (False, True):
         if math.isfinite(begin_s) and (later is None or later.residual_rad > _POOR * later.noise_rad):
-            later = fit_from(*begin, thorough=thorough)
+            later = record.fit(at_impact, thorough=thorough)
     if later is not None and later.explains_the_motion:
         return replace(later, from_release=False)
-    return fit_whole(thorough=True)
+    return record.fit(at_release, thorough=True)
+
+
+@dataclass(frozen=True, slots=True)
+class _Start:
+    """Where a fit begins in the record, and the motion that it starts from."""
+
+    first_s: float
+    """Time of the first point that is fitted."""
+    begin_s: float
+    """Release."""
+    amplitude_rad: float
+    log_r: float
+    scatter: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Record:
+    """A recorded rotation with its impacts, of which the first `count`, up to `stop_s`, are fitted."""
+
+    time_s: Floats
+    rotation_rad: Floats
+    noise_rad: float
+    impacts_s: list[float]
+    speeds_rad_s: list[float]
+    p_rad_s: float
+    alpha_rad: float
+    count: int
+    stop_s: float
+    side: float
+
+    def fit(self, start: _Start, *, thorough: bool) -> MotionFit | None:
+        """None with too few points."""
+        t, y, sigma = _points(self.time_s, self.rotation_rad, start.first_s, self.stop_s, self.noise_rad)
+        if t.size < 4 * FIXED:
+            return None
+        spread = None if start.scatter is None else max(start.scatter, 3e-4)
+        own = np.zeros(0)
+        if spread is not None:
+            own = _deviations(self.speeds_rad_s, self.count, start.log_r) / spread
+        wall = (self.side, self.p_rad_s, self.alpha_rad)
+        problem = MotionModel(t, y, sigma, start.begin_s, start.amplitude_rad, *wall, start.log_r, spread)
+        return _stepwise(problem, own, self.impacts_s, self.count, self.stop_s, thorough=thorough)
 
 
 def _fall_to_first_impact(
