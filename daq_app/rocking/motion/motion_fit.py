@@ -295,12 +295,13 @@ def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: floa
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     motion = problem.motion(x, count)
     # The level that suits deviations of equal weight is their mean: a search may end before it finds that,
-    # for the motion is the same with another level and deviations to match.
+    # for the motion is the same with another level and deviations to match. How far it was still to go is
+    # in the error.
     deviation = 0.0 if problem.spread is None else problem.spread * float(np.mean(x[FIXED:]))
     r = math.exp(problem.log_r + 0.01 * float(x[5]) + deviation)
     return MotionFit(
         r=r,
-        standard_error=r * 0.01 * float(deviations[5]),
+        standard_error=r * math.hypot(0.01 * float(deviations[5]), deviation),
         p_rad_s=motion.p_rad_s,
         sigma_p_rad_s=motion.p_rad_s * P_PRIOR * float(deviations[2]),
         alpha_rad=motion.alpha_rad,
