@@ -124,8 +124,7 @@ class Storm:
         status = session.recorder.status
         safe = status.acknowledged_sample if status.recording else 0
         copy = self.folder.with_name(f"{self.folder.name}-kill{number}")
-        finished = tuple(find_runs(self.folder))
-        _copy_as_it_stands(self.folder, copy)
+        finished = _copy_as_it_stands(self.folder, copy)
         self.log.append(f"{sample}: killed (copy {number}), safe up to {safe}")
         return _Kill(copy, finished, safe, sample, self.sick_until)
 
@@ -250,13 +249,23 @@ class _Kill:
     """The newest one before which the disk had taken nothing for a while."""
 
 
-def _copy_as_it_stands(folder: Path, copy: Path) -> None:
-    """All but the run files; what the recorder removes meanwhile, a kill would not leave a moment later."""
-    try:
-        shutil.copytree(folder, copy, ignore=shutil.ignore_patterns("*.h5*"))
-    except shutil.Error as problem:
-        if any(Path(source).exists() for source, _, _ in problem.args[0]):
-            raise
+def _copy_as_it_stands(folder: Path, copy: Path) -> tuple[Path, ...]:
+    """Copy all but the run files as they are at one moment; the run files of that moment.
+
+    A kill leaves one moment. A copy takes several, in which the ring may become the journal of a run and a
+    journal a run file, and hold neither: it is made again until no file has come or gone meanwhile.
+    """
+    while True:
+        before = _names(folder)
+        with suppress(shutil.Error):  # a file that went meanwhile
+            shutil.copytree(folder, copy, ignore=shutil.ignore_patterns("*.h5*"))
+        if _names(folder) == before:
+            return tuple(find_runs(folder))
+        shutil.rmtree(copy)
+
+
+def _names(folder: Path) -> set[Path]:
+    return set(folder.rglob("*"))
 
 
 def storm_once(rig_file: Path, folder: Path, seed: int) -> tuple[list[str], list[str]]:
