@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -42,11 +43,11 @@ def require_replaceable(out: Path, inputs: Sequence[Path] = (), *, overwrite: bo
 
 
 def _find(folder: Path, suffix: str) -> list[Path]:
-    # Hidden folders hold what some program has not finished (`campaign simulate`), or its own affairs.
-    return sorted(
-        path
-        for path in folder.rglob(f"*{suffix}")
-        if path.is_file()
-        and not path.is_symlink()
-        and not any(part.startswith(".") for part in path.relative_to(folder).parts[:-1])
-    )
+    found: list[Path] = []
+    for parent, folders, files in os.walk(folder):
+        # Hidden folders hold what some program has not finished (`campaign simulate`) or its own affairs: the
+        # ring of a recorder comes and goes while somebody looks.
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        paths = (Path(parent, name) for name in files if os.path.normcase(name).endswith(suffix))
+        found += [path for path in paths if path.is_file() and not path.is_symlink()]
+    return sorted(found)

@@ -11,6 +11,7 @@ differs from the armed plan, no two contradicting words, nothing that had been c
 from __future__ import annotations
 
 import errno
+import os
 import re
 import shutil
 import sys
@@ -265,7 +266,8 @@ def _copy_as_it_stands(folder: Path, copy: Path) -> tuple[Path, ...]:
 
 
 def _names(folder: Path) -> set[Path]:
-    return set(folder.rglob("*"))
+    # Unlike `rglob` it takes a folder that goes while it looks for an empty one.
+    return {Path(parent, name) for parent, folders, files in os.walk(folder) for name in (*folders, *files)}
 
 
 def storm_once(rig_file: Path, folder: Path, seed: int) -> tuple[list[str], list[str]]:
