@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from PySide6.QtCore import QObject, QRunnable, QThreadPool, Signal
+from shiboken6 import isValid
 
 
 class _Signals(QObject):
@@ -56,6 +57,9 @@ class Background(QObject):
         def finish(callback: Callable[[Any], None]) -> Callable[[Any], None]:
             def call(value: Any) -> None:
                 self._jobs.discard(job)
+                asked = getattr(callback, "__self__", None)
+                if isinstance(asked, QObject) and not isValid(asked):
+                    return  # its page was closed while the work went on
                 callback(value)
 
             return call
