@@ -16,6 +16,7 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.campaign.recorded import facts_of
 from daq_app.config.rig import Channel
 from daq_app.config.shown_text import csv_cell
 from daq_app.config.shown_units import shown_unit
@@ -70,6 +71,7 @@ class ReplayRun:
             self.first_sample = self._run.first_sample
             self.events: tuple[Event, ...] = tuple(self._run.events)
             self.gaps: tuple[Gap, ...] = tuple(self._run.gaps)
+            self.facts = facts_of(self._run)
             self._motion: tuple[Array, Array] | None = self._compute_motion()
         except BaseException:
             self._run.close()

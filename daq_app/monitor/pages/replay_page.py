@@ -30,6 +30,7 @@ from daq_app.monitor.look.labels import FittedLabel, PlainLabel, number, role_la
 from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.replay_plots import ReplayPlots, shade
 from daq_app.monitor.plots.strip_panel import FAMILY_TITLES
+from daq_app.monitor.widgets.run_notes import show_notes
 from daq_app.runfile import RunFileError
 from daq_app.runfile.durable import written_whole
 from daq_app.runfile.folder import require_replaceable
@@ -55,6 +56,9 @@ class ReplayPage(QWidget):
         self._title = role_label("No run is open", "title")
         self._facts = FittedLabel("muted")
         self._facts.setText("Open a run to look at it.")
+        self.notes = role_label("", "muted")
+        self.notes.setWordWrap(True)
+        self.notes.hide()
         self.tree = QTreeWidget()
         self.tree.setHeaderLabels(["Signal", "At the cursor"])
         self.tree.header().setStretchLastSection(False)
@@ -129,6 +133,7 @@ class ReplayPage(QWidget):
         whole.setSpacing(6)
         whole.addLayout(top)
         whole.addWidget(self._facts)
+        whole.addWidget(self.notes)
         whole.addWidget(self.splitter, 1)
 
     def restyle(self, colours: Colours) -> None:
@@ -171,6 +176,7 @@ class ReplayPage(QWidget):
         size = f"{stop - start:.1f} s at {run.rate_hz:g} Hz · {len(header.channel_ids)} channels"
         self._facts.setText(f"{run.path.name} · {size}{gaps}")
         self._facts.setToolTip(tip_text(self._facts.text()))
+        show_notes(self.notes, run.facts)
         self._fill_tree()
         self._fill_events()
         self.plots.show_run(run, self.chosen)

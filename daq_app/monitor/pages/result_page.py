@@ -14,24 +14,21 @@ from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.result.motions import period_deviation
 from daq_app.campaign.result.result import NoResult, Result, load_result, page_is_current
 from daq_app.campaign.result.words import METHODS, verdict_sentence
-from daq_app.campaign.status import NO_FACTS, RecordedTest, TestFacts
+from daq_app.campaign.status import NO_FACTS, RecordedTest
 from daq_app.config import ConfigError
-from daq_app.config.shown_text import shortened
 from daq_app.config.wording import plus_minus
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.child import said_by
-from daq_app.monitor.look.labels import DASH, Tile, number, set_role, tip_text
+from daq_app.monitor.look.labels import DASH, Tile, number, set_role
 from daq_app.monitor.look.theme import DARK, Colours
 from daq_app.monitor.plots.result_plots import ResultPlots
 from daq_app.monitor.widgets.banner import Banner, keyed_button
 from daq_app.monitor.widgets.family_table import FamilyTable
 from daq_app.monitor.widgets.level_table import LevelTable
 from daq_app.monitor.widgets.opening import open_outside
+from daq_app.monitor.widgets.run_notes import show_notes
 from daq_app.runfile import RunFileError
 from daq_app.runfile.folder import RUN_SUFFIX
-
-_NOTES_SHOWN = 240
-"""Characters of operator and notes on the page; the rest is in the tool tip."""
 
 
 def analyse(run: Path) -> Result:
@@ -177,7 +174,7 @@ class ResultPage(QWidget):
         self.run, self.result = run, None
         self._title.setText(run.stem.split("_")[0])
         self._verdict.setText("The run is being analysed …")
-        self._show_notes(NO_FACTS)
+        show_notes(self.notes, NO_FACTS)
         set_role(self._verdict, "muted")
         self._sign.show_shape("ring", self._colours.muted)
         self.plots.show_result(None)
@@ -222,7 +219,7 @@ class ResultPage(QWidget):
                 continue
             detail = f"{plus_minus(method.standard_error)} · {method.r / test.r_max:.2f} r_max"
             self.tiles[name].show_value(f"{method.r:.3f}", detail)
-        self._show_notes(result.facts)
+        show_notes(self.notes, result.facts)
         deviation = period_deviation(test)
         shown = DASH if deviation is None else f"{number(100 * deviation, 1)} %"
         self.tiles["periods"].show_value(shown, "mean deviation from theory")
@@ -294,13 +291,6 @@ class ResultPage(QWidget):
         self._sign.show_shape(shape, str(getattr(self._colours, role)))
         self._verdict.setText(verdict_sentence(test))
         set_role(self._verdict, role)
-
-    def _show_notes(self, facts: TestFacts) -> None:
-        """Operator and notes: in short on the page, whole when pointed at."""
-        said = [facts.operator, *facts.notes]
-        self.notes.setText(shortened(" · ".join(filter(None, said)), _NOTES_SHOWN))
-        self.notes.setToolTip(tip_text("\n".join(said)))
-        self.notes.setVisible(bool(self.notes.text()))
 
     def _show_buttons(self) -> None:
         for name, button in self.buttons.items():

@@ -14,6 +14,7 @@ from daq_app.monitor.data.replay_data import ROTATION, VELOCITY, ReplayRun
 from daq_app.monitor.pages.campaign_page import CampaignPage
 from daq_app.monitor.window.main_window import MainWindow
 from daq_app.runfile import RunFileError, open_run
+from tests.support.window.stand_in import write_run
 
 
 @pytest.fixture
@@ -70,6 +71,17 @@ def page(qtbot, settings, run_file):
     qtbot.waitUntil(lambda: window.replay.run is not None, timeout=120_000)
     yield window.replay
     window.replay.run.close()
+
+
+def test_notes_are_read_where_the_run_is_shown(qtbot, page, stand_in, configs, tmp_path, run_file):
+    assert page.notes.isHidden(), "a run without notes has no line for them"
+    noted = write_run(stand_in, configs / "fr1.toml", tmp_path, "FR1-L1-2", 2, notes="stay <b>left</b> loose")
+    page.open(noted)
+    qtbot.waitUntil(lambda: page.run is not None and page.run.path == noted, timeout=120_000)
+    assert page.notes.isVisible() and page.notes.text() == "stay <b>left</b> loose"
+    page.open(run_file)
+    qtbot.waitUntil(lambda: page.run is not None and page.run.path == run_file, timeout=120_000)
+    assert page.notes.isHidden()
 
 
 def test_the_page_shows_picks_and_exports(qtbot, page, tmp_path):

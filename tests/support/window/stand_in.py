@@ -225,7 +225,13 @@ class StandIn:
 
 
 def write_run(
-    stand_in: StandIn, rig_file: Path, folder: Path, test: str, when_s: int = 0, end_text: str = "at rest"
+    stand_in: StandIn,
+    rig_file: Path,
+    folder: Path,
+    test: str,
+    when_s: int = 0,
+    end_text: str = "at rest",
+    notes: str = "",
 ) -> Path:
     """A finished run file of the stand-in's test; `end_text`: what its last event says."""
     rig = stand_in.rig
@@ -239,6 +245,7 @@ def write_run(
         reading_units=tuple(channel.reading_unit for channel in rig.channels),
         rate_hz=stand_in.rate_hz,
         start_utc_ns=(1_700_000_000 + when_s) * 10**9,
+        notes=notes,
     )
     impacts = stand_in.motion.impacts_s
     times = {
