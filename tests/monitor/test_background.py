@@ -25,6 +25,7 @@ def test_a_page_that_was_closed_meanwhile_is_not_answered(qtbot) -> None:
     closed, open_ = _Page(answers), _Page(answers)
     qtbot.addWidget(open_)
     background.run(lambda: go.wait(60.0) and "late", closed.take, closed.take)
+    background.run(lambda: "late", lambda answer: closed.take(answer), closed.take)
     background.run(lambda: "soon", open_.take, open_.take)
     shiboken6.delete(closed)
     with qtbot.captureExceptions() as raised:

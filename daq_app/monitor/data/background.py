@@ -49,7 +49,12 @@ class Background(QObject):
     def run(
         self, work: Callable[[], Any], done: Callable[[Any], None], failed: Callable[[Exception], None]
     ) -> None:
-        """Do `work` in another thread, then call `done(result)` or `failed(error)` in this one."""
+        """Do `work` in another thread, then call `done(result)` or `failed(error)` in this one.
+
+        Neither is called where one of them is a method of a widget that was closed meanwhile.
+        """
+        asked = [getattr(callback, "__self__", None) for callback in (done, failed)]
+        pages = [page for page in asked if isinstance(page, QObject)]
         job = _Job(work)
         job.setAutoDelete(False)
         self._jobs.add(job)
@@ -57,10 +62,8 @@ class Background(QObject):
         def finish(callback: Callable[[Any], None]) -> Callable[[Any], None]:
             def call(value: Any) -> None:
                 self._jobs.discard(job)
-                asked = getattr(callback, "__self__", None)
-                if isinstance(asked, QObject) and not isValid(asked):
-                    return  # its page was closed while the work went on
-                callback(value)
+                if all(isValid(page) for page in pages):
+                    callback(value)
 
             return call
 

@@ -160,9 +160,9 @@ def test_a_wider_page_shows_a_finer_line(qtbot, page):
     def points() -> int:
         return page.plots._curves[ROTATION].getData()[0].size
 
-    page.plots.resize(300, 500)
+    page.plots.setFixedSize(300, 500)  # no layout that is still to come makes it another one
     qtbot.waitUntil(lambda: points() < 500, timeout=60_000)
-    page.plots.resize(1400, 500)
+    page.plots.setFixedSize(1400, 500)
     qtbot.waitUntil(lambda: points() > 2000, timeout=60_000)
 
 
