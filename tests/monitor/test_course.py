@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from daq_app.acquisition.messages.published import Call, EventMessage, Judgement, State, StateMessage
+from daq_app.acquisition.messages.published import (
+    Call,
+    EventMessage,
+    HealthMessage,
+    Judgement,
+    State,
+    StateMessage,
+)
 from daq_app.monitor.course.course_view import CourseView
 from daq_app.monitor.course.cues import Cue, CueWatch
 from daq_app.monitor.course.gauge_words import target_words
@@ -43,6 +50,12 @@ def live_window(qtbot, settings, configs, clock):
 
 def say(session, clock, state, judgement) -> None:
     session.feed(Published(StateMessage(state=state, judgement=judgement), clock.now))
+
+
+def health(sample: int) -> HealthMessage:
+    """Everything read before `sample` is on disk but the last hundred samples."""
+    counts = dict.fromkeys(("backlog_samples", "buffer_samples", "gaps", "lost_samples"), 0)
+    return HealthMessage(sample=sample, acknowledged_sample=sample - 100, recording=True, **counts)
 
 
 @pytest.mark.parametrize(("width", "height"), [(1200, 600), (700, 420), (1920, 1080)])
@@ -158,6 +171,39 @@ def test_arming_and_release_bring_the_gauge_and_live_stays_where_it_was_chosen(l
             window._after(StateMessage(state=state))
             assert window.stack.currentWidget() is expected
         window._after(StateMessage(state=State.PREVIEWING))
+
+
+def test_strip_and_picture_say_one_word_however_long_a_drawing_takes(live_window, clock):
+    window = live_window
+    window.moment.source, window.session.clock = clock, window.moment
+    words = set()
+    for sample in range(0, 40_000, 4000):
+        window.link.inbox = [
+            Published(StateMessage(state=State.ARMED, armed=True), clock.now - 0.9),
+            Published(health(sample + 4000), clock.now - 0.1),
+        ]
+        window._on_frame()
+        clock.now += 0.7  # a drawing takes so long
+        window._on_slow()
+        window.test.view.grab()
+        clock.now += 0.3
+        words.add(window.header.words["recording"])
+        assert window.header.words["recording"] in window.test.view.texts
+    assert words == {"Recording"}
+
+
+def test_a_link_that_is_lost_is_seen_though_the_window_draws_on(live_window, clock):
+    window = live_window
+    window.moment.source, window.session.clock = clock, window.moment
+    window.link.inbox = [
+        Published(StateMessage(state=State.ARMED, armed=True), clock.now),
+        Published(health(4000), clock.now),
+    ]
+    window._on_frame()
+    assert window.header.words["recording"] == "Recording"
+    clock.now += 0.6
+    window._on_frame()
+    assert window.header.words["recording"] == "Not confirmed"
 
 
 @pytest.mark.parametrize("state", [State.HOLDING, State.ROCKING, State.AT_REST])

@@ -258,6 +258,12 @@ class Session:
         return self.age_s(kind) <= STALE_AFTER_S
 
     @property
+    def what_is_live(self) -> tuple[bool, ...]:
+        """Whether readings, rotation, health and recording are live: each change is drawn at once."""
+        kinds = (BlockMessage, MotionMessage, HealthMessage)
+        return (*(self.fresh(kind) for kind in kinds), self.recording_on_disk)
+
+    @property
     def linked(self) -> bool:
         """Whether the acquisition is heard at all."""
         return min((self.age_s(kind) for kind in self._received), default=math.inf) <= SILENT_AFTER_S

@@ -18,12 +18,9 @@ from PySide6.QtWidgets import QApplication, QMainWindow, QPushButton, QWidget
 
 from daq_app.acquisition.messages.published import (
     RECORDING,
-    BlockMessage,
     Call,
     CheckMessage,
     EventMessage,
-    HealthMessage,
-    MotionMessage,
     Reply,
     State,
     StateMessage,
@@ -31,6 +28,7 @@ from daq_app.acquisition.messages.published import (
 from daq_app.campaign.plan import Campaign
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.link import Link
+from daq_app.monitor.data.moment import Moment
 from daq_app.monitor.data.session import Session
 from daq_app.monitor.data.settings import TYPE_SIZES, WindowSettings
 from daq_app.monitor.look.theme import THEMES, Colours, apply_theme
@@ -65,7 +63,8 @@ class MainWindow(QMainWindow):
         self.setWindowTitle("Rocking-test recorder")
         self.link = link
         self.settings = settings
-        self.session = Session()
+        self.moment = Moment()
+        self.session = Session(self.moment)
         self.background = Background(self)
         self._analyses = Background(self)
         """Its own queue: an analysis takes seconds, a sensor check must not wait for it."""
@@ -231,11 +230,6 @@ class MainWindow(QMainWindow):
             self.longest_stall_s = max(self.longest_stall_s, now - self._last_frame_s)
         self._last_frame_s = now
         self._take_in()
-        live = tuple(self.session.fresh(kind) for kind in (BlockMessage, MotionMessage, HealthMessage))
-        if live != self._was_live:
-            # What has just gone stale must not stand as live until the next slow tick.
-            self._was_live = live
-            self._on_slow()
         if self.stack.currentWidget() is self.live:
             self.live.draw_frame()
         self.display.frame()
@@ -245,6 +239,12 @@ class MainWindow(QMainWindow):
             for published in self.link.take():
                 self.session.feed(published)
                 self._after(published.message)
+        self.moment.renew()
+        live = self.session.what_is_live
+        if live != self._was_live:
+            # What has just gone stale must not stand as live until the next slow tick.
+            self._was_live = live
+            self._on_slow()
 
     def _on_urgent(self) -> None:
         """r has come: it is on screen before the next frame is drawn."""
