@@ -259,9 +259,10 @@ class MainWindow(QMainWindow):
                 self.orders.adopt_plan(message)
                 self._show_target(message)
                 self._on_state(message)
-                # Both at once: strip and gauge never show the words of two different moments.
+                # All at once: strip, gauge and picture never show the words of two different moments.
                 self.header.refresh(self.colours)
                 self.prepare.gauge.update()
+                self.display.show_state()
             case CheckMessage():
                 self.prepare.show_check(message.check)
                 self.notices.settle(*what_to_tell.found_good(message.check))

@@ -99,6 +99,11 @@ class TestDisplay(QObject):
             for view in self._views():
                 view.refresh()
 
+    def show_state(self) -> None:
+        """The recorder's words have changed: they are painted together with those of the header."""
+        for view in self._views():
+            view.refresh()
+
     def show_estimate(self) -> None:
         """r has come: it is on screen before the next frame."""
         for view in self._views():
@@ -109,7 +114,7 @@ class TestDisplay(QObject):
         self.sounds.play(self._watch.look(self._session))
         if self.full_screen is not None:
             self.full_screen.view.footer = self._footer(covers=self.full_screen.covers)
-            self.full_screen.view.refresh()
+        self.show_state()
 
     def _footer(self, *, covers: bool) -> str:
         """The message in front; without one the keys, where they are wanted here."""
