@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -20,6 +21,22 @@ _BAD_OUTCOMES: Final = {
     "timeout": "the wall had not come to rest when the recording ended",
     "failed": "the recording failed before the end",
 }
+
+
+@dataclass(frozen=True, slots=True)
+class RunAccount:
+    """What a run says of its test; with the operator's verdict it makes a `RecordedTest`."""
+
+    run_id: str
+    test: str
+    """Name of the test, as the recorder gave it; empty where it had none."""
+    released: bool
+    """Whether the wall was let go."""
+    released_ns: int
+    """Wall clock of the run."""
+    verdict: TestVerdict
+    reason: str
+    facts: TestFacts
 
 
 def read_recorded(folder: Path) -> list[RecordedTest]:
@@ -50,15 +67,28 @@ def recorded_test(path: Path, verdicts: Mapping[str, OperatorVerdict]) -> Record
 
 def test_of(run: Run, verdicts: Mapping[str, OperatorVerdict]) -> RecordedTest | None:
     """The same of an opened run; None where it is no release of a named test."""
-    given = verdicts.get(run.header.run_id)
-    name = _name(given.test if given is not None and given.test else run.header.test)
-    if name is None or not was_released(run.events):
+    return test_by(account_of(run), run.path, verdicts)
+
+
+def account_of(run: Run) -> RunAccount:
+    """What an opened run says of its test."""
+    header, (verdict, reason) = run.header, _judged(run)
+    released = was_released(run.events)
+    return RunAccount(
+        header.run_id, header.test, released, header.start_utc_ns, verdict, reason, facts_of(run)
+    )
+
+
+def test_by(account: RunAccount, path: Path, verdicts: Mapping[str, OperatorVerdict]) -> RecordedTest | None:
+    """The test of a run by its account; None where it is no release of a named test."""
+    given = verdicts.get(account.run_id)
+    name = _name(given.test if given is not None and given.test else account.test)
+    if name is None or not account.released:
         return None
+    verdict, reason = account.verdict, account.reason
     if given is not None and given.verdict is not None:
         verdict, reason = TestVerdict(given.verdict), given.reason
-    else:
-        verdict, reason = _judged(run)
-    return RecordedTest(name, verdict, run.header.start_utc_ns, run.path, reason, facts_of(run))
+    return RecordedTest(name, verdict, account.released_ns, path, reason, account.facts)
 
 
 def facts_of(run: Run) -> TestFacts:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from daq_app.rocking import AnalysisOptions, TestAnalysis, TestRecord, analyse_r
 from studies.restitution.faults import FAULTS, Fault
 from studies.restitution.foreign import foreign_tests
 from studies.restitution.laboratory import LaboratoryTest, draw_test
-from studies.restitution.walls import WALLS, Wall
+from studies.restitution.walls import WALLS, Wall, mean_r_of_impacts
 
 RIG = Path(__file__).parents[2] / "configs" / "fr1.toml"
 _OPTIONS = AnalysisOptions(bias_runs=0, keep_series=False)
@@ -44,6 +44,8 @@ class Answer:
     standard_error: float
     """Of the verdict."""
     trust: str
+    all_hold: bool
+    """Whether the interval of each of `_METHODS` holds the truth."""
     said: tuple[str, ...]
     """First channel, family and kind of each warning; what is told of the wall without one is in brackets."""
 
@@ -59,29 +61,42 @@ def answer_of(record: TestRecord, true_r: float) -> Answer:
         if finding.severity == "warning" or finding.family == "wall"
     )
     if not analysis.found:
-        return Answer((math.nan,) * len(_METHODS), math.nan, "not found", said)
+        return Answer((math.nan,) * len(_METHODS), math.nan, "not found", False, said)
     values = [analysis.estimates["eav"].r, analysis.estimates["crt"].r, analysis.verdict.r]
     values.append(None if analysis.fit is None else analysis.fit.r)
     errors = tuple(math.nan if r is None else r - true_r for r in values)
-    return Answer(errors, analysis.verdict.standard_error or math.nan, analysis.verdict.trust, said)
+    intervals = intervals_of(analysis).values()
+    all_hold = all(i is None or i[0] <= true_r <= i[1] for i in intervals)
+    verdict = analysis.verdict
+    return Answer(errors, verdict.standard_error or math.nan, verdict.trust, all_hold, said)
+
+
+def intervals_of(analysis: TestAnalysis) -> dict[str, tuple[float, float] | None]:
+    """The 95 % interval of r by each method and of the verdict; None where there is none."""
+    fit = None if analysis.fit is None else analysis.fit.interval95()
+    methods = {name: analysis.estimates[name].interval95() for name in ("eav", "crt")}
+    return {**methods, "verdict": analysis.verdict.interval95, "fit": fit}
 
 
 def row_of(what: str, answers: Sequence[Answer], sound: Sequence[Answer]) -> str:
     """One line of the table of faults or walls, beside what the same tests say as sound ones (`sound`).
 
-    Counted are tests that are called good although what was put in moves r: by any method by more than
-    `_OFF_R`, or the verdict by more than `_OFF_SIGMAS` of its standard errors.
+    Counted as quiet are tests that are called good although what was put in moves r: by any method by more
+    than `_OFF_R`, or the verdict by more than `_OFF_SIGMAS` of the sound test's standard errors. Counted
+    as missed are those of them whose own interval of r does not hold the truth either.
     """
-    quiet = 0
+    quiet = missed = 0
     for answer, before in zip(answers, sound, strict=True):
         moved = np.abs(np.subtract(answer.errors, before.errors))
         doubtful = moved[_METHODS.index("verdict")] > _OFF_SIGMAS * before.standard_error
-        quiet += answer.trust == "good" and bool(np.nanmax(moved) > _OFF_R or doubtful)
+        said_nothing = answer.trust == "good" and bool(np.nanmax(moved) > _OFF_R or doubtful)
+        quiet += said_nothing
+        missed += said_nothing and not answer.all_hold
     table = np.array([answer.errors for answer in answers])
     numbers = " ".join(f"{value:8.4f}" for value in np.nanmax(np.abs(table), axis=0, initial=0.0))
     trusts = Counter(answer.trust for answer in answers)
     said = Counter(what for answer in answers for what in answer.said)
-    return f"{what:28s} {numbers} {quiet:6d}  {dict(trusts)}  {dict(said)}"
+    return f"{what:28s} {numbers} {quiet:6d} {missed:6d}  {dict(trusts)}  {dict(said)}"
 
 
 def fault_row(fault: Fault, tests: Sequence[LaboratoryTest], sound: Sequence[Answer]) -> str:
@@ -91,15 +106,17 @@ def fault_row(fault: Fault, tests: Sequence[LaboratoryTest], sound: Sequence[Ans
     return row_of(f"{fault.family}{single} {fault.kind} {fault.size:g}", answers, sound)
 
 
-def wall_row(wall: Wall, seeds: Sequence[int], sound: Sequence[Answer]) -> str:
-    """The line of a wall in the laboratories of `seeds`; the errors are those of r at its impacts."""
-    return row_of(wall.name, [wall_answer(wall, seed) for seed in seeds], sound)
+def wall_row(wall: Wall, seeds: Sequence[int], sound: Mapping[bool, Sequence[Answer]]) -> str:
+    """The line of a wall in the laboratories of `seeds`; `sound` by whether r is that of a test's impacts."""
+    own = wall.changes_r
+    return row_of(wall.name, [wall_answer(wall, seed, own_impacts=own) for seed in seeds], sound[own])
 
 
-def wall_answer(wall: Wall, seed: int) -> Answer:
+def wall_answer(wall: Wall, seed: int, *, own_impacts: bool) -> Answer:
     """What the analysis says of a wall in the laboratory of `seed`."""
     test = wall.test(load_rig(RIG), seed)
-    return answer_of(test.record(), wall.true_r(test))
+    true_r = mean_r_of_impacts(test) if own_impacts else float(test.truth["restitution"])
+    return answer_of(test.record(), true_r)
 
 
 def deviations(test: LaboratoryTest, analysis: TestAnalysis) -> list[tuple[str, float]]:
@@ -145,9 +162,7 @@ def coverage(tests: Iterable[LaboratoryTest]) -> list[str]:
         trusted = analysis.verdict.trust != "doubtful"
         warned += analysis.verdict.trust != "good"
         r = test.truth["restitution"]
-        intervals = {name: analysis.estimates[name].interval95() for name in ("eav", "crt")}
-        intervals["verdict"] = analysis.verdict.interval95
-        intervals["fit"] = None if analysis.fit is None else analysis.fit.interval95()
+        intervals = intervals_of(analysis)
         held = [(f"r {name}", i[0] <= r <= i[1]) for name, i in intervals.items() if i is not None]
         held += [(name, abs(ratio) <= 1.96) for name, ratio in deviations(test, analysis)]
         for name, holds in held:
@@ -180,13 +195,16 @@ def main() -> None:
     if options.table == "coverage":
         print("\n".join(coverage(tests)))
         return
-    head = f"largest |error| of r:       {' '.join(f'{name:>8s}' for name in _METHODS)}  quiet  trust, said"
+    methods = " ".join(f"{name:>8s}" for name in _METHODS)
+    head = f"largest |error| of r:       {methods}  quiet missed  trust, said"
     if options.table == "walls":
         seeds = range(options.first_seed, options.first_seed + options.tests)
-        sound = [wall_answer(WALLS[0], seed) for seed in seeds]
+        rigid = {
+            own: [wall_answer(WALLS[0], seed, own_impacts=own) for seed in seeds] for own in (False, True)
+        }
         print(head)
         for wall in WALLS:
-            print(wall_row(wall, seeds, sound), flush=True)
+            print(wall_row(wall, seeds, rigid), flush=True)
         return
     tests = list(tests)
     sound = [answer_of(test.record(), test.truth["restitution"]) for test in tests]

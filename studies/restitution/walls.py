@@ -13,7 +13,9 @@ from studies.restitution.laboratory import LaboratoryTest, draw_test
 
 _SLOWEST_RAD_S: Final = 0.02
 """Slower impacts are lost in the noise: r of a test is not theirs."""
-_CHANGES_R: Final = ("restitution_slope", "restitution_wear", "restitution_scatter")
+_CHANGES_R: Final = ("restitution_slope", "restitution_wear")
+"""Effects by which r goes from one value to another within a test, so that none is its r. A scatter is none
+of them: r is then the mean that the impacts are drawn about, as it is of every sound test."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,21 +29,24 @@ class Wall:
         """The laboratory of `seed` with this wall."""
         return draw_test(rig, seed, effects={self.effect: self.parameters} if self.effect else {})
 
-    def true_r(self, test: LaboratoryTest) -> float:
-        """r of the test: where the effect changes it from impact to impact, the mean of its impacts."""
-        r = float(test.truth["restitution"])
-        if self.effect not in _CHANGES_R:
-            return r
-        before = np.abs(test.truth["velocity_before_rad_s"])
-        after = np.abs(test.truth["velocity_after_rad_s"])
-        counted = before > _SLOWEST_RAD_S
-        return float(np.mean(after[counted] / before[counted]))
+    @property
+    def changes_r(self) -> bool:
+        """Whether r of the test is the mean of its impacts; the sound tests beside it count by the same."""
+        return self.effect in _CHANGES_R
 
     @property
     def name(self) -> str:
         """For a table."""
         told = ", ".join(f"{key} {value:g}" for key, value in self.parameters.items())
         return f"{self.effect} {told}" if self.effect else "rigid block"
+
+
+def mean_r_of_impacts(test: LaboratoryTest) -> float:
+    """Mean of |speed after| / |speed before| over the impacts that are not lost in the noise."""
+    before = np.abs(test.truth["velocity_before_rad_s"])
+    after = np.abs(test.truth["velocity_after_rad_s"])
+    counted = before > _SLOWEST_RAD_S
+    return float(np.mean(after[counted] / before[counted]))
 
 
 WALLS = (

@@ -17,10 +17,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from daq_app.campaign.recorded import RunAccount
 from daq_app.campaign.report.collect import collect
 from daq_app.campaign.result.result import load_result, page_is_current
+from daq_app.campaign.status import TestFacts, TestVerdict
 from daq_app.campaign.summaries.mark import ANALYSIS_CODE, AnalysisMark, digest_of, surroundings
-from daq_app.campaign.summaries.store import SUFFIX, NotKept, keep_summary, kept_summary
+from daq_app.campaign.summaries.store import SUFFIX, KeptAnalysis, NotKept, keep_analysis, kept_analysis
 from daq_app.campaign.summaries.summary import MethodResult, TestSummary
 from daq_app.campaign.verdicts import give_place, give_verdict
 from daq_app.cli.app import build_app
@@ -84,6 +86,16 @@ SUMMARIES = dataclass_of(
     reasons=st.lists(WORDS, max_size=2).map(tuple),
 )
 
+FACTS = dataclass_of(
+    TestFacts,
+    theta0_over_alpha=st.none() | NUMBERS,
+    r=st.dictionaries(st.sampled_from(["EAV", "CRT"]), NUMBERS, max_size=2),
+    operator=WORDS,
+    notes=st.lists(WORDS, max_size=2).map(tuple),
+)
+ACCOUNTS = st.builds(RunAccount, verdict=st.sampled_from(TestVerdict), facts=FACTS)
+KEPT = st.builds(KeptAnalysis, account=ACCOUNTS, summary=SUMMARIES)
+
 
 def digits(summary: TestSummary) -> str:
     """Every number of a summary as Python writes it: equal only where all bits are."""
@@ -115,13 +127,15 @@ def mark_of(run: Path, **options: Any) -> AnalysisMark:
     return AnalysisMark.of(run, AnalysisOptions(**options))
 
 
-@given(summary=SUMMARIES)
+@given(kept=KEPT)
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_any_summary_comes_back_to_the_last_digit(tmp_path: Path, summary: TestSummary) -> None:
+def test_any_analysis_comes_back_to_the_last_digit(tmp_path: Path, kept: KeptAnalysis) -> None:
     run = tmp_path / "run.h5"
     run.write_bytes(b"a run")
-    keep_summary(run, mark_of(run), summary)
-    assert digits(kept_summary(run, mark_of(run))) == digits(summary)
+    keep_analysis(run, mark_of(run), kept)
+    again = kept_analysis(run, mark_of(run))
+    assert digits(again.summary) == digits(kept.summary)
+    assert repr(again.account) == repr(kept.account)
 
 
 def test_a_kept_analysis_is_taken_and_is_the_fresh_one(run: Path) -> None:
@@ -132,18 +146,30 @@ def test_a_kept_analysis_is_taken_and_is_the_fresh_one(run: Path) -> None:
     assert digits(kept.tests[0]) == digits(fresh.tests[0])
 
 
-@given(summary=SUMMARIES, content=st.binary(min_size=1, max_size=64), data=st.data())
+def test_a_run_whose_analysis_is_kept_is_not_opened(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = collect(run.parent, workers=1, anew=True)
+
+    def never(path: Path) -> None:
+        raise AssertionError(f"{path} was opened")
+
+    monkeypatch.setattr("daq_app.campaign.summaries.of_run.open_run", never)
+    kept = collect(run.parent, workers=1)
+    assert repr(kept.recorded) == repr(opened.recorded)
+    assert digits(kept.tests[0]) == digits(opened.tests[0])
+
+
+@given(kept=KEPT, content=st.binary(min_size=1, max_size=64), data=st.data())
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=20)
 def test_a_run_of_which_one_byte_differs_has_nothing_kept(
-    tmp_path: Path, summary: TestSummary, content: bytes, data: st.DataObject
+    tmp_path: Path, kept: KeptAnalysis, content: bytes, data: st.DataObject
 ) -> None:
     run = tmp_path / "run.h5"
     run.write_bytes(content)
-    keep_summary(run, mark_of(run), summary)
+    keep_analysis(run, mark_of(run), kept)
     place = data.draw(st.integers(0, len(content) - 1))
     run.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
     with pytest.raises(NotKept, match="another one than was analysed"):
-        kept_summary(run, mark_of(run))
+        kept_analysis(run, mark_of(run))
 
 
 @pytest.mark.parametrize(
@@ -181,7 +207,7 @@ def test_a_mark_that_differs_in_one_digit_is_refused(run: Path, key: str, place:
     old = getattr(mark, key)
     other = old[:place] + ("0" if old[place] != "0" else "1") + old[place + 1 :]
     with pytest.raises(NotKept):
-        kept_summary(run, dataclasses.replace(mark, **{key: other}))
+        kept_analysis(run, dataclasses.replace(mark, **{key: other}))
 
 
 @pytest.mark.parametrize(
@@ -190,7 +216,7 @@ def test_a_mark_that_differs_in_one_digit_is_refused(run: Path, key: str, place:
 )
 def test_every_option_is_in_the_mark(run: Path, change: dict[str, Any]) -> None:
     with pytest.raises(NotKept, match="other options"):
-        kept_summary(run, mark_of(run, **change))
+        kept_analysis(run, mark_of(run, **change))
 
 
 def test_a_change_of_any_module_of_the_analysis_gives_another_mark(tmp_path: Path) -> None:
@@ -234,7 +260,7 @@ def test_taking_a_kept_analysis_loads_no_scipy(run: Path, repository: Path) -> N
         "print(collect(Path(sys.argv[1]), workers=1).origin)\n"
         "print('scipy.optimize' in sys.modules or 'scipy.signal' in sys.modules)\n"
     )
-    # With one worker the runs are read in a process of its own: what it takes, it must find kept.
+    # Kept analyses are taken by the process that asks for them.
     done = subprocess.run(
         [sys.executable, "-c", code, str(run.parent)],
         cwd=repository,

@@ -15,7 +15,7 @@ from daq_app.campaign.result.report import write_result
 from daq_app.campaign.result.words import repetition_rows, verdict_sentence
 from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.campaign.summaries.mark import AnalysisMark
-from daq_app.campaign.summaries.store import NotKept, kept_summary
+from daq_app.campaign.summaries.store import NotKept, kept_analysis
 from daq_app.campaign.summaries.summary import MethodResult, TestSummary, judged
 from daq_app.rocking import free_rocking
 from daq_app.rocking.analysis.options import AnalysisOptions
@@ -142,7 +142,7 @@ def test_a_damaged_summary_is_made_anew(tmp_path: Path, damage: bytes) -> None:
     run.write_bytes(b"abc")
     run.with_suffix(".result.json").write_bytes(damage)
     with pytest.raises(NotKept):
-        kept_summary(run, AnalysisMark.of(run, AnalysisOptions()))
+        kept_analysis(run, AnalysisMark.of(run, AnalysisOptions()))
 
 
 def test_the_verdict_that_holds_now_counts() -> None:

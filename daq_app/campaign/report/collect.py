@@ -1,16 +1,30 @@
-"""Analyses every run of a campaign folder on all cores and gathers what the report needs."""
+"""Analyses every run of a campaign folder on all cores and gathers what the report needs.
+
+What is kept beside a run is taken by threads of this process: nearly all of it is hashing, which needs no
+process of its own.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from daq_app.campaign.recorded import orphans, verdicts_of
 from daq_app.campaign.status import RecordedTest
-from daq_app.campaign.summaries.of_run import Answer, Failure, failure_of_journal, read_and_summarise
+from daq_app.campaign.summaries.of_run import (
+    Answer,
+    Failure,
+    failure_of_journal,
+    kept_answer,
+    read_and_summarise,
+)
+from daq_app.campaign.summaries.store import NotKept
 from daq_app.campaign.summaries.summary import TestSummary
+from daq_app.campaign.verdicts import OperatorVerdict
 from daq_app.rocking.analysis.options import AnalysisOptions
 from daq_app.runfile.folder import find_runs
 from daq_app.workers import Workers, run_all
@@ -59,16 +73,22 @@ def collect(
     stopped.
     """
     verdicts = verdicts_of(folder)
-    runs = find_runs(folder)
-    work = partial(
-        read_and_summarise, verdicts=verdicts, options=options or AnalysisOptions(), use_kept=not anew
-    )
+    runs, options = find_runs(folder), options or AnalysisOptions()
+    found: dict[Path, Answer] = {}
 
     def done(number: int, path: Path) -> None:
         if progress:
             progress(number, len(runs), path.stem)
 
-    answers = run_all(work, runs, workers, done)
+    # Other machines know for themselves whether what is kept is theirs: their processors may differ.
+    if not anew and not isinstance(workers, str):
+        take = partial(_kept_or_none, verdicts=verdicts, options=options)
+        found = _kept(runs, take, workers, done)
+    work = partial(read_and_summarise, verdicts=verdicts, options=options, use_kept=not anew)
+    left, taken = [path for path in runs if path not in found], len(found)
+    made = run_all(work, left, workers, lambda number, path: done(taken + number, path))
+    found.update(zip(left, made, strict=True))
+    answers = [found[path] for path in runs]
     loose = [Answer(test, failure_of_journal(test)) for test in orphans(folder, verdicts)]
     known = [(one.test, one.made) for one in [*answers, *loose] if one.test is not None]
     reasons = dict.fromkeys(one.anew for one in answers if one.anew)
@@ -82,3 +102,27 @@ def collect(
             for reason in reasons
         },
     )
+
+
+def _kept(
+    runs: Sequence[Path],
+    take: Callable[[Path], Answer | None],
+    threads: int | None,
+    done: Callable[[int, Path], None],
+) -> dict[Path, Answer]:
+    found: dict[Path, Answer] = {}
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        for path, answer in zip(runs, pool.map(take, runs), strict=True):
+            if answer is not None:
+                found[path] = answer
+                done(len(found), path)
+    return found
+
+
+def _kept_or_none(
+    path: Path, verdicts: Mapping[str, OperatorVerdict], options: AnalysisOptions
+) -> Answer | None:
+    try:
+        return kept_answer(path, verdicts, options)
+    except NotKept:
+        return None

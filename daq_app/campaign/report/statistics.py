@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its `special` is loaded with the first use: what draws needs none of it
 from numpy.typing import NDArray
-from scipy import special
 
 Floats = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ def random_effects_mean(values: Sequence[float], standard_errors: Sequence[float
     mean = float(weights @ y / weights.sum())
     spread = float(weights @ (y - mean) ** 2 / (y.size - 1))
     error = math.sqrt(max(spread, 1.0) / float(weights.sum()))
-    reach = float(special.stdtrit(y.size - 1, 0.975)) * error
+    reach = float(scipy.special.stdtrit(y.size - 1, 0.975)) * error
     return GroupMean(mean, error, mean - reach, mean + reach, scatter, int(y.size))
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from scipy.special import stdtrit
+import scipy  # its `special` is loaded with the first use: what draws needs none of it
 
 from daq_app.campaign.report.statistics import GroupMean, random_effects_mean
 from daq_app.campaign.status import CampaignStatus
@@ -77,7 +77,7 @@ class RepetitionRow:
     def change_interval95(self) -> tuple[float, float]:
         """Student's t with as many degrees of freedom as the scatter is known with."""
         freedom = max(self.first.tests + self.repeated.tests - 2, 1)
-        reach = float(stdtrit(freedom, 0.975)) * self.change_standard_error
+        reach = float(scipy.special.stdtrit(freedom, 0.975)) * self.change_standard_error
         return self.change - reach, self.change + reach
 
 

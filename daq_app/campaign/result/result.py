@@ -15,7 +15,7 @@ from daq_app.campaign.names import TestName
 from daq_app.campaign.recorded import read_recorded
 from daq_app.campaign.status import NO_FACTS, RecordedTest, TestFacts, TestVerdict
 from daq_app.campaign.summaries.mark import AnalysisMark
-from daq_app.campaign.summaries.store import SUFFIX, NotKept, kept_summary
+from daq_app.campaign.summaries.store import SUFFIX, NotKept, kept_analysis
 from daq_app.campaign.summaries.summary import TestSummary, judged
 from daq_app.config import ConfigError
 from daq_app.extras import missing_extra
@@ -95,7 +95,7 @@ def load_result(run: Path) -> Result | None:
 
 def _kept(run: Path) -> TestSummary | None:
     try:
-        return kept_summary(run, AnalysisMark.of(run, AnalysisOptions()))
+        return kept_analysis(run, AnalysisMark.of(run, AnalysisOptions())).summary
     except (NotKept, OSError):
         return None
 

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from daq_app.campaign.recorded import test_of, unreadable
+from daq_app.campaign.recorded import account_of, test_by, test_of, unreadable
 from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.campaign.summaries.mark import AnalysisMark
-from daq_app.campaign.summaries.store import NotKept, keep_summary, kept_summary
+from daq_app.campaign.summaries.store import KeptAnalysis, NotKept, keep_analysis, kept_analysis
 from daq_app.campaign.summaries.summary import MethodResult, TestSummary, judged
 from daq_app.campaign.verdicts import OperatorVerdict
 from daq_app.config import Rig
@@ -57,55 +57,68 @@ class Answer:
 def read_and_summarise(
     path: Path, verdicts: Mapping[str, OperatorVerdict], options: AnalysisOptions, *, use_kept: bool = True
 ) -> Answer:
-    """Judge and analyse one run file, opened once."""
+    """The analysis kept beside a run where that holds; else the run, opened once, judged and analysed."""
+    reason = "as asked for"
+    if use_kept:
+        try:
+            return kept_answer(path, verdicts, options)
+        except NotKept as error:
+            reason = str(error)
     try:
         with open_run(path) as run:
             test = test_of(run, verdicts)
             if test is None or test.verdict is TestVerdict.LOST:
                 return Answer(test)
-            return summarise_run(test, run, options, use_kept=use_kept)
+            made = _analysed_and_kept(test, run, options)
+            return Answer(test, made, reason)
     except RunFileError as error:
         return Answer(unreadable(path, error))
 
 
+def kept_answer(path: Path, verdicts: Mapping[str, OperatorVerdict], options: AnalysisOptions) -> Answer:
+    """The test of a run by the analysis kept beside it. Raises `NotKept`.
+
+    The run is not opened: it is, to the last byte, the one that was opened when it was analysed.
+    """
+    try:
+        kept = kept_analysis(path, AnalysisMark.of(path, options))
+    except OSError as error:
+        raise NotKept(f"it cannot be read ({error.strerror or error})") from None
+    test = test_by(kept.account, path, verdicts)
+    if test is None or test.verdict is TestVerdict.LOST:
+        return Answer(test)
+    return Answer(test, judged(kept.summary, test))
+
+
 def summarise_file(test: RecordedTest, options: AnalysisOptions) -> TestSummary | Failure:
-    """The summary of a recorded test. Whatever is wrong with it comes back as a `Failure`, in words."""
+    """The summary of a recorded test, kept or new; whatever is wrong comes back as a `Failure`, in words."""
     assert test.path is not None
     if test.path.suffix != RUN_SUFFIX:
         return failure_of_journal(test) or _failure(test, "a lost test")
+    with contextlib.suppress(NotKept, OSError):
+        return judged(kept_analysis(test.path, AnalysisMark.of(test.path, options)).summary, test)
     try:
         with open_run(test.path) as run:
-            made = summarise_run(test, run, options).made
+            return _analysed_and_kept(test, run, options)
     except RunFileError as error:
         return _failure(test, str(error))
-    assert made is not None
-    return made
 
 
-def summarise_run(test: RecordedTest, run: Run, options: AnalysisOptions, *, use_kept: bool = True) -> Answer:
-    """The summary of an opened run: the one kept beside it where that holds, else a new one, which is kept.
-
-    Only analyses with the usual options are kept: they are what the window shows.
-    """
+def _analysed_and_kept(test: RecordedTest, run: Run, options: AnalysisOptions) -> TestSummary | Failure:
+    """A new summary of an opened run. Only analyses with the usual options, as the window shows, are kept."""
     try:
         mark = AnalysisMark.of(run.path, options)
     except OSError as error:
-        return Answer(test, _failure(test, str(error)))
-    reason = "as asked for"
-    if use_kept:
-        try:
-            return Answer(test, judged(kept_summary(run.path, mark), test))
-        except NotKept as error:
-            reason = str(error)
+        return _failure(test, str(error))
     made = _analysed(test, run, options)
     if isinstance(made, Failure):
-        return Answer(test, made, reason)
+        return made
     if options == AnalysisOptions():
         with contextlib.suppress(OSError):  # a folder that cannot be written into holds runs all the same
             # The file may have become another one while it was read.
             if AnalysisMark.of(run.path, options) == mark:
-                keep_summary(run.path, mark, made)
-    return Answer(test, judged(made, test), reason)
+                keep_analysis(run.path, mark, KeptAnalysis(account_of(run), made))
+    return judged(made, test)
 
 
 def _analysed(test: RecordedTest, run: Run, options: AnalysisOptions) -> TestSummary | Failure:

@@ -1,16 +1,21 @@
-"""The summary of an analysis, beside its run as ``RUN.result.json``: read back to the last digit."""
+"""The summary of an analysis, beside its run as ``RUN.result.json``: read back to the last digit.
+
+With it stands what the run says of its test, so that a run whose mark is the same need not be opened.
+"""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from daq_app.campaign.recorded import RunAccount
+from daq_app.campaign.status import TestFacts, TestVerdict
 from daq_app.campaign.summaries.mark import AnalysisMark
 from daq_app.campaign.summaries.summary import MethodResult, TestSummary
 from daq_app.rocking.families.verdict import FamilyView, RVerdict
@@ -18,7 +23,7 @@ from daq_app.runfile.durable import write_whole
 from daq_app.runfile.folder import find_runs
 
 SUFFIX: Final = ".result.json"
-_FORMAT: Final = 3
+_FORMAT: Final = 4
 _ARRAYS: Final = ("time_s", "rotation_rad", "velocity_rad_s")
 
 
@@ -26,14 +31,22 @@ class NotKept(Exception):
     """No kept analysis stands for a fresh one: why, in words."""
 
 
-def keep_summary(run: Path, mark: AnalysisMark, summary: TestSummary) -> Path:
-    """Write the summary beside its run. Raises `OSError`."""
-    document = {"format": _FORMAT, "mark": asdict(mark), "summary": _encoded(summary)}
+@dataclass(frozen=True, slots=True)
+class KeptAnalysis:
+    """What stands beside a run: its own account of its test, and the summary of its analysis."""
+
+    account: RunAccount
+    summary: TestSummary
+
+
+def keep_analysis(run: Path, mark: AnalysisMark, kept: KeptAnalysis) -> Path:
+    """Write the analysis beside its run. Raises `OSError`."""
+    document = {"format": _FORMAT, "mark": asdict(mark), **_encoded(kept)}
     return write_whole(run.with_suffix(SUFFIX), json.dumps(document, allow_nan=False))
 
 
-def kept_summary(run: Path, mark: AnalysisMark) -> TestSummary:
-    """The summary kept beside a run, if it has just this mark. Raises `NotKept`."""
+def kept_analysis(run: Path, mark: AnalysisMark) -> KeptAnalysis:
+    """The analysis kept beside a run, if it has just this mark. Raises `NotKept`."""
     try:
         document = json.loads(run.with_suffix(SUFFIX).read_text(encoding="utf-8"))
         if document["format"] != _FORMAT:
@@ -41,10 +54,10 @@ def kept_summary(run: Path, mark: AnalysisMark) -> TestSummary:
         difference = mark.difference(AnalysisMark(**document["mark"]))
         if difference:
             raise NotKept(difference)
-        return _summary(document["summary"])
+        return KeptAnalysis(_account(document["account"]), _summary(document["summary"]))
     except OSError:
         raise NotKept("no analysis is kept beside it") from None
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, AttributeError):
         raise NotKept("the analysis kept beside it cannot be read") from None
 
 
@@ -66,6 +79,19 @@ def _encoded(value: object) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     return value
+
+
+def _account(content: dict[str, Any]) -> RunAccount:
+    facts = content["facts"]
+    told = TestFacts(
+        **{
+            **facts,
+            **_floats(TestFacts, facts),
+            "r": {name: float(r) for name, r in facts["r"].items()},
+            "notes": tuple(facts["notes"]),
+        }
+    )
+    return RunAccount(**{**content, "verdict": TestVerdict(content["verdict"]), "facts": told})
 
 
 def _summary(content: dict[str, Any]) -> TestSummary:

@@ -87,9 +87,9 @@ def _warm_up(folder: Path, *, anew: bool) -> None:
     """Workers begin to import what they need; the program itself too, which each would import anew."""
     from daq_app.campaign.summaries.store import some_have_none
 
-    drawing = ("daq_app.campaign.report.captioned", "daq_app.campaign.report.pdf")
+    drawing = (f"daq_app.campaign.report.{module}" for module in ("captioned", "pdf", "write"))
     analysis = ("daq_app.rocking.analysis.analyse",) if anew or some_have_none(folder) else ()
-    warm_up("daq_app.campaign.report.collect", *analysis, *drawing, "daq_app.cli.app")
+    warm_up(*analysis, *drawing, "daq_app.cli.app")
 
 
 def _known(value: float) -> float | None:
