@@ -5,10 +5,12 @@ from __future__ import annotations
 from itertools import pairwise
 from pathlib import Path
 
+import numba as nb
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from scipy.stats import kstest
 
 from daq_app.config import load_rig
@@ -42,10 +44,24 @@ def terminals(rig: Rig) -> tuple[str, ...]:
     return tuple(channel.physical_channel for channel in rig.channels)
 
 
+@nb.njit
+def deviates(key: np.uint64, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A kernel: Python cannot call its part."""
+    values = np.empty(times.size)
+    for n in range(times.size):
+        values[n] = deviate(key, times[n])
+    return values
+
+
+def test_a_part_of_a_kernel_refuses_python_in_words() -> None:
+    with pytest.raises(TypeError, match="deviate is a part of kernels"):
+        deviate(key_of(1, "LV-A01"), 0.0)
+
+
 def test_deviates_are_normal_white_and_independent() -> None:
     n = 40_000
     times = np.arange(n) / RATE
-    a, b = (np.array([deviate(key_of(1, name), t) for t in times]) for name in ("LV-A01", "LV-A02"))
+    a, b = (deviates(key_of(1, name), times) for name in ("LV-A01", "LV-A02"))
     assert kstest(a, "norm").pvalue > 0.01
     assert a.std() == pytest.approx(1.0, abs=0.015)
     assert np.abs(a).max() > 3.5
