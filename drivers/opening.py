@@ -6,11 +6,11 @@ from collections.abc import Callable
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING
 
-from drivers.ledger import TaskLedger
+from drivers.ni.ledger import TaskLedger
 from drivers.protocol import DeviceInfo
 
 if TYPE_CHECKING:
-    from drivers.nidaqmx_driver import NidaqmxDriver
+    from drivers.ni.nidaqmx_driver import NidaqmxDriver
 
 
 def open_driver(
@@ -30,7 +30,7 @@ def open_driver(
     Raises `DriverError` for a connection that is none. Nothing is reserved before `open`.
     """
     # Imported here: nidaqmx takes a second to load, and replay needs none of it.
-    from drivers.nidaqmx_driver import NidaqmxDriver
+    from drivers.ni.nidaqmx_driver import NidaqmxDriver
 
     kept = TaskLedger(ledger) if ledger is not None else None
     return NidaqmxDriver(

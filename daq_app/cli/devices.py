@@ -11,7 +11,7 @@ from daq_app.config.hardware.max_file import ListedDevice, listed_in_export
 def devices_at(connection: str) -> list[ListedDevice]:
     """The devices that NI-DAQmx finds at a connection. Raises `DriverError`."""
     _require(connection)
-    from drivers.devices import list_devices
+    from drivers.ni.devices import list_devices
 
     return list_devices(connection)
 
@@ -19,7 +19,7 @@ def devices_at(connection: str) -> list[ListedDevice]:
 def product_at(connection: str, device: str) -> dict[str, Any]:
     """The table of a product file that a device's attributes make. Raises `DriverError`."""
     _require(connection)
-    from drivers.product_copy import describe_product
+    from drivers.ni.product_copy import describe_product
 
     return describe_product(connection, device)
 
@@ -27,14 +27,14 @@ def product_at(connection: str, device: str) -> dict[str, Any]:
 def reserve_at(connection: str, chassis: str, *, override: bool) -> None:
     """Reserve a network chassis for the computer of NI-DAQmx. Raises `DriverError`."""
     _require(connection)
-    from drivers.devices import reserve_chassis
+    from drivers.ni.devices import reserve_chassis
 
     reserve_chassis(connection, chassis, override=override)
 
 
 def _require(connection: str) -> None:
     """NI-DAQmx must be there before its client is loaded, which takes a second."""
-    from drivers.local_library import require_ni_daqmx
+    from drivers.ni.local_library import require_ni_daqmx
 
     if connection == "local":
         require_ni_daqmx()

@@ -1,7 +1,7 @@
 """``python -m docs.tools.make_screenshots``: the pictures of the operator's manual, from simulated FR1 tests.
 
 Everything is real but the wall: the acquisition process, the NI-DAQmx client, the simulated device
-server, the window. Pictures go to docs/images/window, each at 1366×768 (dark) and 1920×1080 (light).
+server, the window. Pictures go to docs/images/window: dark/ at 1366×768, light/ at 1920×1080.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ FAULTS = (
 
 def save(widget: QWidget, path: Path) -> None:
     """Write the picture of a widget, and say so."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     widget.grab().save(str(path))
     print(path.name, flush=True)
 
@@ -97,7 +98,7 @@ class Studio:
             self.until(self.is_live)  # a slow machine must not make the picture
             self.window._on_slow()
             self.app.processEvents()  # lays out what has just changed
-            path = self.folder / f"{name}-{theme}-{width}x{height}.png"
+            path = self.folder / theme / f"{name}-{width}x{height}.png"
             save(self.window, path)
 
     def order(self, name: str) -> None:
@@ -252,7 +253,7 @@ def shoot_channel(studio: Studio, name: str) -> None:
     (channel,) = studio.window.channels.shown
     studio.live_for(3.0)
     theme = studio.window.settings.theme
-    save(channel, studio.folder / f"channel-{theme}-{channel.width()}x{channel.height()}.png")
+    save(channel, studio.folder / theme / f"channel-{channel.width()}x{channel.height()}.png")
 
 
 if __name__ == "__main__":

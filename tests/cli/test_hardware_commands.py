@@ -23,7 +23,7 @@ from daq_app.config.hardware.max_file import ListedDevice, listed_in_export
 from daq_app.config.hardware.product_files import product_set
 from daq_app.config.loader import load_rig
 from daq_app.config.rig import Hardware
-from drivers.product_copy import describe_product
+from drivers.ni.product_copy import describe_product
 from sim_hardware.control import SimControl
 from sim_hardware.daqmx_server.program import build_bench, parser
 from sim_hardware.daqmx_server.services.server import DaqmxServer

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drivers import ClockReading
-from drivers.clock_line import ClockLine
+from drivers.ni.clock_line import ClockLine
 
 RATE_HZ = 4000.0
 

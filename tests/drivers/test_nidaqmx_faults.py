@@ -14,7 +14,7 @@ from nidaqmx.errors import RpcError
 from daq_app.config import PlannedChannel
 from daq_app.config.planning.plan import PlannedTask, TaskPlan
 from drivers import Driver, DriverError, open_driver
-from drivers.error_advice import BY_CODE, BY_GRPC_STATUS, advice_for, translate
+from drivers.ni.error_advice import BY_CODE, BY_GRPC_STATUS, advice_for, translate
 from tests.support.driver_reads import assert_true_samples, lost, read_through, started
 
 Laboratories = Callable[..., Any]

@@ -7,7 +7,7 @@ import pytest
 from google.protobuf.message import DecodeError
 from nidaqmx._stubs.nidaqmx_pb2 import ReadAnalogF64Response
 
-from drivers.replies import SamplesReply, in_place
+from drivers.ni.replies import SamplesReply, in_place
 
 VALUES = np.array([1.5, -2.0, np.nan, 4.0e-300])
 read = in_place(ReadAnalogF64Response.FromString)

@@ -12,7 +12,7 @@ import pytest
 from nidaqmx import errors as ni_errors
 
 from drivers import Driver, DriverError, open_driver
-from drivers.stream import TaskStream
+from drivers.ni.stream import TaskStream
 from tests.support.recorder.relay import Relay
 
 SLOW_S = 0.4

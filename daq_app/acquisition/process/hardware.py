@@ -15,7 +15,7 @@ from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.config.rig import Rig
 from daq_app.runfile import RunFileError, open_run
 from drivers import Driver, DriverError, ReplayDriver, open_driver
-from drivers.local_library import require_ni_daqmx
+from drivers.ni.local_library import require_ni_daqmx
 
 _REPLAY = "replay:"
 

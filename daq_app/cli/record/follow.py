@@ -21,7 +21,7 @@ from daq_app.cli.terminal import Console
 from daq_app.config import parse_rig
 from daq_app.guarded import program
 from drivers import DriverError
-from drivers.local_library import require_ni_daqmx
+from drivers.ni.local_library import require_ni_daqmx
 
 _QUIET_S = 0.25
 

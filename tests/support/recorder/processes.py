@@ -22,7 +22,7 @@ def quick_context() -> ForkServerContext | SpawnContext:
         [
             "daq_app.acquisition.process.process",
             "daq_app.acquisition.session.session",
-            "drivers.nidaqmx_driver",
+            "drivers.ni.nidaqmx_driver",
         ]
     )
     return context

@@ -33,7 +33,7 @@ from nidaqmx.constants import (
 from daq_app.config.planning.plan import PlannedTask
 from daq_app.config.rig import Channel
 from daq_app.config.units import G_M_S2
-from drivers.connection import Connection
+from drivers.ni.connection import Connection
 
 NOT_WHILE_LOGGING: Final = -201300
 """NI-DAQmx's code for an attribute that excludes its own logging (ATTRIBUTE_NOT_SUPPORTED_WHEN_LOGGING in

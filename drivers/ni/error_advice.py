@@ -12,7 +12,7 @@ from typing import Final
 
 from nidaqmx import errors as ni_errors
 
-from drivers.local_library import not_installed
+from drivers.ni.local_library import not_installed
 from drivers.protocol import Block, DriverError
 
 

@@ -12,8 +12,8 @@ from nidaqmx.stream_readers import AnalogMultiChannelReader
 from numpy.typing import NDArray
 
 from daq_app.config.planning.plan import PlannedTask
+from drivers.ni.tasks import NOT_WHILE_LOGGING, virtual_name
 from drivers.protocol import DriverError
-from drivers.tasks import NOT_WHILE_LOGGING, virtual_name
 
 _NO_SEEKING: Final = (NOT_WHILE_LOGGING, -200557)
 """Codes of a driver that does not let a running task be read from another place: NI's help on the property

@@ -10,7 +10,7 @@ import nidaqmx
 from nidaqmx import errors as ni_errors
 from nidaqmx.constants import ExcitationSource, ResistanceConfiguration
 
-from drivers.connection import Connection
+from drivers.ni.connection import Connection
 
 _DEFAULT_BITS: Final = 16
 _EXCITATION_V: Final = 2.5

@@ -11,8 +11,8 @@ from nidaqmx import errors as ni_errors
 from nidaqmx.system.physical_channel import PhysicalChannel
 
 from daq_app.config.planning.plan import PlannedTask, TaskPlan
+from drivers.ni.tasks import virtual_name
 from drivers.protocol import DataSheet
-from drivers.tasks import virtual_name
 
 
 def read_data_sheets(system: nidaqmx.system.System, plan: TaskPlan) -> dict[str, DataSheet]:

@@ -11,15 +11,15 @@ import numpy as np
 from nidaqmx import errors as ni_errors
 
 from daq_app.config.planning.plan import TaskPlan
-from drivers.clock_line import ClockLine
-from drivers.connection import Connection
-from drivers.data_sheets import read_data_sheets, read_timing_modes
-from drivers.devices import Inspection, check_devices
-from drivers.error_advice import has_ended, is_garbled, translate
-from drivers.ledger import TaskLedger
+from drivers.ni.clock_line import ClockLine
+from drivers.ni.connection import Connection
+from drivers.ni.data_sheets import read_data_sheets, read_timing_modes
+from drivers.ni.devices import Inspection, check_devices
+from drivers.ni.error_advice import has_ended, is_garbled, translate
+from drivers.ni.ledger import TaskLedger
+from drivers.ni.stream import TaskStream
+from drivers.ni.tasks import commit, create_task, log_to_tdms, read_ranges
 from drivers.protocol import Block, ClockReading, DataSheet, DeviceInfo, DriverError, Opened
-from drivers.stream import TaskStream
-from drivers.tasks import commit, create_task, log_to_tdms, read_ranges
 
 _HOUSEKEEPING_S = 0.08
 """Backlog and overloads are asked for this often: two round trips a task, at each read at the real rate

@@ -13,9 +13,9 @@ from nidaqmx import errors as ni_errors
 from nidaqmx.constants import BusType, ProductCategory, TerminalConfiguration
 
 from daq_app.config.hardware.product_files import product_set
-from drivers.connection import Connection
-from drivers.error_advice import translate
-from drivers.probe_task import Probe, probe
+from drivers.ni.connection import Connection
+from drivers.ni.error_advice import translate
+from drivers.ni.probe_task import Probe, probe
 from drivers.protocol import DriverError
 
 _BUSES: Final = {

@@ -9,8 +9,8 @@ from nidaqmx.constants import BusType, ProductCategory
 
 from daq_app.config.hardware.max_file import ListedDevice
 from daq_app.config.planning.plan import TaskPlan
-from drivers.connection import Connection
-from drivers.error_advice import translate
+from drivers.ni.connection import Connection
+from drivers.ni.error_advice import translate
 from drivers.protocol import DeviceInfo, DriverError
 
 Inspection = Callable[[tuple[DeviceInfo, ...]], list[str]]

@@ -19,8 +19,8 @@ import nidaqmx
 import nidaqmx.system
 from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
+from drivers.ni.replies import READ_CALL, in_place
 from drivers.protocol import DriverError
-from drivers.replies import READ_CALL, in_place
 
 _CHANNEL_OPTIONS = [
     # gRPC refuses messages above 4 MB unless told otherwise, and what a refused reply held is lost:
