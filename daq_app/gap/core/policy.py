@@ -51,6 +51,9 @@ class Policy:
     """Share of what is explained in the groups of features that a further cause improves, in nats, that it
     must explain itself: what does less takes up what the form of the others leaves there. What they explain
     in other groups does not count against it. Raising it loses weak causes beside strong ones."""
+    improved_nats: float = 0.5
+    """What a cause must add to the log likelihood of a group of features to improve it: half a nat is what
+    one more coefficient gains by chance. Raising it compares a cause with less."""
     unforeseen: float = 0.05
     """Probability that an answer is wrong although nothing says so: a further cause too weak to show, a form
     so near one of the library that it leaves nothing. Without it three answers of 62 development cases were

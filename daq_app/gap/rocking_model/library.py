@@ -9,6 +9,7 @@ from dataclasses import replace
 from daq_app.gap.core import Confusion, Effect, Indistinguishable, Library, Parameter
 from daq_app.gap.core.parameters import between, positive, signed
 from daq_app.gap.rocking_model.probes import departures, probes
+from daq_app.gap.rocking_model.tolerances import NEGLIGIBLE
 from sim_hardware.dynamics.effects import MOTION_EFFECTS
 from sim_hardware.dynamics.spec import EffectSpec
 from sim_hardware.dynamics.spec import Parameter as SpecParameter
@@ -103,8 +104,6 @@ _WEAKEST_SIGNED = {
 }
 """Where the design's ranges begin for strengths of either sign, which the simulator's do not say. A mass off
 centre begins where it turns gravity as a tilt of 0.2 mrad does, the slope of r at a tenth of its range."""
-NEGLIGIBLE = 0.5
-"""Share of the weakest strength of a range up to which it is what sound walls and sensors differ by."""
 
 
 def _smallest(spec: EffectSpec, parameter: SpecParameter) -> float:

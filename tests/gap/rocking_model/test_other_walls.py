@@ -14,9 +14,9 @@ from daq_app.gap.blind.world.campaign import draw_world
 from daq_app.gap.blind.world.effects.catalogue import Drawn
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.inspection.inspect_runs import conditions_found
 from daq_app.gap.rocking_model.records import load_run
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare
+from tests.support.gap.conditions import conditions_found
 
 
 def _runs(folder: Path, seed: int, **effects: dict[str, float]) -> list[RockingRun]:

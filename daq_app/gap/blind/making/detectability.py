@@ -21,7 +21,7 @@ from daq_app.gap.blind.world.course import Course
 from daq_app.gap.blind.world.effects.catalogue import Drawn
 from daq_app.gap.blind.world.events.motion import Followed
 from daq_app.gap.blind.world.sensors.chain import CALIBRATION_TOLERANCE, Place, quiet_signals
-from daq_app.gap.blind.world.sensors.faults import ELECTRONICS, Bench
+from daq_app.gap.blind.world.sensors.faults import Bench, through_electronics
 from daq_app.gap.blind.world.surroundings import Surroundings
 from daq_app.gap.blind.world.wall import Wall
 
@@ -151,10 +151,7 @@ def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatA
             continue  # pulses of impacts that take their time are not those of the plain twin
         bench = Bench(channel, scene, _RATE_HZ, place.campaign_s, place.largest_rad, rng)
         noise = noise_si[row] * rng.standard_normal(time_s.size)
-        signal = with_effect[row] + noise
-        for fault in alone.faults:
-            if fault.name in ELECTRONICS and channel.id in fault.targets:
-                signal = ELECTRONICS[fault.name](signal, fault.parameters, bench)
+        signal = through_electronics(with_effect[row] + noise, alone.faults, bench)
         total += _distance(signal - noise, without[row], noise_si[row])
     return total
 

@@ -103,10 +103,6 @@ class Covariance:
             inverse[self._rows] = np.sum(self._inverse**2, axis=0)
         return inverse
 
-    def solve(self, right: FloatArray) -> FloatArray:
-        """C⁻¹ X for X of shape (n,) or (n, m)."""
-        return self.back(self.whiten(right))
-
 
 def log_density(residual: FloatArray, covariance: Covariance) -> float:
     """ln N(r; 0, C) of a residual r, (n,)."""

@@ -24,8 +24,6 @@ REFITTED = 6
 LEADS = 2
 LEAD_SHARE = 0.5
 """A second cause is sought to the two best single ones, to the second of them if it explains half as much."""
-IMPROVED_NATS = 0.5
-"""What a cause must add to the log likelihood of a group of features for that group to be one it improves."""
 POLISHED = 3
 POLISH_REACH = 12.0
 """The best three hypotheses within 12 in log evidence are fitted to the end with exact Jacobians."""
@@ -214,7 +212,7 @@ class Hypotheses:
         if rest not in self.fits:
             return True
         whole, part, nothing = (self.fits[h].by_group for h in (hypothesis, rest, NULL))
-        improved = whole - part > IMPROVED_NATS
+        improved = whole - part > self.policy.improved_nats
         explained = float(np.maximum(whole - nothing, 0.0)[improved].sum())
         return self.evidence[hypothesis] - without[last] >= self.policy.further_share * explained
 

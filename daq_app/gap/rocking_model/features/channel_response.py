@@ -18,7 +18,7 @@ from daq_app.gap.rocking_model.features.oscillations.ring_response import (
 from daq_app.gap.rocking_model.features.response import responded
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.turns import turned, turns
-from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, TAIL_S, Wire
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, TAIL_S, Wire, straight_line
 from daq_app.gap.rocking_model.records import Sensor
 
 
@@ -98,8 +98,6 @@ def _form_of_one(run: RockingRun, wire: Wire, form: str) -> FloatArray:
 
     others = [w.sensor for w in run.wires if w.sensor.id != wire.sensor.id]
     heights = np.array([sensor.position_m[2] for sensor in others])
-    weights = np.array([1.0, wire.sensor.position_m[2]]) @ np.linalg.pinv(
-        np.column_stack([np.ones_like(heights), heights])
-    )
+    weights = np.array([1.0, wire.sensor.position_m[2]]) @ straight_line(heights)
     beyond = moved(wire.sensor) - float(weights @ np.array([moved(sensor) for sensor in others]))
     return np.asarray(beyond * wave)

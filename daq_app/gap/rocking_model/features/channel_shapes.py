@@ -16,7 +16,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.noise import coefficient_covariance
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Wire
-from daq_app.gap.rocking_model.tolerances import CALIBRATION
+from daq_app.gap.rocking_model.tolerances import CALIBRATION, REMAINS_SD, SOUND
 
 _SHAPES = ("gain", "lag", "curvature", "drift")
 _GAIN, _CURVATURE = _SHAPES.index("gain"), _SHAPES.index("curvature")
@@ -43,9 +43,6 @@ by the place's own ringing, which a hop of the wall carries beyond the mask. An 
 its family may be late by: a twelfth of it is in the time across every impact, to one side up and to the other
 down, and those times repeat to some hundredths of a millisecond. A wire is straight to 0.1 % of its travel of
 ± 0.45 m; its side is an anchor known to 5 mm."""
-_SOUND = 0.5
-"""Standard deviation of what a sound channel is off by, in those tolerances."""
-STRUCTURE_SD = 0.2
 RINGING: tuple[Family, ...] = ("accelerometer",)
 """Families whose channels differ in how they ring: what remains of one says nothing."""
 
@@ -156,7 +153,7 @@ def block_of(name: str, family: Family, beside: Others, usual: float, wire: Wire
     k = len(SHAPES[family])
     covariance = np.zeros((k + 1, k + 1))
     covariance[:k, :k] = misfit.covariance
-    covariance[k, k] = STRUCTURE_SD**2
+    covariance[k, k] = REMAINS_SD**2
     remains = 0.0 if family in RINGING else max(misfit.remains - usual, 0.0)
     return Block(
         name,
@@ -178,7 +175,7 @@ def block_of(name: str, family: Family, beside: Others, usual: float, wire: Wire
 
 def _levers(family: Family, beside: Others) -> tuple[float, ...]:
     """What a sound channel is off by from the others' prediction (sd), by shape."""
-    usual = _SOUND * beside.spread * np.array(TOLERANCE[family])
+    usual = SOUND * beside.spread * np.array(TOLERANCE[family])
     usual[_GAIN] = CALIBRATION * beside.spread
     usual[_CURVATURE] *= max(beside.curved / beside.spread, 1.0)
     return tuple(usual.tolist())

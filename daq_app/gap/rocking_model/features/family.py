@@ -16,13 +16,12 @@ from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Rotation
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
+from daq_app.gap.rocking_model.tolerances import SWAY_SHARE
 
 Predict = Callable[[RockingRun, Block, Mapping[str, float]], FloatArray]
 """Predicted coefficients, (k,), of a block of a run at the values of a hypothesis."""
 CROSSTALK_SHARE = "crosstalk"
 """Parameter of the share of the channel scanned before, which the families' blocks carry as `systematic`."""
-_SWAY_SHARE = 0.005
-"""Mean acceleration of the sway over that of gravity, up to which the held wall shows gravity alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +74,7 @@ class Scene:
         middle = float(np.median(grid.raw[before])) if before.any() else 0.0
         held = self.calm & (np.abs(grid.raw - middle) < 0.01 * abs(middle))
         mean_error = 3.0 * self.swings.hold_rate_sd / max(float(held.sum()) / GRID_HZ, 0.05)
-        still: NDArray[np.bool_] = held & (mean_error < _SWAY_SHARE * GRAVITY_M_S2 * abs(middle))
+        still: NDArray[np.bool_] = held & (mean_error < SWAY_SHARE * GRAVITY_M_S2 * abs(middle))
         return still
 
 

@@ -22,6 +22,7 @@ from daq_app.gap.rocking_model.motion.release_speed import release_speed
 from daq_app.gap.rocking_model.motion.rotation import (
     Rotation,
     sample_noise,
+    straight_line,
     wall_rotation,
     wires_of,
 )
@@ -166,7 +167,7 @@ def _wire_heights(run: GapRun) -> tuple[float, float, float, float]:
     z = np.array([run.sensors[i].position_m[2] for i in run.indices("wire")])
     if not z.size:
         return 1.0, 1.0, 0.0, 0.0
-    at_base = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
+    at_base = straight_line(z)[0]
     return (
         float(np.sum(z**2) / np.sum(z)),
         float(np.sum(z**3) / np.sum(z**2)),

@@ -13,6 +13,7 @@ from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.differences import unit_coefficients
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import turned_shape
+from daq_app.gap.rocking_model.motion.rotation import shown_by_wires
 
 _FORMS = {"corner_twist.on": False, "corner_twist.back": True}
 """Form of the turns → whether they change sign with the side."""
@@ -35,10 +36,7 @@ def turned(run: RockingRun, form: str) -> FloatArray:
 def turn_share(run: RockingRun, *, of_base: bool) -> float:
     """What a turn of 1 rad makes of the wires' mean rotation (weights z²), rad, or of the base, m."""
     y = np.array([wire.sensor.position_m[1] for wire in run.wires])
-    z = np.array([wire.sensor.position_m[2] for wire in run.wires])
-    if of_base:
-        return -float(np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0] @ y)
-    return -float(z @ y / (z @ z))
+    return -shown_by_wires(run.wires, y, of_base=of_base)
 
 
 def turned_coefficients(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:

@@ -32,14 +32,10 @@ from daq_app.gap.rocking_model.inspection.channel_families import (
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Wire
 from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.tolerances import AS_SINGLE, REMAINS, SUSPECT
 
-SUSPECT: dict[Family, float] = {"lvdt": 4.0, "wire": 2.0, "accelerometer": 3.0}
-"""Tolerances by which a channel must be off to be looked at on its own. Each wire is told from few others, so
-its tolerance is wide already."""
 CROWDED: tuple[Family, ...] = ("lvdt", "accelerometer")
 """Families in which several channels may be wrong and the others still say so."""
-STRUCTURE = 0.5
-"""Excess of the logarithm of what remains over noise from which a channel is suspect for it alone."""
 _POWERS = (1, 1, 2, 0, 1)
 """Power of its reading that each of a wire's shapes goes with. The wall's rotation θ adds height × f(θ) to
 every reading, and its base the same to all."""
@@ -51,11 +47,6 @@ LOOKED_AT = 6
 neighbours are predicted by more than they leave of its own fault."""
 SCREENED = 3
 """Runs that are looked at before all are."""
-
-
-EXAMINED = 2
-"""Channels of one family that are examined one by one (assumed). Raising it lets effects on single channels
-stand for what many of them have together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,13 +63,13 @@ class OutlierChannels:
     @property
     def single(self) -> dict[str, Family]:
         """Those whose faults effects may explain one by one, each with its family."""
-        few = {family: names for family, names in self.channels.items() if len(names) <= EXAMINED}
+        few = {family: names for family, names in self.channels.items() if len(names) <= AS_SINGLE}
         return {name: family for family, names in few.items() for name in names}
 
     @property
     def several(self) -> dict[Family, tuple[str, ...]]:
         """Those of families in which more disagree than can be examined one by one."""
-        return {family: names for family, names in self.channels.items() if len(names) > EXAMINED}
+        return {family: names for family, names in self.channels.items() if len(names) > AS_SINGLE}
 
     def plus(self, family: Family, name: str | None) -> OutlierChannels:
         """These with one more of a family."""
@@ -222,9 +213,7 @@ def _sizes(
             size = float(sizes.max())
             if family in RINGING:
                 usual = misfit.remains
-            rows.setdefault(name, []).append(
-                max(size, SUSPECT[family] * (misfit.remains - usual) / STRUCTURE)
-            )
+            rows.setdefault(name, []).append(max(size, SUSPECT[family] * (misfit.remains - usual) / REMAINS))
     return {name: float(np.median(values)) for name, values in rows.items()}
 
 

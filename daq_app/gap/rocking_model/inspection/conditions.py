@@ -26,28 +26,21 @@ from daq_app.gap.rocking_model.inspection.spikes import (
     shaken_samples,
 )
 from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.tolerances import (
+    FEWEST_STEPS,
+    FROZEN_S,
+    RANGE_MARGIN,
+    SMALLEST_STEP,
+    SPIKY_PER_S,
+    STANDS_OUT,
+    USUAL_HUM,
+)
 
 MAINS_HZ = 50.0
 _SLOW_S = 0.1
 """Means over which a record that is turned back by the mains frequency keeps 0.6 Hz to a per cent."""
 LOUD = 4.0
 """Size beyond that of noise and hum together from which a sample belongs to an impact …"""
-FEWEST_STEPS = 0.004
-"""Share of samples at which a quantised reading goes on by a step."""
-SMALLEST_STEP = 5e-4
-"""Smallest step that matters, as a share of the span of the reading."""
-USUAL_HUM = 0.45
-"""Amplitude of hum, over the rms of a sample's noise, up to which it is no fault."""
-FROZEN_S = 0.008
-"""Equal readings in a row for longer than this are no chance."""
-SPIKY_PER_S = 0.3
-"""Lone samples a second, on the mean of all runs, that no ordinary channel has (assumed: 0.2 at most)."""
-STANDS_OUT = 2.0
-"""Times what any other channel of its family has of a condition, 1, from which one stands for itself.
-
-Pick-up of sound channels differs by less (development laboratories); raising it hides one among many."""
-RANGE_MARGIN = 0.03
-"""Share of the range next to its end where a reading may stand still: the sensor is at its stop."""
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer")
 
 

@@ -20,9 +20,8 @@ from daq_app.gap.rocking_model.features.oscillations.rings import Ring, cleaner,
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
+from daq_app.gap.rocking_model.tolerances import BURST_SD, SHAKEN_POWER
 
-LOUD = 4.0
-"""Power over the usual one, averaged over a second, from which the floor shook: twice the amplitude."""
 WINDOW_S = 0.5
 """Half-cycles whose middles are this near count together …"""
 _ENOUGH = 60
@@ -33,8 +32,6 @@ the rotation's own second derivative is not known well enough."""
 _USUAL = 3.0
 """Power over the usual one up to which a half-cycle says what is usual."""
 _ROUNDS = 12
-_SHARE_SD = 0.1
-"""Relative error of the size of a burst."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,9 +75,9 @@ def floor_bursts(
         power = np.array([cycle.power(rings) for cycle in cycles])
         usual = floor + per_jump * np.array([cycle.jump for cycle in cycles]) ** 2
         excess, loud = _loudest(cycles, power, usual)
-        if loud > LOUD:
+        if loud > SHAKEN_POWER:
             size = float(np.sqrt(max(excess, 0.0)))
-            row.append(RunFinding("shaking@floor", "burst of shaking", "m/s²", size, _SHARE_SD * size))
+            row.append(RunFinding("shaking@floor", "burst of shaking", "m/s²", size, BURST_SD * size))
     return findings
 
 

@@ -33,9 +33,8 @@ from daq_app.gap.rocking_model.inspection.saturation import saturated
 from daq_app.gap.rocking_model.inspection.second_axis import second_axis
 from daq_app.gap.rocking_model.inspection.vertical import odd_vertical, vertical_block
 from daq_app.gap.rocking_model.inspection.wiring import mend
-from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.records import GapRun, Wiring
-from daq_app.gap.rocking_model.tolerances import COUNT_SD, LATE_S
+from daq_app.gap.rocking_model.tolerances import COUNT_SD, LATE_S, MIDDLE_OF_IMPACT_S
 
 _SPOILING = ("quantisation", "dropout", "saturation", "spikes")
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer", "tiltmeter")
@@ -312,8 +311,3 @@ def calibrations(runs: Sequence[RockingRun]) -> dict[str, dict[str, float]]:
         for b in run.blocks
         if b.kind == "channel"
     }
-
-
-def conditions_found(runs: Sequence[RockingRun]) -> dict[str, str]:
-    """Conditions of the electronics that are there in any run, with the family of their channels."""
-    return {finding.key: finding.family for run in runs for finding in run.findings if finding.value > 0.0}

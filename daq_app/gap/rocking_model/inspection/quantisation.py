@@ -17,7 +17,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined
-from daq_app.gap.rocking_model.motion.rotation import wall_rotation
+from daq_app.gap.rocking_model.motion.rotation import straight_line, wall_rotation
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.tolerances import CALIBRATION
 
@@ -81,8 +81,7 @@ def _weights(run: GapRun, family: str, chosen: Sequence[int]) -> dict[str, Float
     """What each block makes of the readings of a family, sample by sample: a weight for each channel."""
     x, y, z = np.array([run.sensors[i].position_m for i in chosen]).reshape(-1, 3).T
     if family == "wire":
-        at_base = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
-        return {"wire": z / (z @ z), "base": at_base}
+        return {"wire": z / (z @ z), "base": straight_line(z)[0]}
     lift, theta, twist = np.linalg.pinv(np.column_stack([np.ones_like(x), -x, -x * y]))
     return {"wire": -theta, "joint": lift, "twist": twist}
 

@@ -8,6 +8,7 @@ from scipy.ndimage import maximum_filter1d
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.tolerances import LOUD_NOISE, LOUD_TOGETHER, SPIKE_NOISE
 from daq_app.rocking.geometry.noise import white_noise
 
 Mask = NDArray[np.bool_]
@@ -15,14 +16,8 @@ _REST_S = 0.45
 """Rest at the end of a record from which noise is read, s."""
 AROUND_S = 0.03
 """Samples so near to a loud one belong to the same impact."""
-_SIZE = 9.0
-"""A sample this many noise sd off its neighbours is a spike."""
-_LOUD = 4.0
-"""A sample this many noise sd off its neighbours is loud."""
 _BEND_NOISE = 1.22
 """Rms, over that of white noise, of a sample's distance from the mean of its neighbours: √1.5."""
-_TOGETHER = 3
-"""Accelerometers that are loud together at an impact; spikes of single channels do not meet."""
 
 
 def reading_noise(run: GapRun, index: int) -> float:
@@ -37,7 +32,7 @@ def lone_samples_per_s(values: FloatArray, noise: float, rate_hz: float, where: 
     `values`: (n,); `noise`: rms of one sample; `where`: samples that count, (n,), all if left out.
     """
     bent = np.abs(_bend(values))
-    alone = (bent > _SIZE * _BEND_NOISE * noise) & (np.abs(values[2:] - values[:-2]) < 0.5 * bent)
+    alone = (bent > SPIKE_NOISE * _BEND_NOISE * noise) & (np.abs(values[2:] - values[:-2]) < 0.5 * bent)
     return float(np.sum(alone if where is None else alone & where[1:-1])) / values.size * rate_hz
 
 
@@ -50,11 +45,11 @@ def shaken_samples(run: GapRun) -> Mask | None:
     for index in run.indices("accelerometer"):
         bend = _bend(run.channels[index])
         if np.all(np.isfinite(bend)) and run.sensors[index].id not in run.excluded:
-            loud.append(np.pad(np.abs(bend) > _LOUD * _BEND_NOISE * reading_noise(run, index), 1))
-    if len(loud) < _TOGETHER:
+            loud.append(np.pad(np.abs(bend) > LOUD_NOISE * _BEND_NOISE * reading_noise(run, index), 1))
+    if len(loud) < LOUD_TOGETHER:
         return None
     width = 2 * round(AROUND_S * run.rate_hz) + 1
-    together = np.sum([maximum_filter1d(one, width) for one in loud], axis=0) >= _TOGETHER
+    together = np.sum([maximum_filter1d(one, width) for one in loud], axis=0) >= LOUD_TOGETHER
     return np.asarray(together, dtype=np.bool_)
 
 

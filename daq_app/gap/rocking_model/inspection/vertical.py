@@ -22,16 +22,12 @@ from daq_app.gap.rocking_model.features.channel_shapes import (
     usual_remains,
 )
 from daq_app.gap.rocking_model.inspection.channel_families import smoothed
-from daq_app.gap.rocking_model.inspection.channel_faults import SUSPECT
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rigid_body import across_axes, lever_arm
+from daq_app.gap.rocking_model.motion.rotation import straight_line
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
-from daq_app.gap.rocking_model.tolerances import CROSSTALK, MOUNT_RAD
-
-_SOUND_SHARE = 0.4
-"""Share of the worst one's size that the others may show: what the wall does differently (an edge that is not
-where the survey has it) is in all of them."""
+from daq_app.gap.rocking_model.tolerances import CROSSTALK, MOUNT_RAD, SUSPECT, VERTICAL_OTHERS
 
 
 def odd_vertical(runs: Sequence[GapRun], grids: Sequence[Grid], late_s: Sequence[float]) -> str | None:
@@ -53,7 +49,7 @@ def odd_vertical(runs: Sequence[GapRun], grids: Sequence[Grid], late_s: Sequence
         return None
     worst = max(usual, key=lambda name: usual[name])
     others = max(size for name, size in usual.items() if name != worst)
-    odd = usual[worst] > SUSPECT["accelerometer"] and others < _SOUND_SHARE * usual[worst]
+    odd = usual[worst] > SUSPECT["accelerometer"] and others < VERTICAL_OTHERS * usual[worst]
     return worst if odd else None
 
 
@@ -71,7 +67,7 @@ def _vertical(run: GapRun, grid: Grid, late_s: float) -> dict[str, Others]:
     if len(along_x) < 4 or not along_z or grid.impact_s.size < 2:
         return {}
     heights = np.array([run.sensors[i].position_m[2] for i in along_x])
-    weights = np.linalg.pinv(np.column_stack([np.ones(heights.size), heights]))[1]
+    weights = straight_line(heights)[1]
     signals = smoothed(run, along_x, late_s)
     turning = weights @ signals
     # Behind the last impact that can be told from its neighbours nobody knows on which edge the wall stands.

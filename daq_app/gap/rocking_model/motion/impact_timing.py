@@ -11,6 +11,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
+from daq_app.gap.rocking_model.tolerances import IMPACT_FORM_S
 
 MOST = 14
 """Impacts used: the first ones are the loudest."""
@@ -23,10 +24,6 @@ _SHARP_S = 8e-3
 """Half width of the misfit's dip up to which it is that of impacts, whatever their form."""
 _NEAR_S = 3e-3
 """How far from its lowest point the shape of a sharp dip is read."""
-MIDDLE_OF_IMPACT_S = 1.5e-3
-"""By how much the middle of an impact is later than the contact, at sensors that are not late at all."""
-MODEL_ERROR_S = 3e-4
-"""How well the shape of an impact is known at all."""
 
 
 def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
@@ -66,7 +63,7 @@ def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
     each = np.array([lowest(fine_delays, tables[:, k]) for k in range(tables.shape[1])])
     spread = 1.48 * float(np.median(np.abs(each - np.median(each))))
     form = dip.lopsided_s if dip.broad else 0.0
-    return shift, 1.57 * spread**2 / len(windows) + MODEL_ERROR_S**2 + form**2
+    return shift, 1.57 * spread**2 / len(windows) + IMPACT_FORM_S**2 + form**2
 
 
 def _windows(grid: Grid) -> NDArray[np.intp]:

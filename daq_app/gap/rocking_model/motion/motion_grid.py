@@ -14,6 +14,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.rotation import coarse
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import Survey
+from daq_app.gap.rocking_model.tolerances import AS_FROM_REST
 
 SMOOTH_HZ = 30.0
 POLYNOMIAL_DEGREE = 8
@@ -26,8 +27,6 @@ _END_OF_FALL_S = (0.1, 0.02)
 """Before an impact: where the speed of the fall is read."""
 _FALLS = 4
 """Falls that are compared: the first one and those after it."""
-_AS_FROM_A_PEAK = 0.01
-"""Relative difference of the first fall's speed beyond which it was no fall from rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +153,7 @@ def _speeds(
     later = shares[1:][np.isfinite(shares[1:])]
     share = float(shares[0] / np.median(later)) if later.size else np.nan
     approach = speeds[:-1].copy()
-    if abs(share - 1.0) > _AS_FROM_A_PEAK:
+    if abs(share - 1.0) > AS_FROM_REST:
         approach[0] *= share
     return approach, speeds[1:]
 

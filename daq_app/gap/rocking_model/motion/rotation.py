@@ -144,6 +144,12 @@ def reaches_its_range(values: FloatArray, limits: tuple[float, float]) -> bool:
     return bool(at_range_end(values, *limits).any())
 
 
+def straight_line(heights: FloatArray) -> FloatArray:
+    """Weights, (2, k), of readings at these heights, (k,), m: value at the foot and slope of their line."""
+    weights: FloatArray = np.linalg.pinv(np.column_stack([np.ones_like(heights), heights]))
+    return weights
+
+
 @dataclass(frozen=True, slots=True)
 class Wire:
     """One wire with its real geometry about the nominal edges."""
@@ -211,9 +217,14 @@ def _moved(wires: Sequence[Wire], theta: FloatArray, shortenings: Sequence[Float
     """Motion of the base, m, that wires shorter by `shortenings` show beyond `theta`."""
     z = np.array([wire.sensor.position_m[2] for wire in wires])
     moved = np.array([s - wire.shortening(theta) for wire, s in zip(wires, shortenings, strict=True)])
-    at_base = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
-    mean: FloatArray = np.tensordot(at_base, moved, 1)
+    mean: FloatArray = np.tensordot(straight_line(z)[0], moved, 1)
     return mean
+
+
+def shown_by_wires(wires: Sequence[Wire], moved: FloatArray, *, of_base: bool) -> float:
+    """What wires moved by so much, (w,), m, show of the base, m, or of the rotation (weights z²), rad."""
+    z = np.array([wire.sensor.position_m[2] for wire in wires])
+    return float(straight_line(z)[0] @ moved) if of_base else float(z @ moved / (z @ z))
 
 
 def wall_rotation(run: GapRun) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:

@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
-from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
-from daq_app.gap.rocking_model.motion.rotation import gridded
+from daq_app.gap.rocking_model.motion.rotation import gridded, straight_line
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
-from daq_app.gap.rocking_model.tolerances import ACCELEROMETER_SPREAD_M, DELAY_FORM, DELAY_WITHOUT_ONE, LATE_S
+from daq_app.gap.rocking_model.tolerances import (
+    ACCELEROMETER_SPREAD_M,
+    DELAY_FORM,
+    DELAY_WITHOUT_ONE,
+    LATE_S,
+    MIDDLE_OF_IMPACT_S,
+)
 
 _ROUNDS = 3
 
@@ -60,7 +65,7 @@ def _at_the_foot(run: GapRun, grid: Grid, rows: FloatArray, places: FloatArray) 
     z = places[:, 2]
     if z.size < 3 or np.ptp(z) < ACCELEROMETER_SPREAD_M:
         return None
-    weights = np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0]
+    weights = straight_line(z)[0]
     arm = float(weights @ places[:, 0]) - np.sign(grid.theta) * run.survey.half_base_m
     gravity = -GRAVITY_M_S2 * np.sin(grid.theta)
     difference = weights @ rows - (gravity - grid.omega**2 * arm)

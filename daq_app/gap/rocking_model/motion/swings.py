@@ -13,6 +13,7 @@ from scipy.signal import butter, sosfiltfilt
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.rotation import HOLD_S
+from daq_app.gap.rocking_model.tolerances import SMALLEST_RAD
 from sim_hardware.dynamics.parameters import REST_AMPLITUDE_RAD
 
 FRACTIONS = (0.85, 0.5, 0.15)
@@ -21,8 +22,6 @@ RELEASE_FRACTIONS = (0.99, 0.96, 0.85, 0.5, 0.15)
 """The same for the quarter-cycle after the release, which is watched closer at its start."""
 TOP_DEGREE = 4
 """Degree of the polynomial over the top of a half-cycle from which its peak is read."""
-SMALLEST_RAD = 2e-3
-"""Half-cycles with smaller peaks are not used."""
 MOST = 30
 _LAST = 9
 """Peaks from which the fall from one to the next is taken, where it no longer depends on the amplitude."""

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from daq_app.gap.rocking_model.findings import findings_of
-from daq_app.gap.rocking_model.inspection.inspect_runs import conditions_found, found_channels
+from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import diagnose_runs, model_and_library, prepare
+from tests.support.gap.conditions import conditions_found
 from tests.support.simulated_wall import simulate
 
 LEVEL = (-0.35,)

@@ -12,7 +12,7 @@ from daq_app.gap.rocking_model.features.coefficients import block_coefficients
 from daq_app.gap.rocking_model.features.oscillations.rings import ring_columns
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.findings import findings_of
-from daq_app.gap.rocking_model.inspection.inspect_runs import conditions_found, found_channels
+from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels
 from daq_app.gap.rocking_model.inspection.saturation import saturated
 from daq_app.gap.rocking_model.inspection.wiring import mend
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
@@ -22,6 +22,7 @@ from daq_app.gap.rocking_model.run_cache import RunCache
 from daq_app.gap.rocking_model.study import model_and_library, prepare
 from sim_hardware.dynamics import parameters as par
 from sim_hardware.sensors.scene import pivots
+from tests.support.gap.conditions import conditions_found
 from tests.support.gap.simulated_campaign import simulate as longer_held
 from tests.support.simulated_wall import simulate
 

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from daq_app.config import Scaling
 from daq_app.gap.blind.world.events.scene import Scene
 from daq_app.gap.blind.world.sensors.chain import Calibration, Place, clipped_readings, quiet_signals
-from daq_app.gap.blind.world.sensors.faults import ELECTRONICS, Bench, Fault
+from daq_app.gap.blind.world.sensors.faults import Bench, Fault, through_electronics
 from daq_app.gap.blind.world.sensors.installation import Installation, Sizes
 
 FloatArray = NDArray[np.float64]
@@ -54,9 +54,7 @@ def bench_readings(
         added += _spikes(sizes, samples.size, rate_hz, rng)
         signal += installation.noise_si[row] * added
         bench = Bench(channel, scene, rate_hz, place.campaign_s, place.largest_rad, rng)
-        for fault in faults:
-            if fault.name in ELECTRONICS and channel.id in fault.targets:
-                signal = ELECTRONICS[fault.name](signal, fault.parameters, bench)
+        signal = through_electronics(signal, faults, bench)
         rows[row] = np.clip(signal, *channel.range_si) + calibration.zero_si[row]
     volts = clipped_readings(rig, Scaling.of(rig.channels).to_readings(rows))
     steps = installation.step_v[:, None]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from daq_app.config import Rig, Scaling
 from daq_app.gap.blind.world.events.scene import Scene
-from daq_app.gap.blind.world.sensors.faults import ELECTRONICS, RESPONSES, Bench, Fault
+from daq_app.gap.blind.world.sensors.faults import RESPONSES, Bench, Fault, through_electronics
 from daq_app.gap.blind.world.sensors.instruments import ideal
 
 FloatArray = NDArray[np.float64]
@@ -100,9 +100,7 @@ def readings(
         walk = _ZERO_WALK * rng.standard_normal()
         signal += channel.noise_si * (noise + walk)
         bench = Bench(channel, scene, rate_hz, place.campaign_s, place.largest_rad, rng)
-        for fault in faults:
-            if fault.name in ELECTRONICS and channel.id in fault.targets:
-                signal = ELECTRONICS[fault.name](signal, fault.parameters, bench)
+        signal = through_electronics(signal, faults, bench)
         rows[row] = np.clip(signal, *channel.range_si) + calibration.zero_si[row]
     steps = np.array([ADC_STEP_V if c.measurement == "voltage" else 1e-7 for c in rig.channels])[:, None]
     return np.asarray(np.round(clipped_readings(rig, scaling.to_readings(rows)) / steps) * steps)

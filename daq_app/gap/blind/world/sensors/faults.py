@@ -7,7 +7,7 @@ the electronics make of signal and noise (`ELECTRONICS`). Polarity and swapped c
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -192,3 +192,11 @@ ELECTRONICS: dict[str, Apply] = {
     "quantisation": _quantisation,
     "spikes": _spikes,
 }
+
+
+def through_electronics(signal: FloatArray, faults: Iterable[Fault], bench: Bench) -> FloatArray:
+    """A signal with noise, (n,), after those faults of the second kind that its channel has."""
+    for fault in faults:
+        if fault.name in ELECTRONICS and bench.channel.id in fault.targets:
+            signal = ELECTRONICS[fault.name](signal, fault.parameters, bench)
+    return signal

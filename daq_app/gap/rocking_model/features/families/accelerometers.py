@@ -24,13 +24,13 @@ from daq_app.gap.rocking_model.features.family import (
 from daq_app.gap.rocking_model.features.response import delay
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
-from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
+from daq_app.gap.rocking_model.motion.impact_timing import acceleration_delay
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rigid_body import across_axes
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.motion.swing_timing import swing_delay
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, Survey
-from daq_app.gap.rocking_model.tolerances import CALIBRATION, MOUNT_RAD
+from daq_app.gap.rocking_model.tolerances import CALIBRATION, MIDDLE_OF_IMPACT_S, MOUNT_RAD
 
 _TURNED = "turned_accelerometers"
 """Parameter of the mean angle by which the accelerometers along x are turned on their mounts, rad."""

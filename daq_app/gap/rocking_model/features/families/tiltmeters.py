@@ -27,10 +27,8 @@ from daq_app.gap.rocking_model.motion.rotation import (
     gridded,
 )
 from daq_app.gap.rocking_model.records import Survey
-from daq_app.gap.rocking_model.tolerances import CALIBRATION, SKEW_S, TILT_CONSTANT
+from daq_app.gap.rocking_model.tolerances import CALIBRATION, SHORTEST_TILT_S, SKEW_S, TILT_CONSTANT
 
-_SHORTEST_S = 0.05
-"""Least time constant, s, to which errors are relative: a tiltmeter below it is as prompt as the grid."""
 _ROUNDS = 12
 _DELAY = "tilt_delay"
 """Parameter of how much later the tiltmeters are sampled than the reference."""
@@ -48,7 +46,7 @@ def _tilt_block(scene: Scene) -> Block | None:
         return None
     pick = scene.rocking | (grid.time_s <= 0)
     measured = [gridded(run, i) for i in chosen]
-    nominal = np.array([max(run.sensors[i].time_constant_s, _SHORTEST_S) for i in chosen])
+    nominal = np.array([max(run.sensors[i].time_constant_s, SHORTEST_TILT_S) for i in chosen])
     slow = np.array([_time_constant(scene, m, s, pick) for m, s in zip(measured, nominal, strict=True)])
     block = regress(
         "tiltmeter",

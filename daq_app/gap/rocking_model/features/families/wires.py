@@ -37,14 +37,11 @@ from daq_app.gap.rocking_model.motion.rotation import (
     anchors_move,
     coarse,
     gridded,
+    straight_line,
     wall_rotation,
 )
 from daq_app.gap.rocking_model.records import GapRun, Survey
-from daq_app.gap.rocking_model.tolerances import CALIBRATION
-
-_OTHER_WIRES = 2e-3
-"""Difference in calibration between the mean of some wires and that of all."""
-
+from daq_app.gap.rocking_model.tolerances import CALIBRATION, OTHER_WIRES
 
 _TURNS = 8
 """Impacts at which a turn about the vertical is looked for: those with most speed."""
@@ -64,7 +61,7 @@ def _wire_block(scene: Scene) -> Block | None:
     block = regress("wire", compared, columns, scene.in_range & grid.settled, ("zero",))
     if block is not None and some:
         # Other wires than in the other runs: their mean has another calibration.
-        block.covariance[block.names.index("gain"), block.names.index("gain")] += _OTHER_WIRES**2
+        block.covariance[block.names.index("gain"), block.names.index("gain")] += OTHER_WIRES**2
     return with_crosstalk(block, leaked_turn(run))
 
 
@@ -103,8 +100,7 @@ def _translation_block(scene: Scene) -> Block | None:
         sensor = run.sensors[i]
         ideal = Wire(sensor, run.survey.half_base_m).shortening(grid.theta)
         shift.append(gridded(run, i) - ideal)
-    design = np.column_stack([np.ones_like(heights), heights])
-    at_base = np.linalg.pinv(design)[0]
+    at_base = straight_line(heights)[0]
     moved = at_base @ np.array(shift)
     columns = {
         "zero": (np.ones_like(grid.theta), "m"),

@@ -13,6 +13,7 @@ from daq_app.gap.rocking_model.features.differences import difference_of
 from daq_app.gap.rocking_model.features.oscillations.rings import forced_column, ring_columns
 from daq_app.gap.rocking_model.features.response import delay, transfer
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.motion.rotation import shown_by_wires
 
 
 def _ring_coefficients(
@@ -127,10 +128,7 @@ def turning_wave(run: RockingRun) -> FloatArray:
 def bent_share(run: RockingRun, *, of_base: bool) -> float:
     """What a top that bends by 1 m makes of the wires' mean rotation (weights z²), rad, or of the base, m."""
     z = np.array([wire.sensor.position_m[2] for wire in run.wires])
-    shape = (z / run.survey.height_m) ** 2
-    if of_base:
-        return float(np.linalg.pinv(np.column_stack([np.ones_like(z), z]))[0] @ shape)
-    return float(z @ shape / (z @ z))
+    return shown_by_wires(run.wires, (z / run.survey.height_m) ** 2, of_base=of_base)
 
 
 def bending(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:

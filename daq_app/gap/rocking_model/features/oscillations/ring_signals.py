@@ -10,17 +10,15 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Shares
-from daq_app.gap.rocking_model.motion.impact_timing import MIDDLE_OF_IMPACT_S, acceleration_delay
+from daq_app.gap.rocking_model.motion.impact_timing import acceleration_delay
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Rotation, coarse, gridded, wall_rotation
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
-from daq_app.gap.rocking_model.tolerances import CALIBRATION
+from daq_app.gap.rocking_model.tolerances import CALIBRATION, MIDDLE_OF_IMPACT_S, RING_LATE_S
 
 DISPLACEMENT_MASK_S = 0.02
 """A base that gives way takes milliseconds to turn after an impact: a quick decay, but no ring-down."""
 ACCELERATION_MASK_S = 0.035
-LATE_S = 5e-3
-"""Delay of a family from which what an impact leaves in it is looked for that much later."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +121,7 @@ def accelerations(run: GapRun, grid: Grid, chosen: Sequence[int]) -> Acceleratio
     """
     seen = acceleration_delay(run, grid)
     late = seen[0] - MIDDLE_OF_IMPACT_S if seen is not None else 0.0
-    late = late if abs(late) > LATE_S else 0.0
+    late = late if abs(late) > RING_LATE_S else 0.0
     early = round(late * run.rate_hz)
     z = np.array([run.sensors[i].position_m[2] for i in chosen])
     measured = np.array([gridded(run, i, early) for i in chosen])
@@ -140,7 +138,7 @@ def _between_late(grid: Grid, beyond: FloatArray, heights: FloatArray) -> NDArra
     pick = (grid.time_s > 0.0) & (grid.time_s < grid.rest_s)
     speed = grid.omega[pick]
     late = -float(heights @ (beyond[:, pick] @ speed)) / float(heights @ heights) / float(speed @ speed)
-    return _between(grid, DISPLACEMENT_MASK_S + (2.0 * abs(late) if abs(late) > LATE_S else 0.0))
+    return _between(grid, DISPLACEMENT_MASK_S + (2.0 * abs(late) if abs(late) > RING_LATE_S else 0.0))
 
 
 def _between(grid: Grid, mask_s: float) -> NDArray[np.bool_]:

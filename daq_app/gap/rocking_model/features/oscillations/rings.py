@@ -19,15 +19,13 @@ from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal
 from daq_app.gap.rocking_model.features.response import resonator
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
+from daq_app.gap.rocking_model.tolerances import RING_SD
 
 BEND_HZ = np.geomspace(2.0, 42.0, 61)
 TURN_HZ = np.geomspace(1.5, 14.0, 40)
 DAMPING = (0.01, 0.04)
 FINE_DAMPING = (0.007, 0.012, 0.02, 0.032, 0.05, 0.08)
 _DEGREE = 4
-REPEATABILITY = 0.07
-"""Relative repeatability of a ring-down in one run: kicks differ from impact to impact. It is no free
-scatter, which would grow until an effect that nobody named hides in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -295,7 +293,7 @@ def with_repeatability(blocks: Sequence[Block]) -> list[Block]:
         covariance = block.covariance.copy()
         for k, name in enumerate(block.names):
             if " in " in name:
-                covariance[k, k] += (REPEATABILITY * usual.get(name.partition(" in ")[2], 0.0)) ** 2
+                covariance[k, k] += (RING_SD * usual.get(name.partition(" in ")[2], 0.0)) ** 2
             else:
                 covariance[k, k] *= len(blocks)
         widened.append(replace(block, covariance=covariance))
