@@ -1,4 +1,4 @@
-"""A task: its channels, its settings and its state."""
+"""A task: NI's states, and the run while it goes on."""
 
 from __future__ import annotations
 
@@ -6,26 +6,22 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from nidaqmx.constants import SampleTimingType, TaskMode
+from nidaqmx.constants import TaskMode
 from numpy.typing import NDArray
 
 from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.channels.virtual import VirtualChannel
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
-from sim_hardware.daqmx_server.inventory.devices import Device, channel_list
 from sim_hardware.daqmx_server.tasks.checks import check_configuration
-from sim_hardware.daqmx_server.tasks.generation import Generation
-from sim_hardware.daqmx_server.tasks.needs import buffer_size, resources_of
+from sim_hardware.daqmx_server.tasks.needs import resources_of
 from sim_hardware.daqmx_server.tasks.runs import make_run, trigger_readings
 from sim_hardware.daqmx_server.tasks.samplers import (
     on_demand_sampler,
     play,
-    pulse_times_s,
     sampler_of,
     stop_playing,
 )
-from sim_hardware.daqmx_server.tasks.tdms_log import TdmsLog
-from sim_hardware.daqmx_server.timing import triggers
+from sim_hardware.daqmx_server.tasks.settings import TaskSettings
 from sim_hardware.daqmx_server.timing.acquisition import Run
 from sim_hardware.daqmx_server.timing.routing import drives, edges_of
 from sim_hardware.daqmx_server.timing.sample_times import SampleTimes
@@ -44,24 +40,12 @@ class State(IntEnum):
     RUNNING = 4
 
 
-class Task:
+class Task(TaskSettings):
     """Everything a client can do with one task, but the reading itself (`tasks.reading`)."""
 
     def __init__(self, bench: Bench, name: str) -> None:
-        self.bench = bench
-        self.name = name
-        self.channels: list[VirtualChannel] = []
+        super().__init__(bench, name)
         self.timing = TaskTiming(self)
-        self.trigger: dict[str, Any] = {"START_TRIG_TYPE": triggers.NONE, "REF_TRIG_TYPE": triggers.NONE}
-        self.reading: dict[str, Any] = {}
-        self.exported: dict[str, Any] = {}
-        self.real_time: dict[str, Any] = {}
-        self.writing: dict[str, Any] = {}
-        self.watchdog: dict[str, Any] = {}
-        self.log = TdmsLog(self.reading)
-        self.generation = Generation(self.writing)
-        self.input_buffer: int | None = None
-        self.output_buffer: int | None = None
         self.taken_on_demand = 0
         """Software-timed samples so far."""
         self.state = State.UNVERIFIED
@@ -96,93 +80,12 @@ class Task:
         self._stale = True
         self.channels += channels
 
-    def channel(self, name: str) -> VirtualChannel:
-        """By virtual or physical name; −200088-style error of NI otherwise."""
-        wanted = name.strip().lower()
-        for channel in self.channels:
-            if wanted in (channel.name.lower(), channel.physical.lower()):
-                return channel
-        raise DaqmxError(Code.CHANNEL_NOT_IN_TASK, f"Channel Name: {name}")
-
-    def channels_named(self, text: str) -> list[VirtualChannel]:
-        """Channels of a list; all of them for an empty one."""
-        whole = [channel for channel in self.channels if channel.name == text]
-        if whole:
-            return whole
-        return [self.channel(name) for name in channel_list(text)] if text else list(self.channels)
-
-    def read_rows(self) -> list[int] | None:
-        """Rows of the channels to read, None for all in order."""
-        text = self.reading.get("CHANNELS_TO_READ", "")
-        return [self.channels.index(channel) for channel in self.channels_named(text)] if text else None
-
-    @property
-    def devices(self) -> list[str]:
-        return list(dict.fromkeys(channel.device.name for channel in self.channels))
-
-    @property
-    def hosts(self) -> list[str]:
-        """Owners of the clocks and triggers of this task's devices, the first one first."""
-        return list(dict.fromkeys(self.bench.inventory.host_of(channel.device) for channel in self.channels))
-
-    @property
-    def is_buffered(self) -> bool:
-        return self.io == "CO" or bool(self.timing.timing_type != SampleTimingType.ON_DEMAND.value)
-
-    @property
-    def detects_changes(self) -> bool:
-        """Whether changes of digital lines are its sample clock."""
-        return self.io == "DI" and self.timing.timing_type == SampleTimingType.CHANGE_DETECTION.value
-
-    @property
-    def pulse_periods_s(self) -> NDArray[np.float64]:
-        """Periods of the pulses that a counter output makes in turn; empty for a regular train."""
-        return np.asarray(self.generation.pulses.sum(axis=0))
+    # --- states -------------------------------------------------------------------------------
 
     @property
     def is_reserved(self) -> bool:
         """Whether the task holds its devices, and so may drive their lines."""
         return self.state >= State.RESERVED
-
-    @property
-    def host(self) -> Device | None:
-        """The device that owns the task's clocks and triggers."""
-        hosts = self.hosts
-        return self.bench.inventory.devices.get(hosts[0]) if hosts else None
-
-    @property
-    def io(self) -> str:
-        """Kind of the task's channels (AI, AO, DI, DO, CI, CO); empty without channels."""
-        return self.channels[0].io if self.channels else ""
-
-    @property
-    def is_output(self) -> bool:
-        return self.io in ("AO", "DO", "CO")
-
-    @property
-    def pulse_rate_hz(self) -> float:
-        """Frequency of a task that puts out pulses; 0 for any other."""
-        if self.io != "CO":
-            return 0.0
-        low_s, high_s = pulse_times_s(self.channels[0])
-        return 1.0 / (low_s + high_s)
-
-    def live_value(self, channel: VirtualChannel, name: str) -> Any:
-        """Value of an attribute that the running hardware decides; None for the others."""
-        if name == "CO_PULSE_DONE":
-            return self.run is None or self.run.is_done(self.bench.clock.glance())
-        if name == "CI_COUNT" and self.state is not State.RUNNING:
-            return int(channel.attributes.get("CI_COUNT_EDGES_INITIAL_CNT", 0))
-        if name == "CI_COUNT" and self.run is None:
-            return int(on_demand_sampler(self, self.bench.clock.glance()).codes(0, 1)[0, 0])
-        return None
-
-    @property
-    def buffer_size(self) -> int:
-        """Samples per channel of the circular buffer."""
-        return buffer_size(self)
-
-    # --- states -------------------------------------------------------------------------------
 
     def control(self, action: int) -> None:
         """NI's TaskControl."""
@@ -323,6 +226,16 @@ class Task:
                 raise DaqmxError(Code.NOT_DONE)
 
     # --- the run ------------------------------------------------------------------------------
+
+    def live_value(self, channel: VirtualChannel, name: str) -> Any:
+        """Value of an attribute that the running hardware decides; None for the others."""
+        if name == "CO_PULSE_DONE":
+            return self.run is None or self.run.is_done(self.bench.clock.glance())
+        if name == "CI_COUNT" and self.state is not State.RUNNING:
+            return int(channel.attributes.get("CI_COUNT_EDGES_INITIAL_CNT", 0))
+        if name == "CI_COUNT" and self.run is None:
+            return int(on_demand_sampler(self, self.bench.clock.glance()).codes(0, 1)[0, 0])
+        return None
 
     def edges_at(self, terminal: str) -> list[float]:
         """Instants of the task's edges at a (plain) terminal, as far as they have happened."""
