@@ -23,7 +23,6 @@ from daq_app.acquisition.messages.items import RequestRefused
 from daq_app.acquisition.messages.options import READY, parse, time_factor
 from daq_app.acquisition.messages.published import Command, Reply
 from daq_app.acquisition.process.hardware import driver_maker, planned_truth
-from daq_app.acquisition.session.requests import answer
 from daq_app.acquisition.viewers.desk import Answer, Desk, DeskError
 from daq_app.acquisition.viewers.session_file import SessionFile, remove_session_file, write_session_file
 from daq_app.config import ConfigError, Rig, TaskPlan, load_rig, plan_tasks
@@ -44,9 +43,11 @@ class Process:
         # Loaded while a simulated server starts: the analysis takes seconds to load, and so does it.
         from daq_app.acquisition.pipeline.reader import Patience
         from daq_app.acquisition.process.unattended import Unattended
+        from daq_app.acquisition.session.requests import answer
         from daq_app.acquisition.session.session import Session, SessionSettings
 
         self._rig = rig
+        self._answer = answer
         self._no_results = bool(options.no_results)
         self._plan_rate_hz = plan.rate_hz
         self._rig_text = options.rig.read_text(encoding="utf-8")
@@ -137,7 +138,7 @@ class Process:
             return Reply(ok=True, text="Rocking-test recorder", data=self._about())
         if command.name == "shutdown":
             return self._shutdown(force=bool(command.arguments.get("force", 0)))
-        return answer(self.session, command)
+        return self._answer(self.session, command)
 
     def _about(self) -> dict[str, object]:
         """What a viewer needs to know before it listens."""

@@ -11,6 +11,7 @@ differs from the armed plan, no two contradicting words, nothing that had been c
 from __future__ import annotations
 
 import errno
+import math
 import os
 import re
 import shutil
@@ -45,6 +46,8 @@ from tests.support.recorder.storm_parts import (
 _ORDERS = ("tare", "check", "pull", "plan", "arm", "arm", "abort", "stop", "marker", "nonsense", "preview")
 _FALLING = (800, 1600)
 """Samples after a release in which every wall falls, and has fallen fast enough to be seen."""
+_TRIED_AGAIN_S = (1.5, 5.5)
+"""A run, and the ring, try a disk again within so many seconds of the clock, 1 and 5, and write."""
 _AROUND_RELEASE = (RATE_HZ, 2 * RATE_HZ)
 """Samples before and after a release that must be in a run."""
 
@@ -61,6 +64,8 @@ class Storm:
     broken: list[str] = field(default_factory=list)
     sick_until: int = 0
     """The newest sample that was read while the disk took nothing."""
+    well_since_s: float = 0.0
+    """When the disk had taken nothing for the last time, on the clock."""
 
     def run(self) -> list[str]:
         """What did not hold, in words; empty when everything did."""
@@ -82,10 +87,11 @@ class Storm:
             end = wall.readings.shape[1] // 400 * 400
             while driver.allowed < end:
                 self._order(session)
-                self._break(disk)
+                self._break(session, listener, disk)
                 driver.allow(min(end, driver.allowed + int(self.rng.integers(1, 10)) * 400))
                 listener.until(lambda: session.analyst.voice.sample >= driver.allowed - 400)
-                self.sick_until = driver.allowed if disk.trouble else self.sick_until
+                if disk.trouble:
+                    self.sick_until, self.well_since_s = driver.allowed, time.monotonic()
                 session.tick()
                 if self.rng.random() < 0.03 and not disk.trouble:
                     kills.append(self._kill(session, driver.allowed, len(kills)))
@@ -112,17 +118,28 @@ class Storm:
         with suppress(RequestRefused):
             answer(session, Command(name=name, arguments=arguments))
 
-    def _break(self, disk: BadDisk) -> None:
+    def _break(self, session: Session, listener: Listener, disk: BadDisk) -> None:
         if self.rng.random() < 0.04:
             disk.trouble = int(self.rng.choice([0, errno.ENOSPC, errno.EIO]))
             self.log.append(f"disk: {disk.trouble}")
         elif disk.trouble and self.rng.random() < 0.3:
             disk.trouble = 0
             self.log.append("disk: well")
+            if session.recorder.status.recording and self.rng.random() < 0.5:
+                # The seconds of the clock in which the recorder tries again: what had waited is safe then.
+                listener.until(lambda: self._has_caught_up(session))
+                self.well_since_s = -math.inf
+
+    def _has_caught_up(self, session: Session) -> bool:
+        status = session.recorder.status
+        return not status.recording or status.acknowledged_sample >= self.sick_until - 400
 
     def _kill(self, session: Session, sample: int, number: int) -> _Kill:
         """The folder as kill −9 would leave it now, what had been called safe, and the newest sample."""
         status = session.recorder.status
+        well_s = time.monotonic() - self.well_since_s
+        if well_s < _TRIED_AGAIN_S[not status.recording]:
+            self.sick_until = sample
         safe = status.acknowledged_sample if status.recording else 0
         copy = self.folder.with_name(f"{self.folder.name}-kill{number}")
         finished = _copy_as_it_stands(self.folder, copy)
@@ -226,7 +243,7 @@ class Storm:
         if safe > max(ends):
             self.broken.append(f"{copy.name}: safe up to {safe}, recovered up to {max(ends)}")
         # A release that lies a second back had been noticed: the kill must not cost it, if there was a disk
-        # that took it. The recorder tries a full one again in seconds of the clock, not of samples.
+        # that took it, and the clock had gone on long enough for the recorder to try that disk again.
         for release in wall.releases:
             known = kill.sick_until <= release and release + RATE_HZ < sample <= release + 2 * RATE_HZ
             if known and not any(first <= release - 400 and end > release for first, end in spans):
