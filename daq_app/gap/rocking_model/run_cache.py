@@ -46,14 +46,19 @@ class _Part(Generic[T]):
         outer = values if isinstance(values, _Watched) else None
         plain = values if outer is None else outer.plain
         get = plain.get
+        asked: tuple[str, ...] = ()
+        found: tuple[float | None, ...] = ()
         for entry in reversed(self._known):
             keys, given, names, result = entry
-            if tuple(map(get, keys)) == given and (names is None or names == tuple(plain)):
+            if keys is not asked:  # most entries ask for the same
+                asked, found = keys, tuple(map(get, keys))
+            if found == given and (names is None or names == tuple(plain)):
                 break
         else:
             watched = _Watched(plain)
             result = make(watched)
-            keys = tuple(watched.asked)
+            new = tuple(watched.asked)
+            keys = next((entry[0] for entry in self._known if entry[0] == new), new)
             if len(self._known) >= _KEPT:
                 del self._known[0]
             names = tuple(plain) if watched.listed else None

@@ -35,8 +35,12 @@ def turned(run: RockingRun, form: str) -> FloatArray:
 
 def turn_share(run: RockingRun, *, of_base: bool) -> float:
     """What a turn of 1 rad makes of the wires' mean rotation (weights z²), rad, or of the base, m."""
-    y = np.array([wire.sensor.position_m[1] for wire in run.wires])
-    return -shown_by_wires(run.wires, y, of_base=of_base)
+
+    def share() -> float:
+        y = np.array([wire.sensor.position_m[1] for wire in run.wires])
+        return -shown_by_wires(run.wires, y, of_base=of_base)
+
+    return run.cache.constant(("turn share", of_base), share)
 
 
 def turned_coefficients(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:

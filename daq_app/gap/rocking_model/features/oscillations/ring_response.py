@@ -127,8 +127,12 @@ def turning_wave(run: RockingRun) -> FloatArray:
 
 def bent_share(run: RockingRun, *, of_base: bool) -> float:
     """What a top that bends by 1 m makes of the wires' mean rotation (weights z²), rad, or of the base, m."""
-    z = np.array([wire.sensor.position_m[2] for wire in run.wires])
-    return shown_by_wires(run.wires, (z / run.survey.height_m) ** 2, of_base=of_base)
+
+    def share() -> float:
+        z = np.array([wire.sensor.position_m[2] for wire in run.wires])
+        return shown_by_wires(run.wires, (z / run.survey.height_m) ** 2, of_base=of_base)
+
+    return run.cache.constant(("bent share", of_base), share)
 
 
 def bending(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
