@@ -1,4 +1,4 @@
-"""Which answers count as right for which truth, and the families of the design page's table.
+"""Which answers count as right for which truth.
 
 Effects that share a row of the table because no sensor tells them apart accept each other. A name
 may carry a target (``gain@WP-1``): the part before the ``@`` is compared here.
@@ -9,18 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from typing import Final
-
-FAMILIES: Final = (
-    "interface",
-    "restitution",
-    "dissipation",
-    "geometry",
-    "contact",
-    "structure",
-    "release",
-    "ambient",
-    "sensor",
-)
 
 _SAME_TO_ALL_SENSORS: Final = (
     # A base that leans, a mass off centre and unequal edges turn gravity against the wall alike.

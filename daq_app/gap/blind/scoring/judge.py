@@ -218,19 +218,11 @@ def _matches(claimed: Sequence[str], accept: Sequence[tuple[str, ...]]) -> bool:
 def _outside_score(decision: str, result: dict[str, Any], which: Sequence[Hypothesis]) -> float:
     """How strongly a result speaks for "none of these", in [0, 2]; 1 and more where it decides so.
 
-    Within a decision the chance of what it leaves ranks (``rest_p``, else the p-value of its goodness of
-    fit), and without one the probability that the first hypothesis leaves over. A result may give its
-    probability of an unknown cause (``p_unknown``, or ``notes.outside_score``) instead.
+    Within a decision its probability of an unknown cause ranks, or what its first hypothesis leaves over.
     """
-    given = result.get("p_unknown", (result.get("notes") or {}).get("outside_score"))
-    p_value = result.get("rest_p", (result.get("goodness") or {}).get("p_value"))
-    if isinstance(given, int | float):
-        inner = min(1.0, max(0.0, float(given)))
-    elif isinstance(p_value, int | float):
-        size = -math.log10(max(float(p_value), 1e-300))
-        inner = max(0.0, size) / (1.0 + max(0.0, size))
-    else:
-        inner = 1.0 - (_first(which)[1] if which else 0.0)
+    given = result.get("p_unknown")
+    left_over = 1.0 - (_first(which)[1] if which else 0.0)
+    inner = min(1.0, max(0.0, float(given))) if isinstance(given, int | float) else left_over
     return inner + (1.0 if decision == "none_of_these" else 0.0)
 
 

@@ -116,6 +116,7 @@ def table(judged: Sequence[Judged]) -> list[Row]:
     nulls = [j for j in judged if j.category == "null"]
     pairs = [j for j in judged if j.category == "pair"]
     triples = [j for j in judged if j.category == "triple"]
+    sizes = [float(j.set_size) for j in known if j.set_size]
     unsure = [j for j in judged if j.decision == "cannot_tell"]
     speaking = [j for j in judged if j.decision != "failed"]
     return [
@@ -123,7 +124,11 @@ def table(judged: Sequence[Judged]) -> list[Row]:
         Row("family right, effect ≥ 4 sd", share([j.family_right for j in visible]), low=0.98),
         Row("first answer right, effect < 4 sd", share([j.first_right for j in weak])),
         Row("95 % set holds the truth", share([j.in_set for j in known]), 0.93, 0.98),
-        Row("95 % set: mean size", _mean([float(j.set_size) for j in known if j.set_size]), high=1.5),
+        Row(
+            "95 % set: mean size",
+            bootstrap(sizes, np.mean),
+            high=1.5,
+        ),
         Row("wrong at p > 0.95", share([wrong_and_sure(j) for j in speaking]), high=0.01),
         Row("expected calibration error", _calibration(judged), high=0.05),
         Row("calibration error by chance alone", calibration_error_by_chance(claims(judged)[0])),
@@ -185,7 +190,7 @@ def _closure_rows(judged: Sequence[Judged]) -> list[Row]:
         Row("closure ≥ 0.9", share([c >= 0.9 for c in closures]), low=0.9),
         Row(
             "held-out gap after, against the floor, median",
-            _median([j.after_to_floor for j in found]),
+            bootstrap([j.after_to_floor for j in found]),
             high=1.1,
         ),
     ]
@@ -194,7 +199,7 @@ def _closure_rows(judged: Sequence[Judged]) -> list[Row]:
 def _parameter_rows(singles: Sequence[Judged]) -> list[Row]:
     met = [j for j in singles if j.parameter_covered is not None and j.first_right]
     return [
-        Row("parameter error, median", _median([j.parameter_error for j in met]), high=0.02),
+        Row("parameter error, median", bootstrap([j.parameter_error for j in met]), high=0.02),
         Row(
             "95 % interval holds the parameter",
             share([bool(j.parameter_covered) for j in met]),
@@ -231,14 +236,6 @@ def _calibration(judged: Sequence[Judged]) -> Value:
         draws.append(calibration_error(p[pick].tolist(), hit[pick].tolist()))
     low, high = np.quantile(draws, [0.025, 0.975])
     return Value(calibration_error(claimed, right), float(low), float(high), p.size)
-
-
-def _mean(values: Sequence[float]) -> Value:
-    return bootstrap(values, np.mean)
-
-
-def _median(values: Sequence[float]) -> Value:
-    return bootstrap(values)
 
 
 def _finite(value: Any) -> Any:

@@ -24,11 +24,7 @@ from daq_app.gap.rocking_model.features.channel_shapes import (
     deviation,
     usual_remains,
 )
-from daq_app.gap.rocking_model.inspection.channel_families import (
-    ChannelFamily,
-    beside,
-    channel_family,
-)
+from daq_app.gap.rocking_model.inspection.channel_families import ChannelFamily, beside, channel_family
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Wire
 from daq_app.gap.rocking_model.records import GapRun

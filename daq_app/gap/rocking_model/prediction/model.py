@@ -15,11 +15,7 @@ from daq_app.gap.rocking_model.features.oscillations.floor_response import with_
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.prediction.free_forms import free_times, with_uneven_loss
 from daq_app.gap.rocking_model.prediction.true_motion import pause_at_impact, true_rotations
-from daq_app.gap.rocking_model.prediction.vector import (
-    half_cycle_table,
-    kernel_vector,
-    restitution_of,
-)
+from daq_app.gap.rocking_model.prediction.vector import half_cycle_table, kernel_vector, restitution_of
 from daq_app.gap.rocking_model.prediction.wires_alone import times_carry
 from daq_app.gap.rocking_model.records import Survey
 from daq_app.gap.rocking_model.tolerances import PUSH_RAD_S

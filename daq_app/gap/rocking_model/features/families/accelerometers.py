@@ -10,10 +10,7 @@ from scipy.signal import butter, sosfiltfilt
 from daq_app.gap.core import Parameter
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block, regress, scalar_block
-from daq_app.gap.rocking_model.features.differences import (
-    base_rotation,
-    own_gain,
-)
+from daq_app.gap.rocking_model.features.differences import base_rotation, own_gain
 from daq_app.gap.rocking_model.features.family import (
     Scene,
     SensorFamily,

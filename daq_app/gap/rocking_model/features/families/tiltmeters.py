@@ -22,10 +22,7 @@ from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size,
 from daq_app.gap.rocking_model.features.response import slow_response
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
-from daq_app.gap.rocking_model.motion.rotation import (
-    GRID_HZ,
-    gridded,
-)
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.records import Survey
 from daq_app.gap.rocking_model.tolerances import CALIBRATION, SHORTEST_TILT_S, SKEW_S, TILT_CONSTANT
 
