@@ -29,6 +29,8 @@ _SCATTERS = np.concatenate(([0.0], np.geomspace(5e-5, 0.15, 56)))
 _SCATTER_STEPS = np.gradient(_SCATTERS)
 """Weight of each size of the scatter before the values are seen: all sizes alike, up to 15 %. A prior that
 prefers small scatter makes the standard errors of tests with few impacts too small."""
+_SURELY = 0.01
+"""Chance of less scatter than what is stated as its least."""
 _FEWEST = 4
 """Points below which a scatter cannot be told from the values' own errors: none is assumed."""
 
@@ -60,6 +62,8 @@ class RestitutionEstimate:
     """Infinite where the standard error holds what is not known of the scatter."""
     scatter: float = 0.0
     """Relative standard deviation of r from impact to impact that is the likeliest."""
+    least_scatter: float = 0.0
+    """What the scatter is below with a chance of 1 %."""
     plain_mean: float | None = None
     """Mean of the points, as in the paper."""
     plain_standard_error: float | None = None
@@ -180,7 +184,9 @@ def estimate_all(wanted: Sequence[DecaySeries]) -> list[RestitutionEstimate]:
     return found
 
 
-def _estimate(series: DecaySeries, slope: float, variance: float, scatter: float) -> RestitutionEstimate:
+def _estimate(
+    series: DecaySeries, slope: float, variance: float, scatter: float, least_scatter: float
+) -> RestitutionEstimate:
     single = np.array([point.r for point in series.points])
     r = math.exp(slope)
     return RestitutionEstimate(
@@ -190,18 +196,19 @@ def _estimate(series: DecaySeries, slope: float, variance: float, scatter: float
         standard_error=r * math.sqrt(variance),
         degrees_of_freedom=math.inf if len(series.points) >= _FEWEST else max(len(series.points) - 1, 1),
         scatter=scatter,
+        least_scatter=least_scatter,
         plain_mean=float(single.mean()),
         plain_standard_error=float(single.std(ddof=1) / math.sqrt(single.size)) if single.size > 1 else None,
     )
 
 
-def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float]]:
-    """Generalised least-squares slope of the values against their index, its variance, and the scatter.
+def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float, float]]:
+    """Generalised least-squares slope of the values against their index, its variance, scatter and its least.
 
     Errors are independent (`variances`) plus a random walk of step s. Every s of a grid is tried at
     once, and every series (all of one length), by a Kalman filter that whitens values and regressors
     (Harvey's GLS by prediction errors). Slope and variance are those of the mixture over s, weighted by
-    the restricted likelihood; the scatter is the likeliest s.
+    the restricted likelihood; the scatter is the likeliest s, its least the quantile of `_SURELY`.
     """
     usable = np.array([series.usable for series in together])
     variances = np.array([series.variances for series in together])
@@ -238,5 +245,6 @@ def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float]]
     slopes, variances_of_slope = solution[..., -1, 0], inverse[..., -1, -1]
     slope = (weights * slopes).sum(axis=1)
     variance = (weights * (variances_of_slope + (slopes - slope[:, None]) ** 2)).sum(axis=1)
-    best = np.argmax(likelihood, axis=1)
-    return list(zip(slope.tolist(), variance.tolist(), _SCATTERS[best].tolist(), strict=True))
+    best = _SCATTERS[np.argmax(likelihood, axis=1)]
+    least = _SCATTERS[np.argmax(np.cumsum(weights, axis=1) >= _SURELY, axis=1)]
+    return list(zip(*(found.tolist() for found in (slope, variance, best, least)), strict=True))

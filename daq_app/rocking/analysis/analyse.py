@@ -25,7 +25,7 @@ from daq_app.rocking.analysis.results import Bias, Series, TestAnalysis, Theory
 from daq_app.rocking.analysis.tracks import decay_series, estimates_of, follow_families
 from daq_app.rocking.analysis.wall_checks import pattern_of, wall_findings
 from daq_app.rocking.estimators import RestitutionEstimate
-from daq_app.rocking.families.block_checks import is_rigid_block
+from daq_app.rocking.families.block_checks import is_rigid_block, scatter_findings
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.verdict import judge, with_change_by_speed, with_findings
 from daq_app.rocking.geometry.joint import JointMotion
@@ -86,6 +86,7 @@ def _analyse(
     pattern = pattern_of(instruments, tracks, further)
     change = pattern.change_with_speed
     further += wall_findings(instruments, tracks, joint, further, pattern)
+    further += scatter_findings(estimates["eav"], estimates["crt"], [*instruments.findings, *further])
     verdict, findings = verdict_of(instruments, tracks, series, estimates, further, change)
     estimates = {
         name: with_findings(with_change_by_speed(estimate, change), findings)

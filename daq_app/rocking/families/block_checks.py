@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Final
 
+from daq_app.rocking.estimators import RestitutionEstimate
 from daq_app.rocking.families import words
 from daq_app.rocking.families.body import BodyEstimate
 from daq_app.rocking.families.finding import FamilyFinding
@@ -35,6 +36,10 @@ _DURATION_SIGMAS: Final = 4.0
 """rms by which durations deviate from the block's, in their own errors, that is named; sound ones reach 2."""
 _FEWEST_DURATIONS: Final = 6
 """Half-cycles below which α and p take up what deviates."""
+
+ORDINARY_SCATTER: Final = 0.006
+"""Relative scatter of r from impact to impact up to which nothing is said (assumed: `campaign simulate` draws
+0.004). Lowering it names sound walls whose impacts happen to differ."""
 
 
 def is_rigid_block(findings: Iterable[FamilyFinding]) -> bool:
@@ -87,6 +92,20 @@ def weaker_hop(pattern: ImpactPattern) -> list[FamilyFinding]:
     if pattern.pause is None or pattern.pause.chance >= _CHANCE_TOLD or share <= R_TOLERANCE:
         return []
     return [words.perhaps_hops(pattern.hop_s, share)]
+
+
+def scatter_findings(
+    eav: RestitutionEstimate, crt: RestitutionEstimate, others: Iterable[FamilyFinding]
+) -> list[FamilyFinding]:
+    """r that scatters more than it ordinarily does, by speeds and by peaks; `others`: what else was found.
+
+    A wall or a zero that does something else at each side or speed makes r scatter as well: that is named.
+    """
+    if not is_rigid_block(others) or any(finding.kind == "drift" for finding in others):
+        return []
+    if min(eav.least_scatter, crt.least_scatter) <= ORDINARY_SCATTER or not eav.standard_error:
+        return []
+    return [words.r_scatters(min(eav.scatter, crt.scatter), eav.standard_error)]
 
 
 def _named(coefficient: Coefficient | None) -> bool:

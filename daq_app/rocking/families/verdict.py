@@ -181,8 +181,14 @@ def judge(
 
 
 def _touches_r(finding: FamilyFinding) -> bool:
-    """Whether r may be off by it: a gain cancels in EAV and moves CRT by 0.0001 for 1 %; no time is in r."""
-    return finding.kind not in ("gain", "late") and finding.family not in ("tiltmeters", "accelerometers")
+    """Whether r may be off by it: a gain cancels in EAV and moves CRT by 0.0001 for 1 %; no time is in r.
+
+    What a scatter makes of r is in its error.
+    """
+    return finding.kind not in ("gain", "late", "scatter") and finding.family not in (
+        "tiltmeters",
+        "accelerometers",
+    )
 
 
 def _share_of_r(finding: FamilyFinding, r: float) -> float:

@@ -187,6 +187,16 @@ def hop_at_impacts(hop_s: float, share: float) -> FamilyFinding:
     return FamilyFinding("wall", (), "hop", share, "1", "none", "warning", text)
 
 
+def r_scatters(share: float, standard_error: float) -> FamilyFinding:
+    """Single impacts differ more than those of walls that strike the same way each time."""
+    text = (
+        f"r scatters by {share:.1%} from impact to impact, more than that of a wall which strikes the same "
+        f"way each time: this test knows it to ± {standard_error:.4f} only, its single impacts tell nothing. "
+        "Usual causes: grit in the joint, a twist, edges that crumble"
+    )
+    return FamilyFinding("wall", (), "scatter", share, "1", "none", "warning", text)
+
+
 def perhaps_hops(hop_s: float, share: float) -> FamilyFinding:
     """The wall may leave the ground at its impacts; the stated errors hold it."""
     text = (

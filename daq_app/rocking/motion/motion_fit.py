@@ -44,6 +44,8 @@ may be wrong by. The fit takes up a zero that stands still; one that walks bends
 early ones, which p and α of small motions answer to."""
 _CORRELATED_POINTS = 12
 """Residuals this many points (0.1 s) apart may still be correlated: slow noise, hum, sway of the wall."""
+_LEAST_LEFT = 0.2
+"""Share of slow noise that a fit is taken to leave at least: of less, residuals say too little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,18 +259,24 @@ def _points(
     return t[good], y[good], noise_rad / math.sqrt(size)
 
 
-def _long_run_variance(residuals: Floats) -> float:
+def _long_run_variance(residuals: Floats, jacobian: Floats) -> float:
     """Variance that counts for slow parameters: Bartlett-weighted autocovariances (Newey and West 1987).
 
-    At least the plain variance: neighbouring residuals that alternate make nothing better known.
+    `jacobian` (rows, parameters): the first rows are those of `residuals` (n,), the others of the priors. A
+    parameter takes up what is as slow as itself, so that residuals hold less of slow noise than there was:
+    each sum is divided by the share of it that the fit leaves of white noise, whose covariance of residuals
+    is I − J (JᵀJ)⁻¹ Jᵀ. At least the plain variance: neighbours that alternate make nothing better known.
     """
-    n = residuals.size
-    plain = float(residuals @ residuals) / n
-    lags = range(1, min(_CORRELATED_POINTS, n - 1) + 1)
-    together = sum(
-        (1.0 - k / (_CORRELATED_POINTS + 1.0)) * float(residuals[k:] @ residuals[:-k]) / n for k in lags
+    points = jacobian[: residuals.size]
+    answer = np.linalg.solve(jacobian.T @ jacobian, points.T).T
+    lags = range(1, min(_CORRELATED_POINTS, residuals.size - 1) + 1)
+    weights = [1.0 - k / (_CORRELATED_POINTS + 1.0) for k in lags]
+    plain, left = float(residuals @ residuals), residuals.size - float(np.sum(answer * points))
+    total = plain + 2.0 * sum(
+        w * float(residuals[k:] @ residuals[:-k]) for k, w in zip(lags, weights, strict=True)
     )
-    return max(plain + 2.0 * together, plain)
+    taken = 2.0 * sum(w * float(np.sum(answer[k:] * points[:-k])) for k, w in zip(lags, weights, strict=True))
+    return max(plain / left, total / max(left - taken, _LEAST_LEFT * residuals.size))
 
 
 def _of_walking_zero(jacobian: Floats, points: int, sigma: float) -> Floats:
@@ -284,11 +292,10 @@ def _of_walking_zero(jacobian: Floats, points: int, sigma: float) -> Floats:
 def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: float) -> MotionFit | None:
     x = found.x
     data = found.fun[: found.fun.size - 3 - (x.size - FIXED)]
-    excess = max(1.0, _long_run_variance(data) * data.size / max(data.size - FIXED, 1))
     # Data rows are weakened by what the model leaves; priors keep their weight.
     scaled = found.jac.copy()
-    scaled[: data.size] /= math.sqrt(excess)
     try:
+        scaled[: data.size] /= math.sqrt(max(1.0, _long_run_variance(data, found.jac)))
         covariance = np.linalg.inv(scaled.T @ scaled) + _of_walking_zero(found.jac, data.size, sigma)
     except np.linalg.LinAlgError:
         return None
