@@ -130,7 +130,8 @@ def crt(
     """CRT (4.5): peaks_rad[0] is the release, peaks_rad[n] the peak that follows impact n.
 
     `exact` uses the nonlinear potential 1 − cos(α − |θ|) in place of the paper's (α − |θ|)²/2; the
-    caller names the method accordingly.
+    caller names the method accordingly. A peak whose sigma is NaN is not used; points begin at the first
+    that is.
     """
     return estimate_all([crt_series(peaks_rad, sigmas_rad, alpha_rad, exact=exact, method=method)])[0]
 
@@ -153,9 +154,12 @@ def crt_series(
     relative = np.where(usable, slope * sigmas / energies, 0.0)
     log = np.log(energies)
     points = []
-    for n in [n for n in range(1, peaks.size) if usable[n]] if peaks.size and usable[0] else []:
-        r = math.exp((log[n] - log[0]) / (2 * n))
-        points.append(RestitutionPoint(n, 0, n, r, r * math.hypot(relative[0], relative[n]) / (2 * n)))
+    usable_peaks = np.flatnonzero(usable).tolist()
+    for first, n in [(usable_peaks[0], n) for n in usable_peaks[1:]]:
+        steps = 2 * (n - first)
+        r = math.exp((log[n] - log[first]) / steps)
+        sigma = r * math.hypot(relative[first], relative[n]) / steps
+        points.append(RestitutionPoint(n, first, n, r, sigma))
     levels = np.ones((peaks.size, 1))
     return DecaySeries(method, tuple(points), log / 2.0, (relative / 2.0) ** 2, usable, levels)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 from daq_app.rocking.estimators import crt, eav
 from daq_app.rocking.motion.arcs import fit_arc
@@ -127,6 +128,14 @@ def test_a_lost_half_cycle_costs_its_pairs_only():
     assert estimate.r == pytest.approx(0.9)
 
 
+def test_peaks_tell_r_where_the_first_of_them_is_not_known():
+    """A release that is no clean one makes no φ0 of the decay: points begin at the first peak after it."""
+    peaks = [0.3 * ALPHA, *(ALPHA * (1 - math.sqrt(1 - (1 - 0.75**2) * 0.81**n)) for n in range(6))]
+    estimate = crt(peaks, [math.nan, *[1e-5] * 6], ALPHA)
+    assert [(point.first, point.impact) for point in estimate.points] == [(1, n) for n in range(2, 7)]
+    assert estimate.r == pytest.approx(0.9, abs=1e-6)
+
+
 def test_late_noisy_points_do_not_spoil_the_weighted_mean():
     speeds = 0.3 * 0.9 ** np.arange(12.0)
     sigmas = np.full(12, 2e-4)
@@ -200,6 +209,32 @@ def test_fit_of_the_whole_motion_finds_the_body_too(scatter):
     assert fit.alpha_rad == pytest.approx(ALPHA, rel=3e-3)
     assert fit.r == pytest.approx(truth, abs=max(1e-3, 0.15 * scatter))
     assert abs(fit.r - 0.88) < 4 * fit.standard_error + 1e-4
+
+
+def test_the_errors_of_p_and_alpha_hold_where_slow_noise_is_more_than_it_is_taken_for():
+    """A fit takes up a part of slow noise: by what it leaves alone, p would be off by 1.2 of its errors."""
+    rng = np.random.default_rng(1)
+    white, slow, keep, off = 8e-5, 2.4e-5, math.exp(-1.0 / 20.0), []
+    for _ in range(100):
+        motion, time, rotation = rock(0.2, 0.88 * np.exp(0.003 * rng.standard_normal(40)), smallest=1e-3)
+        noise = slow * lfilter([math.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal(time.size))
+        fit = fit_motion(
+            time,
+            rotation + noise + white * rng.standard_normal(time.size),
+            release_s=0.6,
+            theta0_rad=float(motion.peaks_rad[0]),
+            impacts_s=motion.impacts_s.tolist(),
+            peaks_rad=motion.peaks_rad.tolist(),
+            speeds_rad_s=motion.speeds_before_rad_s.tolist(),
+            r=0.88,
+            scatter=0.003,
+            noise_rad=1.2 * white,
+            p_rad_s=P,
+            alpha_rad=ALPHA,
+        )
+        off.append(((fit.p_rad_s - P) / fit.sigma_p_rad_s, (fit.alpha_rad - ALPHA) / fit.sigma_alpha_rad))
+    assert np.all(np.std(off, axis=0) < 1.1)
+    assert np.all(np.std(off, axis=0) > 0.8)
 
 
 @pytest.mark.parametrize("spread", [None, 0.02])

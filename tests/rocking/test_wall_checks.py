@@ -90,6 +90,25 @@ def test_the_interval_of_an_r_with_friction_or_hops_reaches_to_the_r_of_the_impa
     assert low <= r <= high
 
 
+def test_an_r_that_scatters_widely_is_remarked_and_its_interval_holds_the_mean_of_many_impacts():
+    test, analysis = drawn({"restitution_scatter": {"sigma": 0.02}})
+    low, high = analysis.verdict.interval95
+
+    assert kinds(analysis) >= {"scatter"}
+    assert analysis.verdict.trust == "remarks"
+    assert low <= test.truth["restitution"] <= high
+
+
+def test_a_slow_release_is_remarked_and_r_by_the_peaks_begins_after_it():
+    _, slow = drawn({"slow_release": {"tau": 0.1}})
+    _, sound = drawn({})
+
+    assert kinds(slow) >= {"release"}
+    assert slow.verdict.trust == "remarks"
+    assert {point.first for point in slow.estimates["crt"].points} == {1}
+    assert slow.estimates["crt"].r == pytest.approx(sound.estimates["crt"].r, abs=0.001)
+
+
 def test_r_that_changes_with_speed_by_less_than_is_named_is_in_the_stated_error_of_every_method():
     _, changing = drawn({"restitution_slope": {"k": 0.05}})
     _, sound = drawn({})

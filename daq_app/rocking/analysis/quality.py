@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,7 +17,6 @@ from daq_app.rocking.record import TestRecord
 _THETA0_DISAGREEMENT = 0.005
 _REST_TOLERANCE_RAD = 3e-4
 _SLIDING_TOLERANCE_M = 5e-4
-_CLEAN_RELEASE_SHARE = 0.01
 
 
 def quality_notes(
@@ -34,7 +32,7 @@ def quality_notes(
     notes = [QualityNote(finding.severity, finding.text) for finding in findings]
     notes += [*_part(record), *_sensors(record, signals), *_course(times), _alignment(record)]
     if track is not None and analysis is not None:
-        notes += [*_agreement(signals, analysis), *_motion(times, track, analysis), *_shocks(record, onsets)]
+        notes += [*_agreement(signals, analysis), *_motion(track, analysis), *_shocks(record, onsets)]
     return tuple(sorted(notes, key=lambda note: note.severity != "warning"))
 
 
@@ -165,11 +163,8 @@ def _agreement(signals: Signals, analysis: TestAnalysis) -> list[QualityNote]:
     return notes
 
 
-def _motion(times: TestTimes, track: MotionTrack, analysis: TestAnalysis) -> list[QualityNote]:
+def _motion(track: MotionTrack, analysis: TestAnalysis) -> list[QualityNote]:
     notes = []
-    residual = track.release.residual_rad
-    if not math.isfinite(residual) or residual > _CLEAN_RELEASE_SHARE * abs(track.theta0_rad):
-        notes.append(_warn("the release was no clean one: the fall does not start from rest at the hold"))
     lost = [n + 1 for n, arc in enumerate(track.arcs) if arc is None]
     if lost:
         notes.append(_info(f"half-cycles before impacts {', '.join(map(str, lost))} could not be fitted"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
@@ -13,6 +14,7 @@ from daq_app.rocking.analysis.families_table import LEADS, body_of, other_is_bla
 from daq_app.rocking.analysis.preparation.instruments import Instruments
 from daq_app.rocking.analysis.results import JointSummary
 from daq_app.rocking.analysis.tracks import FamilyTracks
+from daq_app.rocking.families import words
 from daq_app.rocking.families.block_checks import (
     duration_findings,
     pattern_findings,
@@ -86,6 +88,9 @@ def wall_findings(
         found += weaker_hop(pattern)
     if any(f.kind == "drift" and f.treatment == "none" and LEADS[lead] in f.family for f in findings):
         found = [finding for finding in found if finding.kind not in _MADE_BY_A_DRIFT]
+    if not tracks.lead.fell_freely:
+        share = tracks.lead.release.residual_rad / abs(tracks.lead.theta0_rad)
+        found.append(words.slow_release(share if math.isfinite(share) else 1.0))
     if joint is not None:
         block = RigidBlock.from_specimen(instruments.record.rig.specimen)
         found += pivot_findings(block, joint.inset_left_m, joint.inset_right_m)

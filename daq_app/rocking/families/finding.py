@@ -8,7 +8,7 @@ from typing import Literal
 Family = Literal["wires", "LVDTs", "tiltmeters", "accelerometers", "survey", "wall"]
 Kind = Literal[
     "slow", "late", "gain", "zero", "hum", "reversed", "unit", "drift", "motion",
-    "speed", "side", "loss", "pause", "hop", "duration", "scatter", "pivot",
+    "speed", "side", "loss", "pause", "hop", "duration", "scatter", "release", "pivot",
 ]  # fmt: skip
 Treatment = Literal["none", "left out", "put in step", "put right", "removed"]
 
@@ -23,8 +23,8 @@ class FamilyFinding:
     """The channels concerned; none where it is the whole family."""
     kind: Kind
     size: float
-    """SI; a share for gain, loss, pause, hop and scatter, the factor for unit, a change of r for speed and
-    side, standard errors for duration."""
+    """SI; a share for gain, loss, pause, hop, scatter and release, the factor for unit, a change of r for
+    speed and side, standard errors for duration."""
     unit: str
     treatment: Treatment
     severity: Literal["info", "warning"]

@@ -197,6 +197,15 @@ def r_scatters(share: float, standard_error: float) -> FamilyFinding:
     return FamilyFinding("wall", (), "scatter", share, "1", "none", "warning", text)
 
 
+def slow_release(misfit_share: float) -> FamilyFinding:
+    """The wall was let go slowly, or pushed: its fall is not that of a block from rest at θ0."""
+    text = (
+        "the release was no clean one: the fall does not start from rest at the hold, so that r by the peaks "
+        "is taken from the first peak after it. Usual causes: a release that opens slowly, a rope that drags"
+    )
+    return FamilyFinding("wall", (), "release", misfit_share, "1", "removed", "warning", text)
+
+
 def perhaps_hops(hop_s: float, share: float) -> FamilyFinding:
     """The wall may leave the ground at its impacts; the stated errors hold it."""
     text = (

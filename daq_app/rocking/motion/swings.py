@@ -27,9 +27,9 @@ _REFERENCE_S = (1.0, 0.5)
 """Before a release that was no clean one, the hold is taken to be still over this span."""
 _LEFT_SIGMAS = 4.0
 """Means of 20 ms that are further from the level of the still hold, in their scatter, belong to the fall."""
-_SLOW_RELEASE_SHARE = 0.003
-"""Misfit of hold and free fall, as a share of θ0, above which the end of the still hold is looked for: clean
-releases stay below 0.001."""
+_SLOW_RELEASE_SHARE = 0.002
+"""Misfit of hold and free fall, as a share of θ0, above which the end of the still hold is looked for and θ0
+makes no r: clean releases of drawn laboratories stay below 0.0011, letting go within 100 ms leaves 0.003."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ class MotionTrack:
         if release is None or abs(release.time_s - release_s) > 0.3:
             release = Release(release_s, hold_rad, math.nan)
         held_until_s = release.time_s
-        if release.residual_rad > _SLOW_RELEASE_SHARE * abs(hold_rad):
+        if not _is_free_fall(release, hold_rad):
             held_until_s = _end_of_hold(time_s, rotation_rad, release.time_s, settings.rate_hz)
         level, sigma = hold_level(time_s, rotation_rad, held_until_s, settings)
         if not math.isfinite(level):
@@ -205,12 +205,25 @@ class MotionTrack:
 
     def crt_series(self, method: str = "CRT") -> DecaySeries:
         """What `crt` is found from."""
-        return crt_series(self.peaks_rad, self.sigma_peaks_rad, self.settings.alpha_rad, method=method)
+        return crt_series(self.peaks_rad, self._sigmas_in_decay, self.settings.alpha_rad, method=method)
 
     def crt_exact_series(self, method: str = "CRT exact potential") -> DecaySeries:
         """What `crt_exact` is found from."""
         alpha = self.settings.alpha_rad
-        return crt_series(self.peaks_rad, self.sigma_peaks_rad, alpha, exact=True, method=method)
+        return crt_series(self.peaks_rad, self._sigmas_in_decay, alpha, exact=True, method=method)
+
+    @property
+    def fell_freely(self) -> bool:
+        """Whether the wall falls as a block does from rest at θ0, so that θ0 is a peak of its decay."""
+        return _is_free_fall(self.release, self.theta0_rad)
+
+    @property
+    def _sigmas_in_decay(self) -> list[float]:
+        return self.sigma_peaks_rad if self.fell_freely else [math.nan, *self.sigma_peaks_rad[1:]]
+
+
+def _is_free_fall(release: Release, theta0_rad: float) -> bool:
+    return release.residual_rad <= _SLOW_RELEASE_SHARE * abs(theta0_rad)
 
 
 def _end_of_hold(time_s: Floats, rotation_rad: Floats, release_s: float, rate_hz: float) -> float:
