@@ -229,6 +229,15 @@ def test_p_and_alpha_of_a_wall_that_is_no_rigid_block_have_no_stated_error(effec
     assert math.isnan(fit.sigma_alpha_rad) and math.isnan(fit.sigma_p_rad_s)
 
 
+def test_a_motion_that_the_fit_does_not_explain_is_remarked_and_the_verdict_of_r_stands():
+    test = draw_test(RIG, SEED, effects={"base_tilt": {"beta": 0.004}})
+    analysis = analyse_record(test.record(), AnalysisOptions(bias_runs=0, keep_series=False))
+
+    assert {finding.kind for finding in analysis.findings if finding.severity == "warning"} == {"misfit"}
+    assert analysis.verdict.trust == "remarks"
+    assert analysis.verdict.r == pytest.approx(test.truth["restitution"], abs=0.003)
+
+
 @pytest.mark.parametrize("method", ["eav", "crt"])
 @pytest.mark.parametrize(
     ("effect", "parameters"), [("coulomb", {"mu": 0.02}), ("restitution_asymmetry", {"d": 0.02})]

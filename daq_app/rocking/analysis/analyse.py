@@ -25,7 +25,7 @@ from daq_app.rocking.analysis.results import Bias, Series, TestAnalysis, Theory
 from daq_app.rocking.analysis.tracks import decay_series, estimates_of, follow_families
 from daq_app.rocking.analysis.wall_checks import pattern_of, wall_findings
 from daq_app.rocking.estimators import RestitutionEstimate
-from daq_app.rocking.families.block_checks import is_rigid_block, scatter_findings
+from daq_app.rocking.families.block_checks import is_rigid_block, misfit_findings, scatter_findings
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.verdict import judge, with_change_by_speed, with_findings
 from daq_app.rocking.geometry.joint import JointMotion
@@ -87,6 +87,7 @@ def _analyse(
     change = pattern.change_with_speed
     further += wall_findings(instruments, tracks, joint, further, pattern)
     further += scatter_findings(estimates["eav"], estimates["crt"], [*instruments.findings, *further])
+    further += misfit_findings(fit)
     verdict, findings = verdict_of(instruments, tracks, series, estimates, further, change)
     estimates = {
         name: with_findings(with_change_by_speed(estimate, change), findings)
@@ -95,7 +96,6 @@ def _analyse(
     fit = None if fit is None else _for_this_wall(fit, findings, change)
     headline = theta0.get("tiltmeters", theta0["wires"])
     bias = _bias(record, signals, track, estimates, velocity_filter, options)
-    residuals = residuals_after(signals, times.rest)
     analysis = TestAnalysis(
         label=record.label,
         found=True,
@@ -115,7 +115,7 @@ def _analyse(
         bias=bias,
         theory=_theory(record, abs(headline.value), estimates["crt"].r, len(times.impacts_s)),
         joint=joint,
-        residuals=residuals,
+        residuals=residuals_after(signals, times.rest),
         noise_rad=signals.noise_rad,
         zero=signals.zero,
         filter_statement=velocity_filter.statement,

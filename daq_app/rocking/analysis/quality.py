@@ -32,7 +32,7 @@ def quality_notes(
     notes = [QualityNote(finding.severity, finding.text) for finding in findings]
     notes += [*_part(record), *_sensors(record, signals), *_course(times), _alignment(record)]
     if track is not None and analysis is not None:
-        notes += [*_agreement(signals, analysis), *_motion(track, analysis), *_shocks(record, onsets)]
+        notes += [*_agreement(signals, analysis), *_motion(track), *_shocks(record, onsets)]
     return tuple(sorted(notes, key=lambda note: note.severity != "warning"))
 
 
@@ -163,18 +163,11 @@ def _agreement(signals: Signals, analysis: TestAnalysis) -> list[QualityNote]:
     return notes
 
 
-def _motion(track: MotionTrack, analysis: TestAnalysis) -> list[QualityNote]:
+def _motion(track: MotionTrack) -> list[QualityNote]:
     notes = []
     lost = [n + 1 for n, arc in enumerate(track.arcs) if arc is None]
     if lost:
         notes.append(_info(f"half-cycles before impacts {', '.join(map(str, lost))} could not be fitted"))
-    if analysis.fit is not None and not analysis.fit.explains_the_motion:
-        notes.append(
-            _info(
-                f"Housner's motion leaves {analysis.fit.residual_rad * 1e3:.2f} mrad rms, "
-                f"noise is {analysis.fit.noise_rad * 1e3:.3f}: the wall does more than the model"
-            )
-        )
     return notes
 
 

@@ -8,7 +8,8 @@ from typing import Literal
 Family = Literal["wires", "LVDTs", "tiltmeters", "accelerometers", "survey", "wall"]
 Kind = Literal[
     "slow", "late", "gain", "zero", "hum", "reversed", "unit", "drift", "motion",
-    "speed", "side", "loss", "pause", "hop", "duration", "scatter", "release", "pivot",
+    "speed", "side", "loss", "pause", "hop", "duration", "scatter", "release",
+    "misfit", "pivot",
 ]  # fmt: skip
 Treatment = Literal["none", "left out", "put in step", "put right", "removed"]
 

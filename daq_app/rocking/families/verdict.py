@@ -183,9 +183,9 @@ def judge(
 def _touches_r(finding: FamilyFinding) -> bool:
     """Whether r may be off by it: a gain cancels in EAV and moves CRT by 0.0001 for 1 %; no time is in r.
 
-    What a scatter makes of r is in its error.
+    What a scatter makes of r is in its error, and a misfit is in the error of r by the fit alone.
     """
-    return finding.kind not in ("gain", "late", "scatter") and finding.family not in (
+    return finding.kind not in ("gain", "late", "scatter", "misfit") and finding.family not in (
         "tiltmeters",
         "accelerometers",
     )

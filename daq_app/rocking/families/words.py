@@ -197,6 +197,17 @@ def r_scatters(share: float, standard_error: float) -> FamilyFinding:
     return FamilyFinding("wall", (), "scatter", share, "1", "none", "warning", text)
 
 
+def not_housner_motion(residual_rad: float, noise_rad: float, *, notable: bool) -> FamilyFinding:
+    """The fit of the whole motion leaves more than noise; a warning where it is `notable`."""
+    severity: Literal["info", "warning"] = "warning" if notable else "info"
+    text = (
+        f"Housner's motion leaves {residual_rad * 1e3:.2f} mrad rms, noise is {noise_rad * 1e3:.3f}: the "
+        "wall does more than the model, and r by the fit of the whole motion is that of the nearest block. "
+        "Usual causes: a base that is not level, a cable that still pulls, a wall that bends"
+    )
+    return FamilyFinding("wall", (), "misfit", residual_rad, "rad", "none", severity, text)
+
+
 def slow_release(misfit_share: float) -> FamilyFinding:
     """The wall was let go slowly, or pushed: its fall is not that of a block from rest at θ0."""
     text = (
