@@ -86,8 +86,8 @@ def _analyse(
     pattern = pattern_of(instruments, tracks, further)
     change = pattern.change_with_speed
     further += wall_findings(instruments, tracks, joint, further, pattern)
-    further += scatter_findings(estimates["eav"], estimates["crt"], [*instruments.findings, *further])
-    further += misfit_findings(fit)
+    others = [*instruments.findings, *further]
+    further += scatter_findings(estimates["eav"], estimates["crt"], others) + misfit_findings(fit, others)
     verdict, findings = verdict_of(instruments, tracks, series, estimates, further, change)
     estimates = {
         name: with_findings(with_change_by_speed(estimate, change), findings)

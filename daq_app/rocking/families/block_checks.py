@@ -101,11 +101,14 @@ def weaker_hop(pattern: ImpactPattern) -> list[FamilyFinding]:
     return [words.perhaps_hops(pattern.hop_s, share)]
 
 
-def misfit_findings(fit: MotionFit | None) -> list[FamilyFinding]:
-    """What the fit of the whole motion leaves, where that is more than noise."""
+def misfit_findings(fit: MotionFit | None, others: Iterable[FamilyFinding]) -> list[FamilyFinding]:
+    """What the fit of the whole motion leaves, where that is more than noise; `others`: what else was found.
+
+    It is no warning of its own where a warning says why.
+    """
     if fit is None or fit.explains_the_motion:
         return []
-    notable = fit.residual_rad > _MISFIT_NAMED * fit.noise_rad
+    notable = fit.residual_rad > _MISFIT_NAMED * fit.noise_rad and not _is_explained(others)
     return [words.not_housner_motion(fit.residual_rad, fit.noise_rad, notable=notable)]
 
 
@@ -116,11 +119,17 @@ def scatter_findings(
 
     A wall or a zero that does something else at each side or speed makes r scatter as well: that is named.
     """
-    if not is_rigid_block(others) or any(finding.kind == "drift" for finding in others):
+    if _is_explained(others):
         return []
     if min(eav.least_scatter, crt.least_scatter) <= ORDINARY_SCATTER or not eav.standard_error:
         return []
     return [words.r_scatters(min(eav.scatter, crt.scatter), eav.standard_error)]
+
+
+def _is_explained(others: Iterable[FamilyFinding]) -> bool:
+    """Whether something is named that scatters r and bends the motion: a moving zero, no rigid block."""
+    found = list(others)
+    return not is_rigid_block(found) or any(finding.kind == "drift" for finding in found)
 
 
 def _named(coefficient: Coefficient | None) -> bool:
