@@ -38,7 +38,8 @@ _REACH: Final[Mapping[str, float]] = {"voltage": 10.0, "iepe": 5.0, "current": 0
 """Largest reading (V, A, V/V) of a sensor whose list gives a sensitivity and no range. Assumed: what NI's
 usual modules read."""
 _NOISE_SHARE: Final = 1e-4
-"""Expected noise of an auxiliary sensor as a share of its range, where the list gives none. Assumed."""
+"""Expected noise of a sensor as a share of its range, where the list gives none and it is auxiliary or of a
+family that no rig file of the program has. Assumed."""
 _THERMOCOUPLE: Final[Mapping[str, Any]] = {
     "thermocouple": "K",
     "sensitivity": 1.0,
@@ -82,7 +83,8 @@ def channel_keys(sensor: Sensor, measurement: str, product: Product) -> tuple[di
         keys["offset"] = given.get("offset", 0.0)  # the usual sensor's offset is none of this one's
         if "range_si" not in given:
             keys["range_si"] = _range_of(sensor, measurement, keys)
-    if is_auxiliary(sensor.family) and "noise_si" not in keys and "range_si" in keys:
+    known = not is_auxiliary(sensor.family) and any(sensor.family == family for family, _ in _templates())
+    if not known and "noise_si" not in keys and "range_si" in keys:
         keys["noise_si"] = _NOISE_SHARE * max(map(abs, keys["range_si"]))
     unsure = len(measurements_of(sensor)) > 1
     if measurement != "voltage" or (unsure and "sensitivity" in given):
