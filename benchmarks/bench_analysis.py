@@ -97,7 +97,7 @@ def figures() -> list[Figure]:
             "online analysis, share of a core", 100 * statistics.median(online), "%", _RUNS, 3.0, note=note
         ),
         Figure(
-            "analysis of a 20 s run", statistics.median(whole), "s", _RUNS, 1.0, note=note + ", with bias"
+            "analysis of a 20 s run", statistics.median(whole), "s", _RUNS, 0.3, note=note + ", with bias"
         ),
         Figure("processor time of it", processor, "s", note="one run; BLAS threads included"),
         Figure("the same without simulated bias", statistics.median(bare), "s", _RUNS, 1.0),

@@ -37,18 +37,7 @@ class CaptionedFigure:
 
 
 def campaign_figures(tests: Sequence[TestSummary]) -> list[CaptionedFigure]:
-    """Figures 4.1 to 4.4, laid out; 4.1 and 4.3 once per specimen for its level with most tests."""
-    figures = _built(tests)
-    for one in figures:
-        # Otherwise each time a figure is saved it is laid out anew, and drawn twice for it.
-        engine = one.figure.get_layout_engine()
-        if engine is not None:
-            engine.execute(one.figure)
-            one.figure.set_layout_engine(None)
-    return figures
-
-
-def _built(tests: Sequence[TestSummary]) -> list[CaptionedFigure]:
+    """Figures 4.1 to 4.4; 4.1 and 4.3 once per specimen for its level with most tests."""
     found: list[CaptionedFigure] = []
     specimens = list(dict.fromkeys(test.specimen for test in tests))
     richest = {specimen: _richest_level(tests, specimen) for specimen in specimens}

@@ -19,7 +19,25 @@ _THEORY: dict[str, Any] = {"color": "#333333", "lw": 1.2}
 _GRID: dict[str, Any] = {"color": "#dddddd", "lw": 0.6}
 
 
-def _axes(figure: Figure, rows: int, columns: int) -> list[Axes]:
+_LEFT, _RIGHT, _BOTTOM, _TOP, _BETWEEN = 0.75, 0.15, 0.6, 0.15, 0.75
+"""Margins of the axes and the width between two of them, inches: room for tick labels of four characters.
+They are given because matplotlib finds them by drawing each figure twice more."""
+_TITLE = 0.4
+"""Height of a title or a row of legend above the axes, inches."""
+
+
+def _axes(figure: Figure, rows: int, columns: int, *, above: float = 0.0) -> list[Axes]:
+    """Axes in a grid; `above`: room above them, inches."""
+    width, height = figure.get_size_inches()
+    wide = (width - _LEFT - _RIGHT - (columns - 1) * _BETWEEN) / columns
+    figure.subplots_adjust(
+        left=_LEFT / width,
+        right=1.0 - _RIGHT / width,
+        bottom=_BOTTOM / height,
+        top=1.0 - (_TOP + above) / height,
+        wspace=_BETWEEN / wide,
+        hspace=0.08,
+    )
     grid = figure.subplots(rows, columns, squeeze=False)
     axes = [axis for row in grid for axis in row]
     for axis in axes:
@@ -32,8 +50,8 @@ def _axes(figure: Figure, rows: int, columns: int) -> list[Axes]:
 
 def histories(tests: Sequence[TestSummary], title: str) -> Figure:
     """Figure 4.1: rotation and velocity of a level, its repetitions overlaid."""
-    figure = Figure(figsize=(10, 6), layout="constrained")
-    top, bottom = _axes(figure, 2, 1)
+    figure = Figure(figsize=(10, 6))
+    top, bottom = _axes(figure, 2, 1, above=_TITLE)
     bottom.sharex(top)
     for index, test in enumerate(tests):
         style = "--" if test.repetition else "-"
@@ -53,7 +71,7 @@ def histories(tests: Sequence[TestSummary], title: str) -> Figure:
 
 def period_against_amplitude(tests: Sequence[TestSummary]) -> Figure:
     """Figure 4.2: measured periods against peak rotation, with the theory of each specimen (4.1)."""
-    figure = Figure(figsize=(8, 5), layout="constrained")
+    figure = Figure(figsize=(8, 5))
     (axis,) = _axes(figure, 1, 1)
     specimens = sorted({test.specimen for test in tests})
     amplitudes = np.linspace(0.002, max([0.45, *(t.phi0 * 1.05 for t in tests)]), 300)
@@ -86,8 +104,8 @@ def period_against_amplitude(tests: Sequence[TestSummary]) -> Figure:
 
 def decay(tests: Sequence[TestSummary], title: str) -> Figure:
     """Figure 4.3: T_n (4.2) and φ_n (4.3) against n, measured and theory with the mean CRT r."""
-    figure = Figure(figsize=(10, 4.2), layout="constrained")
-    left, right = _axes(figure, 1, 2)
+    figure = Figure(figsize=(10, 4.2))
+    left, right = _axes(figure, 1, 2, above=_TITLE)
     good = [test for test in tests if test.good]
     longest = max((len(test.peaks_rad) for test in good), default=2)
     n = np.arange(0, longest)
@@ -121,8 +139,8 @@ def decay(tests: Sequence[TestSummary], title: str) -> Figure:
 def restitution_by_level(tests: Sequence[TestSummary]) -> Figure:
     """Figure 4.4: r of every test by level, CRT and EAV, one panel per specimen, with r_max."""
     specimens = sorted({test.specimen for test in tests})
-    figure = Figure(figsize=(5.2 * max(len(specimens), 1), 4.6), layout="constrained")
-    axes = _axes(figure, 1, max(len(specimens), 1))
+    figure = Figure(figsize=(5.2 * max(len(specimens), 1), 4.6))
+    axes = _axes(figure, 1, max(len(specimens), 1), above=2 * _TITLE)
     for axis, specimen in zip(axes, specimens, strict=False):
         of_specimen = [test for test in tests if test.specimen == specimen]
         labels = sorted({_level_label(test) for test in of_specimen})
@@ -156,9 +174,7 @@ def restitution_by_level(tests: Sequence[TestSummary]) -> Figure:
         for axis in axes
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
     }
-    figure.legend(
-        handles.values(), handles.keys(), loc="outside upper center", ncols=3 * len(axes), frameon=False
-    )
+    figure.legend(handles.values(), handles.keys(), loc="upper center", ncols=3 * len(axes), frameon=False)
     axes[0].set_ylabel("coefficient of restitution r")
     return figure
 
