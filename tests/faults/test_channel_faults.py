@@ -46,7 +46,9 @@ def test_a_channel_that_is_broken(
     saved = shared.stop()
     facts = look_at(saved.run_path, None)
     assert facts.lost == 0, "the other forty go on"
-    assert any(channel in text for text in facts.reasons)
+    assert any(channel in text for text in facts.reasons), (
+        f"{facts.verdict}: {facts.reasons}\n{facts.account}"
+    )
     row(f"{fault.replace('_', ' ')} ({channel})", told, facts)
 
 
