@@ -233,7 +233,7 @@ def completed(
     turns = [turn_signals(e.run, e.joint, e.features.grid, height) for e in examined]
     bending = _add_rings(blocks_by_run, examined, bends, "bending", slow=False)
     _add_rings(blocks_by_run, examined, turns, "turning", slow=True)
-    vibrations = find_vibration([e.run for e in examined], grids)
+    vibrations = find_vibration([e.run for e in examined], grids, bending)
     examined = [_on_still_floor(e, v) for e, v in zip(examined, vibrations, strict=True)]
     bursts = floor_bursts(
         [e.run for e in examined],

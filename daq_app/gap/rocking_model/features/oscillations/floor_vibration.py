@@ -1,7 +1,8 @@
 """Does the floor vibrate? A sinusoid that the accelerometers show while the wall is held and after it rests.
 
 The frequency is common to all runs, the phase is each run's own. While the wall is held it may sway;
-what a sway implies at the accelerometers is taken out with the rotation's own record.
+what a sway implies at the accelerometers is taken out with the rotation's own record. A wall that bends rings
+on after it has come to rest, at a frequency of its own, which is no floor's: that is taken out as well.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.features.oscillations.rings import Ring, ring_columns
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
@@ -49,13 +51,19 @@ class _Quiet:
     """Samples of the swings: used to sharpen the frequency only."""
 
 
-def find_vibration(runs: Sequence[GapRun], grids: Sequence[Grid]) -> list[Vibration | None]:
-    """Vibration of every run at the one frequency that explains most; None where nothing can be said."""
-    data = [_quiet(run, grid) for run, grid in zip(runs, grids, strict=True)]
-    usable = [d for d in data if d is not None]
+def find_vibration(
+    runs: Sequence[GapRun], grids: Sequence[Grid], ring: Ring | None = None
+) -> list[Vibration | None]:
+    """Vibration of every run at the one frequency that explains most; None where nothing can be said.
+
+    `ring` is the wall's own ring-down after impacts.
+    """
+    usable, data, gain = _seen(runs, grids, None)
+    if ring is not None and usable and ring.decays and ring.gain > float(gain.max()):
+        # What follows the impacts better than an even wave follows the quiet parts is the wall's own.
+        usable, data, gain = _seen(runs, grids, ring)
     if not usable:
         return [None] * len(runs)
-    gain = np.sum([_gain(d, FREQUENCIES_HZ) for d in usable], axis=0)
     best = float(FREQUENCIES_HZ[int(np.argmax(gain))])
     significant = float(gain.max()) > FLOOR_GAIN * len(usable)
     fine = best + np.linspace(-0.03, 0.03, 31)
@@ -64,6 +72,16 @@ def find_vibration(runs: Sequence[GapRun], grids: Sequence[Grid]) -> list[Vibrat
     bend = float(np.gradient(np.gradient(sharp, fine[1] - fine[0]), fine[1] - fine[0]).min())
     sd = float(1.0 / np.sqrt(max(-bend, 1.0)))
     return [None if d is None else _share(d, best, sd, significant) for d in data]
+
+
+def _seen(
+    runs: Sequence[GapRun], grids: Sequence[Grid], ring: Ring | None
+) -> tuple[list[_Quiet], list[_Quiet | None], FloatArray]:
+    """(usable parts, parts of each run, gain of each frequency) without the ring-down of `ring`."""
+    data = [_quiet(run, grid, ring) for run, grid in zip(runs, grids, strict=True)]
+    usable = [d for d in data if d is not None]
+    gains = [_gain(d, FREQUENCIES_HZ) for d in usable]
+    return usable, data, np.sum(gains, axis=0) if gains else np.zeros(FREQUENCIES_HZ.size)
 
 
 def without_vibration(run: GapRun, grid: Grid, found: Vibration) -> GapRun:
@@ -79,7 +97,7 @@ def without_vibration(run: GapRun, grid: Grid, found: Vibration) -> GapRun:
     return replace(run, channels=channels)
 
 
-def _quiet(run: GapRun, grid: Grid) -> _Quiet | None:
+def _quiet(run: GapRun, grid: Grid, ring: Ring | None) -> _Quiet | None:
     chosen = run.steady_accelerometers("x")
     if not chosen:
         return None
@@ -95,10 +113,18 @@ def _quiet(run: GapRun, grid: Grid) -> _Quiet | None:
     # The held wall sways, and a compliant joint does at rest: its own rotation says by how much.
     before, after = grid.time_s < 0.0, grid.time_s > grid.rest_s
     sway = [column for part in (before, after) for column in _sway(grid.raw, part, height)]
-    columns = np.column_stack([held, resting, *sway])[pick].astype(float)
+    own = [] if ring is None else _rings_on(grid, ring, resting)
+    columns = np.column_stack([held, resting, *sway, *own])[pick].astype(float)
     columns[:, 2:] /= np.abs(columns[:, 2:]).max(axis=0) + 1e-30
     basis, _ = np.linalg.qr(columns[:, np.any(columns != 0.0, axis=0)])
     return _Quiet(grid.time_s[pick], measured[pick], basis, resting[pick])
+
+
+def _rings_on(grid: Grid, ring: Ring, resting: NDArray[np.bool_]) -> list[FloatArray]:
+    """The ring-down of the wall in the part at rest, and the same of a frequency a little off."""
+    waves = ring_columns(grid, ring.frequency_hz, ring.zeta) * resting[:, None]
+    since = (grid.time_s - grid.rest_s)[:, None]
+    return list(np.hstack([waves, waves * since, waves * since**2]).T)
 
 
 def _sway(rotation: FloatArray, part: NDArray[np.bool_], height: float) -> list[FloatArray]:

@@ -26,6 +26,8 @@ TURN_HZ = np.geomspace(1.5, 14.0, 40)
 DAMPING = (0.01, 0.04)
 FINE_DAMPING = (0.007, 0.012, 0.02, 0.032, 0.05, 0.08)
 _DEGREE = 4
+_VAGUE_ZETA = 0.4
+"""Relative error of a damping that the runs do not say."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +40,11 @@ class Ring:
     frequency_sd: float
     zeta_sd: float
     """Relative."""
+
+    @property
+    def decays(self) -> bool:
+        """Whether the runs say how fast; what follows no impact has no damping to speak of."""
+        return self.zeta_sd < _VAGUE_ZETA
 
 
 def ring_columns(grid: Grid, frequency_hz: float, zeta: float) -> FloatArray:
@@ -130,7 +137,7 @@ def scan(grids: Sequence[Grid], signals: Sequence[list[Signal]], *, slow: bool) 
         zeta,
         float(score.max()),
         float(min(sd, 0.3 * frequency)),
-        float(np.clip(zeta_sd, 0.02, 0.4)),
+        float(np.clip(zeta_sd, 0.02, _VAGUE_ZETA)),
     )
 
 
