@@ -107,6 +107,12 @@ IMPACT_FORM_S = 3e-4
 Raising it hides delays of accelerometers below it.
 """
 
+VAGUE_DAMPING = 0.4
+"""Relative error, 1, of a ring-down's damping from which the runs do not say how fast it decays (assumed).
+
+Raising it takes a vibration of the floor that follows impacts by chance for the wall's own.
+"""
+
 RING_SD = 0.07
 """Relative sd, 1, of a ring-down in one run: kicks differ from impact to impact (assumed).
 

@@ -19,15 +19,13 @@ from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal
 from daq_app.gap.rocking_model.features.response import resonator
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
-from daq_app.gap.rocking_model.tolerances import RING_SD
+from daq_app.gap.rocking_model.tolerances import RING_SD, VAGUE_DAMPING
 
 BEND_HZ = np.geomspace(2.0, 42.0, 61)
 TURN_HZ = np.geomspace(1.5, 14.0, 40)
 DAMPING = (0.01, 0.04)
 FINE_DAMPING = (0.007, 0.012, 0.02, 0.032, 0.05, 0.08)
 _DEGREE = 4
-_VAGUE_ZETA = 0.4
-"""Relative error of a damping that the runs do not say."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +42,7 @@ class Ring:
     @property
     def decays(self) -> bool:
         """Whether the runs say how fast; what follows no impact has no damping to speak of."""
-        return self.zeta_sd < _VAGUE_ZETA
+        return self.zeta_sd < VAGUE_DAMPING
 
 
 def ring_columns(grid: Grid, frequency_hz: float, zeta: float) -> FloatArray:
@@ -137,7 +135,7 @@ def scan(grids: Sequence[Grid], signals: Sequence[list[Signal]], *, slow: bool) 
         zeta,
         float(score.max()),
         float(min(sd, 0.3 * frequency)),
-        float(np.clip(zeta_sd, 0.02, _VAGUE_ZETA)),
+        float(np.clip(zeta_sd, 0.02, VAGUE_DAMPING)),
     )
 
 
