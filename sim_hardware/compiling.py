@@ -1,7 +1,7 @@
-"""The first start on a machine: the wall's motion is compiled beside its sensors, in a process of its own.
+"""What is compiled at the first start on a machine: the wall's motion and its sensors.
 
-Each takes about ten seconds of processor time; Numba keeps the result on disk, and later starts load it.
-``python -m sim_hardware.compiling`` compiles the motion.
+Each takes about seven seconds of processor time; Numba keeps the result on disk, and later starts load it.
+``python -m sim_hardware.compiling`` compiles the motion (`first_start` starts it).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from daq_app.guarded import end_guarded, start_guarded
+from daq_app.guarded import end_guarded
 from sim_hardware.dynamics import Body, Release, Restitution, simulate_motion
 from sim_hardware.dynamics.kernel import integrate
 from sim_hardware.dynamics.pieces import constant_piece, evaluate
@@ -23,11 +23,6 @@ def motion_is_compiled() -> bool:
     """Whether Numba has the motion on disk. True too where it compiles nothing (NUMBA_DISABLE_JIT)."""
     stats = getattr(integrate, "stats", None)
     return stats is None or any(Path(stats.cache_path).glob("kernel.integrate*.nbc"))
-
-
-def start_compiling_motion() -> subprocess.Popen[str]:
-    """Begin to compile the motion in another process, which ends with this one."""
-    return start_guarded("sim_hardware.compiling", [], quiet=True)
 
 
 def finish_compiling_motion(process: subprocess.Popen[str]) -> None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import signal
+import subprocess
 import sys
 import threading
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import psutil
@@ -24,105 +24,15 @@ from sim_hardware.daqmx_server.channels.teds import read_data_sheet
 from sim_hardware.daqmx_server.errors import DaqmxError
 from sim_hardware.daqmx_server.inventory.devices import Inventory, device_from_text
 from sim_hardware.daqmx_server.inventory.max_export import MaxExport, load_max_export
+from sim_hardware.daqmx_server.options import parser
 from sim_hardware.daqmx_server.services.devices.storage import fill
 from sim_hardware.daqmx_server.services.server import DaqmxServer, missing_table
 from sim_hardware.faults.script import load_faults
+from sim_hardware.first_start import start_compiling_motion
 from sim_hardware.marked_line import MarkedLine
 from sim_hardware.signals import NothingWired, SignalSource
 
 _PARENT_POLL_S = 0.5
-
-
-def _speed(text: str) -> float:
-    if text == "max":
-        return float("inf")
-    value = float(text)
-    if not 0 < value <= 10_000:
-        raise argparse.ArgumentTypeError("speed is a factor above 0, or max")
-    return value
-
-
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    options = argparse.ArgumentParser(
-        prog="python -m sim_hardware.daqmx_server",
-        description="Simulated NI-DAQmx device server (gRPC, loopback only): with a rocking wall wired to "
-        "it, or on its own with the devices of an NI MAX export or of product names.",
-        epilog="examples: python -m sim_hardware.daqmx_server --config configs/fr1.toml --speed 10; "
-        "python -m sim_hardware.daqmx_server --device Dev1=PCIe-6363 --port 31763",
-    )
-    options.add_argument("--port", type=int, default=0, help="TCP port; 0 lets the system choose")
-    _add_wall(options)
-    _add_devices(options)
-    options.add_argument("--faults", type=Path, metavar="FILE", help="script of faults (TOML or JSON)")
-    options.add_argument(
-        "--finite", choices=("real", "instant"), default="real", help="clock of finite tasks"
-    )
-    options.add_argument(
-        "--missing",
-        action="store_true",
-        help="print which calls of the service are not simulated",
-    )
-    options.add_argument("--parent-pid", type=int, help="end when this process has ended")
-    return options
-
-
-def _add_wall(options: argparse.ArgumentParser) -> None:
-    options.add_argument(
-        "--config", type=Path, metavar="RIG.toml", help="rig: hardware and wall; none: no wall"
-    )
-    options.add_argument(
-        "--speed", type=_speed, default=1.0, help="time factor, or max: time moves with the reads"
-    )
-    options.add_argument("--seed", type=int, help="seed of noise and scatter; default: the rig's")
-    options.add_argument("--theta0-over-alpha", type=float, metavar="X", help="release rotation over alpha")
-    options.add_argument(
-        "--wall",
-        choices=("scripted", "commanded", "marked"),
-        default="scripted",
-        help="pulled and released by the rig file's times, or by commands of the control service; "
-        "marked: no wall, every sample of an LVDT tells its own place",
-    )
-
-
-def _add_devices(options: argparse.ArgumentParser) -> None:
-    options.add_argument(
-        "--max-export",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="FILE.ini",
-        help="take devices, scales, saved tasks and channels from NI MAX, not from the rig; may be repeated",
-    )
-    options.add_argument(
-        "--device",
-        action="append",
-        default=[],
-        metavar="NAME=PRODUCT",
-        help="a device, for instance Dev1=PCIe-6363, cDAQ1=cDAQ-9178, cDAQ1Mod1=NI-9205; may be repeated",
-    )
-    options.add_argument(
-        "--real",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="a device that calls itself not simulated: its inputs see its own outputs, not NI's sine",
-    )
-    options.add_argument(
-        "--teds",
-        action="append",
-        default=[],
-        metavar="TERMINAL=FILE",
-        help="a sensor with a data sheet (virtual TEDS file) on a module that asks for it; may be repeated",
-    )
-    options.add_argument(
-        "--products",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="FILE.toml",
-        help="product file of your own; may be repeated",
-    )
 
 
 def build_bench(arguments: argparse.Namespace) -> Bench:
@@ -182,35 +92,39 @@ def _wall(rig: Rig, arguments: argparse.Namespace) -> SignalSource:
     return wall
 
 
-def warm_up(bench: Bench, arguments: argparse.Namespace) -> None:
+def warm_up(bench: Bench, arguments: argparse.Namespace, motion: subprocess.Popen[str] | None = None) -> None:
     """Load the wall's compiled kernels now: a second of it would be a second in which nothing is sampled.
 
     On a new machine they are compiled here. A commanded wall would meet those of the motion only at its
-    release, so a scripted one is let go in its place.
+    release, so a scripted one is let go in its place. `motion`: the process that compiles them already.
     """
     terminals = tuple(name for device in bench.present() for name in device.physical_channels)
     if arguments.wall == "commanded":
-        _compile_beside(bench, terminals)
+        _compile_beside(bench, terminals, motion)
     bench.source.volts(terminals, np.linspace(0.0, 0.01, 11))
     if arguments.wall == "commanded":
         rehearsed = argparse.Namespace(**{**vars(arguments), "wall": "scripted"})
         _wall(load_rig(arguments.config), rehearsed).volts(terminals, np.arange(0.0, 60.0, 0.5))
 
 
-def _compile_beside(bench: Bench, terminals: tuple[str, ...]) -> None:
+def _compile_beside(bench: Bench, terminals: tuple[str, ...], motion: subprocess.Popen[str] | None) -> None:
     from sim_hardware import compiling  # compiles its kernels: only for a wall
 
-    if compiling.motion_is_compiled():
-        return
+    if motion is None:
+        if compiling.motion_is_compiled():
+            return
+        motion = start_compiling_motion()
     print("Compiling the simulated wall, once on this machine: its motion and its sensors", flush=True)
-    motion = compiling.start_compiling_motion()
     bench.source.volts(terminals, np.linspace(0.0, 0.01, 11))
     print("The sensors are compiled; the motion follows", flush=True)
     compiling.finish_compiling_motion(motion)
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Serve until a signal, or until the parent has gone. Exit code 2 for a bad configuration."""
+def main(argv: Sequence[str] | None = None, motion: subprocess.Popen[str] | None = None) -> int:
+    """Serve until a signal, or until the parent has gone. Exit code 2 for a bad configuration.
+
+    `motion`: a process that compiles the wall's motion already.
+    """
     arguments = parser().parse_args(argv)
     if arguments.missing:
         print(missing_table())
@@ -222,7 +136,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     _report_unknown(server.bench.inventory)
     if arguments.config is not None:
-        warm_up(server.bench, arguments)
+        warm_up(server.bench, arguments, motion)
     ended = threading.Event()
     for name in ("SIGINT", "SIGTERM", "SIGBREAK"):
         if hasattr(signal, name):

@@ -25,7 +25,8 @@ from daq_app.config.loader import load_rig
 from daq_app.config.rig import Hardware
 from drivers.ni.product_copy import describe_product
 from sim_hardware.control import SimControl
-from sim_hardware.daqmx_server.program import build_bench, parser
+from sim_hardware.daqmx_server.options import parser
+from sim_hardware.daqmx_server.program import build_bench
 from sim_hardware.daqmx_server.services.server import DaqmxServer
 from tests.cli.test_config_commands import daq_app
 

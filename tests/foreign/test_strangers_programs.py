@@ -22,7 +22,8 @@ from nidaqmx.stream_writers import AnalogSingleChannelWriter
 from nptdms import TdmsFile
 
 from sim_hardware.control import SimControl
-from sim_hardware.daqmx_server.program import build_bench, parser
+from sim_hardware.daqmx_server.options import parser
+from sim_hardware.daqmx_server.program import build_bench
 from sim_hardware.daqmx_server.services.server import DaqmxServer
 
 DEVICES = ["Dev1=PCIe-6363", "cDAQ1=cDAQ-9178", "cDAQ1Mod1=NI 9205", "cDAQ1Mod2=NI 9234"]

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from nidaqmx.system import System
 
-from sim_hardware.daqmx_server.program import build_bench, parser
+from sim_hardware.daqmx_server.options import parser
+from sim_hardware.daqmx_server.program import build_bench
 from sim_hardware.daqmx_server.services.server import DaqmxServer
 
 C_SERIES = [

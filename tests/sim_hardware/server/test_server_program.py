@@ -25,7 +25,8 @@ from nidaqmx.grpc_session_options import GrpcSessionOptions
 from daq_app.config.errors import ConfigError
 from sim_hardware.control import SimControl, SimControlError
 from sim_hardware.daqmx_server.inventory.max_export import load_max_export
-from sim_hardware.daqmx_server.program import build_bench, main, parser
+from sim_hardware.daqmx_server.options import parser
+from sim_hardware.daqmx_server.program import build_bench, main
 from sim_hardware.daqmx_server.services.server import DaqmxServer, missing_calls, missing_table
 
 RIG = Path(__file__).parents[3] / "configs" / "fr1.toml"

@@ -12,7 +12,8 @@ from nidaqmx.constants import AcquisitionType, ReadRelativeTo, TaskMode
 from nidaqmx.errors import DaqError
 
 from sim_hardware.control import SimControl
-from sim_hardware.daqmx_server.program import build_bench, parser
+from sim_hardware.daqmx_server.options import parser
+from sim_hardware.daqmx_server.program import build_bench
 from sim_hardware.daqmx_server.services.server import DaqmxServer
 
 NOISE_V = 0.03 * 2.0 + 1e-3
