@@ -13,11 +13,11 @@ from daq_app.gap.rocking_model.features.block import scalar_block
 from daq_app.gap.rocking_model.features.families import sensor_families
 from daq_app.gap.rocking_model.features.families.wires import leaked_turn
 from daq_app.gap.rocking_model.features.family import Scene
-from daq_app.gap.rocking_model.features.oscillations.floor_vibration import quiet
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion import swings as sw
 from daq_app.gap.rocking_model.motion.hold import from_hold
 from daq_app.gap.rocking_model.motion.motion_grid import make_grid
+from daq_app.gap.rocking_model.motion.quiet import quiet
 from daq_app.gap.rocking_model.motion.release_speed import release_speed
 from daq_app.gap.rocking_model.motion.rotation import (
     Rotation,

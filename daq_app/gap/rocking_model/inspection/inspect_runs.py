@@ -15,13 +15,10 @@ from daq_app.config.rig import Family
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block, scalar_block
-from daq_app.gap.rocking_model.features.oscillations.floor_vibration import (
-    Vibration,
-    find_vibration,
-    without_vibration,
-)
+from daq_app.gap.rocking_model.features.oscillations.floor_vibration import find_vibration, without_vibration
 from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal, bend_signals, turn_signals
 from daq_app.gap.rocking_model.features.oscillations.rings import Ring, ring_block, scan, with_repeatability
+from daq_app.gap.rocking_model.features.oscillations.vibration import Vibration
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined, examine
 from daq_app.gap.rocking_model.features.run_findings import RunFinding

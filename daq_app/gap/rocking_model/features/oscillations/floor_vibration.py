@@ -16,7 +16,9 @@ from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.features.oscillations.rings import Ring, ring_columns
+from daq_app.gap.rocking_model.features.oscillations.vibration import Vibration
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.quiet import quiet
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 from daq_app.gap.rocking_model.tolerances import FLOOR_GAIN
@@ -25,19 +27,6 @@ FREQUENCIES_HZ = np.arange(0.4, 6.0, 0.02)
 _REST_MARGIN_S = 0.3
 _SHORTEST, _ENOUGH = 60, 120
 """Samples of the grid in a part that is used, and in both."""
-
-
-@dataclass(frozen=True, slots=True)
-class Vibration:
-    """One run's share: amplitude (m/s²) with its error, and the phase at release (rad), of sin(2πft + φ)."""
-
-    frequency_hz: float
-    frequency_sd: float
-    amplitude: float
-    amplitude_sd: float
-    phase: float
-    phase_sd: float
-    found: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,19 +125,6 @@ def _sway(rotation: FloatArray, part: NDArray[np.bool_], height: float) -> list[
         twice = np.gradient(np.gradient(theta, 1 / GRID_HZ), 1 / GRID_HZ)
         shown[:, part] = -GRAVITY_M_S2 * theta, height * twice, np.gradient(height * twice, 1 / GRID_HZ)
     return list(shown)
-
-
-def quiet(run: GapRun, grid: Grid) -> NDArray[np.bool_]:
-    """Samples of the grid at which nothing rings in the accelerometers (steps on the floor, a knock)."""
-    step = round(run.rate_hz / GRID_HZ)
-    spread = np.zeros(grid.time_s.size)
-    for i in run.indices("accelerometer"):
-        if np.all(np.isfinite(run.channels[i])):
-            cells = run.channels[i, : spread.size * step].reshape(spread.size, step)
-            deviation = cells.std(axis=1)
-            spread = np.maximum(spread, deviation / max(float(np.median(deviation[-60:])), 1e-12))
-    loud = np.convolve(spread > 2.5, np.ones(round(0.12 * GRID_HZ)), "same") > 0
-    return np.asarray(~loud)
 
 
 def _gain(data: _Quiet, frequencies: FloatArray) -> FloatArray:

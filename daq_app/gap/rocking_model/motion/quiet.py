@@ -1,0 +1,23 @@
+"""When nothing but the wall moves the accelerometers."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
+from daq_app.gap.rocking_model.records import GapRun
+
+
+def quiet(run: GapRun, grid: Grid) -> NDArray[np.bool_]:
+    """Samples of the grid at which nothing rings in the accelerometers (steps on the floor, a knock)."""
+    step = round(run.rate_hz / GRID_HZ)
+    spread = np.zeros(grid.time_s.size)
+    for i in run.indices("accelerometer"):
+        if np.all(np.isfinite(run.channels[i])):
+            cells = run.channels[i, : spread.size * step].reshape(spread.size, step)
+            deviation = cells.std(axis=1)
+            spread = np.maximum(spread, deviation / max(float(np.median(deviation[-60:])), 1e-12))
+    loud = np.convolve(spread > 2.5, np.ones(round(0.12 * GRID_HZ)), "same") > 0
+    return np.asarray(~loud)
