@@ -66,7 +66,7 @@ def demo(
         options = ["--rig", str(rig_file), "--out", str(runs), "--speed", speed]
         last = _play(rig, planned, options, None if headless else campaign_file, console)
     if not no_report:
-        report(runs, campaign_file, folder / "report")
+        report(runs, campaign_file, folder / "report", overwrite=True)  # that of the tests before these
     console.print(f"Look at the last run: daq-app view {last}")
     console.print("Your own wall: daq-app rig new")
 

@@ -14,20 +14,22 @@ from daq_app.runfile import open_run
 
 
 @pytest.mark.heavy
-def test_a_test_day_plays_in_an_empty_folder_and_ends_with_a_report(tmp_path: Path) -> None:
+def test_a_test_day_plays_in_an_empty_folder_goes_on_and_ends_with_a_report(tmp_path: Path) -> None:
     command = [sys.executable, "-c", "from daq_app.cli import main; main()", "demo"]
-    options = ["day", "--headless", "--tests", "2", "--speed", "max"]
-    done = subprocess.run(
-        [*command, *options], cwd=tmp_path, capture_output=True, encoding="utf-8", check=False
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
+    for tests in ("2", "1"):
+        options = ["day", "--headless", "--tests", tests, "--speed", "max"]
+        done = subprocess.run(
+            [*command, *options], cwd=tmp_path, capture_output=True, encoding="utf-8", check=False
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
     runs = sorted((tmp_path / "day" / "runs").glob("*.h5"))
-    tests = []
+    taken = []
     for path in runs:
         with open_run(path) as run:
-            tests.append(run.header.test)
-    assert tests == ["FR1-L1-1", "FR1-L1-2"]
+            taken.append(run.header.test)
+    assert taken == ["FR1-L1-1", "FR1-L1-2", "FR1-L1-3"]
     assert (tmp_path / "day" / "report" / "report.html").is_file()
+    assert "3 kept beside their runs" in done.stdout
     assert "daq-app view" in done.stdout
 
 
