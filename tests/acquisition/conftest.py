@@ -250,8 +250,9 @@ def live(
     """Make a session on a staged driver; ended with the test."""
     ends: list[Callable[[], None]] = []
 
-    def make(folder: Path | None = None, driver: StageDriver | None = None, **settings: Any) -> Live:
-        stage = driver or StageDriver(wall_test)
+    def make(folder: Path | None = None, refusal: DriverError | None = None, **settings: Any) -> Live:
+        stage = StageDriver(wall_test)
+        stage.refuse_to_open = refusal
         where = folder or tmp_path / "runs"
         where.mkdir(exist_ok=True)
         # The stage runs out of samples while a run is being saved: on a busy machine for longer than 30 s.

@@ -6,9 +6,11 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
@@ -16,7 +18,7 @@ import pytest
 
 from daq_app.acquisition.closing import finaliser as closing
 from daq_app.acquisition.closing.finaliser import Finaliser, Finished
-from daq_app.guarded import end_guarded
+from daq_app.guarded import end_guarded, start_guarded
 from daq_app.runfile import JournalWriter, RunHeader, open_run
 from tests.support.recorder.processes import makers_of_runs
 
@@ -61,6 +63,33 @@ def test_a_worker_that_does_not_end_is_given_up_and_the_next_journal_is_recovere
     answer = stuck.result(120.0)
     assert not answer.ok and "is untouched" in answer.text
     assert recovered.result(120.0).ok and (tmp_path / "healthy.h5").exists()
+
+
+def test_a_worker_loads_before_its_first_job(finaliser: Finaliser) -> None:
+    assert not makers_of_runs(psutil.Process())
+    finaliser.warm()
+    waiting = threading.Event()
+    while not makers_of_runs(psutil.Process()):
+        waiting.wait(0.02)
+
+
+def test_a_worker_that_cannot_be_started_early_is_started_for_its_job(
+    finaliser: Finaliser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tries: list[str] = []
+
+    def start(module: str, *arguments: Any, **options: Any) -> subprocess.Popen[str]:
+        tries.append(module)
+        if len(tries) == 1:
+            raise OSError("no process to be had")
+        return start_guarded(module, *arguments, **options)
+
+    monkeypatch.setattr(closing, "start_guarded", start)
+    finaliser.warm()
+    journal = _journal(tmp_path / "a.journal")
+    saved = finaliser.submit({"job": "finalise", "journal": str(journal), "out": f"{tmp_path}/a.h5"})
+    assert saved.result(120.0).ok
+    assert len(tries) == 2
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="kill -9")

@@ -163,3 +163,15 @@ def test_the_same_error_without_any_progress_is_not_repeated_for_ever(live: Live
         lab.driver.fail_at(8000, overwritten())
     lab.driver.let(40_000)
     assert "overwritten" in lab.wait_for_state(State.FAILED).text
+
+
+def test_what_saves_runs_is_loaded_once_the_device_is_open(
+    live: Lives, finaliser: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before, it would take the processor from what the device waits for."""
+    loads: list[str] = []
+    monkeypatch.setattr(finaliser, "warm", lambda: loads.append("loads"))
+    live(refusal=gone())
+    assert loads == []
+    live()
+    assert loads == ["loads"]

@@ -1,7 +1,7 @@
 """Turns closed journals into run files, in a process of its own, so that reading never waits.
 
 Packing a minute of 41 channels takes a processor for seconds; done in our process it would hold the
-interpreter's lock against the reader. The worker is started early and kept, so that it is warm.
+interpreter's lock against the reader. The worker is started before it is needed, and kept.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
+from enum import Enum
 from functools import partial
 from pathlib import Path
 from typing import IO, Final
@@ -44,6 +45,13 @@ class Finished:
     path: str = ""
 
 
+class _Word(Enum):
+    """What a finaliser is told between jobs."""
+
+    WARM = "warm"
+    END = "end"
+
+
 class Finaliser(threading.Thread):
     """Sends jobs to workers, one after the other; starts a new worker if one dies or does not end.
 
@@ -53,9 +61,13 @@ class Finaliser(threading.Thread):
 
     def __init__(self) -> None:
         super().__init__(name="finaliser", daemon=True)
-        self._jobs: queue.SimpleQueue[tuple[dict[str, str], Future[Finished]] | None] = queue.SimpleQueue()
+        self._jobs: queue.SimpleQueue[tuple[dict[str, str], Future[Finished]] | _Word] = queue.SimpleQueue()
         self._worker = _Worker()
         self._recovery = _Recovery()
+
+    def warm(self) -> None:
+        """Start the worker of this session's runs, which loads for a second, and return at once."""
+        self._jobs.put(_Word.WARM)
 
     def submit(self, job: dict[str, str], then: Callable[[Finished], None] | None = None) -> Future[Finished]:
         """Do ``{"job": "finalise", "journal": …, "out": …}`` or ``{"job": "recover", "journal": …}``.
@@ -73,8 +85,11 @@ class Finaliser(threading.Thread):
 
     def run(self) -> None:
         """Until `close`."""
-        self._worker.start()
-        while (entry := self._jobs.get()) is not None:
+        while (entry := self._jobs.get()) is not _Word.END:
+            if entry is _Word.WARM:
+                with contextlib.suppress(OSError, MemoryError):  # the first job tries again
+                    self._worker.start()
+                continue
             job, done = entry
             done.set_result(until_memory(partial(self._worker.do, job)))
         until_memory(self._worker.end)
@@ -82,7 +97,7 @@ class Finaliser(threading.Thread):
     def close(self) -> None:
         """Finish what must be saved (recovery can wait for the next start), then end the workers."""
         self._recovery.close()
-        self._jobs.put(None)
+        self._jobs.put(_Word.END)
         if self.is_alive():
             self.join()
 
@@ -158,7 +173,7 @@ class _Worker:
         self._stopped = threading.Event()
 
     def start(self) -> None:
-        """Start the process now, so that it is warm when it is needed."""
+        """Start the process unless it runs."""
         if self._process is None or self._process.poll() is not None:
             self.end()
             self._process = start_guarded(_WORKER, [], reads_input=True)

@@ -207,6 +207,7 @@ class Session:
         match item:
             case Started(opened=opened):
                 self.opened = opened
+                self._finaliser.warm()
             case SourceEnded(error=error):
                 self.opened = None
                 self.error = error

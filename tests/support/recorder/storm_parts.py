@@ -136,6 +136,9 @@ class Listener:
 class QuickFinaliser:
     """Makes run files at once and without an analysis: what they hold is what is judged here."""
 
+    def warm(self) -> None:
+        """Nothing to load."""
+
     def submit(self, job: dict[str, str], then: Callable[[Finished], None] | None = None) -> Future[Finished]:
         done: Future[Finished] = Future()
         if job["job"] == "finalise":
