@@ -115,7 +115,8 @@ def _compile_beside(bench: Bench, terminals: tuple[str, ...], motion: subprocess
             return
         motion = start_compiling_motion()
     print("Compiling the simulated wall, once on this machine: its motion and its sensors", flush=True)
-    bench.source.volts(terminals, np.linspace(0.0, 0.01, 11))
+    with compiling.without_collection():
+        bench.source.volts(terminals, np.linspace(0.0, 0.01, 11))
     print("The sensors are compiled; the motion follows", flush=True)
     compiling.finish_compiling_motion(motion)
 
