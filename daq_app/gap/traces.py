@@ -25,8 +25,8 @@ from daq_app.gap.rocking_model.motion.hold import from_hold
 from daq_app.gap.rocking_model.motion.rotation import (
     Wire,
     anchors_turn,
+    mean_rotation,
     sample_noise,
-    wall_rotation,
     wires_of,
     zeroed,
 )
@@ -126,8 +126,8 @@ def _rotations(run: GapRun, result: Diagnosis) -> tuple[GapRun, Swings, FloatArr
     families = {name.partition("@")[2] for name in _effects_of(result)}
     shown = next((f for f in ("wire", "tiltmeter", "lvdt") if f in families), "lvdt")
     run, joint = from_hold(run)
-    rows, heights, _ = wall_rotation(run)
-    wires = np.average(rows, axis=0, weights=heights**2) if len(rows) else joint.theta
+    turned = mean_rotation(run)
+    wires = joint.theta if turned is None else turned
     # What the effect does not touch tells the motion; what it touches is shown.
     true = wires if shown == "lvdt" and "lvdt" in families else joint.theta
     swings = find_swings(true, sample_noise(true, run.rate_hz), run.rate_hz, run.name)

@@ -12,7 +12,7 @@ import numpy as np
 from rich.console import Console
 
 from daq_app.gap.core import Diagnosis, Fit, Options, diagnose, fit
-from daq_app.gap.core.features import PlainRun
+from daq_app.gap.own_model import Measured
 from studies.real_gap.emps_model import EmpsModel, library, load_runs
 from studies.real_gap.independence import with_independence
 from studies.real_gap.report import arguments, print_rows, show
@@ -37,7 +37,7 @@ class EmpsResult:
     published: dict[str, tuple[float, float]]
     from_mass: Diagnosis
     from_viscous: Diagnosis
-    runs: list[PlainRun]
+    runs: list[Measured]
     fits: dict[str, Fit]
 
 
@@ -67,7 +67,7 @@ def run(folder: Path) -> EmpsResult:
     return EmpsResult(residuals, published, from_mass, from_viscous, both, fits)
 
 
-def _relative(model: EmpsModel, runs: list[PlainRun], found: Fit) -> float:
+def _relative(model: EmpsModel, runs: list[Measured], found: Fit) -> float:
     """‖force − prediction‖ / ‖force‖ over all samples of the runs."""
     values = {key: value for key, (value, _, _) in found.values.items()}
     misses = np.concatenate([r.features.values - model.predict(r, values).features for r in runs])

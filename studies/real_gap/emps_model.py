@@ -28,8 +28,9 @@ from daq_app.gap.core import (
     Run,
     Scatter,
 )
-from daq_app.gap.core.features import FloatArray, PlainRun
+from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.parameters import positive, signed
+from daq_app.gap.own_model import Measured
 
 RATE_HZ = 1000.0
 STATE_CUTOFF_HZ = 80.0
@@ -71,7 +72,7 @@ def smooth(values: FloatArray) -> FloatArray:
     return filtered
 
 
-def load_runs(path: Path, noise_n: float = 0.5) -> list[PlainRun]:
+def load_runs(path: Path, noise_n: float = 0.5) -> list[Measured]:
     """The record cut into `SEGMENTS` runs; the level is the record's name, so whole records are held out.
 
     `noise_n`: force noise of the feature alone; what exceeds it is estimated as scatter.
@@ -95,7 +96,7 @@ def load_runs(path: Path, noise_n: float = 0.5) -> list[PlainRun]:
         )
         features = FeatureSet(force[pick], np.full(pick.size, noise_n), labels)
         inputs = {"motion": motion, "pick": pick, "cache": {}}
-        runs.append(PlainRun(f"{path.stem}/{number}", path.stem, features, inputs))
+        runs.append(Measured(f"{path.stem}/{number}", path.stem, features, inputs))
     return runs
 
 
@@ -129,7 +130,7 @@ class EmpsModel:
         return ()
 
     def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
-        assert isinstance(run, PlainRun)
+        assert isinstance(run, Measured)
         motion: Motion = run.inputs["motion"]
         pick = run.inputs["pick"]
         v, x = motion.velocity, motion.position

@@ -12,9 +12,10 @@ import numpy as np
 from rich.console import Console
 
 from daq_app.gap.core import Diagnosis, Fit, Options, diagnose, fit
-from daq_app.gap.core.features import FloatArray, PlainRun
+from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.fitting.experiment import Experiment
 from daq_app.gap.core.fitting.held_out import score
+from daq_app.gap.own_model import Measured
 from studies.real_gap import pendulum_model as pm
 from studies.real_gap.independence import with_independence
 from studies.real_gap.report import arguments, print_rows, show
@@ -42,7 +43,7 @@ class PendulumResult:
     """From the angle after the release, with viscous damping in the baseline: which loss beyond it."""
     hand_end_s: dict[str, float]
     """Record → time at which the hand's torque is last significant."""
-    traces: list[PlainRun]
+    traces: list[Measured]
     residuals: dict[str, list[FloatArray]]
 
 

@@ -27,8 +27,9 @@ from daq_app.gap.core import (
     Run,
     Scatter,
 )
-from daq_app.gap.core.features import FloatArray, PlainRun
+from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.parameters import positive, signed
+from daq_app.gap.own_model import Measured
 
 RATE_HZ = 1000.0
 CUTOFF_HZ = 8.0
@@ -51,7 +52,7 @@ def turning_points(angle: FloatArray) -> list[int]:
     return [int(k) + 1 for k in np.flatnonzero(np.diff(np.sign(np.diff(smooth))))]
 
 
-def load_runs(paths: Sequence[Path]) -> list[PlainRun]:
+def load_runs(paths: Sequence[Path]) -> list[Measured]:
     """Features: angular acceleration (rad/s²) every 10 ms, of the whole record with the hand's part."""
     runs = []
     for path in paths:
@@ -82,7 +83,7 @@ def load_runs(paths: Sequence[Path]) -> list[PlainRun]:
             "cache": {},
             "first": first,
         }
-        runs.append(PlainRun(path.stem, path.stem, features, inputs))
+        runs.append(Measured(path.stem, path.stem, features, inputs))
     return runs
 
 
@@ -106,7 +107,7 @@ class PendulumModel:
         return (Parameter("zero", 0.0, 0.03, "rad", meaning="encoder angle when hanging"),)
 
     def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
-        assert isinstance(run, PlainRun)
+        assert isinstance(run, Measured)
         angle, velocity = run.inputs["raw"], run.inputs["velocity"]
 
         def term(key: str, regressor: FloatArray | None = None) -> FloatArray:
@@ -244,7 +245,7 @@ class TraceModel:
         return (*known, damping) if self.viscous_in_baseline else known
 
     def local_nuisance(self, run: Run) -> tuple[Parameter, ...]:
-        assert isinstance(run, PlainRun)
+        assert isinstance(run, Measured)
         return (
             Parameter("theta0", run.inputs["start"], 0.05, "rad"),
             Parameter("omega0", 0.0, 0.5, "rad/s"),
@@ -274,7 +275,7 @@ TRACE_EFFECTS = Library(
 )
 
 
-def load_traces(paths: Sequence[Path]) -> list[PlainRun]:
+def load_traces(paths: Sequence[Path]) -> list[Measured]:
     """Features: the angle every 20 ms from the second turning point on."""
     runs = []
     for path in paths:
@@ -285,5 +286,5 @@ def load_traces(paths: Sequence[Path]) -> list[PlainRun]:
             Label("encoder", "swing", "angle", "rad", float(a), i / angle.size) for i, a in enumerate(angle)
         )
         features = FeatureSet(angle, np.full(angle.size, np.deg2rad(0.09) / np.sqrt(12)), labels, 0.1)
-        runs.append(PlainRun(path.stem, path.stem, features, {"start": float(raw[start])}))
+        runs.append(Measured(path.stem, path.stem, features, {"start": float(raw[start])}))
     return runs

@@ -13,9 +13,10 @@ import numpy as np
 from rich.console import Console
 
 from daq_app.gap.core import Diagnosis, Fit, Options, diagnose, fit
-from daq_app.gap.core.features import FloatArray, PlainRun
+from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.fitting.experiment import Experiment
 from daq_app.gap.core.fitting.held_out import score
+from daq_app.gap.own_model import Measured
 from studies.real_gap.independence import with_independence
 from studies.real_gap.report import arguments, print_rows, show
 from studies.real_gap.tanks_model import TanksModel, library, load_runs
@@ -35,7 +36,7 @@ class TanksResult:
 
     rises_v: dict[str, tuple[float, float]]
     diagnosis: Diagnosis
-    runs: list[PlainRun]
+    runs: list[Measured]
     fits: dict[str, Fit]
 
 

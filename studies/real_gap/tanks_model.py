@@ -33,8 +33,9 @@ from daq_app.gap.core import (
     Run,
     Scatter,
 )
-from daq_app.gap.core.features import FloatArray, PlainRun
+from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.parameters import between, positive, signed
+from daq_app.gap.own_model import Measured
 
 STEP_S = 4.0
 BLOCK = 5
@@ -48,14 +49,14 @@ _NO_LIMIT = 1e9
 _RECORDS = (("estimation", 0, 2), ("validation", 1, 3))
 
 
-def load_runs(path: Path) -> list[PlainRun]:
+def load_runs(path: Path) -> list[Measured]:
     """The two records of ``dataBenchmark.csv``, each a run and a level of its own."""
     table = np.genfromtxt(path, delimiter=",", skip_header=1, usecols=(0, 1, 2, 3), invalid_raise=False)
     table = table[np.isfinite(table).all(axis=1)]
     return [_run(name, table[:, pump], table[:, level]) for name, pump, level in _RECORDS]
 
 
-def _run(name: str, pump_v: FloatArray, level_v: FloatArray) -> PlainRun:
+def _run(name: str, pump_v: FloatArray, level_v: FloatArray) -> Measured:
     starts = np.arange(0, level_v.size - BLOCK, BLOCK)
     starts = starts[(level_v[starts] < FULL_V) & (level_v[starts + BLOCK] < FULL_V)]
     rises = level_v[starts + BLOCK] - level_v[starts]
@@ -71,7 +72,7 @@ def _run(name: str, pump_v: FloatArray, level_v: FloatArray) -> PlainRun:
         for k, rise in zip(starts, rises, strict=True)
     )
     features = FeatureSet(rises, np.full(rises.size, np.sqrt(2.0) * NOISE_V), labels)
-    return PlainRun(name, name, features, {"pump": pump_v, "level": level_v, "starts": starts})
+    return Measured(name, name, features, {"pump": pump_v, "level": level_v, "starts": starts})
 
 
 class TanksModel:
@@ -89,7 +90,7 @@ class TanksModel:
         return (between("x1_start", 1.0, 15.0, "V", "upper level at the beginning"),)
 
     def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
-        assert isinstance(run, PlainRun)
+        assert isinstance(run, Measured)
         get = values.get
         pump = get("pump_curve.q", 0.0) * run.inputs["pump"] ** 2 + run.inputs["pump"]
         pump = np.maximum(pump - get("pump_dead_band.u0", 0.0), 0.0)

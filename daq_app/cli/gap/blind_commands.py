@@ -31,10 +31,6 @@ _PRODUCT = "daq_app.gap.blind.running.diagnosers:product"
 _LabelsOption = Annotated[
     Path | None, typer.Option(help="Folder of the labels; beside the cases, as DIR-labels, if left out.")
 ]
-_WithoutOption = Annotated[
-    str,
-    typer.Option(help="Part of the method to leave out: scatter, channels or probes."),
-]
 _EngineOption = Annotated[
     Literal["events", "contact"] | None,
     typer.Option(help="What moves the wall: own equations or a contact engine; else the laboratory's."),
@@ -124,33 +120,25 @@ def make(
 def run(
     folder: Annotated[Path, typer.Argument(help="Folder of the cases.", metavar="DIR")],
     diagnoser: Annotated[str, typer.Option(help="module:function that diagnoses a case.")] = _PRODUCT,
-    without: _WithoutOption = "",
     scheduler: SchedulerOption = "",
-    results: _ResultsOption = "",
+    results: _ResultsOption = "results",
     workers: _WorkersOption = 0,
     timeout: Annotated[float, typer.Option(min=1, help="Longest time for one case, seconds.")] = 1800.0,
 ) -> None:
-    """Diagnose every case in a process that has nothing but its files. Goes on where it was interrupted.
-
-    With --without the diagnosis lacks a part of its method, and its results are kept apart: score them
-    with the same option.
-    """
-    from daq_app.gap.blind.layout import results_without
-    from daq_app.gap.blind.running.diagnosers import ABLATIONS, load_diagnoser
+    """Diagnose every case in a process that has nothing but its files. Goes on where it was interrupted."""
+    from daq_app.gap.blind.running.diagnosers import load_diagnoser
     from daq_app.gap.blind.running.runner import case_folders, pending, run_pending
     from daq_app.gap.blind.running.scheduler import run_on_scheduler
 
     with _refusals():
-        kept = results or results_without(_part(without))
-        diagnoser = ABLATIONS.get(without, diagnoser)
         load_diagnoser(diagnoser)
-        total, todo = len(case_folders(folder)), len(pending(folder, diagnoser, kept))
+        total, todo = len(case_folders(folder)), len(pending(folder, diagnoser, results))
         if total == 0:
             raise ValueError(f"{folder} holds no sealed cases. Make some: daq-app gap blind make --out DIR")
         outcomes = (
-            run_on_scheduler(folder, diagnoser, scheduler, timeout, kept)
+            run_on_scheduler(folder, diagnoser, scheduler, timeout, results)
             if scheduler
-            else run_pending(folder, diagnoser, _workers(workers), timeout, kept)
+            else run_pending(folder, diagnoser, _workers(workers), timeout, results)
         )
         failed = 0
         with _progress("diagnosing", total) as advance:
@@ -168,22 +156,19 @@ def run(
 def score(
     folder: Annotated[Path, typer.Argument(help="Folder of the cases.", metavar="DIR")],
     labels: _LabelsOption = None,
-    without: _WithoutOption = "",
-    results: _ResultsOption = "",
+    results: _ResultsOption = "results",
     html: Annotated[Path | None, typer.Option(help="Write a page with pictures.")] = None,
     page: Annotated[Path | None, typer.Option(help="The same as Markdown, pictures in images/.")] = None,
     json_out: Annotated[Path | None, typer.Option("--json", help="Write all numbers as JSON.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that are there.")] = False,
 ) -> None:
     """Open the labels, check the seals, say how good the diagnosis is. Exit code 1: a target is missed."""
-    from daq_app.gap.blind.layout import results_without
     from daq_app.gap.blind.scoring.score import score_folder
 
     with _refusals():
-        kept = results or results_without(_part(without))
         for written in filter(None, (html, page, json_out)):
             require_replaceable(written, overwrite=overwrite)
-        found = score_folder(folder, labels or _beside(folder), kept)
+        found = score_folder(folder, labels or _beside(folder), results)
         _print_score(found)
         if json_out:
             write_whole(json_out, json.dumps(found.to_dict(), ensure_ascii=False, indent=1))
@@ -287,15 +272,6 @@ def _progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
     with Progress(*columns, console=Console(stderr=True)) as progress:
         task = progress.add_task(what, total=total)
         yield lambda n: progress.advance(task, n)
-
-
-def _part(without: str) -> str:
-    """The part of the method to leave out, if there is one of that name."""
-    from daq_app.gap.blind.running.diagnosers import ABLATIONS
-
-    if without and without not in ABLATIONS:
-        raise ValueError(f"--without is {', '.join(ABLATIONS)}, not {without}")
-    return without
 
 
 def _beside(folder: Path) -> Path:

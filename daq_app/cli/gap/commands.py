@@ -135,7 +135,7 @@ def _diagnose_walls(paths: list[Path], rig: Path | None, asked: _Asked) -> tuple
     from daq_app.workers import warm_up
 
     if asked.workers > 1:  # while this process imports and reads the files
-        warm_up("daq_app.gap.rocking_model.prediction.model")
+        warm_up("daq_app.gap.rocking_model.prediction.preloaded")
     from daq_app.gap.rocking_model.records import load_run
     from daq_app.gap.rocking_model.study import diagnose_runs
 

@@ -14,8 +14,3 @@ RESULTS: Final = "results"
 def run_files(case: Path) -> list[Path]:
     """Run files of a case in the order of their names."""
     return sorted(case.glob("*.h5"))
-
-
-def results_without(part: str) -> str:
-    """Folder of the results of a diagnosis that lacks a part of its method; the whole one's for no part."""
-    return f"{RESULTS}-without-{part}" if part else RESULTS

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 
 FloatArray = NDArray[np.float64]
 
@@ -81,16 +82,6 @@ class Run(Protocol):
     def features(self) -> FeatureSet: ...
 
 
-@dataclass(frozen=True, slots=True)
-class PlainRun:
-    """A run with its features and whatever its model wants to know (`inputs`)."""
-
-    name: str
-    level: str
-    features: FeatureSet
-    inputs: dict[str, Any] = field(default_factory=dict)
-
-
 def independent_fraction(residual: FloatArray) -> float:
     """Share of independent samples in an autocorrelated residual, (n,): 1/τ, τ = 1 + 2 Σ ρ_k.
 
@@ -101,7 +92,7 @@ def independent_fraction(residual: FloatArray) -> float:
     n = centred.size
     if n < 4 or not np.any(centred):
         return 1.0
-    size = 1 << (2 * n - 1).bit_length()
+    size = next_fast_len(2 * n - 1, real=True)
     spectrum = np.fft.rfft(centred, size)
     covariance = np.fft.irfft(spectrum * np.conj(spectrum), size)[:n]
     rho = covariance / covariance[0]

@@ -83,6 +83,11 @@ class Parameter:
         return inside or (0.0,)
 
 
+def known(name: str, sd: float, unit: str, meaning: str, *, mean: float = 0.0) -> Parameter:
+    """What is known of a sensor to within `sd`, and what every prediction is a straight line in."""
+    return Parameter(name, mean, sd, unit, meaning=meaning, linear=True)
+
+
 def signed(
     name: str,
     reach: float,

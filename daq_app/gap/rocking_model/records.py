@@ -119,10 +119,16 @@ class GapRun:
     def steady_accelerometers(self, axis: str) -> list[int]:
         """Places of the accelerometers along an axis that read, and read down to standstill."""
         return [
-            i
-            for i in self.indices("accelerometer", axis)
-            if np.all(np.isfinite(self.channels[i])) and not self.sensors[i].ac_coupled
+            i for i in self.indices("accelerometer", axis) if self.reads(i) and not self.sensors[i].ac_coupled
         ]
+
+    def reads(self, place: int) -> bool:
+        """Whether a channel has no gap."""
+        return self.cache.constant(("reads", place), lambda: bool(np.isfinite(self.channels[place]).all()))
+
+    def positions(self, places: Sequence[int]) -> FloatArray:
+        """Where some of the sensors are, (k, 3), m."""
+        return np.array([self.sensors[i].position_m for i in places], dtype=np.float64).reshape(-1, 3)
 
     def at_clock(self) -> GapRun:
         """The run with all channels at the instants of the sample clock."""

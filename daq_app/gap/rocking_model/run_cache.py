@@ -8,75 +8,78 @@ is a pure function of its values asks for the same ones as long as they are the 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar
 
 _KEPT = 6
 """Results kept of each part: a fit goes back to its last values after every step of its differences."""
 T = TypeVar("T")
 
 
+class _Known(NamedTuple):
+    """One result of a part, with the names that it asked for and their values."""
+
+    keys: tuple[str, ...]
+    given: tuple[float | None, ...]
+    result: Any
+
+
 class RunCache:
     """What has been worked out of one run; a run that is changed begins with an empty one."""
 
     def __init__(self) -> None:
-        self._constants: dict[Hashable, object] = {}
-        self._parts: dict[Hashable, _Part[Any]] = {}
+        self._constants: dict[Hashable, Any] = {}
+        self._parts: dict[Hashable, list[_Known]] = {}
 
     def constant(self, key: Hashable, make: Callable[[], T]) -> T:
         """What the run alone decides, made once."""
         if key not in self._constants:
             self._constants[key] = make()
-        return cast(T, self._constants[key])
+        value: T = self._constants[key]
+        return value
 
     def part(self, key: Hashable, values: Mapping[str, float], make: Callable[[Mapping[str, float]], T]) -> T:
         """What `make` makes of the values; worked out only if something that it asks for is new."""
-        if key not in self._parts:
-            self._parts[key] = _Part[T]()
-        return cast(T, self._parts[key].of(values, make))
-
-
-class _Part(Generic[T]):
-    """The last few results of one part: names asked for, their values, all names where listed, result."""
-
-    def __init__(self) -> None:
-        self._known: list[tuple[tuple[str, ...], tuple[float | None, ...], tuple[str, ...] | None, T]] = []
-
-    def of(self, values: Mapping[str, float], make: Callable[[Mapping[str, float]], T]) -> T:
         # A part within another one looks at the plain values; the other one depends on what decided.
-        outer = values if isinstance(values, _Watched) else None
-        plain = values if outer is None else outer.plain
-        get = plain.get
-        asked: tuple[str, ...] = ()
-        found: tuple[float | None, ...] = ()
-        for entry in reversed(self._known):
-            keys, given, names, result = entry
-            if keys is not asked:  # most entries ask for the same
-                asked, found = keys, tuple(map(get, keys))
-            if found == given and (names is None or names == tuple(plain)):
-                break
-        else:
+        outer = values if type(values) is _Watched else None
+        plain = outer.plain if outer is not None else values
+        listed = self._parts.setdefault(key, [])
+        known = _found(listed, plain)
+        if known is None:
             watched = _Watched(plain)
             result = make(watched)
-            new = tuple(watched.asked)
-            keys = next((entry[0] for entry in self._known if entry[0] == new), new)
-            if len(self._known) >= _KEPT:
-                del self._known[0]
-            names = tuple(plain) if watched.listed else None
-            self._known.append((keys, tuple(map(get, keys)), names, result))
+            asked = tuple(watched.asked)
+            keys = next((old.keys for old in listed if old.keys == asked), asked)
+            known = _Known(keys, tuple(map(plain.get, keys)), result)
+            if len(listed) == _KEPT:
+                del listed[0]
+            listed.append(known)
         if outer is not None:
-            outer.asked.update(dict.fromkeys(keys))
-            outer.listed = outer.listed or names is not None
-        return result
+            outer.asked.update(dict.fromkeys(known.keys))
+        value: T = known.result
+        return value
+
+
+def _found(listed: list[_Known], values: Mapping[str, float]) -> _Known | None:
+    """The result for these values, which becomes the last one; results used last come last."""
+    asked: tuple[str, ...] = ()
+    given: tuple[float | None, ...] = ()
+    for place in range(len(listed) - 1, -1, -1):
+        known = listed[place]
+        if known.keys is not asked:  # most ask for the same
+            asked = known.keys
+            given = tuple(map(values.get, asked))
+        if given == known.given:
+            listed.append(listed.pop(place))
+            return known
+    return None
 
 
 class _Watched(Mapping[str, float]):
-    """Values that note which of them were asked for."""
+    """Values that note which of them were asked for. Their names cannot be listed: nobody could note that."""
 
     def __init__(self, values: Mapping[str, float]) -> None:
         self.plain = values
         self.asked: dict[str, None] = {}
-        self.listed = False
-        """Whether the names themselves were asked for."""
 
     def __getitem__(self, key: str) -> float:
         self.asked[key] = None
@@ -92,9 +95,6 @@ class _Watched(Mapping[str, float]):
         return key in self.plain
 
     def __iter__(self) -> Iterator[str]:
-        self.listed = True
-        return iter(self.plain)
+        raise TypeError("a part of a prediction asks for values by name")
 
-    def __len__(self) -> int:
-        self.listed = True
-        return len(self.plain)
+    __len__ = __iter__  # type: ignore[assignment]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -22,10 +23,13 @@ from daq_app.gap.rocking_model.inspection.inspect_runs import (
     without_outlier_channels,
 )
 from daq_app.gap.rocking_model.library import rocking_library
-from daq_app.gap.rocking_model.prediction.model import RockingModel, UnscatteredModel
+from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun, check_consistent
 from daq_app.gap.rocking_model.tolerances import EITHER, FAR_FROM_SURVEY
 from daq_app.workers import warm_up
+
+PRELOADED: Final = "daq_app.gap.rocking_model.prediction.preloaded"
+"""Module that worker processes are forked from."""
 
 
 def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
@@ -92,39 +96,41 @@ def diagnose_runs(
     runs: Sequence[GapRun],
     options: Options | None = None,
     only: Collection[str] = (),
-    without: Collection[str] = (),
 ) -> Diagnosis:
     """Where, which and how far, for tests of one specimen on one rig.
 
     With `only`, no effects but these are considered (and no probes): a quick answer to a narrow question.
-    `without` leaves out parts of the method, to see what each is worth: ``scatter`` of r, ``channels`` beyond
-    the rotation, ``probes``.
 
     Raises `CannotDiagnose` with the reason in words, and `parallel.Interrupted` when stopped.
     """
     if options is not None and options.workers > 1:
-        warm_up(RockingModel.__module__)  # while the features are worked out
+        warm_up(PRELOADED)  # while the features are worked out
     prepared, limits = prepare(runs)
-    sides = {np.sign(run.swings.peak_rad[0]) for run in prepared}
-    if len({run.level for run in prepared}) < 2:
-        limits.append(
-            "One level only: effects that differ in how they grow with amplitude cannot be told apart."
-        )
-    if len(sides) < 2:
-        limits.append(
-            "All releases are to one side: release effects cannot be told from a difference of sides."
-        )
-    if "channels" in without:
-        prepared = [run.rotation_alone() for run in prepared]
     model, library = model_and_library(prepared)
-    if "scatter" in without:
-        model = UnscatteredModel(model.survey, model.channels)
-    if "probes" in without:
-        library = library.without(*(e.name for e in library.values() if e.kind != "effect"))
     if only:
         library = library.without(*(name for name in library if name not in only))
         limits.append(f"Only {', '.join(sorted(only))} were considered.")
-    result = diagnose(model, prepared, library, options, limits, findings_of(prepared))
+    return diagnose_prepared(model, prepared, library, options, limits)
+
+
+def diagnose_prepared(
+    model: RockingModel,
+    prepared: Sequence[RockingRun],
+    library: Library,
+    options: Options | None = None,
+    limits: Sequence[str] = (),
+) -> Diagnosis:
+    """The diagnosis of runs whose features are known (`prepare`), with `limits` that are stated already."""
+    stated = list(limits)
+    if len({run.level for run in prepared}) < 2:
+        stated.append(
+            "One level only: effects that differ in how they grow with amplitude cannot be told apart."
+        )
+    if len({np.sign(run.swings.peak_rad[0]) for run in prepared}) < 2:
+        stated.append(
+            "All releases are to one side: release effects cannot be told from a difference of sides."
+        )
+    result = diagnose(model, prepared, library, options, stated, findings_of(prepared))
     wiring = prepared[0].wiring
     result.notes["wiring"] = {"reversed": list(wiring.reversed_ids), "exchanged": dict(wiring.exchanged)}
     return _doubt_the_survey(result)

@@ -10,8 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from daq_app.cli.app import build_app
-from daq_app.gap.blind.layout import results_without, run_files
-from daq_app.gap.blind.running.diagnosers import ABLATIONS, load_diagnoser
+from daq_app.gap.blind.layout import run_files
 from daq_app.gap.blind.running.runner import case_folders, pending, read_outcome, run_pending
 from daq_app.gap.blind.seal import SealBroken, open_label, seal_case
 from daq_app.runfile import open_run
@@ -78,13 +77,11 @@ def test_what_is_done_is_not_done_again(check: Path) -> None:
     assert len(pending(check, "another:diagnoser")) == 3
 
 
-def test_results_without_a_part_are_kept_apart(check: Path) -> None:
+def test_results_of_a_name_are_kept_apart(check: Path) -> None:
     run(check, "guess")
-    apart = results_without("probes")
-    assert len(list(run_pending(check, "blind_test_diagnosers:guess", 2, 120.0, apart))) == 3
-    assert read_outcome(check, "case_0001", apart) is not None
+    assert len(list(run_pending(check, "blind_test_diagnosers:guess", 2, 120.0, "apart"))) == 3
+    assert read_outcome(check, "case_0001", "apart") is not None
     assert not pending(check, "blind_test_diagnosers:guess")
-    assert all(callable(load_diagnoser(name)) for name in ABLATIONS.values())
 
 
 def test_an_interrupted_run_keeps_what_it_has(check: Path) -> None:
@@ -123,8 +120,6 @@ def test_bad_arguments_are_told_in_words(check: Path, tmp_path: Path, configs: P
     app, cli = build_app(), CliRunner()
     unknown = cli.invoke(app, ["gap", "blind", "run", str(check), "--diagnoser", "nowhere:nothing"])
     assert unknown.exit_code == 2 and "is no diagnoser" in unknown.output
-    part = cli.invoke(app, ["gap", "blind", "run", str(check), "--without", "everything"])
-    assert part.exit_code == 2 and "scatter, channels, probes" in part.output
     empty = cli.invoke(app, ["gap", "blind", "run", str(tmp_path / "none"), "--diagnoser", "os:getcwd"])
     assert empty.exit_code == 2 and "no sealed cases" in empty.output
     inside = ["gap", "blind", "make", "--out", str(tmp_path), "--labels", str(tmp_path / "labels")]

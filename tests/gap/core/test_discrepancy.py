@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from daq_app.gap.core import Options, diagnose, fit
-from daq_app.gap.core.features import PlainRun
+from daq_app.gap.own_model import Measured
 from tests.support.gap.toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
 
 
-def spoilt(runs: list[PlainRun], sd_s: float, seed: int = 1) -> list[PlainRun]:
+def spoilt(runs: list[Measured], sd_s: float, seed: int = 1) -> list[Measured]:
     """Durations that are far worse than they are said to be: errors with heavy tails."""
     rng = np.random.default_rng(seed)
     for run in runs:

@@ -22,8 +22,8 @@ from daq_app.gap.core import (
     Run,
     Scatter,
 )
-from daq_app.gap.core.features import PlainRun
 from daq_app.gap.core.parameters import positive, signed
+from daq_app.gap.own_model import Measured
 
 PEAKS = 12
 
@@ -42,7 +42,7 @@ class DecayModel:
         return (Parameter("a0", 1.0, 0.5, "rad", 0.0, 5.0),)
 
     def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
-        assert isinstance(run, PlainRun)
+        assert isinstance(run, Measured)
         measured = run.features.values[:PEAKS]
         before = np.concatenate([[values["a0"]], measured[:-1]])
         r = (
@@ -94,7 +94,7 @@ class BendingModel(DecayModel):
         return found
 
 
-def make_runs(seed: int, count: int = 6, scatter: float = 0.004, **effects: float) -> list[PlainRun]:
+def make_runs(seed: int, count: int = 6, scatter: float = 0.004, **effects: float) -> list[Measured]:
     """Runs at three levels; `effects` as ``slope_k=0.03``, ``step_h=…``, ``bend_c=…`` (no effects)."""
     rng = np.random.default_rng(seed)
     r_true, d_true = 0.9 + 0.01 * rng.normal(), 1.0 + 0.02 * rng.normal()
@@ -116,5 +116,5 @@ def make_runs(seed: int, count: int = 6, scatter: float = 0.004, **effects: floa
             for name, unit in (("peak", "rad"), ("duration", "s"))
             for i in range(PEAKS)
         )
-        runs.append(PlainRun(f"run {number}", f"L{number % 3}", FeatureSet(values, sd, labels)))
+        runs.append(Measured(f"run {number}", f"L{number % 3}", FeatureSet(values, sd, labels)))
     return runs

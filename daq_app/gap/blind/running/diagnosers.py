@@ -7,7 +7,7 @@ The result is the JSON of ``daq-app gap diagnose`` (docs/reference/gap-result.md
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -39,10 +39,10 @@ def load_diagnoser(name: str) -> Diagnoser:
     return diagnoser
 
 
-def product(case: Path, without: Collection[str] = ()) -> Result:
+def product(case: Path) -> Result:
     """What ``daq-app gap diagnose`` says of all runs of the case with its rig file.
 
-    One process: the cases fill the cores. `without`: parts of the method to leave out (`diagnose_runs`).
+    One process: the cases fill the cores.
     """
     from daq_app.config import ConfigError, load_rig
     from daq_app.gap.core import CannotDiagnose, Options
@@ -53,25 +53,6 @@ def product(case: Path, without: Collection[str] = ()) -> Result:
     try:
         rig = load_rig(case / RIG_FILE)
         runs = [load_run(path, rig) for path in run_files(case)]
-        return diagnose_runs(runs, Options(workers=1), without=without).to_dict()
+        return diagnose_runs(runs, Options(workers=1)).to_dict()
     except (CannotDiagnose, ConfigError, RunFileError) as refusal:
         raise DiagnoserError(f"gap diagnose refuses: {refusal}") from None
-
-
-def without_scatter(case: Path) -> Result:
-    """The product with a likelihood in which every impact loses the same."""
-    return product(case, ("scatter",))
-
-
-def without_channels(case: Path) -> Result:
-    """The product on θ(t) alone."""
-    return product(case, ("channels",))
-
-
-def without_probes(case: Path) -> Result:
-    """The product without the free form of each family."""
-    return product(case, ("probes",))
-
-
-ABLATIONS: Final = {part: f"{__name__}:without_{part}" for part in ("scatter", "channels", "probes")}
-"""Diagnosers that lack one part of the method."""

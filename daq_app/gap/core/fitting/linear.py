@@ -27,8 +27,20 @@ class Linear:
     at the point itself, priors of the sizes included.
     """
 
-    def __init__(self, problem: Problem, u: FloatArray, lines: Sequence[Linearised], sizes: Sizes) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        u: FloatArray,
+        lines: Sequence[Linearised],
+        sizes: Sizes,
+        stacked: Sequence[FloatArray] | None = None,
+    ) -> None:
+        """`stacked`: Jacobian of each run in its own columns beside its residual, where that is known."""
         self.problem, self.u, self.lines, self.sizes = problem, u, lines, sizes
+        self._stacked = stacked or [
+            np.column_stack([line.jacobian[:, problem.columns(i)], line.residual])
+            for i, line in enumerate(lines)
+        ]
         self.covariances: list[Covariance] = []
         self.white: list[FloatArray] = []
         """Whitened columns of each run, the residual last, (n, p + 1)."""
@@ -38,9 +50,9 @@ class Linear:
         for i, line in enumerate(lines):
             columns, weight = problem.columns(i), problem.runs[i].features.independent_fraction
             covariance = sizes.covariance(problem.experiment, i, line.prediction)
-            white = covariance.whiten(np.column_stack([line.jacobian[:, columns], line.residual]))
+            white = covariance.whiten(self._stacked[i])
             gram = weight * (white.T @ white)
-            self.hessian[np.ix_(columns, columns)] += gram[:-1, :-1]
+            self.hessian[columns[:, None], columns] += gram[:-1, :-1]
             self.gradient[columns] -= gram[:-1, -1]
             log_likelihood -= 0.5 * float(gram[-1, -1])
             log_likelihood -= 0.5 * weight * (covariance.log_det + line.residual.size * LOG_2PI)
@@ -153,7 +165,7 @@ class Linear:
 
     def under(self, sizes: Sizes) -> Linear:
         """The same linearisation in the metric of other sizes."""
-        return Linear(self.problem, self.u, self.lines, sizes)
+        return Linear(self.problem, self.u, self.lines, sizes, self._stacked)
 
 
 def relaxed(linear: Linear, rounds: int, settled: float = 0.01) -> tuple[Linear, FloatArray]:

@@ -42,11 +42,7 @@ class Linearised:
 
 
 class Problem:
-    """Maps the vector u to the model's values and linearises the prediction.
-
-    `fixed` gives unit coordinates of unknowns that are held (by key): the held-out score fits only
-    the local parameters of a run, with everything shared held at the posterior.
-    """
+    """Maps the vector u to the model's values and linearises the prediction."""
 
     def __init__(self, experiment: Experiment, effects: Sequence[Effect]) -> None:
         self.experiment = experiment

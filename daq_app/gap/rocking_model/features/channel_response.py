@@ -15,7 +15,7 @@ from daq_app.gap.rocking_model.features.oscillations.ring_response import (
     kicks_that_turn,
     turning_wave,
 )
-from daq_app.gap.rocking_model.features.response import responded
+from daq_app.gap.rocking_model.features.response import effects_on, responded
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.turns import turned, turns
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, TAIL_S, Wire, straight_line
@@ -36,14 +36,12 @@ def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
     # A wire's faults act on its length, of which its height times the rotation is a curved picture.
     true = block.expected if block.wire is None else block.wire.shortening(_rotation(block))
     total: FloatArray | None = None
-    for key in {k.rpartition(".")[0] for k in values if k.rpartition(".")[0].endswith("@" + block.family)}:
-        effect = key.partition("@")[0]
-        given = {k.rpartition(".")[2]: v for k, v in values.items() if k.rpartition(".")[0] == key}
+    for effect, value in effects_on(block.family, values).items():
         if effect == "wire_anchor":
             assert block.wire is not None
-            series = block.wire.shortening(_rotation(block), given["height"]) - true
+            series = block.wire.shortening(_rotation(block), value) - true
         else:
-            series = responded(true, effect, given) - true
+            series = responded(true, effect, value, block.family, values) - true
         total = series if total is None else total + series
     coefficients = np.zeros(len(block.names))
     apart = _moved_apart(run, block, values)

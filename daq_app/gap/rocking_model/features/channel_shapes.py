@@ -98,10 +98,11 @@ def deviation(beside: Others) -> Deviation:
         ]
     )[beside.pick]
     scale = np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
-    inverse = np.linalg.pinv(columns / scale, rcond=1e-9) / scale[:, None]
+    basis, triangle = np.linalg.qr(columns / scale)
+    inverse = np.linalg.pinv(triangle, rcond=1e-9) @ basis.T / scale[:, None]
     difference = (beside.measured - e)[beside.pick]
     left = difference - columns @ (inverse @ difference)
-    left = left - _leaked(left, columns, beside)
+    left = left - _leaked(left, basis, beside)
     left_over = float(left @ left) / max(left.size - columns.shape[1], 1)
     rest = (beside.measured - e)[-round(0.4 * GRID_HZ) :]
     noise = float(np.std(rest - np.linspace(rest[:8].mean(), rest[-8:].mean(), rest.size))) + 1e-12
@@ -118,17 +119,16 @@ def deviation(beside: Others) -> Deviation:
         (inverse @ difference)[kept],
         covariance,
         inverse[kept],
-        np.linalg.qr(columns / scale)[0],
+        basis,
         0.5 * float(np.log(left_over / noise**2)),
         noise,
     )
 
 
-def _leaked(left: FloatArray, columns: FloatArray, beside: Others) -> FloatArray:
+def _leaked(left: FloatArray, basis: FloatArray, beside: Others) -> FloatArray:
     """What ordinary imperfections explain of what the shapes leave, both (n,): their posterior mean."""
     if beside.imperfections is None:
         return np.zeros_like(left)
-    basis = np.linalg.qr(columns / (np.abs(columns).max(axis=0) + 1e-300))[0]
     imperfections = beside.imperfections[:, beside.pick].T
     imperfections = imperfections - basis @ (basis.T @ imperfections)
     noise = float(left @ left) / left.size

@@ -9,6 +9,7 @@ import numpy as np
 
 from daq_app.gap.core import Parameter
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.core.parameters import known
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.channel_response import channel
 from daq_app.gap.rocking_model.features.families import sensor_families
@@ -49,20 +50,23 @@ def sizes() -> Mapping[tuple[str, str], Size]:
     return {key: size for family in sensor_families() for key, size in family.sizes.items()}
 
 
-def block_coefficients(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
-    """Predicted coefficients of all blocks of a run, and the unit of their scatter, each (k,)."""
-    if not run.blocks:
-        return np.zeros(0), np.zeros(0)
-    units = run.cache.constant("units", lambda: [_units(block) for block in run.blocks])
+def block_coefficients(run: RockingRun, values: Mapping[str, float]) -> FloatArray:
+    """Predicted coefficients of all blocks of a run, (k,)."""
     predicted = [
         run.cache.part(place, values, partial(_coefficients, run, block, unit))
-        for place, (block, unit) in enumerate(zip(run.blocks, units, strict=True))
+        for place, (block, unit) in enumerate(zip(run.blocks, units(run), strict=True))
     ]
-    return np.concatenate(predicted), np.concatenate(units)
+    return np.concatenate(predicted) if predicted else np.zeros(0)
 
 
-def _units(block: Block) -> FloatArray:
-    return np.array([repeatability(block, i) for i in range(len(block.names))])
+def units(run: RockingRun) -> list[FloatArray]:
+    """Units of the scatter of the coefficients of each block of a run, (k,) each."""
+    return run.cache.constant(
+        "units",
+        lambda: [
+            np.array([repeatability(block, i) for i in range(len(block.names))]) for block in run.blocks
+        ],
+    )
 
 
 def _coefficients(run: RockingRun, block: Block, unit: FloatArray, values: Mapping[str, float]) -> FloatArray:
@@ -107,23 +111,16 @@ def sensor_priors(survey: Survey) -> tuple[Parameter, ...]:
     """
     family_priors = (parameter for family in sensor_families() for parameter in family.priors(survey))
     biases = (
-        Parameter(
+        known(
             _bias_name(family, coefficient),
-            0.0,
             size.bias,
             size.unit,
-            meaning=f"what sound sensors may be off by: {coefficient} of {family}",
-            linear=True,
+            f"what sound sensors may be off by: {coefficient} of {family}",
         )
         for (family, coefficient), size in sizes().items()
         if size.bias > 0.0
     )
-    unequal = (
-        Parameter(
-            f"{name}_unequal", 0.0, 1.0, "1", meaning=f"{name} from unequal accelerometers", linear=True
-        )
-        for name in _RINGS
-    )
+    unequal = (known(f"{name}_unequal", 1.0, "1", f"{name} from unequal accelerometers") for name in _RINGS)
     shared = Parameter(
         CROSSTALK_SHARE, 0.0, CROSSTALK, "1", meaning="crosstalk from the channel scanned before"
     )

@@ -3,39 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache
+from functools import partial
 
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE
-from daq_app.gap.rocking_model.features.response import bessel, first_order, resonator, slow_response
+from daq_app.gap.rocking_model.features.response import effects_on, responded, slow_response
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape
 from daq_app.gap.rocking_model.motion.rotation import anchors_turn
 
-_FAMILY_EFFECTS = {
-    "gain": "error",
-    "lag": "tau",
-    "slow_response": "tau",
-    "filter_delay": "tau",
-    "drift": "rate",
-    "wire_cosine": "kappa",
-    "wire_anchor": "height",
-    "wire_inertia": "frequency",
-}
-"""Effects on a whole family, and the parameter that says that they are there."""
-
-
-@cache
-def _family_keys(family: str) -> tuple[str, ...]:
-    """Parameters that say which effects there are on a family."""
-    return tuple(f"{name}@{family}.{parameter}" for name, parameter in _FAMILY_EFFECTS.items())
-
 
 def family_difference(run: RockingRun, family: str, values: Mapping[str, float]) -> FloatArray | None:
-    """What a family's sensor effects add to the rotation it shows, (m,), rad; None for nothing."""
+    """What a family's sensor effects add to the rotation it shows, (m,), rad; None for nothing.
+
+    Several blocks ask for it: it is worked out once.
+    """
+    return run.cache.part(("shown by", family), values, partial(_family_difference, run, family))
+
+
+def _family_difference(run: RockingRun, family: str, values: Mapping[str, float]) -> FloatArray | None:
     shown = run.grid.theta
     if family == "wire" and family != run.reference and "sliding.c" in values:
         # A slip is a step to whatever the wires answer with.
@@ -53,15 +42,11 @@ def family_difference(run: RockingRun, family: str, values: Mapping[str, float])
 
 def _added(run: RockingRun, family: str, values: Mapping[str, float], theta: FloatArray) -> FloatArray | None:
     """What a family's sensor effects add to the rotation `theta`; None for nothing."""
-    if not any(key in values for key in _family_keys(family)):
-        return None
     parts = [
-        _added_by(name, run, family, values, value, theta)
-        for name, parameter in _FAMILY_EFFECTS.items()
-        if (value := values.get(f"{name}@{family}.{parameter}")) is not None
+        _added_by(effect, run, family, values, value, theta)
+        for effect, value in effects_on(family, values).items()
     ]
-    total: FloatArray = np.sum(parts, axis=0)
-    return total
+    return np.asarray(np.sum(parts, axis=0)) if parts else None
 
 
 def _added_by(
@@ -75,17 +60,8 @@ def _added_by(
     """What one effect of strength `value` adds to the rotation `theta` (n,) of a family, rad."""
     time_s = run.grid.time_s
     match effect:
-        case "gain":
-            return value * theta
         case "lag":
             return np.interp(time_s - value, time_s, theta) - theta
-        case "slow_response":
-            return first_order(theta, value) - theta
-        case "filter_delay":
-            return bessel(theta, value) - theta
-        case "wire_inertia":
-            zeta = values.get(f"wire_inertia@{family}.zeta", 0.2)
-            return resonator(theta, 2.0 * np.pi * value, zeta) - theta
         case "drift":
             scale = {"wire": run.wire_height_m, "lvdt": np.inf}.get(family, 1.0)
             return value / scale * (time_s - (run.swings.rest_s - run.swings.release_s))
@@ -93,7 +69,7 @@ def _added_by(
             return anchors_turn(run.wires, theta, value)
         case "wire_cosine":
             return run.wire_bend_m * value * theta**2
-    raise KeyError(effect)
+    return responded(theta, effect, value, family, values) - theta
 
 
 def difference_of(run: RockingRun, first: str, second: str, values: Mapping[str, float]) -> FloatArray | None:

@@ -24,16 +24,17 @@ def walk_variance(residual: FloatArray, places: NDArray[np.intp]) -> float:
     The mean square increment over a lag is 2 σ² + q · lag: what an impact leaves is short and only raises σ²,
     a cable that jumps by s in n samples is a walk of q = s²/n. 0 where increments do not grow with the lag.
     """
-    breaks = np.flatnonzero(np.diff(places) != 1) + 1
-    squares: list[list[FloatArray]] = [[] for _ in _LAGS]
-    for part in np.split(residual, breaks):
-        count = part.size // _CELL
-        means = part[: count * _CELL].reshape(count, _CELL).mean(axis=1)
-        for row, lag in zip(squares, _LAGS, strict=True):
-            if count > lag:
-                row.append((means[lag:] - means[:-lag]) ** 2)
-    known = [(lag * _CELL, np.concatenate(row)) for lag, row in zip(_LAGS, squares, strict=True) if row]
-    known = [(lag, row) for lag, row in known if row.size >= 8]
+    # Cells of each unbroken part of the record, as far as they are whole.
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(places) != 1) + 1, [places.size]])
+    cells = np.diff(edges) // _CELL
+    part = np.repeat(np.arange(cells.size), cells)
+    within = np.arange(part.size) - np.repeat(np.cumsum(cells) - cells, cells)
+    means = residual[(edges[part] + _CELL * within)[:, None] + np.arange(_CELL)].mean(axis=1)
+    known = []
+    for lag in _LAGS:
+        squares = (means[lag:] - means[:-lag])[part[lag:] == part[:-lag]] ** 2
+        if squares.size >= 8:
+            known.append((lag * _CELL, squares))
     if len(known) < 2:
         return 0.0
     lags = np.array([lag for lag, _ in known], dtype=float)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
@@ -60,24 +60,49 @@ def _discrete(natural: float, zeta: float, rate_hz: float) -> tuple[FloatArray, 
     return numerator[0], denominator
 
 
-def responded(values: FloatArray, effect: str, given: Mapping[str, float]) -> FloatArray:
-    """A signal, (m,) on the grid, as a sensor with the effect shows it."""
+EFFECTS = {
+    "gain": "error",
+    "lag": "tau",
+    "slow_response": "tau",
+    "filter_delay": "tau",
+    "drift": "rate",
+    "wire_cosine": "kappa",
+    "wire_anchor": "height",
+    "wire_inertia": "frequency",
+}
+"""Effects on a sensor family or on one channel, and the parameter that says that they are there."""
+
+
+def effects_on(target: str, values: Mapping[str, float]) -> dict[str, float]:
+    """Effects that there are on a family or a channel, each with its parameter of `EFFECTS`."""
+    return {effect: value for effect, key in _keys(target) if (value := values.get(key)) is not None}
+
+
+@cache
+def _keys(target: str) -> tuple[tuple[str, str], ...]:
+    return tuple((effect, f"{effect}@{target}.{parameter}") for effect, parameter in EFFECTS.items())
+
+
+def responded(
+    signal: FloatArray, effect: str, value: float, target: str, values: Mapping[str, float]
+) -> FloatArray:
+    """A signal, (m,) on the grid, as sensors with an effect on `target` show it; `value` as in `EFFECTS`."""
     match effect:
         case "gain":
-            return values * (1.0 + given["error"])
+            return signal * (1.0 + value)
         case "lag":
-            k = np.arange(values.size, dtype=float)
-            return np.asarray(np.interp(k - given["tau"] * GRID_HZ, k, values))
+            k = np.arange(signal.size, dtype=float)
+            return np.asarray(np.interp(k - value * GRID_HZ, k, signal))
         case "slow_response":
-            return first_order(values, given["tau"])
+            return first_order(signal, value)
         case "filter_delay":
-            return bessel(values, given["tau"])
+            return bessel(signal, value)
         case "wire_inertia":
-            return resonator(values, 2.0 * np.pi * given["frequency"], given.get("zeta", 0.2))
+            return resonator(signal, 2.0 * np.pi * value, values.get(f"wire_inertia@{target}.zeta", 0.2))
         case "wire_cosine":
-            return values + given["kappa"] * values**2
+            return signal + value * signal**2
         case "drift":
-            return values + given["rate"] * np.arange(values.size) / GRID_HZ
+            return signal + value * np.arange(signal.size) / GRID_HZ
     raise KeyError(effect)
 
 

@@ -65,13 +65,6 @@ class RockingRun:
     """What the run shows of conditions of the electronics."""
     cache: RunCache = field(default_factory=RunCache, compare=False)
 
-    def rotation_alone(self) -> RockingRun:
-        """The run with what θ(t) says only."""
-        n = len(self.places) + self.peaks.size
-        old = self.features
-        features = FeatureSet(old.values[:n], old.sd[:n], old.labels[:n], old.independent_fraction)
-        return replace(self, features=features, blocks=(), block_loadings=np.zeros((n, 0)), cache=RunCache())
-
     def with_blocks(self, more: Sequence[Block]) -> RockingRun:
         """The run with further blocks of features after those it has."""
         blocks = (*self.blocks, *more)

@@ -21,9 +21,9 @@ from daq_app.gap.rocking_model.motion.quiet import quiet
 from daq_app.gap.rocking_model.motion.release_speed import release_speed
 from daq_app.gap.rocking_model.motion.rotation import (
     Rotation,
+    mean_rotation,
     sample_noise,
     straight_line,
-    wall_rotation,
     wires_of,
 )
 from daq_app.gap.rocking_model.records import GapRun, Survey
@@ -104,11 +104,10 @@ def _reference(run: GapRun, joint: Rotation, wanted: str) -> tuple[str, FloatArr
     notes = tuple(f"{run.name}: {name} left out, it disagrees with its family." for name in joint.left_out)
     if joint.whole and not wanted:
         return "lvdt", joint.theta, joint.noise_rad, notes
-    rows, heights, _ = wall_rotation(run)
-    if len(rows) == 0:
+    theta = mean_rotation(run)
+    if theta is None:
         limit = () if joint.whole else (f"{run.name}: LVDTs reach their range.",)
         return "lvdt", joint.theta, joint.noise_rad, (*notes, *limit)
-    theta = np.average(rows, axis=0, weights=heights**2)
     why = "LVDTs reach their range" if not joint.whole else "the LVDTs are not fit for it"
     note = f"{run.name}: {why}; its motion is read from the wires."
     return "wire", theta, sample_noise(theta, run.rate_hz), (*notes, note)
@@ -164,7 +163,7 @@ def _wire_heights(run: GapRun) -> tuple[float, float, float, float]:
     The base is where the straight line through the displacements over z ends; last, how far that seems to
     move with the rotation where each wire has another calibration: the root of the sum of their squares.
     """
-    z = np.array([run.sensors[i].position_m[2] for i in run.indices("wire")])
+    z = run.positions(run.indices("wire"))[:, 2]
     if not z.size:
         return 1.0, 1.0, 0.0, 0.0
     at_base = straight_line(z)[0]

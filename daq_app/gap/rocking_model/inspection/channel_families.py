@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,54 +46,47 @@ def channel_family(
     """A family of one run, with the channels of `include` though they are excluded; None of too few."""
     whole = run.including(include)
     moving = (grid.time_s > -0.5) & (grid.time_s < grid.rest_s + 0.2)
-    data: ChannelFamily | None = None
     match family:
         case "lvdt":
-            data = _lvdts(whole, moving & grid.valid)
+            chosen, pick = [i for i in whole.indices("lvdt") if whole.reads(i)], moving & grid.valid
         case "wire":
-            data = _wires(whole, moving)
+            chosen, pick = wall_rotation(whole)[1], moving
         case "accelerometer":
-            data = _accelerometers(whole, moving & ~grid.near_impact)
-    if data is None:
+            chosen, pick = whole.steady_accelerometers("x"), moving & ~grid.near_impact
+        case _:
+            return None
+    if len(chosen) < (8 if family == "lvdt" else 4):
         return None
-    places = [i for name in data.ids for i, sensor in enumerate(run.sensors) if sensor.id == name]
-    return replace(
-        data,
-        step=step,
+    return ChannelFamily(
+        tuple(run.sensors[i].id for i in chosen),
+        _signals(whole, family, chosen),
+        _design(family, run.positions(chosen)),
+        pick,
+        step,
         repeats=grid.impact_s.size,
         sided="side" in SHAPES[family],
-        leaked=CROSSTALK * crosstalk(run, places),
-        turned=MOUNT_RAD * across_axes(run, grid, places) if family == "accelerometer" else None,
+        leaked=CROSSTALK * crosstalk(run, chosen),
+        turned=MOUNT_RAD * across_axes(run, grid, chosen) if family == "accelerometer" else None,
     )
 
 
-def _lvdts(run: GapRun, pick: NDArray[np.bool_]) -> ChannelFamily | None:
-    chosen = [i for i in run.indices("lvdt") if np.all(np.isfinite(run.channels[i]))]
-    if len(chosen) < 8:
-        return None
-    place = np.array([run.sensors[i].position_m for i in chosen])
+def _signals(run: GapRun, family: Family, chosen: Sequence[int]) -> FloatArray:
+    """What the channels show, (k, m): wires as the height times the rotation that each sees."""
+    if family == "accelerometer":
+        return smoothed(run, chosen)
+    if family == "wire":
+        rows = [coarse(row, run.rate_hz) for row in wall_rotation(run)[0]]
+        return run.positions(chosen)[:, 2:] * np.array(rows)
+    return np.array([gridded(run, i) for i in chosen])
+
+
+def _design(family: Family, positions_m: FloatArray) -> FloatArray:
+    """What a rigid motion has for each channel, (k, 2), of LVDTs (k, 4)."""
+    x, y, z = positions_m.T
+    if family != "lvdt":
+        return np.column_stack([np.ones_like(z), z])
     # A face's calibrations that differ along its length look like a twist, of that face alone.
-    twist = -place[:, :1] * place[:, 1:2] * np.column_stack([place[:, 0] < 0, place[:, 0] > 0])
-    design = np.column_stack([np.ones(len(chosen)), -place[:, 0], twist])
-    signals = np.array([gridded(run, i) for i in chosen])
-    return ChannelFamily(tuple(run.sensors[i].id for i in chosen), signals, design, pick)
-
-
-def _wires(run: GapRun, pick: NDArray[np.bool_]) -> ChannelFamily | None:
-    rows, heights, names = wall_rotation(run)
-    if len(names) < 4:
-        return None
-    signals = np.array([z * coarse(row, run.rate_hz) for z, row in zip(heights, rows, strict=True)])
-    return ChannelFamily(names, signals, np.column_stack([np.ones(len(names)), heights]), pick)
-
-
-def _accelerometers(run: GapRun, pick: NDArray[np.bool_]) -> ChannelFamily | None:
-    chosen = run.steady_accelerometers("x")
-    if len(chosen) < 4:
-        return None
-    heights = np.array([run.sensors[i].position_m[2] for i in chosen])
-    names = tuple(run.sensors[i].id for i in chosen)
-    return ChannelFamily(names, smoothed(run, chosen), np.column_stack([np.ones(len(chosen)), heights]), pick)
+    return np.column_stack([np.ones_like(x), -x, -x * y * (x < 0), -x * y * (x > 0)])
 
 
 def beside(data: ChannelFamily, name: str, without: tuple[str, ...]) -> Others:

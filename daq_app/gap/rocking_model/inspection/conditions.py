@@ -7,12 +7,13 @@ healthy channel, and which only the effect of that name predicts to be anything 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 from scipy.signal import butter, sosfiltfilt
 
 from daq_app.config.rig import Family
@@ -67,7 +68,7 @@ def inspect_channel(run: GapRun, index: int, shaken: Mask | None = None) -> Cond
     `shaken`: samples, (n,), around impacts, where an accelerometer is not looked at for lone samples.
     """
     values = run.channels[index]
-    if not np.all(np.isfinite(values)):
+    if not run.reads(index):
         return Condition(0.0, 1.0, None, 0.0, 1.0, 0.0, 1e-3, 0.0)
     rate, accelerometer = run.rate_hz, run.sensors[index].family == "accelerometer"
     hum, hum_sd, wave = _hum(values, rate)
@@ -87,9 +88,8 @@ def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray |
     """(amplitude, its sd, the wave over the record) of the mains frequency, from the rest at the end."""
     count = round(0.6 * rate_hz)
     rest = values[-count:] - values[-count:].mean()
-    t = (np.arange(values.size) - (values.size - count)) / rate_hz
-    design = _wave_columns(t[-count:], MAINS_HZ)
-    coefficients = np.linalg.lstsq(design, rest, rcond=None)[0]
+    design, inverse = _mains_at_rest(count, rate_hz)
+    coefficients = inverse @ rest
     left = rest - design @ coefficients
     noise = float(np.sqrt(np.mean(left**2)))
     sd = noise * np.sqrt(2.0 / count)
@@ -100,10 +100,11 @@ def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray |
     high = values - sosfiltfilt(butter(2, 25.0, fs=rate_hz, output="sos"), values)
     # An impact has some of every frequency: its own share, taken for hum, would ring around every impact.
     loud = np.abs(high) > LOUD * float(np.hypot(noise, amplitude))
-    calm = np.convolve(loud, np.ones(2 * round(AROUND_S * rate_hz) + 1), "same") < 0.5
+    calm = ~maximum_filter1d(loud, 2 * round(AROUND_S * rate_hz) + 1, mode="constant")
     calm = calm if calm.sum() > count else np.ones_like(calm)
-    whole = _wave_columns(t, _sharpened(np.where(calm, high, 0.0), rate_hz))[:, :2]
-    wave = whole @ np.linalg.lstsq(whole[calm], high[calm], rcond=None)[0]
+    waves = _waves(values.size, rate_hz, _sharpened(np.where(calm, high, 0.0), rate_hz))
+    seen = waves * calm
+    wave = np.linalg.solve(seen @ waves.T, seen @ high) @ waves
     # A little hum is on every long cable. It is taken out, but it is nothing to be explained.
     shown = amplitude if amplitude > USUAL_HUM * noise else 0.0
     return shown, float(sd), np.asarray(wave, dtype=float)
@@ -130,10 +131,17 @@ def _mains_phasor(count: int, rate_hz: float) -> NDArray[np.complex128]:
     return turning
 
 
-def _wave_columns(t: FloatArray, frequency: float) -> FloatArray:
-    return np.column_stack(
-        [np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t), np.ones_like(t), t]
-    )
+@lru_cache(maxsize=2)
+def _mains_at_rest(count: int, rate_hz: float) -> tuple[FloatArray, FloatArray]:
+    """Wave of the mains, offset and slope over `count` samples, (count, 4), and their pseudo-inverse."""
+    design = np.array([*_waves(count, rate_hz, MAINS_HZ), np.ones(count), np.arange(count) / rate_hz]).T
+    return design, np.linalg.pinv(design)
+
+
+def _waves(count: int, rate_hz: float, frequency_hz: float) -> FloatArray:
+    """Sine and cosine, (2, count)."""
+    angle = 2.0 * np.pi * frequency_hz / rate_hz * np.arange(count)
+    return np.array([np.sin(angle), np.cos(angle)])
 
 
 def _quantisation_step(values: FloatArray, noise_si: float) -> tuple[float, float]:
@@ -182,6 +190,8 @@ def _frozen(
     edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
     starts, stops = edges[::2], edges[1::2]
     long = stops - starts > FROZEN_S * rate_hz
+    if not long.any():
+        return 0.0, 1e-3
     # Between two steps of its converter, or of a coarser quantisation, a sound reading stands still too, but
     # then it goes on by one of them.
     after = np.minimum(stops + 1, values.size - 1)
@@ -289,16 +299,15 @@ def _attribute_condition(
     return [(family, having)]
 
 
-def _median_with_sd(name: str, cells: Iterable[tuple[float, float, bool]]) -> tuple[float, float]:
+def _median_with_sd(name: str, cells: Sequence[tuple[float, float, bool]]) -> tuple[float, float]:
     """(value, sd) over the channels chosen: their median, or nothing where none has it."""
-    values = [(value, sd) for value, sd, seen in cells if seen]
-    listed = list(cells) if not isinstance(cells, list) else cells
-    noise = float(np.median([sd for _, sd, _ in listed]))
-    if not values:
-        return 0.0, 3.0 * noise if name in ("hum",) else _NONE[name] * 1.0
-    middle = float(np.median([v for v, _ in values]))
-    spread = float(np.std([v for v, _ in values])) / np.sqrt(len(values))
-    return middle, float(np.hypot(np.median([s for _, s in values]), spread)) + 1e-3 * middle
+    having = np.array([(value, sd) for value, sd, seen in cells if seen])
+    if not having.size:
+        noise = float(np.median([sd for _, sd, _ in cells]))
+        return 0.0, _NONE.get(name, 3.0 * noise)
+    middle, sd = np.median(having, axis=0).tolist()
+    spread = float(np.std(having[:, 0])) / math.sqrt(len(having))
+    return middle, math.hypot(sd, spread) + 1e-3 * middle
 
 
 _NONE = {"quantisation": 1e-5, "dropout": 1e-3, "spikes": 0.05}

@@ -99,8 +99,7 @@ def _half_cycles(run: GapRun, grid: Grid, survey: Survey, ring: Ring | None) -> 
     chosen = run.steady_accelerometers("x")
     if len(chosen) < 3:
         return []
-    places = np.array([run.sensors[i].position_m for i in chosen])
-    y, z = places[:, 1], places[:, 2]
+    _, y, z = run.positions(chosen).T
     follows = survey.p_rad_s**2 / GRAVITY_M_S2 * np.cos(survey.alpha_rad)
     shapes = [1.0 - follows * z, z**2, *([y * z] if np.ptp(y) > 0.2 else [])]
     if z.size <= len(shapes):

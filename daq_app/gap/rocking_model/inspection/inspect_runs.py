@@ -13,10 +13,9 @@ import numpy as np
 
 from daq_app.config.rig import Family
 from daq_app.gap.core import CannotDiagnose
-from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block, scalar_block
 from daq_app.gap.rocking_model.features.oscillations.floor_vibration import find_vibration, without_vibration
-from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal, bend_signals, turn_signals
+from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal, ring_signals
 from daq_app.gap.rocking_model.features.oscillations.rings import Ring, ring_block, scan, with_repeatability
 from daq_app.gap.rocking_model.features.oscillations.vibration import Vibration
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
@@ -186,13 +185,9 @@ def _left_out(examined: Sequence[Examined]) -> set[str]:
     """LVDTs that read and that the plane of the joint was made without, in half of the runs or more."""
     seen: list[str] = []
     for entry in examined:
-        whole = {s.id for s, row in zip(entry.run.sensors, entry.run.channels, strict=True) if _reads(row)}
+        whole = {s.id for i, s in enumerate(entry.run.sensors) if entry.run.reads(i)}
         seen += [name for name in entry.joint.left_out if name in whole]
     return {name for name in seen if 2 * seen.count(name) >= len(examined)}
-
-
-def _reads(values: FloatArray) -> bool:
-    return bool(np.all(np.isfinite(values)))
 
 
 def _steps(findings: Sequence[Sequence[RunFinding]]) -> dict[str, float]:
@@ -226,10 +221,9 @@ def completed(
                 block = vertical_block(entry.run, grid, name, _late(entry.features))
             if block is not None:
                 row.append(block)
-    bends = [bend_signals(e.run, e.features.grid, height) for e in examined]
-    turns = [turn_signals(e.run, e.joint, e.features.grid, height) for e in examined]
-    bending = _add_rings(blocks_by_run, examined, bends, "bending", slow=False)
-    _add_rings(blocks_by_run, examined, turns, "turning", slow=True)
+    signals = [ring_signals(e.run, e.joint, e.features.grid, height) for e in examined]
+    bending = _add_rings(blocks_by_run, examined, [bends for bends, _ in signals], "bending", slow=False)
+    _add_rings(blocks_by_run, examined, [turns for _, turns in signals], "turning", slow=True)
     vibrations = find_vibration([e.run for e in examined], grids, bending)
     examined = [_on_still_floor(e, v) for e, v in zip(examined, vibrations, strict=True)]
     bursts = floor_bursts(

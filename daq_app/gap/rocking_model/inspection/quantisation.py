@@ -48,7 +48,7 @@ def _rounded(entry: Examined, family: str, step: float) -> dict[str, FloatArray]
     # Beyond the ends of the intervals the motion goes on straight.
     inside = (np.arange(WITHIN) + 0.5) / WITHIN - 0.5
     theta = grid.raw[:, None] + inside * np.gradient(grid.raw)[:, None]
-    places = np.array([run.sensors[i].position_m for i in chosen])
+    places = run.positions(chosen)
     if family == "wire":
         readings = places[:, 2, None, None] * theta
     else:
@@ -72,14 +72,13 @@ def _channels(entry: Examined, family: str) -> list[int]:
     """Places of the channels that a family's rotation was made from."""
     run = entry.run
     if family == "wire":
-        names = wall_rotation(run)[2]
-        return [i for i in run.indices("wire") if run.sensors[i].id in names]
+        return wall_rotation(run)[1]
     return [i for i in run.indices("lvdt") if run.sensors[i].id in entry.joint.used]
 
 
 def _weights(run: GapRun, family: str, chosen: Sequence[int]) -> dict[str, FloatArray]:
     """What each block makes of the readings of a family, sample by sample: a weight for each channel."""
-    x, y, z = np.array([run.sensors[i].position_m for i in chosen]).reshape(-1, 3).T
+    x, y, z = run.positions(chosen).T
     if family == "wire":
         return {"wire": z / (z @ z), "base": straight_line(z)[0]}
     lift, theta, twist = np.linalg.pinv(np.column_stack([np.ones_like(x), -x, -x * y]))

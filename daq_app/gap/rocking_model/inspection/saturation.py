@@ -100,7 +100,7 @@ def _rotation(run: GapRun, family: Family) -> FloatArray | None:
     rows: list[tuple[float, FloatArray]] = []
     for i in run.indices(family):
         sensor = run.sensors[i]
-        if not np.all(np.isfinite(run.channels[i])) or reaches_its_range(run.aligned(i), sensor.range_si):
+        if not run.reads(i) or reaches_its_range(run.aligned(i), sensor.range_si):
             continue
         values = gridded(run, i)
         if family == "wire" and sensor.anchor_m is not None:
@@ -145,7 +145,7 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None, rough: float) ->
     """
     i = next(k for k, sensor in enumerate(run.sensors) if sensor.id == name)
     sensor = run.sensors[i]
-    if rotation is None or not np.all(np.isfinite(run.channels[i])):
+    if rotation is None or not run.reads(i):
         return 0.0, 0.0
     mine = np.abs(gridded(run, i))
     # A channel stops at a reading, wherever its zero has gone since.
@@ -169,10 +169,13 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None, rough: float) ->
         return 0.0, furthest
     gain = float(np.median(mine[below] / np.maximum(expected[below], 1e-9)))
     reach = gain * expected[top]
-    noise = float(np.std(mine[-40:]))
-    goes_on = float(np.quantile(reach, 0.98)) > (GOES_ON + rough) * largest
+    if float(np.quantile(reach, 0.98)) <= (GOES_ON + rough) * largest:
+        return 0.0, furthest
     # Standing still while the rotation moves on is clipping; following at another rate is not.
-    travel = float(np.quantile(reach, 0.99) - np.quantile(reach, 0.01))
-    moved = float(np.quantile(mine[top], 0.95) - np.quantile(mine[top], 0.05))
+    noise = float(np.std(mine[-40:]))
+    travel, moved = (
+        float(np.ptp(np.quantile(reach, (0.01, 0.99)))),
+        float(np.ptp(np.quantile(mine[top], (0.05, 0.95)))),
+    )
     steady = travel > (0.02 + rough) * largest + 3.0 * noise and moved < 0.5 * travel + 2.0 * noise
-    return (float(np.median(reading[top])), furthest) if goes_on and steady else (0.0, furthest)
+    return (float(np.median(reading[top])) if steady else 0.0), furthest

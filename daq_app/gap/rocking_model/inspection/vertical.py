@@ -66,7 +66,7 @@ def _vertical(run: GapRun, grid: Grid, late_s: float) -> dict[str, Others]:
     along_x, along_z = run.steady_accelerometers("x"), run.steady_accelerometers("z")
     if len(along_x) < 4 or not along_z or grid.impact_s.size < 2:
         return {}
-    heights = np.array([run.sensors[i].position_m[2] for i in along_x])
+    heights = run.positions(along_x)[:, 2]
     weights = straight_line(heights)[1]
     signals = smoothed(run, along_x, late_s)
     turning = weights @ signals

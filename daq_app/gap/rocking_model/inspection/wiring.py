@@ -73,7 +73,7 @@ def _check(run: GapRun) -> Wiring:
         at = [ids.index(name) for name in group]
         # What is read away from impacts only has the edges of that choice, which are late with nothing.
         due = expected[at] if group[0] in parted else _as_late_as(measured[at], expected[at])
-        order, turn = _order(np.array([[_misfit(measured[i], e) for e in due] for i in at]))
+        order, turn = _order(_misfits(measured[at], due))
         exchanged += [(group[i], group[j]) for i, j in enumerate(order) if i != j]
         places = max(places, turn)
     involved = {name for pair in exchanged for name in pair}
@@ -147,22 +147,23 @@ def _order(misfit: FloatArray) -> tuple[list[int], int]:
     return order, fits[0] if fits else 1
 
 
-def _misfit(measured: FloatArray, expected: FloatArray) -> float:
-    """Share of a signal's power that what is expected, with a gain within 15 % of 1, leaves unexplained."""
-    gain = float(np.clip(measured @ expected / max(float(expected @ expected), 1e-30), 0.85, 1.15))
-    left = measured - gain * expected
-    return float(left @ left / max(float(measured @ measured), float(expected @ expected), 1e-30))
+def _misfits(measured: FloatArray, expected: FloatArray) -> FloatArray:
+    """Share of the power of each signal (rows) that what is expected of each sensor (columns), with a gain
+    within 15 % of 1, leaves unexplained; both (k, n)."""
+    power, due = np.sum(measured**2, axis=1)[:, None], np.sum(expected**2, axis=1)
+    product = measured @ expected.T
+    gain = np.clip(product / np.maximum(due, 1e-30), 0.85, 1.15)
+    left = power - 2.0 * gain * product + gain**2 * due
+    return np.asarray(left / np.maximum(np.maximum(power, due), 1e-30))
 
 
 def _compare(run: GapRun) -> tuple[FloatArray, FloatArray, list[str]]:
     """(measured, expected, ids) of all channels that follow the rotation, smoothed and thinned out."""
     step = max(round(run.rate_hz / WORK_HZ), 1)
     low_pass = butter(3, LOW_PASS_HZ, fs=WORK_HZ, output="sos")
-    smooth: dict[int, FloatArray] = {
-        i: sosfiltfilt(low_pass, _thin(zeroed(run, i), step))
-        for i in range(len(run.sensors))
-        if np.all(np.isfinite(run.channels[i]))
-    }
+    reading = np.flatnonzero(np.isfinite(run.channels).all(axis=1)).tolist()
+    thinned = np.array([_thin(zeroed(run, i), step) for i in reading])
+    smooth = dict(zip(reading, sosfiltfilt(low_pass, thinned), strict=True)) if reading else {}
     theta = _median_rotation(run, smooth)
     if theta is None:
         return np.zeros((0, 0)), np.zeros((0, 0)), []

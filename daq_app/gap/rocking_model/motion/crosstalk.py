@@ -21,7 +21,7 @@ def crosstalk(run: GapRun, places: Sequence[int]) -> FloatArray:
     for place in places:
         row = np.zeros(coarse(run.channels[place], run.rate_hz).size)
         scale = _same_volts(run.sensors[place], run.sensors[place - 1])
-        if place > 0 and np.isfinite(scale) and np.all(np.isfinite(run.channels[place - 1])):
+        if place > 0 and np.isfinite(scale) and run.reads(place - 1):
             row = scale * gridded(run, place - 1)
         rows.append(row)
     return np.array(rows)

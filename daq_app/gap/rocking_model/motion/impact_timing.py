@@ -36,7 +36,7 @@ def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
     chosen = run.steady_accelerometers("x")
     if not chosen or grid.impact_s.size < 3:
         return None
-    height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))
+    height = float(run.positions(chosen)[:, 2].mean())
     measured = np.mean([gridded(run, i) for i in chosen], axis=0)
     windows = _windows(grid)
     if len(windows) < 3:
@@ -44,20 +44,21 @@ def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
     fine = np.arange(grid.speed.size) / run.rate_hz + grid.time_s[0] - 0.5 / GRID_HZ
     gravity = np.interp(fine, grid.time_s, GRAVITY_M_S2 * np.sin(grid.theta))
     velocity = height * grid.speed - np.cumsum(gravity) / run.rate_hz
+    ends = np.append(grid.time_s - 0.5 / GRID_HZ, grid.time_s[-1] + 0.5 / GRID_HZ)
+    ends = ends[np.column_stack([windows, windows[:, -1] + 1])]
 
-    def misfit(delay: float) -> FloatArray:
-        edges = np.append(grid.time_s - 0.5 / GRID_HZ, grid.time_s[-1] + 0.5 / GRID_HZ) - delay
-        expected = np.diff(np.interp(edges, fine, velocity)) * GRID_HZ
-        difference = (measured - expected)[windows]
+    def misfit(delays: FloatArray) -> FloatArray:
+        """Squares left, (delays, windows)."""
+        expected = np.diff(np.interp(ends - delays[:, None, None], fine, velocity)) * GRID_HZ
+        difference = measured[windows] - expected
         slow = (difference @ _SLOW_SHAPES) @ _SLOW_SHAPES.T
-        return np.asarray(np.sum((difference - slow) ** 2, axis=1))
+        return np.asarray(np.sum((difference - slow) ** 2, axis=2))
 
     delays = np.arange(-REACH_S, REACH_S, 1e-3)
-    curve = np.array([misfit(float(d)).sum() for d in delays])
-    dip = _Dip.of(delays, curve)
+    dip = _Dip.of(delays, misfit(delays).sum(axis=1))
     reach = min(dip.sooner_s, dip.later_s) if dip.broad else _NEAR_S
     fine_delays = dip.middle_s + np.linspace(-reach, reach, 2 * round(reach / 2.5e-4) + 1)
-    tables = np.array([misfit(float(d)) for d in fine_delays])
+    tables = misfit(fine_delays)
     lowest = _middle if dip.broad else _minimum
     shift = lowest(fine_delays, tables.sum(axis=1))
     each = np.array([lowest(fine_delays, tables[:, k]) for k in range(tables.shape[1])])

@@ -56,9 +56,8 @@ def common_lateness(mine: FloatArray, other: FloatArray, rate_hz: float) -> floa
 
 def _correlation(mine: FloatArray, other: FloatArray, most: int) -> FloatArray:
     """Correlation of the rates for delays of −`most` to `most` samples."""
-    rates = np.gradient(mine), np.gradient(other)
-    inner = slice(most, mine.size - most)
-    return np.array([float(rates[0][inner] @ np.roll(rates[1], k)[inner]) for k in range(-most, most + 1)])
+    inner = np.gradient(mine)[most : mine.size - most]
+    return np.correlate(np.gradient(other), inner, "valid")[::-1]
 
 
 def _largest(correlation: FloatArray) -> float:

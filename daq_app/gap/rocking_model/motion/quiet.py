@@ -15,7 +15,7 @@ def quiet(run: GapRun, grid: Grid) -> NDArray[np.bool_]:
     step = round(run.rate_hz / GRID_HZ)
     spread = np.zeros(grid.time_s.size)
     for i in run.indices("accelerometer"):
-        if np.all(np.isfinite(run.channels[i])):
+        if run.reads(i):
             cells = run.channels[i, : spread.size * step].reshape(spread.size, step)
             deviation = cells.std(axis=1)
             spread = np.maximum(spread, deviation / max(float(np.median(deviation[-60:])), 1e-12))

@@ -7,6 +7,8 @@ hundredth parts of a second around the release know both.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
@@ -40,19 +42,43 @@ def release_speed(
     seen = side * theta[first : first + count * step].reshape(count, step).mean(axis=1)
     time_s = (first + step * (np.arange(count, dtype=np.float64) + 0.5) - 0.5) / rate_hz - swings.release_s
     starts: FloatArray = np.linspace(-SEARCHED_S, SEARCHED_S, _STEPS, dtype=np.float64)
-    lost = [_fit(seen, time_s, start, survey.p_rad_s)[0] for start in starts]
-    best = int(np.argmin(lost))
+    fits = _Fits.of(seen, time_s, starts, survey.p_rad_s)
     for _ in range(4):
         width = starts[1] - starts[0]
-        starts = starts[best] + np.linspace(-width, width, 9, dtype=np.float64)
-        lost = [_fit(seen, time_s, start, survey.p_rad_s)[0] for start in starts]
-        best = int(np.argmin(lost))
-    left, coefficients, _ = _fit(seen, time_s, float(starts[best]), survey.p_rad_s)
+        starts = starts[fits.best] + np.linspace(-width, width, 9, dtype=np.float64)
+        fits = _Fits.of(seen, time_s, starts, survey.p_rad_s)
+    left = float(fits.left[fits.best])
+    _, curvature, speed = np.linalg.solve(fits.triangle[fits.best], fits.along[fits.best]).tolist()
     variance = max(left / max(count - 4, 1), noise_rad**2 / step)
-    told = _told(seen, time_s, survey.p_rad_s, float(coefficients[1]), variance)
+    told = _told(seen, time_s, survey.p_rad_s, speed, variance)
     # Thrown up the wall rises v²/2a above its hold; what the hold sways by is as good as that.
-    swayed = 2.0 * swings.hold_sd * abs(coefficients[2]) / max(abs(coefficients[1]), 1e-6)
-    return float(coefficients[1]), float(np.linalg.norm([told, swayed, RELEASE_SPEED_RAD_S]))
+    swayed = 2.0 * swings.hold_sd * abs(curvature) / max(abs(speed), 1e-6)
+    return speed, float(np.linalg.norm([told, swayed, RELEASE_SPEED_RAD_S]))
+
+
+@dataclass(frozen=True, slots=True)
+class _Fits:
+    """Fits with the release at each of k starts, by the triangle of 1, −(cosh pτ − 1)/p², sinh(pτ)/p."""
+
+    triangle: FloatArray
+    """(k, 3, 3)"""
+    along: FloatArray
+    """(k, 3) what is seen, along the orthonormal basis of the shapes."""
+    left: FloatArray
+    """(k,) squares that are left."""
+
+    @classmethod
+    def of(cls, seen: FloatArray, time_s: FloatArray, starts_s: FloatArray, p: float) -> _Fits:
+        since = p * np.maximum(time_s - starts_s[:, None], 0.0)
+        shapes = (np.ones_like(since), -(np.cosh(since) - 1.0) / p**2, np.sinh(since) / p)
+        basis, triangle = np.linalg.qr(np.stack(shapes, axis=-1))
+        along = seen @ basis
+        left = seen - (basis @ along[:, :, None])[:, :, 0]
+        return cls(triangle, along, np.sum(left**2, axis=1))
+
+    @property
+    def best(self) -> int:
+        return int(np.argmin(self.left))
 
 
 def _told(seen: FloatArray, time_s: FloatArray, p: float, speed: float, variance: float) -> float:
@@ -62,31 +88,13 @@ def _told(seen: FloatArray, time_s: FloatArray, p: float, speed: float, variance
     its sign: the curvature at the best speed would promise too much. The sd is that at which no speed
     at all is as unlikely as it is; where it is likely, how far off others are that are not.
     """
-    lost = np.full(_SPEEDS_RAD_S.size, np.inf)
-    for start in np.linspace(-SEARCHED_S, SEARCHED_S, _PROFILED, dtype=np.float64):
-        # The speed's column comes last: what the others leave is a parabola in the speed.
-        basis, triangle = np.linalg.qr(_design(time_s, float(start), p)[:, [0, 2, 1]])
-        along = basis.T @ seen
-        rest = float(seen @ seen - along @ along)
-        lost = np.minimum(lost, rest + (along[2] - triangle[2, 2] * _SPEEDS_RAD_S) ** 2)
+    fits = _Fits.of(seen, time_s, np.linspace(-SEARCHED_S, SEARCHED_S, _PROFILED, dtype=np.float64), p)
+    # The speed's shape comes last: what the others leave is a parabola in the speed.
+    off = fits.along[:, 2:] - fits.triangle[:, 2, 2:] * _SPEEDS_RAD_S
+    lost = np.min(fits.left[:, None] + off**2, axis=0)
     squares = (lost - lost.min()) / variance
     against_none = float(squares[_SPEEDS_RAD_S.size // 2])
     if against_none > 1.0:
         return abs(speed) / float(np.sqrt(against_none))
     apart = np.abs(_SPEEDS_RAD_S - speed)
     return float(np.min(apart, where=squares >= 1.0, initial=apart.max()))
-
-
-def _design(time_s: FloatArray, start_s: float, p: float) -> FloatArray:
-    since = p * np.maximum(time_s - start_s, 0.0)
-    return np.column_stack([np.ones_like(time_s), np.sinh(since) / p, -(np.cosh(since) - 1.0) / p**2])
-
-
-def _fit(
-    seen: FloatArray, time_s: FloatArray, start_s: float, p: float
-) -> tuple[float, FloatArray, FloatArray]:
-    """(squares left, coefficients, design) with the release at `start_s`."""
-    design = _design(time_s, start_s, p)
-    coefficients: FloatArray = np.linalg.lstsq(design, seen, rcond=None)[0].astype(np.float64)
-    left = seen - design @ coefficients
-    return float(left @ left), coefficients, design

@@ -227,25 +227,27 @@ def shown_by_wires(wires: Sequence[Wire], moved: FloatArray, *, of_base: bool) -
     return float(straight_line(z)[0] @ moved) if of_base else float(z @ moved / (z @ z))
 
 
-def wall_rotation(run: GapRun) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
-    """θ of each wire (w, n), their heights (w,), and their ids; clipped wires are left out.
+def wall_rotation(run: GapRun) -> tuple[FloatArray, list[int]]:
+    """θ of each wire (w, n), and the wires' places; clipped wires are left out.
 
     Each reading is turned into a rotation by the wire's real geometry about the nominal edges.
     """
-    rows, heights, names = [], [], []
-    for i in run.indices("wire"):
-        theta = run.cache.constant(("wire", i), partial(_rotation_of_wire, run, i))
-        if theta is not None:
-            rows.append(theta)
-            heights.append(run.sensors[i].position_m[2])
-            names.append(run.sensors[i].id)
-    return np.array(rows), np.array(heights), tuple(names)
+    wires = run.indices("wire")
+    rotations = [run.cache.constant(("wire", i), partial(_rotation_of_wire, run, i)) for i in wires]
+    read = [(theta, i) for theta, i in zip(rotations, wires, strict=True) if theta is not None]
+    return np.array([theta for theta, _ in read]), [i for _, i in read]
+
+
+def mean_rotation(run: GapRun) -> FloatArray | None:
+    """Mean of what the wires show of the wall's rotation (weights z²), (n,), rad; None where none reads."""
+    rows, chosen = wall_rotation(run)
+    return np.average(rows, axis=0, weights=run.positions(chosen)[:, 2] ** 2) if chosen else None
 
 
 def _rotation_of_wire(run: GapRun, index: int) -> FloatArray | None:
     """θ, (n,), of a wire that reads; None where no rotation explains what it reads."""
     sensor, raw = run.sensors[index], run.aligned(index)
-    if sensor.anchor_m is None or not np.all(np.isfinite(raw)) or reaches_its_range(raw, sensor.range_si):
+    if sensor.anchor_m is None or not run.reads(index) or reaches_its_range(raw, sensor.range_si):
         return None
     theta = Wire(sensor, run.survey.half_base_m).rotation(zeroed(run, index))
     return theta if np.all(np.isfinite(theta)) else None

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
@@ -43,15 +46,13 @@ def swing_delay(run: GapRun, grid: Grid, of_impacts_s: float | None) -> tuple[fl
 
 def _in_step(run: GapRun, grid: Grid, chosen: list[int], early: int) -> tuple[float, float] | None:
     """(delay, variance) from records that are taken `early` samples sooner."""
-    rows = np.array([gridded(run, i, early) for i in chosen])
-    places = np.array([run.sensors[i].position_m for i in chosen])
-    whole = _at_the_foot(run, grid, rows, places)
-    if whole is None:
+    foot = _Foot.of(run, grid, np.array([gridded(run, i, early) for i in chosen]), chosen)
+    whole = None if foot is None else foot.delay(np.ones(len(chosen), dtype=bool))
+    if foot is None or whole is None:
         return None
     delay, variance = whole
     for k in range(len(chosen)):
-        others = np.arange(len(chosen)) != k
-        without = _at_the_foot(run, grid, rows[others], places[others])
+        without = foot.delay(np.arange(len(chosen)) != k)
         if without is not None:
             # The lowest one has most of the say. Where the others do not bear it out, nobody knows better.
             chance = DELAY_WITHOUT_ONE**2 * abs(without[1] - whole[1])
@@ -60,24 +61,42 @@ def _in_step(run: GapRun, grid: Grid, chosen: list[int], early: int) -> tuple[fl
     return undone + delay, variance + (DELAY_FORM * undone) ** 2
 
 
-def _at_the_foot(run: GapRun, grid: Grid, rows: FloatArray, places: FloatArray) -> tuple[float, float] | None:
-    """(delay, variance) of what accelerometers, (k, m) at (k, 3), show when extrapolated to the foot."""
-    z = places[:, 2]
-    if z.size < 3 or np.ptp(z) < ACCELEROMETER_SPREAD_M:
-        return None
-    weights = straight_line(z)[0]
-    arm = float(weights @ places[:, 0]) - np.sign(grid.theta) * run.survey.half_base_m
-    gravity = -GRAVITY_M_S2 * np.sin(grid.theta)
-    difference = weights @ rows - (gravity - grid.omega**2 * arm)
-    pick = (grid.time_s > 0.05) & (grid.time_s < grid.impact_s[-1]) & ~grid.near_impact & grid.valid
-    # Unequal calibrations leave some of the inertia.
-    columns = [np.ones_like(gravity), gravity, grid.alpha, GRAVITY_M_S2 * np.cos(grid.theta) * grid.omega]
-    design = np.column_stack(columns)[pick]
-    if len(design) < 20 * len(columns):
-        return None
-    scale = np.sqrt(np.mean(design**2, axis=0)) + 1e-300
-    inverse = np.linalg.pinv(design / scale, rcond=1e-8) / scale[:, None]
-    left = difference[pick] - design @ (inverse @ difference[pick])
-    fraction = max(independent_fraction(left), 0.01)
-    variance = float(left @ left) / (left.size - len(columns)) / fraction
-    return float(inverse[-1] @ difference[pick]), variance * float(inverse[-1] @ inverse[-1])
+@dataclass(frozen=True, slots=True)
+class _Foot:
+    """Accelerometers between impacts and what they show where they are extrapolated to the foot."""
+
+    rows: FloatArray
+    """(k, n) each accelerometer less gravity and its share of ω² about the edge, m/s²."""
+    heights_m: FloatArray
+    design: FloatArray
+    """(n, 4): zero, gravity, inertia of unequal calibrations, and the rate of gravity: a delay."""
+    inverse: FloatArray
+    """(4, n)"""
+
+    @classmethod
+    def of(cls, run: GapRun, grid: Grid, rows: FloatArray, chosen: list[int]) -> _Foot | None:
+        pick = (grid.time_s > 0.05) & (grid.time_s < grid.impact_s[-1]) & ~grid.near_impact & grid.valid
+        theta, omega = grid.theta[pick], grid.omega[pick]
+        gravity = -GRAVITY_M_S2 * np.sin(theta)
+        columns = [np.ones_like(theta), gravity, grid.alpha[pick], GRAVITY_M_S2 * np.cos(theta) * omega]
+        design = np.column_stack(columns)
+        if len(design) < 20 * len(columns):
+            return None
+        scale = np.sqrt(np.mean(design**2, axis=0)) + 1e-300
+        places = run.positions(chosen)
+        arms = places[:, :1] - np.sign(theta) * run.survey.half_base_m
+        beyond = rows[:, pick] - gravity + omega**2 * arms
+        inverse = np.linalg.pinv(design / scale, rcond=1e-8) / scale[:, None]
+        return cls(beyond, places[:, 2], design, inverse)
+
+    def delay(self, used: NDArray[np.bool_]) -> tuple[float, float] | None:
+        """(delay, variance), s, by some of the accelerometers, (k,); None for too few or too near ones."""
+        z = self.heights_m[used]
+        if z.size < 3 or np.ptp(z) < ACCELEROMETER_SPREAD_M:
+            return None
+        difference = straight_line(z)[0] @ self.rows[used]
+        coefficients = self.inverse @ difference
+        left = difference - self.design @ coefficients
+        fraction = max(independent_fraction(left), 0.01)
+        variance = float(left @ left) / (left.size - self.design.shape[1]) / fraction
+        return float(coefficients[-1]), variance * float(self.inverse[-1] @ self.inverse[-1])

@@ -9,7 +9,7 @@ import numpy as np
 
 from daq_app.gap.core import Parameter, Prediction, Run, Scatter
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.coefficients import block_coefficients, sensor_priors
+from daq_app.gap.rocking_model.features.coefficients import block_coefficients, sensor_priors, units
 from daq_app.gap.rocking_model.features.families.lvdts import FACE_SKEW
 from daq_app.gap.rocking_model.features.oscillations.floor_response import with_measured_inputs
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
@@ -101,20 +101,20 @@ class RockingModel:
         last = count + run.peaks.size
         predicted[count:last] = peaks
         loading_r[count:last] = 1.0 / slopes
-        predicted[last:], units = block_coefficients(run, values)
-        loadings = {SCATTER_R: loading_r, **self._fixed_scatters(run, units)}
+        predicted[last:] = block_coefficients(run, values)
+        loadings = {SCATTER_R: loading_r, **self._fixed_scatters(run)}
         return Prediction(predicted, loadings, run.block_loadings)
 
     @staticmethod
-    def _fixed_scatters(run: RockingRun, units: FloatArray) -> dict[str, FloatArray]:
-        """Loadings that no parameter changes, worked out once per run; `units` are those of the blocks."""
+    def _fixed_scatters(run: RockingRun) -> dict[str, FloatArray]:
+        """Loadings that no parameter changes, worked out once per run."""
 
         def make() -> dict[str, FloatArray]:
             times, releases, sensors = (np.zeros(len(run.features)) for _ in range(3))
             count = len(run.places)
             times[:count] = 1.0
             releases[:count] = (run.places[:, 0] == 0) & (run.places[:, 2] == 0)
-            sensors[count + run.peaks.size :] = units
+            sensors[count + run.peaks.size :] = np.concatenate([np.zeros(0), *units(run)])
             return {SCATTER_TIME: times, SCATTER_RELEASE: releases, SCATTER_SENSOR: sensors}
 
         return run.cache.constant("loadings", make)
@@ -165,9 +165,3 @@ def _half_cycles(
     vector = kernel_vector(run, values)
     true, levels = true_rotations(run, values)
     return vector, true, levels, half_cycle_table(run, vector, true, levels)
-
-
-class UnscatteredModel(RockingModel):
-    """The same with a likelihood that knows no scatter of r, to see what it is worth."""
-
-    scatters = (Scatter(SCATTER_R, 1e-6, 1e-3, "1", "held at nothing"), *RockingModel.scatters[1:])

@@ -47,7 +47,7 @@ def _predicted(run: RockingRun, family: str, effect: dict[str, float]) -> np.nda
         if block.family == family:
             break
         first += len(block.names)
-    return block_coefficients(run, _usual(run, effect))[0][first : first + len(_block(run, family).names)]
+    return block_coefficients(run, _usual(run, effect))[first : first + len(_block(run, family).names)]
 
 
 @pytest.mark.parametrize(

@@ -130,7 +130,7 @@ def test_a_wall_that_rings_slowly_about_the_vertical_is_no_turn_that_stays(
     values = {f"{name}.{key}": value for name, given in effect.items() for key, value in given.items()}
     (run,), (still,) = (prepare([each])[0] for each in (ringing, plain))
     block, before = (next(b for b in each.blocks if b.family == "turn") for each in (run, still))
-    told = block_coefficients(run, _usual(run) | values)[0] - block_coefficients(run, _usual(run))[0]
+    told = block_coefficients(run, _usual(run) | values) - block_coefficients(run, _usual(run))
     first = sum(len(b.names) for b in run.blocks[: run.blocks.index(block)])
     told = told[first : first + len(block.names)]
     sd = np.sqrt(np.diag(block.covariance))

@@ -20,11 +20,13 @@ _LIBRARY: Final = (
     ENTRIES["eccentric_mass"],
 )
 _OUTSIDE: Final = (
-    Entry("one_round_edge", "interface", "near", "rho_m", 0.008, 0.06),
-    Entry("stepped_edge", "interface", "near", "height_m", 4e-4, 4e-3, others=uniform(width_m=(0.02, 0.08))),
-    Entry("damped_bed", "interface", "near", "theta_c_rad", 1e-4, 9e-4),
-    Entry("slippery_base", "contact", "near", "friction_share", 0.99, 0.9),
-    Entry("slippery_edge", "contact", "near", "friction_share", 0.99, 0.9),
+    Entry("one_round_edge", "interface", "rho_m", 0.008, 0.06, kind="near"),
+    Entry(
+        "stepped_edge", "interface", "height_m", 4e-4, 4e-3, others=uniform(width_m=(0.02, 0.08)), kind="near"
+    ),
+    Entry("damped_bed", "interface", "theta_c_rad", 1e-4, 9e-4, kind="near"),
+    Entry("slippery_base", "contact", "friction_share", 0.99, 0.9, kind="near"),
+    Entry("slippery_edge", "contact", "friction_share", 0.99, 0.9, kind="near"),
 )
 _ON_SENSORS: Final = tuple(entry for entry in (ENTRIES[name] for name in LIBRARY) if entry.on_sensors)
 

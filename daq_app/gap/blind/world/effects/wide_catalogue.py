@@ -17,7 +17,7 @@ _FAST_RING: Final = replace(_RING, others=uniform(frequency_hz=(7.0, 42.0), zeta
 _SLOW_RING: Final = replace(
     _RING, low=0.03, high=0.3, others=uniform(frequency_hz=(2.0, 7.0), zeta=(0.005, 0.05))
 )
-_CORNER_TWIST: Final = Entry("corner_twist", "contact", "library", "turn_s", 3e-4, 6e-3, True)
+_CORNER_TWIST: Final = Entry("corner_twist", "contact", "turn_s", 3e-4, 6e-3, signed=True)
 
 WIDE_ENTRIES: Final[Mapping[str, Entry]] = {
     **ENTRIES,

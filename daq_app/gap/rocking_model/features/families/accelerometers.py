@@ -9,6 +9,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core import Parameter
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.core.parameters import known
 from daq_app.gap.rocking_model.features.block import Block, regress, scalar_block
 from daq_app.gap.rocking_model.features.differences import base_rotation, own_gain
 from daq_app.gap.rocking_model.features.family import (
@@ -47,8 +48,7 @@ def _acceleration_block(scene: Scene) -> Block | None:
         return None
     # Means over 5 ms and no filter: one that rings carries an impact past the samples left out around it.
     measured = np.mean([gridded(run, i) for i in chosen], axis=0)
-    height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))
-    x = float(np.mean([run.sensors[i].position_m[0] for i in chosen]))
+    x, _, height = run.positions(chosen).mean(axis=0).tolist()
     arm = x - np.sign(grid.theta) * run.survey.half_base_m
     gravity, inertia = -GRAVITY_M_S2 * np.sin(grid.theta), height * grid.alpha
     expected = gravity + inertia - grid.omega**2 * arm
@@ -126,22 +126,10 @@ def _priors(survey: Survey) -> tuple[Parameter, ...]:
         Parameter(
             "cal_accelerometer", 0.0, CALIBRATION / 2, "1", meaning="calibration of the accelerometers"
         ),
-        Parameter(
-            _TURNED,
-            0.0,
-            MOUNT_RAD / 2,
-            "rad",
-            meaning="mean angle by which the accelerometers are turned on their mounts",
-            linear=True,
+        known(
+            _TURNED, MOUNT_RAD / 2, "rad", "mean angle by which the accelerometers are turned on their mounts"
         ),
-        Parameter(
-            "onset",
-            MIDDLE_OF_IMPACT_S,
-            1e-3,
-            "s",
-            meaning="middle of the impact after the contact",
-            linear=True,
-        ),
+        known("onset", 1e-3, "s", "middle of the impact after the contact", mean=MIDDLE_OF_IMPACT_S),
     )
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core import Parameter
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.core.parameters import known
 from daq_app.gap.rocking_model.features.block import Block, regress
 from daq_app.gap.rocking_model.features.differences import unit_coefficients
 from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size
@@ -127,22 +128,13 @@ def _priors(survey: Survey) -> tuple[Parameter, ...]:
             )
             for name, where in faces
         ),
-        Parameter(
-            FACE_SKEW,
-            0.0,
-            SKEW_S,
-            "s",
-            meaning="how much later the LVDTs at x > 0 are sampled than those at x < 0",
-            linear=True,
-        ),
-        Parameter("twist_follow", 0.0, 2e-3, "1/m", meaning="twist from LVDT calibrations", linear=True),
-        Parameter(
+        known(FACE_SKEW, SKEW_S, "s", "how much later the LVDTs at x > 0 are sampled than those at x < 0"),
+        known("twist_follow", 2e-3, "1/m", "twist from LVDT calibrations"),
+        known(
             "mount_height",
-            0.0,
             survey.mount_tolerance_m,
             "m",
-            meaning="error of the height of the LVDTs' points above the joint",
-            linear=True,
+            "error of the height of the LVDTs' points above the joint",
         ),
     )
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core import Parameter
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.core.parameters import known
 from daq_app.gap.rocking_model.features.block import Block, regress
 from daq_app.gap.rocking_model.features.differences import (
     base_rotation,
@@ -38,7 +39,7 @@ def _tilt_block(scene: Scene) -> Block | None:
     leaves open by a half, spoils neither the gain nor the drift.
     """
     run, grid = scene.run, scene.grid
-    chosen = [i for i in run.indices("tiltmeter", "x") if np.all(np.isfinite(run.channels[i]))]
+    chosen = [i for i in run.indices("tiltmeter", "x") if run.reads(i)]
     if not chosen:
         return None
     pick = scene.rocking | (grid.time_s <= 0)
@@ -129,30 +130,9 @@ def _observe(scene: Scene) -> Iterator[Block | None]:
 
 def _priors(survey: Survey) -> tuple[Parameter, ...]:
     return (
-        Parameter(
-            "cal_tiltmeter",
-            0.0,
-            CALIBRATION / math.sqrt(2),
-            "1",
-            meaning="calibration of the tiltmeters",
-            linear=True,
-        ),
-        Parameter(
-            _DELAY,
-            0.0,
-            2.0 * SKEW_S,
-            "s",
-            meaning="how much later the tiltmeters are sampled than the reference",
-            linear=True,
-        ),
-        Parameter(
-            "tilt_response",
-            0.0,
-            TILT_CONSTANT,
-            "1",
-            meaning="relative error of the tiltmeters' time constant",
-            linear=True,
-        ),
+        known("cal_tiltmeter", CALIBRATION / math.sqrt(2), "1", "calibration of the tiltmeters"),
+        known(_DELAY, 2.0 * SKEW_S, "s", "how much later the tiltmeters are sampled than the reference"),
+        known("tilt_response", TILT_CONSTANT, "1", "relative error of the tiltmeters' time constant"),
     )
 
 

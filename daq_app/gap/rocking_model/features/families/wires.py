@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from daq_app.gap.core import Parameter
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.core.parameters import known
 from daq_app.gap.rocking_model.features.block import Block, regress
 from daq_app.gap.rocking_model.features.differences import (
     base_rotation,
@@ -37,6 +38,7 @@ from daq_app.gap.rocking_model.motion.rotation import (
     anchors_move,
     coarse,
     gridded,
+    mean_rotation,
     straight_line,
     wall_rotation,
 )
@@ -49,17 +51,15 @@ _TURNS = 8
 
 def _wire_block(scene: Scene) -> Block | None:
     run, joint, grid, reference = scene.run, scene.joint, scene.grid, scene.reference
-    rows, heights, _ = wall_rotation(run)
-    if len(rows) == 0:
+    theta = mean_rotation(run)
+    if theta is None:
         return None
-    theta = np.average(rows, axis=0, weights=heights**2)
-    some = len(rows) < len(run.indices("wire"))
     compared = coarse(theta, run.rate_hz) - (
         coarse(joint.theta, run.rate_hz) if reference == "wire" else grid.theta
     )
     columns = rotation_columns(grid, run.survey.alpha_rad)
     block = regress("wire", compared, columns, scene.in_range & grid.settled, ("zero",))
-    if block is not None and some:
+    if block is not None and len(wall_rotation(run)[1]) < len(run.indices("wire")):
         # Other wires than in the other runs: their mean has another calibration.
         block.covariance[block.names.index("gain"), block.names.index("gain")] += OTHER_WIRES**2
     return with_crosstalk(block, leaked_turn(run))
@@ -67,13 +67,15 @@ def _wire_block(scene: Scene) -> Block | None:
 
 def leaked_turn(run: GapRun) -> FloatArray:
     """What a full crosstalk would add to the wires' mean rotation, (m,), rad."""
-    _, heights, names = wall_rotation(run)
-    return np.asarray(heights @ _leaked(run, names) / (heights @ heights))
+    _, chosen = wall_rotation(run)
+    heights = run.positions(chosen)[:, 2]
+    return np.asarray(heights @ crosstalk(run, chosen) / (heights @ heights))
 
 
-def _leaked(run: GapRun, names: tuple[str, ...]) -> FloatArray:
-    """What a full crosstalk would add to these wires, (k, m), m."""
-    return crosstalk(run, [i for i in run.indices("wire") if run.sensors[i].id in names])
+def _beyond_rigid(run: GapRun, grid: Grid, chosen: Sequence[int]) -> FloatArray:
+    """What wires show beyond those of a rigid wall on still edges, (k, m), m."""
+    ideal = [Wire(run.sensors[i], run.survey.half_base_m).shortening(grid.theta) for i in chosen]
+    return np.array([gridded(run, i) for i in chosen]) - np.array(ideal)
 
 
 def rotation_columns(grid: Grid, alpha: float) -> dict[str, tuple[FloatArray, str]]:
@@ -91,17 +93,12 @@ def rotation_columns(grid: Grid, alpha: float) -> dict[str, tuple[FloatArray, st
 def _translation_block(scene: Scene) -> Block | None:
     """Movement of the base along x, from wires at several heights."""
     run, grid = scene.run, scene.grid
-    _, heights, names = wall_rotation(run)
-    if len(set(np.round(heights, 2))) < 2 or len(names) < len(run.indices("wire")):
+    _, chosen = wall_rotation(run)
+    heights = run.positions(chosen)[:, 2]
+    if len(set(np.round(heights, 2))) < 2 or len(chosen) < len(run.indices("wire")):
         return None  # what the base seems to do hangs on the calibration of each wire
-    chosen = [i for i in run.indices("wire") if run.sensors[i].id in names]
-    shift = []
-    for i in chosen:
-        sensor = run.sensors[i]
-        ideal = Wire(sensor, run.survey.half_base_m).shortening(grid.theta)
-        shift.append(gridded(run, i) - ideal)
     at_base = straight_line(heights)[0]
-    moved = at_base @ np.array(shift)
+    moved = at_base @ _beyond_rigid(run, grid, chosen)
     columns = {
         "zero": (np.ones_like(grid.theta), "m"),
         "slip per speed": (slip_shape(grid), "m s/rad"),
@@ -109,7 +106,7 @@ def _translation_block(scene: Scene) -> Block | None:
         "drift": (grid.time_s, "m/s"),
     }
     block = regress("base", moved, columns, scene.rocking, ("zero", "drift"))
-    return with_crosstalk(block, at_base @ _leaked(run, names))
+    return with_crosstalk(block, at_base @ crosstalk(run, chosen))
 
 
 def _turn_block(scene: Scene) -> Block | None:
@@ -120,16 +117,12 @@ def _turn_block(scene: Scene) -> Block | None:
     goes to and fro with the side is play of a wire rather than turning: by least norm that one shape has it.
     """
     run, grid = scene.run, scene.grid
-    _, _, names = wall_rotation(run)
-    chosen = [i for i in run.indices("wire") if run.sensors[i].id in names]
-    y = np.array([run.sensors[i].position_m[1] for i in chosen])
-    z = np.array([run.sensors[i].position_m[2] for i in chosen])
+    _, chosen = wall_rotation(run)
+    _, y, z = run.positions(chosen).T
     design = np.column_stack([np.ones_like(y), z, y])
     if len(chosen) < len(run.indices("wire")) or np.linalg.matrix_rank(design) < 3 or len(chosen) < 4:
         return None
-    ideal = [Wire(run.sensors[i], run.survey.half_base_m).shortening(grid.theta) for i in chosen]
-    shift = np.array([gridded(run, i) for i in chosen]) - np.array(ideal)
-    turned = -np.linalg.pinv(design)[2] @ shift
+    turned = -np.linalg.pinv(design)[2] @ _beyond_rigid(run, grid, chosen)
     theta, count = grid.theta, min(_TURNS, grid.impact_s.size - 1)
     absorbed = {
         "gain": (theta, "1"),
@@ -232,8 +225,8 @@ def _observe(scene: Scene) -> Iterator[Block | None]:
 def _priors(survey: Survey) -> tuple[Parameter, ...]:
     return (
         Parameter("cal_wire", 0.0, CALIBRATION / math.sqrt(5), "1", meaning="calibration of the wires"),
-        Parameter("base_follow", 0.0, 4e-3, "1", meaning="translation from wire calibrations", linear=True),
-        Parameter("wire_even", 0.0, 5e-3, "1/rad", meaning="even part from wire anchors", linear=True),
+        known("base_follow", 4e-3, "1", "translation from wire calibrations"),
+        known("wire_even", 5e-3, "1/rad", "even part from wire anchors"),
     )
 
 

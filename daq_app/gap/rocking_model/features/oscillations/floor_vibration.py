@@ -91,7 +91,7 @@ def _quiet(run: GapRun, grid: Grid, ring: Ring | None) -> _Quiet | None:
     if not chosen:
         return None
     measured = np.mean([gridded(run, i) for i in chosen], axis=0)
-    height = float(np.mean([run.sensors[i].position_m[2] for i in chosen]))
+    height = float(run.positions(chosen)[:, 2].mean())
     calm = quiet(run, grid)
     held, resting = calm & (grid.time_s < -0.05), calm & (grid.time_s > grid.rest_s + _REST_MARGIN_S)
     # Too short a part says nothing, but the other may: a quick pull leaves a swaying wall.
@@ -130,31 +130,28 @@ def _sway(rotation: FloatArray, part: NDArray[np.bool_], height: float) -> list[
 def _gain(data: _Quiet, frequencies: FloatArray) -> FloatArray:
     """Gain in log likelihood of a sinusoid of each frequency."""
     values = data.values - data.basis @ (data.basis.T @ data.values)
-    power = float(values @ values)
     fraction = max(independent_fraction(values), 0.05)
-    gains = np.empty(frequencies.size)
-    for k, frequency in enumerate(frequencies):
-        fit = _fit(data, values, frequency)
-        share = min(max(float(fit[2]) / power, 0.0), 0.9999)
-        gains[k] = -0.5 * fraction * values.size * np.log1p(-share)
-    return gains
+    share = np.clip(_fit(data, values, frequencies)[1] / float(values @ values), 0.0, 0.9999)
+    return np.asarray(-0.5 * fraction * values.size * np.log1p(-share))
 
 
-def _fit(data: _Quiet, values: FloatArray, frequency: float) -> tuple[float, float, float, FloatArray]:
-    """(sine, cosine, explained power, inverse Gram matrix) of a sinusoid."""
-    angle = 2.0 * np.pi * frequency * data.time_s
-    waves = np.column_stack([np.sin(angle), np.cos(angle)])
-    waves = waves - data.basis @ (data.basis.T @ waves)
-    inverse = np.linalg.inv(waves.T @ waves + 1e-9 * np.eye(2))
-    projected = waves.T @ values
-    sine, cosine = inverse @ projected
-    return float(sine), float(cosine), float(projected @ inverse @ projected), inverse
+def _fit(
+    data: _Quiet, values: FloatArray, frequencies: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Sine and cosine, (k, 2), explained power, (k,), inverse Gram matrix, (k, 2, 2), of k sinusoids."""
+    angle = 2.0 * np.pi * frequencies[:, None] * data.time_s
+    waves = np.stack([np.sin(angle), np.cos(angle)], axis=1)
+    waves = waves - (waves @ data.basis) @ data.basis.T
+    inverse = np.linalg.inv(waves @ waves.transpose(0, 2, 1) + 1e-9 * np.eye(2))
+    projected = waves @ values
+    sizes = (inverse @ projected[:, :, None])[:, :, 0]
+    return sizes, np.sum(projected * sizes, axis=1), inverse
 
 
 def _share(data: _Quiet, frequency: float, frequency_sd: float, found: bool) -> Vibration:
     values = data.values - data.basis @ (data.basis.T @ data.values)
-    sine, cosine, explained, inverse = _fit(data, values, frequency)
-    left = max(float(values @ values) - explained, 0.0)
+    ((sine, cosine),), (explained,), (inverse,) = _fit(data, values, np.array([frequency]))
+    left = max(float(values @ values) - float(explained), 0.0)
     fraction = max(independent_fraction(values), 0.05) if not found else 0.3
     variance = left / values.size / fraction
     sd = float(np.sqrt(variance * 0.5 * np.trace(inverse)))

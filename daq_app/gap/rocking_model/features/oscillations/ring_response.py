@@ -26,14 +26,15 @@ def _ring_coefficients(
     frequency, zeta, _ = ring.ring
     natural = 2.0 * np.pi * frequency
     rate = natural * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
-    coefficients = []
-    for name, shares in zip(block.names, block.shares, strict=False):
+    coefficients = [0.0j] * len(block.shares)
+    for k, (name, shares) in enumerate(zip(block.names, block.shares, strict=False)):
+        if not (size := _moved(ring, shares, values)):
+            continue
         family = name.partition(" in ")[2].removesuffix("s")
-        size = _moved(ring, shares, values)
         undone = block.undone_s if family == "accelerometer" else 0.0
         early = np.exp(rate * (undone + delay(run.reference, values)))
         twice = -((1.0 - 2.0 * zeta**2) + 2j * zeta) if family == "accelerometer" else 1.0
-        coefficients.append(size * twice * transfer(rate, family, values) * early if size else 0.0j)
+        coefficients[k] = size * twice * transfer(rate, family, values) * early
     return coefficients
 
 
@@ -50,11 +51,12 @@ def _moved(ring: Block, shares: Shares, values: Mapping[str, float]) -> float:
 def _size(ring: Block, shares: Shares, values: Mapping[str, float]) -> float:
     """Size of the ring-down in a signal of these shares, by the wall's bending or turning."""
     frequency, _, rate = ring.ring
-    mean = float(np.sinc(frequency / rate))
     if ring.kind == "bending":
-        return shares.bend * mean * values.get("flexible_wall.gain", 0.0)
-    turned = shares.yaw * values.get("yaw.kick", 0.0) + shares.twist * values.get("twist.kick", 0.0)
-    return turned * mean / (2.0 * np.pi * frequency)
+        size = shares.bend * values.get("flexible_wall.gain", 0.0)
+    else:
+        turned = shares.yaw * values.get("yaw.kick", 0.0) + shares.twist * values.get("twist.kick", 0.0)
+        size = turned / (2.0 * np.pi * frequency)
+    return size * float(np.sinc(frequency / rate)) if size else 0.0
 
 
 def _put(

@@ -35,30 +35,38 @@ class Signal:
     """What calibrations that differ by one sd make of it, (m,)."""
 
 
-def bend_signals(run: GapRun, grid: Grid, height_m: float) -> list[Signal]:
-    """Bending of the wall as wires and accelerometers show it, in metres (m/s²) of its top."""
-    signals = []
-    rows, heights, names = wall_rotation(run)
+def ring_signals(
+    run: GapRun, joint: Rotation, grid: Grid, height_m: float
+) -> tuple[list[Signal], list[Signal]]:
+    """Signals of bending, in metres (m/s²) of the wall's top, and of turning: slopes along the length.
+
+    Wires and accelerometers show both, the joint what turns.
+    """
+    bending: list[Signal] = []
+    turning: list[Signal] = []
+
+    def shapes(y: FloatArray, z: FloatArray) -> list[tuple[list[Signal], FloatArray]]:
+        return [(bending, (z / height_m) ** 2), *([(turning, y)] if float(np.ptp(y)) > 0.2 else [])]
+
+    rows, wires = wall_rotation(run)
     if len(rows) >= 3:
-        shape = (heights / height_m) ** 2
-        beyond = np.array([z * coarse(r, run.rate_hz) for z, r in zip(heights, rows, strict=True)])
-        beyond = beyond - heights[:, None] * grid.theta
-        weights = shape / (shape @ shape)
-        shares = _shares(weights, _along(run, names), heights, height_m)
-        signals.append(Signal("wire", weights @ beyond, _between_late(grid, beyond, heights), shares))
+        _, y, z = run.positions(wires).T
+        beyond = z[:, None] * (np.array([coarse(row, run.rate_hz) for row in rows]) - grid.theta)
+        pick = _between_late(grid, beyond, z)
+        for signals, shape in shapes(y, z):
+            weights = shape / (shape @ shape)
+            signals.append(Signal("wire", weights @ beyond, pick, _shares(weights, y, z, height_m)))
     chosen = run.steady_accelerometers("x")
     if len(chosen) >= 3:
-        z = np.array([run.sensors[i].position_m[2] for i in chosen])
-        shape = (z / height_m) ** 2
-        y = np.array([run.sensors[i].position_m[1] for i in chosen])
-        shares = _shares(shape / (shape @ shape), y, z, height_m)
-        signals.append(_of_accelerometers(accelerations(run, grid, chosen), shape, z, shares))
-    return signals
-
-
-def _along(run: GapRun, names: Sequence[str]) -> FloatArray:
-    """Places along the length of channels by name, m."""
-    return np.array([next(s.position_m[1] for s in run.sensors if s.id == name) for name in names])
+        _, y, z = run.positions(chosen).T
+        seen = accelerations(run, grid, chosen)
+        for signals, shape in shapes(y, z):
+            shares = _shares(shape / (shape @ shape), y, z, height_m)
+            signals.append(_of_accelerometers(seen, shape, z, shares))
+    if len(joint.used) >= 8:
+        pick = _between(grid, DISPLACEMENT_MASK_S) & grid.valid
+        turning.append(Signal("lvdt", coarse(joint.twist, run.rate_hz), pick, Shares(twist=1.0)))
+    return bending, turning
 
 
 def _shares(weights: FloatArray, y: FloatArray, z: FloatArray, height_m: float) -> Shares:
@@ -69,29 +77,6 @@ def _shares(weights: FloatArray, y: FloatArray, z: FloatArray, height_m: float) 
         yaw=-float(weights @ y),
         twist=float(weights @ (y * z)),
     )
-
-
-def turn_signals(run: GapRun, joint: Rotation, grid: Grid, height_m: float) -> list[Signal]:
-    """Slope along the length of what wires, accelerometers (per metre) and the joint show."""
-    signals = []
-    rows, heights, names = wall_rotation(run)
-    y = _along(run, names)
-    if len(rows) >= 3 and float(np.ptp(y)) > 0.2:
-        beyond = np.array([z * coarse(r, run.rate_hz) for z, r in zip(heights, rows, strict=True)])
-        beyond = beyond - heights[:, None] * grid.theta
-        weights = y / (y @ y)
-        shares = _shares(weights, y, heights, height_m)
-        signals.append(Signal("wire", weights @ beyond, _between_late(grid, beyond, heights), shares))
-    chosen = run.steady_accelerometers("x")
-    y = np.array([run.sensors[i].position_m[1] for i in chosen])
-    if len(chosen) >= 3 and float(np.ptp(y)) > 0.2:
-        z = np.array([run.sensors[i].position_m[2] for i in chosen])
-        shares = _shares(y / (y @ y), y, z, height_m)
-        signals.append(_of_accelerometers(accelerations(run, grid, chosen), y, z, shares))
-    if len(joint.used) >= 8:
-        pick = _between(grid, DISPLACEMENT_MASK_S) & grid.valid
-        signals.append(Signal("lvdt", coarse(joint.twist, run.rate_hz), pick, Shares(twist=1.0)))
-    return signals
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +108,7 @@ def accelerations(run: GapRun, grid: Grid, chosen: Sequence[int]) -> Acceleratio
     late = seen[0] - MIDDLE_OF_IMPACT_S if seen is not None else 0.0
     late = late if abs(late) > RING_LATE_S else 0.0
     early = round(late * run.rate_hz)
-    z = np.array([run.sensors[i].position_m[2] for i in chosen])
+    z = run.positions(chosen)[:, 2]
     measured = np.array([gridded(run, i, early) for i in chosen])
     beyond = measured - z[:, None] * grid.alpha + GRAVITY_M_S2 * np.sin(grid.theta)
     pick = _between(grid, ACCELERATION_MASK_S + abs(late))

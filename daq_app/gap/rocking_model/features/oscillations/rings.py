@@ -9,6 +9,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,8 @@ from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 from daq_app.gap.rocking_model.tolerances import RING_SD, VAGUE_DAMPING
 
+ComplexArray = NDArray[np.complex128]
+Columns = TypeVar("Columns", FloatArray, ComplexArray)
 BEND_HZ = np.geomspace(2.0, 42.0, 61)
 TURN_HZ = np.geomspace(1.5, 14.0, 40)
 DAMPING = (0.01, 0.04)
@@ -47,25 +51,32 @@ class Ring:
 
 def ring_columns(grid: Grid, frequency_hz: float, zeta: float) -> FloatArray:
     """Sine and cosine of the ring-down per unit jump of θ̇, shape (m, 2)."""
-    return ring_table(grid, np.array([frequency_hz]), np.array([zeta]))
+    waves = ring_waves(grid, np.array([frequency_hz]), np.array([zeta]))
+    return np.hstack([waves.imag, waves.real])
 
 
-def ring_table(grid: Grid, frequencies_hz: FloatArray, zetas: FloatArray) -> FloatArray:
-    """`ring_columns` of many oscillators, (k,) each, beside one another, shape (m, 2 k)."""
+def ring_waves(grid: Grid, frequencies_hz: FloatArray, zetas: FloatArray) -> ComplexArray:
+    """Ring-downs of oscillators, (k,) each, per unit jump of θ̇, shape (m, k): cosine + i sine.
+
+    Between two impacts each sample is the one before times exp(rate · interval of the grid), so that all
+    half-cycles share the powers of that.
+    """
     natural = 2.0 * np.pi * frequencies_hz
     rates = -zetas * natural + 1j * natural * np.sqrt(1.0 - zetas**2)
+    first = np.minimum(np.searchsorted(grid.time_s, grid.impact_s), grid.time_s.size - 1)
     last = np.searchsorted(grid.impact_s, grid.time_s, side="right")
-    # What is left of all jumps so far, at each impact; nothing before the first.
-    states = np.zeros((rates.size, grid.impact_s.size + 1), dtype=complex)
-    for k, (jump, pause) in enumerate(
-        zip(grid.jumps, np.diff(grid.impact_s, prepend=grid.impact_s[:1]), strict=True)
-    ):
-        states[:, k + 1] = states[:, k] * np.exp(rates * pause) + jump
-    since = grid.time_s - np.concatenate([grid.time_s[:1], grid.impact_s])[last]
-    waves = states[:, last] * np.exp(rates[:, None] * since)
-    table = np.empty((grid.time_s.size, 2 * rates.size))
-    table[:, 0::2], table[:, 1::2] = waves.imag.T, waves.real.T
-    return table
+    # What is left of all jumps so far, at the first sample after each impact; nothing before the first.
+    states = np.zeros((grid.impact_s.size + 1, rates.size), dtype=complex)
+    left = np.zeros_like(rates)
+    for k, (jump, time) in enumerate(zip(grid.jumps, grid.impact_s, strict=True)):
+        left = left * np.exp(rates * (time - grid.impact_s[max(k - 1, 0)])) + jump
+        states[k + 1] = left * np.exp(rates * (grid.time_s[first[k]] - time))
+    since = np.arange(grid.time_s.size) - np.concatenate([[0], first])[last]
+    since[last == 0] = 0
+    interval = float(grid.time_s[1] - grid.time_s[0])
+    powers = np.exp(interval * np.arange(since.max() + 1)[:, None] * rates)
+    waves: ComplexArray = states[last] * powers[since]
+    return waves
 
 
 def forced_column(grid: Grid, frequency_hz: float, zeta: float, *, accelerations: bool) -> FloatArray:
@@ -96,15 +107,20 @@ def cleaner(grid: Grid, pick: NDArray[np.bool_], slow: bool) -> list[tuple[NDArr
     for start, stop in itertools.pairwise([*edges, places.size]):
         part = places[start:stop]
         if part.size > 2 * _DEGREE + 4:
-            x = np.linspace(-1.0, 1.0, part.size)
-            bases.append((part, np.linalg.qr(np.vander(x, _DEGREE + 1))[0]))
+            bases.append((part, _smooth_curves(part.size)))
     return bases
 
 
-def _clean(values: FloatArray, bases: list[tuple[NDArray[np.intp], FloatArray]]) -> FloatArray:
+@lru_cache(maxsize=1024)
+def _smooth_curves(count: int) -> FloatArray:
+    """Orthonormal polynomials over evenly spaced samples, (count, degree + 1)."""
+    return np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, count), _DEGREE + 1))[0]
+
+
+def _clean(values: Columns, bases: list[tuple[NDArray[np.intp], FloatArray]]) -> Columns:
     """What the bases leave of the columns of `values` (m, k), at their samples."""
     parts = [values[part] - basis @ (basis.T @ values[part]) for part, basis in bases]
-    return np.concatenate(parts) if parts else np.zeros((0, values.shape[1]))
+    return np.concatenate(parts) if parts else values[:0]
 
 
 def scan(grids: Sequence[Grid], signals: Sequence[list[Signal]], *, slow: bool) -> Ring | None:
@@ -166,20 +182,21 @@ def _score(
                 continue
             if waves is None:
                 both = np.meshgrid(frequencies, damping, indexing="ij")
-                waves = ring_table(grid, both[0].ravel(), both[1].ravel())
-            cleaned = _clean(np.column_stack([signal.values, waves]), cleaner(grid, signal.pick, slow))
-            if len(cleaned) >= 60:
-                score += _gains(cleaned[:, 0], cleaned[:, 1:]).reshape(score.shape)
+                waves = ring_waves(grid, both[0].ravel(), both[1].ravel())
+            bases = cleaner(grid, signal.pick, slow)
+            values = _clean(signal.values[:, None], bases)[:, 0]
+            if values.size >= 60:
+                score += _gains(values, _clean(waves, bases)).reshape(score.shape)
     return score
 
 
-def _gains(values: FloatArray, waves: FloatArray) -> FloatArray:
-    """Gain in log likelihood of each pair of columns; residuals' own correlation is allowed for."""
-    pairs = waves.reshape(waves.shape[0], -1, 2)
+def _gains(values: FloatArray, waves: ComplexArray) -> FloatArray:
+    """Gain in log likelihood of sine and cosine of each wave; residuals' own correlation is allowed for."""
     power = float(values @ values)
-    a, b = pairs[:, :, 0], pairs[:, :, 1]
-    aa, bb, ab = (a * a).sum(0), (b * b).sum(0), (a * b).sum(0)
-    av, bv = a.T @ values, b.T @ values
+    a, b = waves.imag, waves.real
+    aa, bb, ab = (np.einsum("nk,nk->k", first, second) for first, second in ((a, a), (b, b), (a, b)))
+    along = values @ waves
+    av, bv = along.imag, along.real
     determinant = np.maximum(aa * bb - ab**2, 1e-12 * aa * bb + 1e-300)
     explained = (bb * av**2 - 2 * ab * av * bv + aa * bv**2) / determinant
     share = np.clip(explained / max(power, 1e-300), 0.0, 0.9999)
@@ -197,11 +214,11 @@ def _colour(
 ) -> float:
     """Size of chance at frequencies around the ring's, over that of white noise; at least 1."""
     factors = [f for f in (0.55, 0.62, 0.7, 0.78, 1.28, 1.43, 1.6, 1.8) if ring.frequency_hz * f < 60.0]
-    waves = ring_table(grid, ring.frequency_hz * np.array(factors), np.full(len(factors), 0.03))
-    waves = _clean(waves, bases)
-    ring_waves = _clean(ring_columns(grid, ring.frequency_hz, ring.zeta), bases)
+    beside = ring_waves(grid, ring.frequency_hz * np.array(factors), np.full(len(factors), 0.03))
+    waves = _clean(np.hstack([beside.imag, beside.real]), bases)
+    own = _clean(ring_columns(grid, ring.frequency_hz, ring.zeta), bases)
     # The ring itself, if there is one, must not count as its own surroundings.
-    left = values - ring_waves @ np.linalg.lstsq(ring_waves, values, rcond=None)[0]
+    left = values - own @ np.linalg.lstsq(own, values, rcond=None)[0]
     size = np.sqrt(np.maximum((waves**2).sum(0), 1e-300))
     z = (waves.T @ left) / size / max(float(np.std(left)), 1e-300)
     return max(1.0, 1.48 * float(np.median(np.abs(z))))
