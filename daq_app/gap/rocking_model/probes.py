@@ -20,45 +20,34 @@ def probes() -> Iterable[Effect]:
     """One free form or more for each family that has one."""
     knots = tuple(signed(f"k{i}", 0.04, "1", f"change of r at {v} rad/s") for i, v in enumerate(PROBE_SPEEDS))
     more = (signed("side", 0.02, "1", "left against right"), signed("order", 0.02, "1", "per ten impacts"))
-    yield Effect(
-        "free_restitution",
-        "restitution",
-        knots + more,
-        "r = r₀ + f(v) + s·side + c·n, f piecewise linear",
-        "non-parametric",
-        confusable_with=tuple(Confusion(law, _MORE_SPEEDS) for law in _LAWS),
-        kind="probe",
-    )
+    form = "r = r₀ + f(v) + s·side + c·n, f piecewise linear"
+    yield _probe("free_restitution", "restitution", knots + more, form, _LAWS, _MORE_SPEEDS)
     places = [
         f"{part} at {size} α" for part in ("upper part", "lower part", "turning") for size in (0, 0.15, 0.4)
     ]
-    yield Effect(
-        "free_restoring",
-        "interface",
-        tuple(signed(f"t{i}", 0.01, "s", text, linear=True) for i, text in enumerate(places)),
-        "half-cycle times + f(peak), the same up and down",
-        "non-parametric",
-        kind="probe",
+    up_and_down = tuple(signed(f"t{i}", 0.01, "s", text, linear=True) for i, text in enumerate(places))
+    yield _probe(
+        "free_restoring", "interface", up_and_down, "half-cycle times + f(peak), the same up and down"
     )
-    yield Effect(
-        "free_dissipation",
-        "dissipation",
-        tuple(signed(f"t{i}", 0.005, "s", text, linear=True) for i, text in enumerate(places[:6])),
-        "times of the fall + f(peak), of the rise − f(peak)",
-        "non-parametric",
-        confusable_with=tuple(Confusion(loss, _MORE_ROTATIONS) for loss in _LOSSES),
-        kind="probe",
-    )
+    lost = tuple(signed(f"t{i}", 0.005, "s", text, linear=True) for i, text in enumerate(places[:6]))
+    form = "times of the fall + f(peak), of the rise − f(peak)"
+    yield _probe("free_dissipation", "dissipation", lost, form, _LOSSES, _MORE_ROTATIONS)
     free = {block: form for family in sensor_families() for block, form in family.probes.items()}
     for family, (kind, count) in free.items():
-        yield Effect(
-            f"free_{family}",
-            kind,
-            tuple(signed(f"c{i}", 40.0, "1", f"coefficient {i}", linear=True) for i in range(count)),
-            f"every coefficient of the {family} family is free",
-            "non-parametric",
-            kind="probe",
-        )
+        shape = tuple(signed(f"c{i}", 40.0, "1", f"coefficient {i}", linear=True) for i in range(count))
+        yield _probe(f"free_{family}", kind, shape, f"every coefficient of the {family} family is free")
+
+
+def _probe(
+    name: str,
+    family: str,
+    shape: tuple[Parameter, ...],
+    form: str,
+    laws: tuple[str, ...] = (),
+    measure: str = "",
+) -> Effect:
+    confusions = tuple(Confusion(law, measure) for law in laws)
+    return Effect(name, family, shape, form, "non-parametric", confusable_with=confusions, kind="probe")
 
 
 def departures() -> Iterable[Effect]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 
 import numpy as np
@@ -14,6 +14,9 @@ from daq_app.gap.rocking_model.features.response import effects_on, responded, s
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape
 from daq_app.gap.rocking_model.motion.rotation import anchors_turn
+
+Term = tuple[float, str, Callable[[], FloatArray]]
+"""Size of a shape, its name, and how it is made, (m,) on the grid."""
 
 
 def family_difference(run: RockingRun, family: str, values: Mapping[str, float]) -> FloatArray | None:
@@ -95,11 +98,17 @@ def own_gain(run: RockingRun, values: Mapping[str, float]) -> float:
     return 0.5 * (face_gain(values, "face_a") + face_gain(values, "face_b"))
 
 
-def unit_coefficients(
-    run: RockingRun, block: Block, name: str, shape: Callable[[], FloatArray]
-) -> FloatArray:
-    """Coefficients, (k,), of a fixed shape, (m,), worked out once per run."""
-    return run.cache.constant((block.family, name), lambda: block.coefficients(shape()))
+def of_shapes(run: RockingRun, block: Block, terms: Iterable[Term]) -> FloatArray:
+    """Coefficients, (k,), of a sum of fixed shapes, each of which the block is asked for once per run."""
+    coefficients = np.zeros(len(block.names))
+    for size, name, shape in terms:
+        if size != 0.0:
+            coefficients += size * run.cache.constant((block.family, name), partial(_unit, block, shape))
+    return coefficients
+
+
+def _unit(block: Block, shape: Callable[[], FloatArray]) -> FloatArray:
+    return block.coefficients(shape())
 
 
 def base_rotation(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
@@ -108,12 +117,17 @@ def base_rotation(run: RockingRun, block: Block, values: Mapping[str, float]) ->
     The reaction keeps its lever arm, the moment of gravity falls with the rotation; `fall` is the share
     of the second, which is the simulator's form (1 where it is not fitted).
     """
-    theta, fall = run.grid.theta, values.get("compliance.fall", 1.0)
+    theta, phi = run.grid.theta, values.get("compliance.phi", 0.0)
+    fall = values.get("compliance.fall", 1.0)
 
     def seen(shape: FloatArray) -> FloatArray:
         return slow_response(shape, np.array(block.time_constants_s))
 
-    moment = unit_coefficients(run, block, "moment", lambda: seen(moment_shape(theta, run.survey.alpha_rad)))
-    reaction = unit_coefficients(run, block, "reaction", lambda: seen(side_of(theta)))
-    coefficients: FloatArray = values["compliance.phi"] * (fall * moment + (1.0 - fall) * reaction)
-    return coefficients
+    return of_shapes(
+        run,
+        block,
+        (
+            (phi * fall, "moment", lambda: seen(moment_shape(theta, run.survey.alpha_rad))),
+            (phi * (1.0 - fall), "reaction", lambda: seen(side_of(theta))),
+        ),
+    )

@@ -8,7 +8,7 @@ import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
-from daq_app.gap.rocking_model.features.differences import unit_coefficients
+from daq_app.gap.rocking_model.features.differences import Term, of_shapes
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import side_of
 from daq_app.gap.rocking_model.motion.rotation import pivots_off
@@ -34,11 +34,12 @@ def travel(run: RockingRun, block: Block, values: Mapping[str, float], of_base: 
     theta = run.grid.theta
     inwards, apart = pivots(run, values)
     each = run.cache.constant("pivots", lambda: pivots_off(run.wires, theta))[of_base]
-    coefficients = inwards * unit_coefficients(run, block, "travel", lambda: each)
-    coefficients = coefficients + apart * unit_coefficients(
-        run, block, "lopsided travel", lambda: side_of(theta) * each
+    shapes: tuple[Term, ...] = (
+        (inwards, "travel", lambda: each),
+        (apart, "lopsided travel", lambda: side_of(theta) * each),
     )
+    coefficients = of_shapes(run, block, shapes)
     if "winkler.theta_c" in values:
         root = np.sqrt(values["winkler.theta_c"] / np.maximum(np.abs(theta), values["winkler.theta_c"]))
-        coefficients = coefficients + block.coefficients(-2.0 * values["half_base"] * root * each)
+        coefficients += block.coefficients(-2.0 * values["half_base"] * root * each)
     return coefficients

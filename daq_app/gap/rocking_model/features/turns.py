@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.block import Block
-from daq_app.gap.rocking_model.features.differences import unit_coefficients
+from daq_app.gap.rocking_model.features.differences import Term
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import turned_shape
 from daq_app.gap.rocking_model.motion.rotation import shown_by_wires
@@ -43,9 +42,7 @@ def turn_share(run: RockingRun, *, of_base: bool) -> float:
     return run.cache.constant(("turn share", of_base), share)
 
 
-def turned_coefficients(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
-    """Coefficients of the rotation about the vertical itself, (k,)."""
-    coefficients = np.zeros(len(block.names))
+def turn_terms(run: RockingRun, values: Mapping[str, float], share: float = 1.0) -> Iterator[Term]:
+    """A share of the rotation about the vertical, by its forms."""
     for form, size in turns(values).items():
-        coefficients = coefficients + size * unit_coefficients(run, block, form, partial(turned, run, form))
-    return coefficients
+        yield share * size, form, partial(turned, run, form)

@@ -87,6 +87,8 @@ def inspect_channel(run: GapRun, index: int, shaken: Mask | None = None) -> Cond
 def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray | None]:
     """(amplitude, its sd, the wave over the record) of the mains frequency, from the rest at the end."""
     count = round(0.6 * rate_hz)
+    if np.ptp(values[-count:]) == 0.0:  # between two steps of its converter
+        return 0.0, 0.0, None
     rest = values[-count:] - values[-count:].mean()
     design, inverse = _mains_at_rest(count, rate_hz)
     coefficients = inverse @ rest

@@ -93,11 +93,7 @@ def _predict(run: RockingRun, block: Block, values: Mapping[str, float]) -> Floa
     gains = {"gain of gravity": ratio - 1.0, "gain of inertia": ratio / clock**2 - 1.0}
     coefficients = np.array([gains.get(name, 0.0) for name in block.names])
     # The base turns slowly: of its rotation the accelerometers show gravity alone, as in the simulator.
-    return (
-        coefficients - GRAVITY_M_S2 * base_rotation(run, block, values)
-        if "compliance.phi" in values
-        else coefficients
-    )
+    return coefficients - GRAVITY_M_S2 * base_rotation(run, block, values)
 
 
 def _predict_impact_timing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:

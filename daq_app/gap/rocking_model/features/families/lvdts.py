@@ -13,7 +13,7 @@ from daq_app.gap.core import Parameter
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.parameters import known
 from daq_app.gap.rocking_model.features.block import Block, regress
-from daq_app.gap.rocking_model.features.differences import unit_coefficients
+from daq_app.gap.rocking_model.features.differences import Term, of_shapes
 from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size
 from daq_app.gap.rocking_model.features.pivots import pivots
 from daq_app.gap.rocking_model.features.response import bessel, first_order
@@ -62,24 +62,21 @@ def _predict_joint(run: RockingRun, block: Block, values: Mapping[str, float]) -
     size = np.abs(theta)
     inwards, apart = pivots(run, values)
     curved = 0.5 * (values.get("rounded_edge.rho", 0.0) - values["mount_height"])
-    coefficients: FloatArray = inwards * unit_coefficients(
-        run, block, "size", lambda: size
-    ) + apart * unit_coefficients(run, block, "theta", lambda: theta)
-    coefficients = coefficients + curved * unit_coefficients(run, block, "square", lambda: size**2)
-    # The opening is told against |θ|, whose zero is where the wall came to rest: a wall that rests a
-    # hundredth of a milliradian off upright makes a step from side to side of it.
-    coefficients = coefficients - values["half_base"] * values["zero"] * unit_coefficients(
-        run, block, "sides", lambda: np.sign(theta)
+    rest = run.swings.rest_s - run.swings.release_s
+    shapes: tuple[Term, ...] = (
+        (inwards, "size", lambda: size),
+        (apart, "theta", lambda: theta),
+        (curved, "square", lambda: size**2),
+        # The opening is told against |θ|, whose zero is where the wall came to rest: a wall that rests a
+        # hundredth of a milliradian off upright makes a step from side to side of it.
+        (-values["half_base"] * values["zero"], "sides", lambda: np.sign(theta)),
+        (values.get("drift@lvdt.rate", 0.0), "time", lambda: run.grid.time_s - rest),
     )
+    coefficients = of_shapes(run, block, shapes)
     if "winkler.theta_c" in values:
         theta_c, half = values["winkler.theta_c"], values["half_base"]
         opened = half * (theta_c - 2.0 * np.sqrt(theta_c * np.maximum(size, theta_c)))
-        coefficients = coefficients + block.coefficients(np.where(size > theta_c, opened, -half * size))
-    if "drift@lvdt.rate" in values:
-        rest = run.swings.rest_s - run.swings.release_s
-        coefficients = coefficients + values["drift@lvdt.rate"] * unit_coefficients(
-            run, block, "time", lambda: run.grid.time_s - rest
-        )
+        coefficients += block.coefficients(np.where(size > theta_c, opened, -half * size))
     smeared = _smeared_opening(run, block.undone_s, values) if block.undone_s else None
     return coefficients if smeared is None else coefficients + block.coefficients(smeared)
 
@@ -103,8 +100,7 @@ def _smeared_opening(run: RockingRun, undone_s: float, values: Mapping[str, floa
 
 def _predict_twist(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     follow = values["twist_follow"] + values.get("twist.follow", 0.0)
-    coefficients: FloatArray = follow * unit_coefficients(run, block, "theta", lambda: run.grid.theta)
-    return coefficients
+    return of_shapes(run, block, [(follow, "theta", lambda: run.grid.theta)])
 
 
 def _observe(scene: Scene) -> Iterator[Block | None]:

@@ -14,10 +14,11 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.parameters import known
 from daq_app.gap.rocking_model.features.block import Block, regress
 from daq_app.gap.rocking_model.features.differences import (
+    Term,
     base_rotation,
     difference_of,
     face_gain,
-    unit_coefficients,
+    of_shapes,
 )
 from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size, with_crosstalk
 from daq_app.gap.rocking_model.features.response import slow_response
@@ -105,16 +106,16 @@ def _predict(run: RockingRun, block: Block, values: Mapping[str, float]) -> Floa
     def seen(shape: FloatArray) -> FloatArray:
         return slow_response(shape, slow)
 
-    coefficients = values["cal_tiltmeter"] * unit_coefficients(run, block, "theta", lambda: seen(theta))
     # Each face of the joint has its own calibration: the slow response makes their difference a drift.
     first, second = values["cal_wire"], values["cal_wire"]
     if run.reference == "lvdt":
         first, second = face_gain(values, "face_a"), face_gain(values, "face_b")
-    positive = unit_coefficients(run, block, "positive", lambda: seen(np.maximum(theta, 0.0)))
-    negative = unit_coefficients(run, block, "negative", lambda: seen(np.minimum(theta, 0.0)))
-    coefficients = coefficients - first * positive - second * negative
-    if "compliance.phi" in values:
-        coefficients = coefficients + base_rotation(run, block, values)
+    shapes: tuple[Term, ...] = (
+        (values["cal_tiltmeter"], "theta", lambda: seen(theta)),
+        (-first, "positive", lambda: seen(np.maximum(theta, 0.0))),
+        (-second, "negative", lambda: seen(np.minimum(theta, 0.0))),
+    )
+    coefficients = of_shapes(run, block, shapes) + base_rotation(run, block, values)
     series = difference_of(run, "tiltmeter", run.reference, values)
     if series is not None:
         coefficients = coefficients + block.coefficients(seen(series))

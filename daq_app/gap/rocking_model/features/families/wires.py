@@ -14,10 +14,11 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.parameters import known
 from daq_app.gap.rocking_model.features.block import Block, regress
 from daq_app.gap.rocking_model.features.differences import (
+    Term,
     base_rotation,
     difference_of,
     face_gain,
-    unit_coefficients,
+    of_shapes,
 )
 from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size, with_crosstalk
 from daq_app.gap.rocking_model.features.oscillations.ring_response import (
@@ -30,7 +31,7 @@ from daq_app.gap.rocking_model.features.oscillations.ring_response import (
 from daq_app.gap.rocking_model.features.pivots import travel
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape, turn_shape
-from daq_app.gap.rocking_model.features.turns import turn_share, turned_coefficients
+from daq_app.gap.rocking_model.features.turns import turn_share, turn_terms
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import (
@@ -143,67 +144,47 @@ def _turn_block(scene: Scene) -> Block | None:
 
 def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     theta = run.grid.theta
-    coefficients = values["cal_wire"] * unit_coefficients(run, block, "theta", lambda: theta)
-    coefficients = coefficients - face_gain(values, "face_a") * unit_coefficients(
-        run, block, "positive", lambda: np.maximum(theta, 0.0)
+    shapes: tuple[Term, ...] = (
+        (values["cal_wire"], "theta", lambda: theta),
+        (-face_gain(values, "face_a"), "positive", lambda: np.maximum(theta, 0.0)),
+        (-face_gain(values, "face_b"), "negative", lambda: np.minimum(theta, 0.0)),
+        (values["wire_even"], "even", lambda: theta**2),
+        (values.get("sliding.c", 0.0) / run.wire_height_m, "slip", partial(slip_shape, run.grid)),
+        *_moved_apart(run, values, of_base=False),
     )
-    coefficients = coefficients - face_gain(values, "face_b") * unit_coefficients(
-        run, block, "negative", lambda: np.minimum(theta, 0.0)
-    )
-    coefficients = coefficients + values["wire_even"] * unit_coefficients(
-        run, block, "even", lambda: theta**2
-    )
-    if "compliance.phi" in values:
-        coefficients = coefficients + base_rotation(run, block, values)
-    if "sliding.c" in values:
-        coefficients = coefficients + values["sliding.c"] / run.wire_height_m * unit_coefficients(
-            run, block, "slip", partial(slip_shape, run.grid)
-        )
-    coefficients = (
-        coefficients + travel(run, block, values, of_base=False) + _bent(run, block, values, of_base=False)
-    )
-    coefficients = coefficients + turn_share(run, of_base=False) * turned_coefficients(run, block, values)
+    coefficients = of_shapes(run, block, shapes)
+    coefficients += travel(run, block, values, of_base=False) + base_rotation(run, block, values)
     series = difference_of(run, "wire", "lvdt", values)
     return coefficients if series is None else coefficients + block.coefficients(series)
 
 
-def _bent(run: RockingRun, block: Block, values: Mapping[str, float], of_base: bool) -> FloatArray | float:
-    """What a wall that bends adds to the wires' mean rotation or to the base."""
-    share = bent_share(run, of_base=of_base)
-    coefficients: FloatArray | float = 0.0
+def _moved_apart(run: RockingRun, values: Mapping[str, float], of_base: bool) -> Iterator[Term]:
+    """What a wall that bends or turns adds to the wires' mean rotation or to the base."""
+    bent = bent_share(run, of_base=of_base)
     for form, size in bent_wall(run, values).items():
-        coefficients = coefficients + size * share * unit_coefficients(
-            run, block, form, partial(bent_form, run, form)
-        )
-    return coefficients
+        yield size * bent, form, partial(bent_form, run, form)
+    yield from turn_terms(run, values, turn_share(run, of_base=of_base))
 
 
 def _predict_base(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
-    follow = values["base_follow"] * run.base_lever
-    following = follow * unit_coefficients(run, block, "theta", lambda: run.grid.theta)
-    coefficients: FloatArray = following + values.get("sliding.c", 0.0) * unit_coefficients(
-        run, block, "slip", partial(slip_shape, run.grid)
+    theta = run.grid.theta
+    shapes: tuple[Term, ...] = (
+        (values["base_follow"] * run.base_lever, "theta", lambda: theta),
+        (values.get("sliding.c", 0.0), "slip", partial(slip_shape, run.grid)),
+        (values.get("wire_cosine@wire.kappa", 0.0) * run.base_bend_m2, "square", lambda: theta**2),
+        *_moved_apart(run, values, of_base=True),
     )
-    coefficients = (
-        coefficients + travel(run, block, values, of_base=True) + _bent(run, block, values, of_base=True)
-    )
-    coefficients = coefficients + turn_share(run, of_base=True) * turned_coefficients(run, block, values)
-    if "wire_cosine@wire.kappa" in values:
-        bend = values["wire_cosine@wire.kappa"] * run.base_bend_m2
-        coefficients = coefficients + bend * unit_coefficients(
-            run, block, "square", lambda: run.grid.theta**2
-        )
+    coefficients = of_shapes(run, block, shapes) + travel(run, block, values, of_base=True)
     if higher := values.get("wire_anchor@wire.height", 0.0):
-        coefficients = coefficients + block.coefficients(anchors_move(run.wires, run.grid.theta, higher))
+        coefficients += block.coefficients(anchors_move(run.wires, theta, higher))
     return coefficients
 
 
 def _predict_turn(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     """Turns that stay, and what a wall that rings about the vertical or twists shows beside them."""
-    coefficients = turned_coefficients(run, block, values)
-    for key, kick in kicks_that_turn(run, values).items():
-        coefficients = coefficients + kick * unit_coefficients(run, block, key, partial(_rung, run, key))
-    return coefficients
+    kicks = kicks_that_turn(run, values).items()
+    rung = ((kick, key, partial(_rung, run, key)) for key, kick in kicks)
+    return of_shapes(run, block, (*turn_terms(run, values), *rung))
 
 
 def _rung(run: RockingRun, key: str) -> FloatArray:

@@ -226,7 +226,7 @@ def _colour(
 
 def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, slow: bool) -> Block | None:
     """Coefficients of sine and cosine of every signal at the common oscillator; accelerations over ω²."""
-    names, units, values, variances, rows, shares, fading, unequal = [], [], [], [], [], [], [], []
+    names, values, variances, rows, shares, fading, unequal = [], [], [], [], [], [], []
     waves = ring_columns(grid, ring.frequency_hz, ring.zeta)
     natural = 2.0 * np.pi * ring.frequency_hz
     for signal in signals:
@@ -249,20 +249,17 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
         # Removing the bases is part of the projection.
         for part, basis in bases:
             full[:, part] -= (full[:, part] @ basis) @ basis.T
-        slopes = _fading(grid, bases, ring, inverse)
-        for k, word in enumerate(("sine", "cosine")):
-            fading.append(float(slopes[k]))
-            names.append(f"{word} in {signal.family}s")
-            units.append("m s/rad" if not slow else "s")
-            values.append(coefficients[k] / scale)
-            variances.append(variance[k] / scale**2)
-            rows.append(full[k] / scale)
-            shares.append(signal.shares)
-            unequal.append(0.0 if signal.unequal is None else float(rows[-1] @ signal.unequal))
+        names += [f"{word} in {signal.family}s" for word in ("sine", "cosine")]
+        values += (coefficients / scale).tolist()
+        variances += (variance / scale**2).tolist()
+        rows += list(full / scale)
+        shares += [signal.shares] * 2
+        fading += _fading(grid, bases, ring, inverse).tolist()
+        unequal += [0.0, 0.0] if signal.unequal is None else (full / scale @ signal.unequal).tolist()
     if not names:
         return None
+    units = ["s" if slow else "m s/rad"] * len(names) + ["Hz", "1"]
     names += ["frequency", "damping"]
-    units += ["Hz", "1"]
     values += [ring.frequency_hz, ring.zeta]
     variances += [ring.frequency_sd**2, (ring.zeta_sd * ring.zeta) ** 2]
     rows += [np.zeros(grid.time_s.size)] * 2
