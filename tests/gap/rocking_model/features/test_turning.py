@@ -9,9 +9,10 @@ import pytest
 
 from daq_app.gap.core import Options
 from daq_app.gap.rocking_model.features.coefficients import block_coefficients
+from daq_app.gap.rocking_model.features.differences import of_shapes
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import extract
-from daq_app.gap.rocking_model.features.turns import turn_share, turned_coefficients
+from daq_app.gap.rocking_model.features.turns import turn_share, turn_terms
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare
@@ -77,7 +78,8 @@ def test_a_simulated_wall_that_turns_about_its_corners_is_predicted(alternation:
     (run,) = simulate({"corner_twist": given}, (0.35,))
     seen = extract(run)
     (block,) = [block for block in seen.blocks if block.family == "turn"]
-    told = turned_coefficients(seen, block, {f"corner_twist.{key}": value for key, value in given.items()})
+    values = {f"corner_twist.{key}": value for key, value in given.items()}
+    told = of_shapes(seen, block, turn_terms(seen, values))
     assert np.max(np.abs(told)) > 0.3 * TURN_S
     np.testing.assert_allclose(block.values, told, atol=0.03 * TURN_S)
 
@@ -90,7 +92,9 @@ def test_a_turn_that_wires_of_one_end_take_for_something_else_is_predicted(
     still, turning = (_of_one_end(run) for run in (plain, *simulate({"corner_twist": given}, (0.35,))))
     before, after = (next(b for b in run.blocks if b.family == family) for run in (still, turning))
     values = {f"corner_twist.{key}": value for key, value in given.items()}
-    told = turn_share(turning, of_base=family == "base") * turned_coefficients(turning, after, values)
+    told = of_shapes(
+        turning, after, turn_terms(turning, values, turn_share(turning, of_base=family == "base"))
+    )
     sd = np.sqrt(np.diag(after.covariance))
     where = after.names.index(coefficient)
     assert abs(told[where]) > 3.0 * sd[where]

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
-from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.block import Block, Shares
 from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal
 from daq_app.gap.rocking_model.features.response import resonator
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
@@ -226,7 +226,10 @@ def _colour(
 
 def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, slow: bool) -> Block | None:
     """Coefficients of sine and cosine of every signal at the common oscillator; accelerations over ω²."""
-    names, values, variances, rows, shares, fading, unequal = [], [], [], [], [], [], []
+    names: list[str] = []
+    rows: list[FloatArray] = []
+    shares: list[Shares] = []
+    values, variances, fading, unequal = (list[float]() for _ in range(4))
     waves = ring_columns(grid, ring.frequency_hz, ring.zeta)
     natural = 2.0 * np.pi * ring.frequency_hz
     for signal in signals:
