@@ -33,7 +33,7 @@ def rig_file(tmp_path: Path, configs: Path) -> Path:
     assert "our_cards" in text
     path = tmp_path / "fr1.toml"
     path.write_text(text, encoding="utf-8")
-    (tmp_path / "our_cards.toml").write_text(PRODUCT, encoding="utf-8")
+    (tmp_path / "our_cards.toml").write_text(PRODUCT, encoding="utf-8", newline="\n")
     return path
 
 

@@ -106,7 +106,7 @@ def test_two_recoveries_at_once_make_one_sound_run(tmp_path: Path) -> None:
         with JournalWriter(tmp_path / f"{number}.journal", header) as writer:
             writer.append_block(0, truth(np.arange(5000)))
     processes = [script(_COMMON + "for r in recover(folder): print(r.outcome)", tmp_path) for _ in range(2)]
-    outcomes = [process.communicate()[0].decode().split("\n")[:-1] for process in processes]
+    outcomes = [process.communicate()[0].decode().splitlines() for process in processes]
     assert all(process.returncode == 0 for process in processes)
     for of_one_journal in zip(*outcomes, strict=True):
         assert of_one_journal.count("recovered") == 1

@@ -10,6 +10,8 @@ import pytest
 from daq_app.runfile import durable
 from daq_app.runfile.durable import write_whole
 
+_REPLACE = Path.replace
+
 
 class HeldFile:
     """`Path.replace` as it is on Windows onto a file that another program has open."""
@@ -21,8 +23,7 @@ class HeldFile:
         if target == self.path and self.left > 0:
             self.left -= 1
             raise PermissionError(13, "Access is denied", str(source))
-        source.rename(target)
-        return target
+        return _REPLACE(source, target)
 
 
 @pytest.fixture

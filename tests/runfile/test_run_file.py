@@ -10,6 +10,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import psutil
 import pytest
 import xarray as xr
 
@@ -165,6 +166,24 @@ def test_a_file_cut_short_is_told_and_made_anew_from_its_journal(run) -> None:
     assert made.outcome == "recovered" and "set aside" in made.text
     with open_run(path) as opened:
         np.testing.assert_array_equal(opened.readings(), readings)
+
+
+@pytest.mark.parametrize("sound", [True, False])
+def test_a_file_that_was_read_is_let_go(run, sound: bool) -> None:
+    """Windows renames and removes no file that is open: not even of a run that could not be read."""
+    path, _ = run
+    if not sound:
+        data = bytearray(path.read_bytes())
+        data[2**16 - 1] ^= 1  # of the first block, which no longer has the hash that was sealed
+        path.write_bytes(data)
+    opened, refused = None, None
+    try:
+        opened = open_run(path, just_written=True)
+        opened.close()
+    except RunFileError as error:
+        refused = error  # its traceback keeps what was open
+    assert (opened is not None, refused is None) == (sound, sound)
+    assert str(path.resolve()) not in {file.path for file in psutil.Process().open_files()}
 
 
 def test_a_flipped_bit_anywhere_never_gives_a_wrong_sample(run) -> None:

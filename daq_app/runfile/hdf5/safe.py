@@ -45,10 +45,14 @@ class OpenedHdf5:
     file: h5py.File
     seal: Seal | None
     """None for a file that was never sealed; it was walked through by a child before it was opened here."""
+    proven: ProvenFile | None = None
+    """What the HDF5 library reads a sealed file through, and does not close."""
 
     def close(self) -> None:
-        """Close the file; safe twice."""
+        """Close the file; safe twice. Windows lets nobody rename or remove it before."""
         self.file.close()
+        if self.proven is not None:
+            self.proven.close()
 
 
 def open_hdf5(path: Path, *, just_written: bool = False, just_proven: bool = False) -> OpenedHdf5:
@@ -67,10 +71,9 @@ def open_hdf5(path: Path, *, just_written: bool = False, just_proven: bool = Fal
     try:
         if not just_written and (seal is None or not is_believed(seal)):
             require_harmless(path)
-        plain = seal is None or just_proven
-        source = path if plain or seal is None else ProvenFile(path, seal)
-        locking = {"locking": "best-effort"} if plain else {}
-        return OpenedHdf5(h5py.File(source, "r", **locking), seal)
+        if seal is None or just_proven:
+            return OpenedHdf5(h5py.File(path, "r", locking="best-effort"), seal)
+        return _opened_through_proof(path, seal)
     except (OSError, ValueError, RuntimeError, RunFileError) as error:
         is_hdf5 = _is_hdf5(path)
         if isinstance(error, RunFileError) and is_hdf5:
@@ -81,6 +84,15 @@ def open_hdf5(path: Path, *, just_written: bool = False, just_proven: bool = Fal
                 advice="If its journal is still there, `daq-app recover` makes the run anew.",
             ) from error
         raise RunFileError(f"{path} is no HDF5 file", advice="Give a run file (.h5).") from error
+
+
+def _opened_through_proof(path: Path, seal: Seal) -> OpenedHdf5:
+    proven = ProvenFile(path, seal)
+    try:
+        return OpenedHdf5(h5py.File(proven, "r"), seal, proven)
+    except BaseException:
+        proven.close()
+        raise
 
 
 def _is_hdf5(path: Path) -> bool:
