@@ -100,6 +100,9 @@ class GapRun:
     """Wall clock of the first sample, which orders the campaign; 0 where it is not known."""
     excluded: tuple[str, ...] = ()
     """Channels that are examined on their own and not used with their family."""
+    scanned_before: tuple[int, ...] = ()
+    """Place of the channel that is scanned before each one, −1 for the first; empty where that is the one
+    before it in the row, as it is unless plugs were exchanged."""
     cache: RunCache = field(default_factory=RunCache, init=False, repr=False, compare=False)
     """Channels of this very run on the grid of the regressions, and rotations of its wires.
 
@@ -115,6 +118,10 @@ class GapRun:
             and (axis is None or sensor.axis == axis)
             and sensor.id not in self.excluded
         ]
+
+    def before(self, place: int) -> int:
+        """Place of the channel that is scanned before this one; −1 where there is none."""
+        return self.scanned_before[place] if self.scanned_before else place - 1
 
     def steady_accelerometers(self, axis: str) -> list[int]:
         """Places of the accelerometers along an axis that read, and read down to standstill."""

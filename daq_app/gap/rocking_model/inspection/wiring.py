@@ -47,7 +47,7 @@ def mend(runs: list[GapRun]) -> tuple[list[GapRun], Wiring]:
 
 def _mended(run: GapRun, wiring: Wiring) -> GapRun:
     place = {sensor.id: i for i, sensor in enumerate(run.sensors)}
-    channels, sensors = run.channels.copy(), list(run.sensors)
+    channels, sensors, offsets = run.channels.copy(), list(run.sensors), run.time_offset_s.copy()
     for name in wiring.reversed_ids:
         at = place[name]
         channels[at] *= -1.0
@@ -55,7 +55,18 @@ def _mended(run: GapRun, wiring: Wiring) -> GapRun:
         sensors[at] = replace(sensors[at], si_per_reading=-sensors[at].si_per_reading)
     for terminal, sensor in wiring.exchanged:
         channels[place[sensor]] = run.channels[place[terminal]]
-    return replace(run, channels=channels, sensors=tuple(sensors))
+        if offsets.size:
+            offsets[place[sensor]] = run.time_offset_s[place[terminal]]
+    if not wiring.exchanged:
+        return replace(run, channels=channels, sensors=tuple(sensors))
+    moved = {place[terminal]: place[sensor] for terminal, sensor in wiring.exchanged}
+    came = {now: then for then, now in moved.items()}
+    # A plug is scanned when it is scanned, and after the same one, wherever its sensor is put back.
+    scanned = [came.get(i, i) - 1 for i in range(len(sensors))]
+    before = tuple(moved.get(then, then) for then in scanned)
+    return replace(
+        run, channels=channels, sensors=tuple(sensors), time_offset_s=offsets, scanned_before=before
+    )
 
 
 def _check(run: GapRun) -> Wiring:

@@ -20,9 +20,10 @@ def crosstalk(run: GapRun, places: Sequence[int]) -> FloatArray:
     rows = []
     for place in places:
         row = np.zeros(coarse(run.channels[place], run.rate_hz).size)
-        scale = _same_volts(run.sensors[place], run.sensors[place - 1])
-        if place > 0 and np.isfinite(scale) and run.reads(place - 1):
-            row = scale * gridded(run, place - 1)
+        before = run.before(place)
+        scale = _same_volts(run.sensors[place], run.sensors[before])
+        if before >= 0 and np.isfinite(scale) and run.reads(before):
+            row = scale * gridded(run, before)
         rows.append(row)
     return np.array(rows)
 

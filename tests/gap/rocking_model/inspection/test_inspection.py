@@ -122,6 +122,28 @@ def test_exchanged_plugs_are_put_back() -> None:
     assert "WP-1 and WP-4 exchanged" in _words(crossed)
 
 
+def test_a_plug_is_scanned_when_it_was_and_after_the_same_one_wherever_its_sensor_is_put_back() -> None:
+    (run,) = simulate({}, ONE)
+    place = {sensor.id: i for i, sensor in enumerate(run.sensors)}
+    run = replace(run, time_offset_s=1e-6 * np.arange(len(run.sensors)))
+    _exchange(run, "WP-1", "WP-4")
+    (mended,), wiring = mend([run])
+    assert dict(wiring.exchanged) == {"WP-1": "WP-4", "WP-4": "WP-1"}
+    before = {name: mended.sensors[mended.before(at)].id for name, at in place.items() if at}
+    assert {n: before[n] for n in ("WP-1", "WP-2", "WP-3", "WP-4", "WP-5", "AC-1")} == {
+        "WP-1": "WP-3",  # in the fourth plug of the wires
+        "WP-2": "WP-4",
+        "WP-3": "WP-2",
+        "WP-4": "LV-B12",
+        "WP-5": "WP-1",
+        "AC-1": "WP-5",
+    }
+    assert mended.before(0) == -1
+    assert mended.time_offset_s[place["WP-4"]] == 1e-6 * place["WP-1"]
+    of_lvdt = crosstalk(run, [place["WP-1"]])  # which are scanned one after the other
+    assert crosstalk(mended, [place["WP-4"]]) == pytest.approx(of_lvdt)
+
+
 def test_exchanged_plugs_of_wires_that_are_late_are_put_back() -> None:
     """What is left of a signal that comes 30 ms late is as much as an exchange leaves of it."""
     runs = simulate({"lag@wire": {"tau": 0.03}}, ONE)
