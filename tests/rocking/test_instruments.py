@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from daq_app.rocking import AnalysisOptions, TestAnalysis, TestRecord, analyse_record
+from daq_app.rocking.families.single_wires import SingleWires
 
 Floats = NDArray[np.float64]
 Change = Callable[[Floats, float], Floats]
@@ -108,6 +109,15 @@ def test_a_single_wire_that_deviates_is_left_out(made):
     assert finding.channels == ("WP-3",)
     assert finding.size == pytest.approx(0.012, abs=0.002)
     assert analysis.theta0_by_family["wires"].value == pytest.approx(-0.35 * 0.215, rel=1e-3)
+
+
+@pytest.mark.parametrize(("gain", "named"), [(0.0105, False), (0.013, True)])
+def test_a_wire_is_named_for_a_gain_that_chance_makes_in_less_than_one_family_of_five_hundred(gain, named):
+    """The first of these gains chance makes in four families of a thousand."""
+    none = np.zeros(5)
+    wires = SingleWires(np.array([0.0015, -0.0015, 0.002, -0.002, gain]), none, none)
+
+    assert (wires.outlier() is not None) == named
 
 
 def test_the_table_shows_each_family_beside_the_survey(made):

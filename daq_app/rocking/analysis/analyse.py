@@ -84,16 +84,16 @@ def _analyse(
     joint = summarise_joint(instruments.record, signals, track) if signals.joint is not None else None
     further = levels_apart(theta0)
     pattern = pattern_of(instruments, tracks, further)
-    change = pattern.change_with_speed
+    by_speed = pattern.sigma_r_by_speed
     further += wall_findings(instruments, tracks, joint, further, pattern)
     others = [*instruments.findings, *further]
     further += scatter_findings(estimates["eav"], estimates["crt"], others) + misfit_findings(fit, others)
-    verdict, findings = verdict_of(instruments, tracks, series, estimates, further, change)
+    verdict, findings = verdict_of(instruments, tracks, series, estimates, further, by_speed)
     estimates = {
-        name: with_findings(with_change_by_speed(estimate, change), findings)
+        name: with_findings(with_change_by_speed(estimate, by_speed), findings)
         for name, estimate in estimates.items()
     }
-    fit = None if fit is None else _for_this_wall(fit, findings, change)
+    fit = None if fit is None else _for_this_wall(fit, findings, by_speed)
     headline = theta0.get("tiltmeters", theta0["wires"])
     bias = _bias(record, signals, track, estimates, velocity_filter, options)
     analysis = TestAnalysis(
@@ -125,12 +125,12 @@ def _analyse(
     return replace(analysis, notes=quality_notes(record, signals, times, track, analysis, onsets, findings))
 
 
-def _for_this_wall(fit: MotionFit, findings: Sequence[FamilyFinding], change: float) -> MotionFit:
+def _for_this_wall(fit: MotionFit, findings: Sequence[FamilyFinding], by_speed: float) -> MotionFit:
     """The fit with errors that hold for r at any impact; p and α have none where the wall is no rigid block.
 
     They are then those of the nearest block, and no property of the wall.
     """
-    fit = replace(fit, standard_error=math.hypot(fit.standard_error, 0.5 * change))
+    fit = replace(fit, standard_error=math.hypot(fit.standard_error, by_speed))
     if fit.explains_the_motion and is_rigid_block(findings):
         return fit
     return replace(fit, sigma_p_rad_s=math.nan, sigma_alpha_rad=math.nan)

@@ -124,11 +124,11 @@ def verdict_of(
     series: Mapping[str, DecaySeries],
     estimates: Mapping[str, RestitutionEstimate],
     further: Sequence[FamilyFinding],
-    change_by_speed: float,
+    sigma_by_speed: float,
 ) -> tuple[RVerdict, tuple[FamilyFinding, ...]]:
     """The verdict of r, and every finding behind it; `further` are those of θ0 and of the wall.
 
-    `change_by_speed`: by how much r changes within the test. It is in the error, and no disagreement.
+    `sigma_by_speed`: what a change of r with speed adds to the error of r. It is no disagreement.
     """
     named = {(finding.family, finding.kind) for finding in instruments.findings}
     findings = list(instruments.findings)
@@ -148,7 +148,7 @@ def verdict_of(
     if disagreement is not None:
         disagreements.append(disagreement)
         findings.append(words.not_housner(disagreement))
-    eav, crt = (with_change_by_speed(estimates[name], change_by_speed) for name in ("eav", "crt_exact"))
+    eav, crt = (with_change_by_speed(estimates[name], sigma_by_speed) for name in ("eav", "crt_exact"))
     verdict = judge(eav, crt, LEADS[lead], findings, disagreements)
     return verdict, tuple(findings)
 

@@ -115,12 +115,9 @@ def methods_apart(eav: RestitutionEstimate, crt: RestitutionEstimate) -> str | N
     )
 
 
-def with_change_by_speed(estimate: RestitutionEstimate, change: float) -> RestitutionEstimate:
-    """The estimate for r at any impact, where r changes by `change` from the fastest to the slowest.
-
-    The r of a decay is that of its middle impacts: the others' are up to half the change away.
-    """
-    return _widened(estimate, 0.5 * change)
+def with_change_by_speed(estimate: RestitutionEstimate, sigma: float) -> RestitutionEstimate:
+    """The estimate for r at any impact; `sigma`: what a change of r with speed adds to its standard error."""
+    return _widened(estimate, sigma)
 
 
 def with_findings(estimate: RestitutionEstimate, findings: Sequence[FamilyFinding]) -> RestitutionEstimate:

@@ -145,7 +145,7 @@ def r_perhaps_by_speed(r_fast: float, r_slow: float, sigma: float) -> FamilyFind
     """r may change with the size of the motion; the stated errors hold it."""
     text = (
         f"r may change with speed: {r_fast:.3f} at the fastest impacts, {r_slow:.3f} at the slowest. The "
-        f"change is known to ± {sigma:.3f}, and scatter alone may make it; the error of r holds half of it"
+        f"change is known to ± {sigma:.3f}, and scatter alone may make it; the error of r holds it"
     )
     return FamilyFinding("wall", (), "speed", r_slow - r_fast, "1", "none", "info", text)
 

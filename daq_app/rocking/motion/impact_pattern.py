@@ -25,7 +25,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtr
+from scipy.special import ndtri, stdtr
 
 from daq_app.rocking.motion.swings import MotionTrack
 
@@ -43,6 +43,8 @@ _ODD_POWER: Final = 3
 _ZERO_KEPT: Final = 0.1
 """Share of the zero's error that crossings keep at least: noise alone may seem smaller than it is."""
 _ROUNDS: Final = 60
+_LEAST_CHANCE: Final = 1e-300
+"""Smaller ones have no normal deviate."""
 _LONGEST_HOP_S: Final = 0.05
 """A hop is not taken for longer: near r = 1 a pause says nothing of its length."""
 
@@ -76,6 +78,8 @@ class ImpactPattern:
     r_fast: float
     """r by the regression at the fastest impact used; NaN where there is none."""
     r_slow: float
+    impacts: int = 0
+    """Impacts behind `by_speed` and `by_side`."""
 
     @property
     def hop_s(self) -> float:
@@ -99,15 +103,32 @@ class ImpactPattern:
         beyond = self.by_speed.value**2 - self.by_speed.sigma**2
         return 0.5 * (self.r_fast + self.r_slow) * math.sqrt(max(beyond, 0.0))
 
+    @property
+    def sigma_r_by_speed(self) -> float:
+        """Standard uncertainty that a change of r with speed adds to the r of a test.
+
+        r of its impacts lies anywhere between those of the fastest and the slowest: a rectangular
+        distribution as wide as the change (JCGM 100:2008, 4.3.7). The change is the mean over both models, r
+        that changes and r that does not (Hoeting and others, 1999), weighted by the Bayesian information
+        criterion at even odds beforehand: the first has one parameter more, and of n impacts it must show a
+        change of more than √(ln n) standard errors to be the likelier one. Scatter alone shows a change
+        beyond its error in one test of three.
+        """
+        if self.by_speed is None:
+            return 0.0
+        deviate = float(ndtri(0.5 * max(self.by_speed.chance, _LEAST_CHANCE)))
+        odds_of_none = math.sqrt(self.impacts) * math.exp(-0.5 * deviate**2)
+        return self.change_with_speed / (1.0 + odds_of_none) / math.sqrt(12.0)
+
 
 def impact_pattern(track: MotionTrack) -> ImpactPattern:
     """Compare the impacts and half-cycles of a track."""
-    by_speed, by_side, r_fast, r_slow = _impacts(track)
+    by_speed, by_side, r_fast, r_slow, impacts = _impacts(track)
     pause, slowed = _pause(track)
-    return ImpactPattern(by_speed, by_side, _between(track), pause, slowed, r_fast, r_slow)
+    return ImpactPattern(by_speed, by_side, _between(track), pause, slowed, r_fast, r_slow, impacts)
 
 
-def _impacts(track: MotionTrack) -> tuple[Coefficient | None, Coefficient | None, float, float]:
+def _impacts(track: MotionTrack) -> tuple[Coefficient | None, Coefficient | None, float, float, int]:
     before, after = np.array(track.speeds_before_rad_s), np.array(track.speeds_after_rad_s)
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.log(np.abs(after) / np.abs(before))
@@ -115,7 +136,7 @@ def _impacts(track: MotionTrack) -> tuple[Coefficient | None, Coefficient | None
         own_after = np.array(track.sigma_speeds_after_rad_s) / np.abs(after)
     usable = np.isfinite(ratio) & (np.hypot(own_before, own_after) < _USABLE_SIGMA)
     if np.count_nonzero(usable) < _FEWEST_IMPACTS:
-        return None, None, math.nan, math.nan
+        return None, None, math.nan, math.nan, 0
     zero = _zero_error(track, before, after)
     covariance = np.diag(own_before**2 + own_after**2) + np.outer(zero, zero)
     for n, arc in enumerate(track.arcs[1:]):
@@ -131,7 +152,7 @@ def _impacts(track: MotionTrack) -> tuple[Coefficient | None, Coefficient | None
     fall = float(centred.min() - centred.max())
     by_speed = Coefficient(slope.value * fall, slope.sigma * abs(fall), slope.chance)
     r_fast, r_slow = np.exp(level.value + slope.value * np.array([centred.max(), centred.min()]))
-    return by_speed, by_side, float(r_fast), float(r_slow)
+    return by_speed, by_side, float(r_fast), float(r_slow), centred.size
 
 
 def _zero_error(track: MotionTrack, before: Floats, after: Floats) -> Floats:

@@ -217,11 +217,21 @@ def _stepwise(
 def _least(
     problem: MotionModel, start: Floats, span: int, stop_s: float, *, thorough: bool
 ) -> OptimizeResult:
-    """The fit of the first `span` impacts; `thorough`: where it leaves too much, in other ways as well."""
+    """The fit of the first `span` impacts; `thorough`: where it leaves too much, in other ways as well.
+
+    A search that used up its evaluations on its way along a valley, where the level and the deviations from
+    it change against each other, goes on from the level that suits them.
+    """
     search = partial(
         least_squares, problem.residual, jac=problem.jacobian, args=(span, stop_s), x_scale="jac", max_nfev=60
     )
     best = search(start, method="lm")
+    if best.status == 0 and problem.spread is not None:
+        levelled = problem.levelled(best.x)
+        kept = np.concatenate((levelled[:FIXED], np.clip(levelled[FIXED:], -1.0, 1.0)))
+        for other in (kept, levelled):
+            if best.status == 0:
+                best = min(best, search(other, method="lm"), key=lambda found: float(found.cost))
     if not thorough:
         return best
     settled = np.concatenate((best.x[:FIXED], np.clip(best.x[FIXED:], -1.0, 1.0)))

@@ -73,6 +73,15 @@ class MotionModel:
         """
         return np.exp(-np.logaddexp(0.0, -_SOFT * self._log_r(x)) / _SOFT)
 
+    def levelled(self, x: Floats) -> Floats:
+        """Parameters of the same motion whose deviations of single impacts have the mean zero."""
+        same = x.copy()
+        if self.spread is not None and x.size > FIXED:
+            mean = float(np.mean(x[FIXED:]))
+            same[5] += self.spread * mean / _R_STEP
+            same[FIXED:] -= mean
+        return same
+
     def motion(self, x: Floats, impacts: int) -> FreeRocking:
         """The motion of these parameters."""
         alpha = self.alpha * math.exp(min(max(ALPHA_PRIOR * x[3], -0.5), 0.5))
