@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from daq_app.rocking import AnalysisOptions, LiveAnalyser, TestRecord, analyse_record
+from daq_app.rocking.analysis.preparation.fusion import best_value
+from daq_app.rocking.analysis.results import ValueWithSigma
 
 QUICK = AnalysisOptions(bias_runs=0, fit=False)
 
@@ -71,6 +73,15 @@ def test_theta0_by_family(whole):
         assert abs(value.value - truth) < 3 * value.sigma
     assert analysis.side == -1
     assert analysis.theta0_over_alpha == pytest.approx(0.35, abs=0.005)
+
+
+@pytest.mark.parametrize(("apart_sigmas", "widened_by"), [(2.9, 1.0), (4.0, 4.0 / math.sqrt(3.0))])
+def test_the_best_theta0_is_known_worse_where_families_differ_by_more_than_chance(apart_sigmas, widened_by):
+    """Three values of which one is off: chance puts it by 3.0 standard errors in one test of twenty."""
+    families = {name: ValueWithSigma(0.0, 1e-4) for name in ("tiltmeters", "wires")}
+    families["lvdts"] = ValueWithSigma(apart_sigmas * 1e-4, 1e-4)
+
+    assert best_value(families).sigma == pytest.approx(1e-4 / math.sqrt(3.0) * widened_by)
 
 
 def test_times_are_aligned_and_refined(whole):

@@ -263,6 +263,15 @@ def test_jacobian_of_the_fit_is_that_of_its_residual(spread):
         np.testing.assert_allclose(analytic[:, column], numeric, atol=1e-4 * np.abs(numeric).max())
 
 
+def test_a_fit_that_strays_to_no_r_at_all_still_has_a_residual():
+    time = np.arange(0.5, 6.0, 0.008)
+    model = MotionModel(time, np.zeros(time.size), 1e-5, 0.6, 0.075, -1.0, P, ALPHA, math.log(0.9), 0.15)
+    x = np.zeros(FIXED + 8)
+    x[5] = -6e21
+
+    assert np.isfinite(model.residual(x, 9, 5.5)).all()
+
+
 def test_a_gain_that_differs_by_side_does_not_reach_eav():
     """Pairs are of the same side: speeds that read 5 % high on one side change nothing."""
     speeds = 0.3 * 0.9 ** np.arange(12.0)

@@ -30,6 +30,7 @@ FIXED = 6
 """Parameters before the deviations of single impacts."""
 _THETA0_STEP_RAD, _RELEASE_STEP_S, _R_STEP = 1e-3, 0.01, 0.01
 _SOFT = 100.0
+_LEAST_R = 1e-3
 _EPSILON = 1e-6
 
 
@@ -69,9 +70,10 @@ class MotionModel:
     def restitutions(self, x: Floats) -> Floats:
         """r of each impact (one value where all are the same), kept below 1 without a corner.
 
-        −ln(1 + e^(−100 ln r))/100 in place of ln r: a fit cannot get stuck at 1.
+        −ln(1 + e^(−100 ln r))/100 in place of ln r: a fit cannot get stuck at 1. One that strays to nothing
+        has the least r, with which it finds no better place.
         """
-        return np.exp(-np.logaddexp(0.0, -_SOFT * self._log_r(x)) / _SOFT)
+        return np.maximum(np.exp(-np.logaddexp(0.0, -_SOFT * self._log_r(x)) / _SOFT), _LEAST_R)
 
     def levelled(self, x: Floats) -> Floats:
         """Parameters of the same motion whose deviations of single impacts have the mean zero."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its `special` is loaded with the first use: the window starts without it
 from numpy.typing import NDArray
 
 from daq_app.rocking.analysis.results import ValueWithSigma
@@ -17,6 +18,9 @@ CALIBRATION_SHARE = 0.0014
 """Standard uncertainty of a family's calibration, as a share of the value: 0.2 % each of two."""
 ZERO_SHARE_RAD = 3e-5
 """Standard uncertainty of a family's zero."""
+_BY_CHANCE = 0.05
+"""Chance below which values scatter more than their errors make them. Raising it makes the errors of sound
+tests too large."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +62,11 @@ def fuse(wires_rad: Floats, lvdts_rad: Floats, wire_noise_rad: float, lvdt_noise
 
 
 def best_value(families: Mapping[str, ValueWithSigma]) -> ValueWithSigma:
-    """Weighted mean of independent values; sigma widened where they scatter beyond their own (Birge)."""
+    """Weighted mean of independent values; sigma widened where they scatter beyond their own (Birge, 1932).
+
+    That is where chance makes them scatter so in less than one of twenty tests: widened wherever they scatter
+    more than they do on average, the sigma of sound tests is too large, for it is never made smaller.
+    """
     good = [v for v in families.values() if math.isfinite(v.value) and v.sigma > 0]
     if not good:
         return ValueWithSigma(math.nan, math.nan)
@@ -67,6 +75,7 @@ def best_value(families: Mapping[str, ValueWithSigma]) -> ValueWithSigma:
     mean = float(weights @ values / weights.sum())
     sigma = 1.0 / math.sqrt(float(weights.sum()))
     if len(good) > 1:
-        birge = math.sqrt(float(weights @ (values - mean) ** 2) / (len(good) - 1))
-        sigma *= max(1.0, birge)
+        squares, freedom = float(weights @ (values - mean) ** 2), len(good) - 1
+        if float(scipy.special.chdtrc(freedom, squares)) < _BY_CHANCE:
+            sigma *= math.sqrt(squares / freedom)
     return ValueWithSigma(mean, sigma)
