@@ -106,8 +106,8 @@ class Problem:
         Differences are central (one-sided at a bound) where `exact`, else forward: half the work, and
         good enough to walk by. `known` are columns taken from elsewhere, shape (n,) by (key, run).
         """
-        here = prediction or self.predict(run, u)
         values = self.values(run, u)
+        here = prediction or self.model.predict(self.runs[run], values)
         jacobian = np.zeros((here.features.size, len(self)))
         for k, key, _ in self._asked[run]:
             column = known.get((key, run)) if known else None

@@ -167,14 +167,10 @@ class Wire:
         """θ, rad, at which the wire is shorter by `shortening`, m; NaN where there is none."""
         return wire_rotation(shortening, self.sensor.position_m, self.anchor_m, self.half_base)
 
-    def shortening(
-        self, theta: FloatArray, anchor_higher: float = 0.0, pivot_further: float = 0.0
-    ) -> FloatArray:
-        """Shortening, m, at `theta`, rad, with the anchor higher and the pivots further out by so much, m."""
+    def shortening(self, theta: FloatArray, anchor_higher: float = 0.0) -> FloatArray:
+        """Shortening, m, at `theta`, rad, with the anchor higher by so much, m."""
         x, y, z = self.anchor_m
-        return wire_shortening(
-            theta, self.sensor.position_m, (x, y, z + anchor_higher), self.half_base + pivot_further
-        )
+        return wire_shortening(theta, self.sensor.position_m, (x, y, z + anchor_higher), self.half_base)
 
 
 def wires_of(run: GapRun) -> tuple[Wire, ...]:
@@ -185,12 +181,12 @@ def wires_of(run: GapRun) -> tuple[Wire, ...]:
 
 def anchors_turn(wires: Sequence[Wire], theta: FloatArray, higher: float) -> FloatArray:
     """What anchors higher by so much, m, add to the wires' mean rotation (weights z²), rad."""
-    return _turned(wires, theta, [wire.shortening(theta, higher) for wire in wires])
+    return _turned(wires, theta, _shortened(wires, theta, higher=higher))
 
 
 def anchors_move(wires: Sequence[Wire], theta: FloatArray, higher: float) -> FloatArray:
     """What anchors higher by so much, m, add to what the wires show of the base, m."""
-    return _moved(wires, theta, [wire.shortening(theta, higher) for wire in wires])
+    return _moved(wires, theta, _shortened(wires, theta, higher=higher))
 
 
 _FURTHER_M = 1e-3
@@ -201,24 +197,37 @@ def pivots_off(wires: Sequence[Wire], theta: FloatArray) -> tuple[FloatArray, Fl
 
     To first order: the wall moves along x by 1 − cos θ and rises by sin|θ| for each metre.
     """
-    seen = [wire.shortening(theta, pivot_further=_FURTHER_M) for wire in wires]
+    seen = _shortened(wires, theta, further=_FURTHER_M)
     return _turned(wires, theta, seen) / _FURTHER_M, _moved(wires, theta, seen) / _FURTHER_M
 
 
-def _turned(wires: Sequence[Wire], theta: FloatArray, shortenings: Sequence[FloatArray]) -> FloatArray:
-    """Mean rotation (weights z²), rad, that wires shorter by `shortenings` show beyond `theta`."""
-    weights = np.array([wire.sensor.position_m[2] for wire in wires]) ** 2
-    turned = np.array([wire.rotation(s) - theta for wire, s in zip(wires, shortenings, strict=True)])
-    mean: FloatArray = np.tensordot(weights / np.sum(weights), turned, 1)
-    return mean
+def _shortened(
+    wires: Sequence[Wire], theta: FloatArray, *, higher: float = 0.0, further: float = 0.0
+) -> FloatArray:
+    """Shortening of each wire, (w, θ's size), m, with anchors higher and pivots further out by so much, m."""
+    positions, anchors = _ends(wires)
+    anchors[:, 2] += higher
+    return wire_shortening(theta.ravel(), positions, anchors, wires[0].half_base + further)
 
 
-def _moved(wires: Sequence[Wire], theta: FloatArray, shortenings: Sequence[FloatArray]) -> FloatArray:
-    """Motion of the base, m, that wires shorter by `shortenings` show beyond `theta`."""
-    z = np.array([wire.sensor.position_m[2] for wire in wires])
-    moved = np.array([s - wire.shortening(theta) for wire, s in zip(wires, shortenings, strict=True)])
-    mean: FloatArray = np.tensordot(straight_line(z)[0], moved, 1)
-    return mean
+def _ends(wires: Sequence[Wire]) -> tuple[FloatArray, FloatArray]:
+    """Where the wires are fixed to the wall and anchored, (w, 3) each, m."""
+    positions, anchors = ([w.sensor.position_m for w in wires], [w.anchor_m for w in wires])
+    return np.array(positions, dtype=np.float64), np.array(anchors, dtype=np.float64)
+
+
+def _turned(wires: Sequence[Wire], theta: FloatArray, shortened: FloatArray) -> FloatArray:
+    """Mean rotation (weights z²), rad, that wires so much shorter show beyond `theta`, in its shape."""
+    positions, anchors = _ends(wires)
+    weights = positions[:, 2] ** 2
+    beyond = wire_rotation(shortened, positions, anchors, wires[0].half_base) - theta.ravel()
+    return np.asarray((weights / weights.sum() @ beyond).reshape(theta.shape))
+
+
+def _moved(wires: Sequence[Wire], theta: FloatArray, shortened: FloatArray) -> FloatArray:
+    """Motion of the base, m, that wires so much shorter show beyond `theta`, in its shape."""
+    weights = straight_line(_ends(wires)[0][:, 2])[0]
+    return np.asarray((weights @ (shortened - _shortened(wires, theta))).reshape(theta.shape))
 
 
 def shown_by_wires(wires: Sequence[Wire], moved: FloatArray, *, of_base: bool) -> float:

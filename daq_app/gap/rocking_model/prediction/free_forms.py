@@ -17,12 +17,12 @@ _MIDDLE = 0.1
 _ZETA_STEP = 1e-4
 
 
-def free_times(run: RockingRun, values: Mapping[str, float]) -> FloatArray:
+def free_times(run: RockingRun, values: Mapping[str, float]) -> FloatArray | float:
     """Free forms of the probes: time features as piecewise linear functions of the peak."""
-    total = np.zeros(len(run.places))
     restoring, loss = "free_restoring.t0" in values, "free_dissipation.t0" in values
     if not (restoring or loss):
-        return total
+        return 0.0
+    total = np.zeros(len(run.places))
     kind, low, share, direction = run.cache.constant("free basis", lambda: _free_basis(run))
     if restoring:
         knots = np.array([values[f"free_restoring.t{i}"] for i in range(9)])

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq_app.gap.core import Parameter, Prediction, Run, Scatter
 from daq_app.gap.core.features import FloatArray
@@ -133,16 +134,15 @@ class RockingModel:
         # Crossings as times from their own peak: positive in the fall, negative in the rise.
         crossings = table[:, first : first + 2 * count].copy()
         crossings[:, count:] *= -1.0
-        places = run.places
-        times = crossings[places[:, 2], places[:, 3]] - crossings[places[:, 0], places[:, 1]]
+        begin, end, k = run.cache.constant("crossings", partial(_crossings_of, run))
+        times = crossings.take(end) - crossings.take(begin)
         across = run.across
-        k = places[across, 0]
         times[across] += table[k, shooting.FALL_S] + pause[k] + table[k + 1, shooting.RISE_S]
         times = times + times_carry(run, values)
         times = times / (1.0 + values.get("clock.error", 0.0)) + free_times(run, values)
         if run.reference == "lvdt":
             # Before an impact one face opens, after it the other.
-            times[across] += np.sign(true[places[across, 0]]) * values[FACE_SKEW]
+            times[across] += np.sign(true[k]) * values[FACE_SKEW]
         k = run.peaks
         before = k - 1
         r = restitution_of(run, values, speeds_out[before], np.sign(true[before]), before)
@@ -156,6 +156,14 @@ class RockingModel:
         slopes = size * stiffness / np.maximum(speeds_in[k], 1e-9) ** 2
         measured = np.log(np.abs(run.swings.peak_rad[k]))
         return times, measured - excess / slopes, slopes
+
+
+def _crossings_of(run: RockingRun) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Places of the crossings, row by row, between which each time feature is, (T,) each; half-cycles before
+    the impacts that it spans."""
+    first, a, second, b = run.places.T
+    width = 2 * run.swings.levels.shape[1]
+    return first * width + a, second * width + b, first[run.across]
 
 
 def _half_cycles(

@@ -28,14 +28,17 @@ def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
     drift = values.get("drift@wire.rate", 0.0) / run.wire_height_m if name == "wire" else 0.0
     offset = values["zero"] + drift * (run.swings.peak_s - rest) + peaks_carry(run, values)
     levels = side[:, None] * run.swings.levels
-    # A delay moves peaks and crossings alike; what a response rounds beyond it goes with the acceleration.
-    slow = _second_order(values, name) * values["p"] ** 2
-    rounded = [-slow * np.sign(seen) * np.sin(values["alpha"] - np.abs(seen)) for seen in (peaks, levels)]
-    rounded[0][0] = 0.0  # it is held there
-    true = (peaks - offset - _bent(run, values, peaks) - rounded[0]) / gain
+    true = peaks - offset - _bent(run, values, peaks)
+    behind = levels - offset[:, None] - _bent(run, values, levels)
+    if second := _second_order(values, name):
+        # A delay moves peaks and crossings alike; what a response rounds beyond it goes with the
+        # acceleration. At the first peak the wall is held.
+        slow = second * values["p"] ** 2 * side
+        true[1:] += slow[1:] * np.sin(values["alpha"] - np.abs(peaks[1:]))
+        behind += slow[:, None] * np.sin(values["alpha"] - np.abs(levels))
+    true /= gain
     true[0] += side[0] * values["theta0"]
-    behind = (levels - offset[:, None] - _bent(run, values, levels) - rounded[1]) / gain[:, None]
-    return true, np.abs(behind)
+    return true, np.abs(behind / gain[:, None])
 
 
 def _bent(run: RockingRun, values: Mapping[str, float], theta: FloatArray) -> FloatArray | float:

@@ -68,9 +68,11 @@ def half_cycle_table(run: RockingRun, vector: FloatArray, true: FloatArray, leve
     return table
 
 
-def _curvature(run: RockingRun, values: Mapping[str, float], speeds: FloatArray) -> FloatArray:
+def _curvature(run: RockingRun, values: Mapping[str, float], speeds: FloatArray) -> FloatArray | float:
     """What the departures from a straight r(v) add."""
     power, square = values.get("slope_power.c", 0.0), values.get("slope_square.c", 0.0)
+    if power == square == 0.0:
+        return 0.0
     middle = _MIDDLE_SPEED * run.survey.p_rad_s * run.survey.alpha_rad
     off = speeds - middle
     return power * (speeds * np.log(np.maximum(speeds, 1e-6) / middle) - off) + square * off**2
@@ -95,5 +97,4 @@ def restitution_of(
         r = r + np.interp(speeds, PROBE_SPEEDS, knots) + sides * values["free_restitution.side"]
         r = r + values["free_restitution.order"] * impacts / 10.0
     r = r * (1.0 - values.get("restitution_wear.loss", 0.0) * 0.01 * (run.impacts_before + impacts))
-    clipped: FloatArray = np.clip(r, 0.05, 1.2)
-    return clipped
+    return np.minimum(np.maximum(r, 0.05), 1.2)

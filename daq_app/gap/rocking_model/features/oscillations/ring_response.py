@@ -23,18 +23,19 @@ def _ring_coefficients(
     imaginary part of c exp(rate · t) has the sine Re c and the cosine Im c; accelerations over ω².
     The impacts are where the reference shows them, as late as it is.
     """
+    coefficients = [0.0j] * len(block.shares)
+    motion = _kicked(ring, values)
+    if not any(motion):
+        return coefficients
     frequency, zeta, _ = ring.ring
     natural = 2.0 * np.pi * frequency
     rate = natural * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
-    coefficients = [0.0j] * len(block.shares)
     for k, (name, shares) in enumerate(zip(block.names, block.shares, strict=False)):
-        if not (size := _moved(ring, shares, values)):
-            continue
         family = name.partition(" in ")[2].removesuffix("s")
         undone = block.undone_s if family == "accelerometer" else 0.0
         early = np.exp(rate * (undone + delay(run.reference, values)))
         twice = -((1.0 - 2.0 * zeta**2) + 2j * zeta) if family == "accelerometer" else 1.0
-        coefficients[k] = size * twice * transfer(rate, family, values) * early
+        coefficients[k] = _size(shares, motion) * twice * transfer(rate, family, values) * early
     return coefficients
 
 
@@ -43,33 +44,42 @@ def _forced(values: Mapping[str, float]) -> float:
     return values.get("flexible_wall.forced", 0.0)
 
 
-def _moved(ring: Block, shares: Shares, values: Mapping[str, float]) -> float:
-    """Size of the sine in a signal of these shares: inertia bends a wall against the jump of its speed."""
-    return _size(ring, shares, values) * (1.0 - 2.0 * _forced(values) if ring.kind == "bending" else 1.0)
+Motion = tuple[float, float, float]
+"""Sizes of a ring-down by bending, by yaw and by twist."""
 
 
-def _size(ring: Block, shares: Shares, values: Mapping[str, float]) -> float:
-    """Size of the ring-down in a signal of these shares, by the wall's bending or turning."""
+def _rung(ring: Block, values: Mapping[str, float]) -> Motion:
+    """How far the wall rings, as means over the intervals of the grid show it."""
     frequency, _, rate = ring.ring
+    mean = float(np.sinc(frequency / rate))
     if ring.kind == "bending":
-        size = shares.bend * values.get("flexible_wall.gain", 0.0)
-    else:
-        turned = shares.yaw * values.get("yaw.kick", 0.0) + shares.twist * values.get("twist.kick", 0.0)
-        size = turned / (2.0 * np.pi * frequency)
-    return size * float(np.sinc(frequency / rate)) if size else 0.0
+        return mean * values.get("flexible_wall.gain", 0.0), 0.0, 0.0
+    mean /= 2.0 * np.pi * frequency
+    return 0.0, mean * values.get("yaw.kick", 0.0), mean * values.get("twist.kick", 0.0)
+
+
+def _kicked(ring: Block, values: Mapping[str, float]) -> Motion:
+    """The sine in it: inertia bends a wall against the jump of its speed."""
+    bend, yaw, twist = _rung(ring, values)
+    return bend * (1.0 - 2.0 * _forced(values)), yaw, twist
+
+
+def _size(shares: Shares, motion: Motion) -> float:
+    """Size of a motion in a signal of these shares."""
+    bend, yaw, twist = motion
+    return shares.bend * bend + shares.yaw * yaw + shares.twist * twist
 
 
 def _put(
     run: RockingRun, block: Block, values: Mapping[str, float], frequency: float, zeta: float
 ) -> FloatArray:
     """The coefficients of a ring-down as numbers, with those of the oscillator."""
-    coefficients = np.zeros(len(block.names))
-    for k, c in enumerate(_ring_coefficients(run, block, block, values)):
-        coefficients[k] = c.real if block.names[k].startswith("sine") else c.imag
-    oscillator = {"frequency": frequency, "damping": zeta}
-    for k, name in enumerate(block.names):
-        coefficients[k] = oscillator.get(name, coefficients[k])
-    return coefficients * _faded(block, zeta) + _of_the_other(run, block, values)
+    seen = _ring_coefficients(run, block, block, values)
+    waves = [c.real if k % 2 == 0 else c.imag for k, c in enumerate(seen)]  # sine and cosine in turns
+    coefficients = np.array([*waves, frequency, zeta])
+    if zeta != block.ring[1]:
+        coefficients *= _faded(block, zeta)
+    return coefficients + _of_the_other(run, block, values)
 
 
 _EVEN = 1e-9
@@ -83,7 +93,8 @@ def _of_the_other(run: RockingRun, block: Block, values: Mapping[str, float]) ->
     """
     coefficients = np.zeros(len(block.names))
     other = next((b for b in run.blocks if b.ring[0] and b.kind != block.kind), None)
-    if other is None or not any(abs(_moved(other, s, values)) > _EVEN for s in block.shares):
+    motion = (0.0, 0.0, 0.0) if other is None else _kicked(other, values)
+    if other is None or not any(abs(_size(shares, motion)) > _EVEN for shares in block.shares):
         return coefficients
     frequency, zeta, _ = other.ring
     columns = run.cache.constant(
@@ -151,12 +162,13 @@ def _forced_ring(run: RockingRun, block: Block, values: Mapping[str, float]) -> 
     coefficients = np.zeros(len(block.names))
     if not (forced := _forced(values)):
         return coefficients
+    motion = _rung(block, values)
     for k, (name, shares) in enumerate(zip(block.names, block.shares, strict=False)):
         family = name.partition(" in ")[2].removesuffix("s")
         columns = run.cache.constant(
             (block.family, "forced", family), partial(_forced_columns, run, block, family)
         )
-        coefficients[k] = -forced * _size(block, shares, values) * float(columns[k])
+        coefficients[k] = -forced * _size(shares, motion) * float(columns[k])
     return coefficients
 
 
