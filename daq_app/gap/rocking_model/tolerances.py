@@ -179,6 +179,18 @@ Ten calibrations. Raising it overlooks neighbours that show nearly the same.
 EXCHANGE_EACH = 1e-3
 """Misfit, 1, that a channel must lose to count as moved: channels that show the same stay where they are."""
 
+EXCHANGE_GAINS = (0.85, 1.15)
+"""Gain, from … to, 1, with which a channel may show the sensor of its place: gain errors are 10 % at most.
+
+Widening it takes the next sensor up the wall for the one that is due.
+"""
+
+LIVELY = 0.05
+"""Power that a channel should show over the median of all, 1, from which its sign can be judged (assumed).
+
+Raising it overlooks reversed leads of sensors low on the wall.
+"""
+
 FAR_FROM_UPRIGHT = 0.25
 """Share of the largest rotation, 1, from which a reading is far enough from an impact to tell its channel."""
 
@@ -187,6 +199,18 @@ IN_PROPORTION = (0.3, 0.85)
 """Part of a channel's travel, from … to, 1, over which it must be in proportion to the rotation.
 
 Widening it takes the bend of a limit for a gain.
+"""
+
+FLAT_TOP = 0.985
+"""Share of its largest reading, 1, from which a channel may be at its end (assumed).
+
+Raising it leaves too few samples of a top to be called flat.
+"""
+
+SAME_LIMIT = 0.97
+"""Share of the furthest reading of all runs, 1, below which a stop is none (assumed): it went beyond.
+
+Raising it overlooks limits that move with the zero.
 """
 
 LIMIT_SD = 0.01
@@ -208,6 +232,12 @@ USUAL_HUM = 0.45
 It is taken out all the same. Raising it hides weak pick-up.
 """
 
+HUM_SD = 6.0
+"""Amplitude of a hum over its error, 1, from which it is none of chance, in hundreds of channels.
+
+Raising it leaves weak hum in the readings.
+"""
+
 FEWEST_STEPS = 0.004
 """Share of samples, 1, at which a reading in steps goes on by a step at least.
 
@@ -218,6 +248,18 @@ SMALLEST_STEP = 5e-4
 """Step over the span of the reading, 1, from which it matters: below, it is the converter's own.
 
 Raising it overlooks fine steps.
+"""
+
+CONVERTER_STEP = 3.0
+"""Step over the declared noise of a reading, 1, up to which it is the converter's own (assumed).
+
+Raising it overlooks fine steps.
+"""
+
+GOES_ON_STEPS = 2.5
+"""Steps of its converter, 1, by which a reading goes on after it stood still for it to have been frozen.
+
+A sound one goes on by one, or two with noise. Raising it overlooks drop-outs in slow motion.
 """
 
 FROZEN_S = 0.008
@@ -267,6 +309,13 @@ SUSPECT: dict[Family, float] = {"lvdt": 4.0, "wire": 2.0, "accelerometer": 3.0}
 """What a channel must be off by, in what sound ones differ by (`channel_shapes.TOLERANCE`), to be suspect, 1.
 
 Each wire is told from few others, so its tolerance is wide already. Raising it hides single channels.
+"""
+
+OTHERS_AGREE = 0.4
+"""What the others of a family may be off by, over what a faulty channel is, 1, beside which they agree.
+
+Assumed: a faulty one is in the prediction of its neighbours. Raising it names a channel where two are
+wrong.
 """
 
 SOUND = 0.5

@@ -28,7 +28,7 @@ from daq_app.gap.rocking_model.inspection.channel_families import ChannelFamily,
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Wire
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances import AS_SINGLE, REMAINS, SUSPECT
+from daq_app.gap.rocking_model.tolerances import AS_SINGLE, OTHERS_AGREE, REMAINS, SUSPECT
 
 CROWDED: tuple[Family, ...] = ("lvdt", "accelerometer")
 """Families in which several channels may be wrong and the others still say so."""
@@ -112,7 +112,7 @@ def _single_outlier(usable: Sequence[ChannelFamily], family: Family, order: Sequ
     for name in order:
         rest = _sizes(usable, family, (name,))
         size = rest.pop(name)
-        agree = max(bar, 0.4 * size)
+        agree = max(bar, OTHERS_AGREE * size)
         if size > bar and max(rest.values()) < agree:
             doubt = _wires_doubt(usable, name) if family == "wire" else max(rest.values())
             agreed.append((doubt, agree, name))
@@ -150,7 +150,7 @@ def _outlier_set(usable: Sequence[ChannelFamily], family: Family) -> tuple[str, 
         rest = {name: size for name, size in sizes.items() if name not in outliers}
         worst = max(rest, key=lambda name: rest[name])
         if rest[worst] <= bar:
-            clear = all(0.4 * sizes[name] > min(rest[worst], bar) for name in outliers)
+            clear = all(OTHERS_AGREE * sizes[name] > min(rest[worst], bar) for name in outliers)
             return tuple(sorted(outliers)) if len(outliers) > 1 and clear else ()
         outliers.append(worst)
     return ()

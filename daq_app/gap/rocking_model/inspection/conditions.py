@@ -28,8 +28,11 @@ from daq_app.gap.rocking_model.inspection.spikes import (
 )
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.tolerances import (
+    CONVERTER_STEP,
     FEWEST_STEPS,
     FROZEN_S,
+    GOES_ON_STEPS,
+    HUM_SD,
     RANGE_MARGIN,
     SMALLEST_STEP,
     SPIKY_PER_S,
@@ -42,6 +45,11 @@ _SLOW_S = 0.1
 """Means over which a record that is turned back by the mains frequency keeps 0.6 Hz to a per cent."""
 LOUD = 4.0
 """Size beyond that of noise and hum together from which a sample belongs to an impact …"""
+_STEP_SD = 0.02
+"""Error of a step, as a share of it."""
+_FROZEN_SD = 1e-3
+"""Error of a share of frozen samples: that of reading it off one record, and not of what a few moments say of
+other records. A sound channel never freezes, and each run has a share of its own."""
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer")
 
 
@@ -49,15 +57,13 @@ _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer")
 class Condition:
     """What the samples of one channel in one run say."""
 
-    hum_si: float
-    hum_sd: float
-    hum_wave: FloatArray | None
+    hum_si: float = 0.0
+    hum_sd: float = 1.0
+    hum_wave: FloatArray | None = None
     """The hum itself, shape (n,), where there is any."""
-    step_si: float
-    step_sd: float
-    frozen_share: float
-    frozen_sd: float
-    spikes_per_s: float
+    step_si: float = 0.0
+    frozen_share: float = 0.0
+    spikes_per_s: float = 0.0
     noise_si: float = 0.0
     """Rms noise of one reading: that of this record or the declared one, whichever is larger."""
 
@@ -69,19 +75,19 @@ def inspect_channel(run: GapRun, index: int, shaken: Mask | None = None) -> Cond
     """
     values = run.channels[index]
     if not run.reads(index):
-        return Condition(0.0, 1.0, None, 0.0, 1.0, 0.0, 1e-3, 0.0)
+        return Condition()
     rate, accelerometer = run.rate_hz, run.sensors[index].family == "accelerometer"
     hum, hum_sd, wave = _hum(values, rate)
     usual = reading_noise(run, index)
     clean = values if wave is None else values - wave
     if accelerometer:
         spikes = 0.0 if shaken is None else lone_samples_per_s(clean, usual, rate, ~shaken)
-        return Condition(hum, hum_sd, wave, 0.0, 1.0, 0.0, 1e-3, spikes, usual)
-    step, step_sd = _quantisation_step(values, run.sensors[index].noise_si)
-    frozen, frozen_sd = _frozen(values, rate, step, run.sensors[index].range_si)
+        return Condition(hum, hum_sd, wave, spikes_per_s=spikes, noise_si=usual)
+    step = _quantisation_step(values, run.sensors[index].noise_si)
+    frozen = _frozen(values, rate, step, run.sensors[index].range_si)
     # A channel that rests at the end of its range shows no noise there.
     spikes = lone_samples_per_s(clean, usual, rate) if step == 0.0 and frozen == 0.0 else 0.0
-    return Condition(hum, hum_sd, wave, step, step_sd, frozen, frozen_sd, spikes, usual)
+    return Condition(hum, hum_sd, wave, step, frozen, spikes, usual)
 
 
 def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray | None]:
@@ -96,7 +102,7 @@ def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray |
     noise = float(np.sqrt(np.mean(left**2)))
     sd = noise * np.sqrt(2.0 / count)
     amplitude = float(np.hypot(*coefficients[:2]))
-    if amplitude < 6.0 * sd:
+    if amplitude < HUM_SD * sd:
         return 0.0, float(sd), None
     # Over the whole record the frequency is sharp enough for the phase to hold.
     high = values - sosfiltfilt(butter(2, 25.0, fs=rate_hz, output="sos"), values)
@@ -146,8 +152,8 @@ def _waves(count: int, rate_hz: float, frequency_hz: float) -> FloatArray:
     return np.array([np.sin(angle), np.cos(angle)])
 
 
-def _quantisation_step(values: FloatArray, noise_si: float) -> tuple[float, float]:
-    """(step, its sd) of a reading that only takes values a step apart; 0 where it does not.
+def _quantisation_step(values: FloatArray, noise_si: float) -> float:
+    """Step of a reading that only takes values a step apart; 0 where it does not.
 
     From sample to sample such a reading stays, or goes on by whole steps; noise does neither.
     """
@@ -155,15 +161,14 @@ def _quantisation_step(values: FloatArray, noise_si: float) -> tuple[float, floa
     top = _quantile(change, 0.9995)
     large = change > 0.4 * top
     if top <= 0.0 or np.mean(large) < FEWEST_STEPS:
-        return 0.0, 1.0
+        return 0.0
     step = float(np.median(change[large]))
     rest = float(np.sqrt(np.mean(change[~large] ** 2)))
     whole = change[large] / step
     if rest > 0.05 * step or np.mean(np.abs(whole - np.round(whole)) < 0.15) < 0.9:
-        return 0.0, 1.0
-    if step < 3.0 * noise_si or step < SMALLEST_STEP * float(np.ptp(values)):
-        return 0.0, 1.0  # that is the converter's own step
-    return step, 0.02 * step
+        return 0.0
+    own = step < CONVERTER_STEP * noise_si or step < SMALLEST_STEP * float(np.ptp(values))
+    return 0.0 if own else step  # the converter's own step is none
 
 
 def _quantile(values: FloatArray, share: float) -> float:
@@ -175,14 +180,8 @@ def _quantile(values: FloatArray, share: float) -> float:
     return float(ordered[low] + (at - low) * (ordered[high] - ordered[low]))
 
 
-def _frozen(
-    values: FloatArray, rate_hz: float, step: float, limits: tuple[float, float]
-) -> tuple[float, float]:
-    """(share, its sd) of the record in which the reading stands still although it should not.
-
-    The error is that of reading it off this record, and not of what a few moments say of other records:
-    a sound channel never freezes, and each run has a share of its own.
-    """
+def _frozen(values: FloatArray, rate_hz: float, step: float, limits: tuple[float, float]) -> float:
+    """Share of the record in which the reading stands still although it should not."""
     inside = (values > limits[0] + RANGE_MARGIN * np.abs(limits[0])) & (
         values < limits[1] * (1 - RANGE_MARGIN)
     )
@@ -193,13 +192,12 @@ def _frozen(
     starts, stops = edges[::2], edges[1::2]
     long = stops - starts > FROZEN_S * rate_hz
     if not long.any():
-        return 0.0, 1e-3
+        return 0.0
     # Between two steps of its converter, or of a coarser quantisation, a sound reading stands still too, but
     # then it goes on by one of them.
     after = np.minimum(stops + 1, values.size - 1)
-    long &= np.abs(values[after] - values[starts]) > 2.5 * max(step, _resolution(values))
-    lengths = (stops - starts)[long] / values.size
-    return float(lengths.sum()), 1e-3
+    long &= np.abs(values[after] - values[starts]) > GOES_ON_STEPS * max(step, _resolution(values))
+    return float((stops - starts)[long].sum()) / values.size
 
 
 def _resolution(values: FloatArray) -> float:
@@ -251,8 +249,10 @@ def findings_per_run(
         spiky = np.mean([[c.spikes_per_s for c in row] for row in rows], axis=0) > SPIKY_PER_S
         table = {
             "hum": [[(c.hum_si, c.hum_sd, c.hum_si > 0.0) for c in row] for row in rows],
-            "quantisation": [[(c.step_si, c.step_sd, c.step_si > 0) for c in row] for row in rows],
-            "dropout": [[(c.frozen_share, c.frozen_sd, c.frozen_share > 1e-3) for c in row] for row in rows],
+            "quantisation": [[(c.step_si, _STEP_SD * c.step_si, c.step_si > 0) for c in row] for row in rows],
+            "dropout": [
+                [(c.frozen_share, _FROZEN_SD, c.frozen_share > _FROZEN_SD) for c in row] for row in rows
+            ],
             "spikes": [
                 [(c.spikes_per_s, 0.05, often) for c, often in zip(row, spiky, strict=True)] for row in rows
             ],

@@ -21,7 +21,14 @@ from daq_app.gap.rocking_model.motion.rotation import (
     zeroed,
 )
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances import BEYOND_FAMILY, GOES_ON, IN_PROPORTION, LIMIT_SD
+from daq_app.gap.rocking_model.tolerances import (
+    BEYOND_FAMILY,
+    FLAT_TOP,
+    GOES_ON,
+    IN_PROPORTION,
+    LIMIT_SD,
+    SAME_LIMIT,
+)
 
 _OTHER: dict[Family, Family] = {"lvdt": "wire", "wire": "lvdt"}
 
@@ -49,7 +56,7 @@ def saturated(
         ]
         table = np.array(cells).reshape(len(runs), len(ids), 2)
         # A limit is one in all runs: what a channel has gone beyond in another run was none.
-        table[:, :, 0] *= table[:, :, 0] > 0.97 * table[:, :, 1].max(axis=0)
+        table[:, :, 0] *= table[:, :, 0] > SAME_LIMIT * table[:, :, 1].max(axis=0)
         clipped = [k for k in range(len(ids)) if np.any(table[:, k, 0] > 0.0)]
         # A faulty rotation makes all channels of the other family look wrong in the same way.
         for k in clipped:
@@ -84,8 +91,8 @@ def _narrowed(run: GapRun, limits: dict[str, float]) -> GapRun:
         replace(
             s,
             range_si=(
-                max(s.range_si[0], -0.985 * limits[s.id]),
-                min(s.range_si[1], 0.985 * limits[s.id]),
+                max(s.range_si[0], -FLAT_TOP * limits[s.id]),
+                min(s.range_si[1], FLAT_TOP * limits[s.id]),
             ),
         )
         if s.id in limits
@@ -164,7 +171,7 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None, rough: float) ->
     same = np.sign(rotation) == side
     largest = float(mine[same].max(initial=0.0))
     below = same & (mine > IN_PROPORTION[0] * largest) & (mine < IN_PROPORTION[1] * largest)
-    top = same & (mine > 0.985 * largest)
+    top = same & (mine > FLAT_TOP * largest)
     if below.sum() < 20 or top.sum() < round(0.05 * GRID_HZ):
         return 0.0, furthest
     gain = float(np.median(mine[below] / np.maximum(expected[below], 1e-9)))
@@ -173,9 +180,7 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None, rough: float) ->
         return 0.0, furthest
     # Standing still while the rotation moves on is clipping; following at another rate is not.
     noise = float(np.std(mine[-40:]))
-    travel, moved = (
-        float(np.ptp(np.quantile(reach, (0.01, 0.99)))),
-        float(np.ptp(np.quantile(mine[top], (0.05, 0.95)))),
-    )
+    travel = float(np.ptp(np.quantile(reach, (0.01, 0.99))))
+    moved = float(np.ptp(np.quantile(mine[top], (0.05, 0.95))))
     steady = travel > (0.02 + rough) * largest + 3.0 * noise and moved < 0.5 * travel + 2.0 * noise
     return (float(np.median(reading[top])) if steady else 0.0), furthest

@@ -20,8 +20,10 @@ from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Sensor, Wiri
 from daq_app.gap.rocking_model.tolerances import (
     EXCHANGE_EACH,
     EXCHANGE_GAIN,
+    EXCHANGE_GAINS,
     EXCHANGE_MISFIT,
     FAR_FROM_UPRIGHT,
+    LIVELY,
     REVERSED_BELOW,
 )
 
@@ -76,7 +78,7 @@ def _check(run: GapRun) -> Wiring:
     size = np.sum(expected**2, axis=1)
     slope = np.array([_slope(run, name, y, e) for name, y, e in zip(ids, measured, expected, strict=True)])
     # A channel that should show next to nothing cannot be judged by its slope.
-    lively = size > 0.05 * np.median(size)
+    lively = size > LIVELY * np.median(size)
     exchanged: list[tuple[str, str]] = []
     parted = {sensor.id for sensor in run.sensors if _away_from_impacts(sensor)}
     places = 0
@@ -163,7 +165,7 @@ def _misfits(measured: FloatArray, expected: FloatArray) -> FloatArray:
     within 15 % of 1, leaves unexplained; both (k, n)."""
     power, due = np.sum(measured**2, axis=1)[:, None], np.sum(expected**2, axis=1)
     product = measured @ expected.T
-    gain = np.clip(product / np.maximum(due, 1e-30), 0.85, 1.15)
+    gain = np.clip(product / np.maximum(due, 1e-30), *EXCHANGE_GAINS)
     left = power - 2.0 * gain * product + gain**2 * due
     return np.asarray(left / np.maximum(np.maximum(power, due), 1e-30))
 
