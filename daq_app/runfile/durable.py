@@ -21,7 +21,7 @@ _REPLACE_WAITS_S: Final = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 (assumed). Longer waits keep the operator waiting where a person has the file open."""
 
 
-def create_anew(path: Path) -> int:
+def create_anew(path: Path, mode: int = 0o644) -> int:
     """A new file, open for reading and writing. What stood there is removed, never written through.
 
     A name that is known beforehand (``RUN.h5.tmp``) may be a link that leads to another file.
@@ -30,7 +30,25 @@ def create_anew(path: Path) -> int:
     path.unlink(missing_ok=True)
     flags = os.O_RDWR | os.O_CREAT | os.O_EXCL
     flags |= getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
-    return os.open(path, flags, 0o644)
+    return os.open(path, flags, mode)
+
+
+def remove(path: Path) -> bool:
+    """Remove a file, waiting a little where Windows refuses it; whether it is gone. Never raises `OSError`.
+
+    A virus scanner, or a viewer that reads the file at that moment, lets go soon. What stays is of no harm
+    where this is used: it must not turn what has been done into a failure.
+    """
+    for wait_s in (*_REPLACE_WAITS_S, None):
+        try:
+            path.unlink(missing_ok=True)
+            return True
+        except PermissionError:
+            if wait_s is not None:
+                time.sleep(wait_s)
+        except OSError:
+            return False
+    return False
 
 
 def write_whole(path: Path, content: bytes | str, *, other_name: bool = False) -> Path:
@@ -46,7 +64,7 @@ def write_whole(path: Path, content: bytes | str, *, other_name: bool = False) -
             file.write(data)
         return replace_durably(beside, path, other_name=other_name)
     finally:
-        beside.unlink(missing_ok=True)
+        remove(beside)
 
 
 def name_beside(path: Path) -> Path:
@@ -66,7 +84,7 @@ def written_whole(path: Path) -> Iterator[Path]:
         yield beside
         replace_durably(beside, path)
     finally:
-        beside.unlink(missing_ok=True)
+        remove(beside)
 
 
 def fsync_data(fd: int) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from daq_app.runfile import durable
-from daq_app.runfile.durable import write_whole
+from daq_app.runfile.durable import remove, write_whole
 
 _REPLACE = Path.replace
 
@@ -70,3 +70,22 @@ def test_a_file_that_must_have_its_name_is_refused_and_stays_as_it_was(
     assert ledger.read_text(encoding="utf-8") == "old"
     assert list(tmp_path.iterdir()) == [ledger]
     assert sum(waits) < 2.0
+
+
+@pytest.mark.parametrize(("attempts", "gone"), [(0, True), (4, True), (float("inf"), False)])
+def test_a_file_that_another_program_reads_is_removed_once_it_is_let_go(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, waits: list[float], attempts: float, gone: bool
+) -> None:
+    path, left, unlink = tmp_path / "a.part", [attempts], Path.unlink
+    path.write_text("old", encoding="utf-8")
+
+    def refused(self: Path, *, missing_ok: bool = False) -> None:
+        if left[0] > 0:
+            left[0] -= 1
+            raise PermissionError(13, "Access is denied", str(self))
+        unlink(self, missing_ok=missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", lambda self, missing_ok=False: refused(self, missing_ok=missing_ok))
+    assert remove(path) is gone
+    assert path.exists() is not gone
+    assert len(waits) == min(attempts, 6)

@@ -39,6 +39,7 @@ from daq_app.runfile import (
     read_journal,
     rig_of,
 )
+from daq_app.runfile.durable import replace_durably
 from daq_app.runfile.folder import find_journals, find_runs
 from daq_app.runfile.journal.locks import journal_locked
 
@@ -120,7 +121,7 @@ def _keep_release(segments: list[JournalContents], session: str, out: Path) -> P
     part.unlink(missing_ok=True)
     with JournalWriter(part, whole) as writer:
         _write_run(rig, whole, segments, first, writer)
-    part.replace(path)
+    replace_durably(part, path)
     return path
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 from pathlib import Path
 from typing import Final
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+
+from daq_app.runfile import RunFileError
+from daq_app.runfile.durable import create_anew, name_beside, remove, replace_durably
 
 NAME: Final = ".acquisition.json"
 _MAX_BYTES: Final = 64 * 1024
@@ -25,13 +27,23 @@ class SessionFile(BaseModel):
 
 
 def write_session_file(folder: Path, content: SessionFile) -> Path:
-    """Write it for nobody else's eyes; replaces what a dead session left."""
+    """Write it for nobody else's eyes; replaces what a dead session left. Raises `RunFileError`.
+
+    A viewer that looks for a session may be reading what is replaced, which Windows refuses meanwhile.
+    """
     path = folder / NAME
-    path.unlink(missing_ok=True)
-    fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    with os.fdopen(fd, "w", encoding="utf-8") as file:
-        file.write(content.model_dump_json(indent=1))
-    return path
+    beside = name_beside(path)
+    try:
+        with os.fdopen(create_anew(beside, 0o600), "wb") as file:
+            file.write(content.model_dump_json(indent=1).encode())
+        return replace_durably(beside, path)
+    except OSError as error:
+        raise RunFileError(
+            f"{path} cannot be written ({error.strerror or error})",
+            advice="Viewers find the acquisition by it: close the program that has it open, and start again.",
+        ) from error
+    finally:
+        remove(beside)
 
 
 def read_session_file(folder: Path) -> SessionFile | None:
@@ -47,5 +59,4 @@ def read_session_file(folder: Path) -> SessionFile | None:
 
 def remove_session_file(folder: Path) -> None:
     """The session has ended."""
-    with contextlib.suppress(OSError):
-        (folder / NAME).unlink(missing_ok=True)
+    remove(folder / NAME)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from daq_app.runfile import layout
-from daq_app.runfile.durable import fsync_file, replace_durably
+from daq_app.runfile.durable import fsync_file, remove, replace_durably
 from daq_app.runfile.errors import RunFileError
 from daq_app.runfile.hdf5.chunks import chunk_samples
 from daq_app.runfile.hdf5.read import open_run
@@ -33,15 +33,15 @@ def finalise(
 ) -> Path:
     """Make the run file of a closed journal and return `out`.
 
-    The journal is left beside the run unless `keep_journal` is false; then it is deleted once the run
-    has its name.  If `out` is already the run of this journal nothing is done.  Raises `RunFileError`
-    if the journal is still being written or holds no samples, if `out` is another run, or if the disk
-    lacks room: the journal is untouched then.
+    The journal is left beside the run unless `keep_journal` is false; then it is removed once the run
+    has its name, unless another program holds it.  If `out` is already the run of this journal nothing
+    is done.  Raises `RunFileError` if the journal is still being written or holds no samples, if `out`
+    is another run, or if the disk lacks room: the journal is untouched then.
     """
     with journal_locked(journal), read_journal(journal) as contents:
         finalise_contents(contents, out, derived)
     if not keep_journal:
-        journal.unlink()
+        remove(journal)
     return out
 
 
@@ -77,7 +77,7 @@ def save_run(
             advice="What it is made from is untouched; a journal becomes a run with `daq-app recover`.",
         ) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        remove(temporary)
 
 
 def require_space(folder: Path, n_bytes: int) -> None:
