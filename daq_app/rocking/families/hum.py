@@ -54,8 +54,11 @@ def find_hum(rows: Floats, noises: Sequence[float], rate_hz: float) -> Hum | Non
     window = np.hanning(groups)
     length = 1 << int(4 * groups - 1).bit_length()
     spectrum = np.fft.rfft((means - means.mean(axis=1, keepdims=True)) * window, length, axis=1)
-    frequency = np.arange(spectrum.shape[1]) * rate / length
-    power = (np.abs(spectrum) ** 2).max(axis=0)
+    # Only what lies about the lines is looked at.
+    first = int((_BANDS_HZ[0][0] - 2.0 * _AROUND_HZ) * length / rate)
+    last = int((_BANDS_HZ[-1][1] + 2.0 * _AROUND_HZ) * length / rate)
+    frequency = np.arange(first, last) * rate / length
+    power = (np.abs(spectrum[:, first:last]) ** 2).max(axis=0)
     best: tuple[float, float] | None = None
     for low, high in _BANDS_HZ:
         inside = np.flatnonzero((frequency > low) & (frequency < high))
@@ -64,7 +67,7 @@ def find_hum(rows: Floats, noises: Sequence[float], rate_hz: float) -> Hum | Non
         top = int(inside[np.argmax(power[inside])])
         clearness = float(np.sqrt(power[top] / max(float(np.median(power[around])), 1e-300)))
         if clearness > _CLEAR and (best is None or clearness > best[0]):
-            best = (clearness, _vertex(power, top) * rate / length)
+            best = (clearness, (first + top + _vertex(power, top)) * rate / length)
     if best is None:
         return None
     line_hz = best[1]
@@ -78,7 +81,7 @@ def find_hum(rows: Floats, noises: Sequence[float], rate_hz: float) -> Hum | Non
 
 
 def _vertex(power: Floats, top: int) -> float:
-    """Place of the maximum by a parabola through the logarithms of three neighbours."""
+    """How far the maximum lies beyond `top`, by a parabola through the logarithms of three neighbours."""
     left, middle, right = np.log(power[top - 1 : top + 2] + 1e-300)
     bend = left - 2.0 * middle + right
-    return top + (0.5 * float((left - right) / bend) if bend else 0.0)
+    return 0.5 * float((left - right) / bend) if bend else 0.0

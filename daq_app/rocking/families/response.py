@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,15 +126,35 @@ class _Pair:
     follower: Floats
     step_s: float
 
+    @cached_property
+    def both(self) -> NDArray[np.bool_]:
+        """(n,) where both are known."""
+        return np.asarray(np.isfinite(self.reference) & np.isfinite(self.follower))
+
     @property
     def known(self) -> int:
-        return int(np.count_nonzero(np.isfinite(self.reference) & np.isfinite(self.follower)))
+        return int(np.count_nonzero(self.both))
+
+    @cached_property
+    def _places(self) -> Floats:
+        return np.arange(self.reference.size, dtype=np.float64)
+
+    @cached_property
+    def _filled(self) -> Floats:
+        """The reference, straight across its gaps."""
+        known = np.isfinite(self.reference)
+        return np.interp(self._places, self._places[known], self.reference[known])
+
+    @cached_property
+    def _rest(self) -> tuple[Floats, Floats]:
+        """Columns of the offset and the drift where both are known, and the follower there."""
+        time = (self._places - self._places.mean()) * self.step_s
+        known = time[self.both]
+        return np.column_stack([np.ones(known.size), known]), self.follower[self.both]
 
     def solved(self, delay_s: float, response_s: float) -> _Solved:
         """Linear part for a delay and a response: residuals where both are known."""
-        n = np.arange(self.reference.size, dtype=np.float64)
-        known = np.isfinite(self.reference)
-        filled = np.interp(n, n[known], self.reference[known])
+        n, filled = self._places, self._filled
         if delay_s:
             filled = np.interp(n - delay_s / self.step_s, n, filled)
         if response_s > 0.0:
@@ -142,10 +163,8 @@ class _Pair:
             b = 1.0 - (1.0 - a) * response_s / self.step_s
             start = np.array([filled[0] * (1.0 - b)])
             filled, _ = lfilter([b, 1.0 - a - b], [1.0, -a], filled, zi=start)
-        good = known & np.isfinite(self.follower)
-        time = (n - n.mean()) * self.step_s
-        table = np.column_stack([filled[good], np.ones(int(good.sum())), time[good]])
-        y = self.follower[good]
+        rest, y = self._rest
+        table = np.column_stack([filled[self.both], rest])
         normal = table.T @ table
         solution = np.linalg.solve(normal, table.T @ y)
         left = y - table @ solution

@@ -70,6 +70,8 @@ class MotionTrack:
     """Impacts as detected."""
     arcs: list[Arc | None] = field(default_factory=list)
     """Arc n ends at impact n + 1; None where it could not be fitted."""
+    _impacts: list[ImpactTime] = field(default_factory=list, init=False, repr=False, compare=False)
+    """Found when first asked for; the next half-cycle changes the last of them."""
 
     @classmethod
     def begin(
@@ -115,6 +117,7 @@ class MotionTrack:
         )
         self.crossings_s.extend(crossings_s)
         self.arcs.extend(arcs)
+        self._impacts = []
         return arcs
 
     def fitted_again(
@@ -134,7 +137,9 @@ class MotionTrack:
     @property
     def impacts(self) -> list[ImpactTime]:
         """Impact times with their errors."""
-        return [self._impact(index) for index in range(len(self.crossings_s))]
+        if len(self._impacts) != len(self.crossings_s):
+            self._impacts = [self._impact(index) for index in range(len(self.crossings_s))]
+        return self._impacts
 
     def _impact(self, index: int) -> ImpactTime:
         before = self.arcs[index]
