@@ -21,6 +21,7 @@ from daq_app.gap.rocking_model.tolerances import (
     EXCHANGE_EACH,
     EXCHANGE_GAIN,
     EXCHANGE_GAINS,
+    EXCHANGE_LEAST,
     EXCHANGE_MISFIT,
     FAR_FROM_UPRIGHT,
     LIVELY,
@@ -142,14 +143,14 @@ def _order(misfit: FloatArray) -> tuple[list[int], int]:
     order = list(range(n))
     known = np.flatnonzero(misfit.min(axis=1) < EXCHANGE_MISFIT)
     table = misfit[np.ix_(known, known)]
-    if known.size < 2 or float(np.trace(table)) <= EXCHANGE_MISFIT:
+    if known.size < 2 or float(np.trace(table)) <= EXCHANGE_LEAST:
         return order, 0
     at = np.arange(known.size)
     _, best = linear_sum_assignment(table + EXCHANGE_EACH * (1.0 - np.eye(known.size)))
     # Those that stay where they are misfit before and after: they say nothing about the others' plugs.
     moved = at != best
     straight, after = float(table[at, at][moved].sum()), float(table[at, best][moved].sum())
-    if straight <= EXCHANGE_MISFIT or after >= EXCHANGE_GAIN * straight:
+    if straight <= EXCHANGE_LEAST or after >= EXCHANGE_GAIN * straight:
         return order, 0
     left = float(table[at, best].sum())
     for i, j in zip(known, known[best], strict=True):

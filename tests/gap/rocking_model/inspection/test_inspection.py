@@ -122,6 +122,15 @@ def test_exchanged_plugs_are_put_back() -> None:
     assert "WP-1 and WP-4 exchanged" in _words(crossed)
 
 
+@pytest.mark.parametrize("pair", [("WP-1", "WP-2"), ("WP-2", "WP-3"), ("WP-3", "WP-4")])
+def test_exchanged_neighbours_are_seen(pair: tuple[str, str]) -> None:
+    """With a gain of its own each shows nearly what the other should."""
+    (run,) = simulate({}, ONE)
+    _exchange(run, *pair)
+    _, wiring = mend([run])
+    assert dict(wiring.exchanged) == dict([pair, pair[::-1]])
+
+
 def test_a_plug_is_scanned_when_it_was_and_after_the_same_one_wherever_its_sensor_is_put_back() -> None:
     (run,) = simulate({}, ONE)
     place = {sensor.id: i for i, sensor in enumerate(run.sensors)}
