@@ -22,6 +22,7 @@ from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import extract
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun, Sensor, Survey
+from daq_app.gap.rocking_model.run_cache import RunCache
 from daq_app.gap.rocking_model.study import diagnose_runs, model_and_library, prepare
 from sim_hardware.direct import synthesise_test
 
@@ -76,7 +77,7 @@ def _growth(prepared: list[RockingRun]) -> list[Figure]:
     found = []
     for runs, share in ((3, 1.0), (6, 1.0), (12, 1.0), (6, 0.25), (6, 0.5)):
         kept = library.without(*names[round(share * len(names)) :])
-        fresh = [replace(run, cache={}) for run in prepared[:runs]]
+        fresh = [replace(run, cache=RunCache()) for run in prepared[:runs]]
         start = time.process_time()
         diagnose(model, fresh, kept, Options(workers=1))
         spent = time.process_time() - start
