@@ -127,7 +127,7 @@ def figures() -> list[Figure]:
             times[0],
             "s",
             1,
-            aim=30.0,
+            aim=5.0,
             note=f"{cores} cores, features and start of all included; {result.decision.verdict}: {named}",
         ),
         Figure("the same once more, processes there", statistics.median(times[1:]), "s", _DIAGNOSES - 1),
