@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from typing import Any, NamedTuple, TypeVar
 
+_BY_NAME = "a part of a prediction asks for values by name"
 _KEPT = 6
 """Results kept of each part: a fit goes back to its last values after every step of its differences."""
 T = TypeVar("T")
@@ -95,6 +96,7 @@ class _Watched(Mapping[str, float]):
         return key in self.plain
 
     def __iter__(self) -> Iterator[str]:
-        raise TypeError("a part of a prediction asks for values by name")
+        raise TypeError(_BY_NAME)
 
-    __len__ = __iter__  # type: ignore[assignment]
+    def __len__(self) -> int:
+        raise TypeError(_BY_NAME)
