@@ -84,7 +84,7 @@ def publish(
             values,
             scheduler or workers,
         )
-        Console().print(f"{target}: {len(found)} tests", highlight=False, markup=False, soft_wrap=True)
+        Console().print(f"{target}: {_tests(len(found))}", highlight=False, markup=False, soft_wrap=True)
         if as_zip:
             made = _zipped(target)
             Console().print(f"{made}: the same, as one file", highlight=False, markup=False, soft_wrap=True)
@@ -100,7 +100,11 @@ def _write_template(folder: Path, campaign: Campaign, names: list[str], plan_fil
     if path.exists():
         raise RunFileError(f"{path} exists already", advice="Fill it in, or move it away first.")
     write_whole(path, fields_template(campaign.fields, names))
-    echo(f"{path}: a row for each of {len(names)} tests")
+    echo(f"{path}: a row for each test, {_tests(len(names))}")
+
+
+def _tests(count: int) -> str:
+    return "1 test" if count == 1 else f"{count} tests"
 
 
 def _checked(
