@@ -42,8 +42,8 @@ PACKAGES: Final = (
     "daq_app.cli",
 )
 DIAGNOSIS: Final = ("daq_app/gap/core", "daq_app/gap/rocking_model")
-POLICY: Final = ("policy.py", "tolerances.py")
-"""Modules in which numbers that decide may stand."""
+POLICY: Final = ("policy", "tolerances")
+"""Modules and folders in which numbers that decide may stand."""
 _PLAIN: Final = frozenset({0.0, 1.0, 2.0, 0.5})
 """Numbers in a comparison that belong to its form and decide nothing by their size."""
 _CLIPS: Final = frozenset({"min", "max", "clip", "minimum", "maximum"})
@@ -204,7 +204,7 @@ def _numbers(folder: Path) -> Measures:
     for place in DIAGNOSIS:
         for file in sorted((folder / place).rglob("*.py")):
             tree = ast.parse(file.read_text(encoding="utf-8"))
-            inside = file.name in POLICY
+            inside = file.stem in POLICY or file.parent.name in POLICY
             named[inside] += len(list(named_constants(tree, fields=inside)))
             bare += len(list(bare_floats(tree)))
     return {

@@ -9,7 +9,7 @@ from dataclasses import replace
 from daq_app.gap.core import Confusion, Effect, Indistinguishable, Library, Parameter
 from daq_app.gap.core.parameters import between, positive, signed
 from daq_app.gap.rocking_model.probes import departures, probes
-from daq_app.gap.rocking_model.tolerances import NEGLIGIBLE
+from daq_app.gap.rocking_model.tolerances.walls import NEGLIGIBLE
 from sim_hardware.dynamics.effects import MOTION_EFFECTS
 from sim_hardware.dynamics.spec import EffectSpec
 from sim_hardware.dynamics.spec import Parameter as SpecParameter

@@ -25,7 +25,7 @@ from daq_app.gap.rocking_model.inspection.inspect_runs import (
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun, check_consistent
-from daq_app.gap.rocking_model.tolerances import EITHER, FAR_FROM_SURVEY
+from daq_app.gap.rocking_model.tolerances.walls import EITHER, FAR_FROM_SURVEY
 from daq_app.workers import warm_up
 
 PRELOADED: Final = "daq_app.gap.rocking_model.prediction.preloaded"

@@ -16,7 +16,8 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.noise import coefficient_covariance
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Wire
-from daq_app.gap.rocking_model.tolerances import CALIBRATION, REMAINS_SD, SOUND
+from daq_app.gap.rocking_model.tolerances.inspection import REMAINS_SD, SOUND
+from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION
 
 _SHAPES = ("gain", "lag", "curvature", "drift")
 _GAIN, _CURVATURE = _SHAPES.index("gain"), _SHAPES.index("curvature")

@@ -18,7 +18,7 @@ from daq_app.gap.rocking_model.features.oscillations.floor_response import floor
 from daq_app.gap.rocking_model.features.oscillations.ring_response import bending, turning
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.records import Survey
-from daq_app.gap.rocking_model.tolerances import CROSSTALK
+from daq_app.gap.rocking_model.tolerances.sensors import CROSSTALK
 
 BIAS = "bias_"
 """Prefix of the parameters that say what sound sensors may be off by in all runs."""

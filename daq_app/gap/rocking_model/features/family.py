@@ -16,7 +16,7 @@ from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Rotation
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
-from daq_app.gap.rocking_model.tolerances import SWAY_SHARE
+from daq_app.gap.rocking_model.tolerances.walls import SWAY_SHARE
 
 Predict = Callable[[RockingRun, Block, Mapping[str, float]], FloatArray]
 """Predicted coefficients, (k,), of a block of a run at the values of a hypothesis."""

@@ -17,7 +17,7 @@ from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rigid_body import across_axes
 from daq_app.gap.rocking_model.motion.rotation import coarse, gridded, sooner, wall_rotation, zeroed
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances import CALIBRATION, CROSSTALK, MOUNT_RAD
+from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, CROSSTALK, MOUNT_RAD
 
 _SMOOTH_S = 0.04
 """Window over which accelerations are averaged: with 30 ms of ringing it stays within the mask of 50 ms."""

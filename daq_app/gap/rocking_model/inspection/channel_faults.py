@@ -28,7 +28,7 @@ from daq_app.gap.rocking_model.inspection.channel_families import ChannelFamily,
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Wire
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances import AS_SINGLE, OTHERS_AGREE, REMAINS, SUSPECT
+from daq_app.gap.rocking_model.tolerances.inspection import AS_SINGLE, OTHERS_AGREE, REMAINS, SUSPECT
 
 CROWDED: tuple[Family, ...] = ("lvdt", "accelerometer")
 """Families in which several channels may be wrong and the others still say so."""

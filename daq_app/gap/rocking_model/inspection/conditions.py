@@ -27,7 +27,7 @@ from daq_app.gap.rocking_model.inspection.spikes import (
     shaken_samples,
 )
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances import (
+from daq_app.gap.rocking_model.tolerances.inspection import (
     CONVERTER_STEP,
     FEWEST_STEPS,
     FROZEN_S,

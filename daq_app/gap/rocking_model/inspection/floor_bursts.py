@@ -20,7 +20,7 @@ from daq_app.gap.rocking_model.features.oscillations.rings import Ring, cleaner,
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
-from daq_app.gap.rocking_model.tolerances import BURST_SD, SHAKEN_POWER
+from daq_app.gap.rocking_model.tolerances.walls import BURST_SD, SHAKEN_POWER
 
 WINDOW_S = 0.5
 """Half-cycles whose middles are this near count together …"""

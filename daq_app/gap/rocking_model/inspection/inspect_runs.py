@@ -30,7 +30,9 @@ from daq_app.gap.rocking_model.inspection.second_axis import second_axis
 from daq_app.gap.rocking_model.inspection.vertical import odd_vertical, vertical_block
 from daq_app.gap.rocking_model.inspection.wiring import mend
 from daq_app.gap.rocking_model.records import GapRun, Wiring
-from daq_app.gap.rocking_model.tolerances import COUNT_SD, LATE_S, MIDDLE_OF_IMPACT_S
+from daq_app.gap.rocking_model.tolerances.inspection import COUNT_SD
+from daq_app.gap.rocking_model.tolerances.sensors import LATE_S
+from daq_app.gap.rocking_model.tolerances.walls import MIDDLE_OF_IMPACT_S
 
 _SPOILING = ("quantisation", "dropout", "saturation", "spikes")
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer", "tiltmeter")

@@ -19,7 +19,7 @@ from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined
 from daq_app.gap.rocking_model.motion.rotation import straight_line, wall_rotation
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances import CALIBRATION
+from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION
 
 DRAWS = 40
 """Zeros and calibrations that are tried."""

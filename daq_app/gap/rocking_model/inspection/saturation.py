@@ -21,7 +21,7 @@ from daq_app.gap.rocking_model.motion.rotation import (
     zeroed,
 )
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances import (
+from daq_app.gap.rocking_model.tolerances.inspection import (
     BEYOND_FAMILY,
     FLAT_TOP,
     GOES_ON,

@@ -12,7 +12,7 @@ from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import coarse, zeroed
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances import MOUNT_SD, TURNED
+from daq_app.gap.rocking_model.tolerances.inspection import MOUNT_SD, TURNED
 
 
 def second_axis(runs: Sequence[GapRun], grids: Sequence[Grid]) -> list[list[RunFinding]]:

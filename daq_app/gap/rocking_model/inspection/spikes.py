@@ -8,7 +8,7 @@ from scipy.ndimage import maximum_filter1d
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances import LOUD_NOISE, LOUD_TOGETHER, SPIKE_NOISE
+from daq_app.gap.rocking_model.tolerances.inspection import LOUD_NOISE, LOUD_TOGETHER, SPIKE_NOISE
 from daq_app.rocking.geometry.noise import white_noise
 
 Mask = NDArray[np.bool_]

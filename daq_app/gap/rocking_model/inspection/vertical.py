@@ -27,7 +27,8 @@ from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rigid_body import across_axes, lever_arm
 from daq_app.gap.rocking_model.motion.rotation import straight_line
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
-from daq_app.gap.rocking_model.tolerances import CROSSTALK, MOUNT_RAD, SUSPECT, VERTICAL_OTHERS
+from daq_app.gap.rocking_model.tolerances.inspection import SUSPECT, VERTICAL_OTHERS
+from daq_app.gap.rocking_model.tolerances.sensors import CROSSTALK, MOUNT_RAD
 
 
 def odd_vertical(runs: Sequence[GapRun], grids: Sequence[Grid], late_s: Sequence[float]) -> str | None:

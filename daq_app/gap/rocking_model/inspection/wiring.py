@@ -17,7 +17,7 @@ from daq_app.gap.rocking_model.features.response import first_order
 from daq_app.gap.rocking_model.motion.late_joint import common_lateness
 from daq_app.gap.rocking_model.motion.rotation import zeroed
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Sensor, Wiring
-from daq_app.gap.rocking_model.tolerances import (
+from daq_app.gap.rocking_model.tolerances.inspection import (
     EXCHANGE_EACH,
     EXCHANGE_GAIN,
     EXCHANGE_GAINS,

@@ -11,7 +11,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
-from daq_app.gap.rocking_model.tolerances import IMPACT_FORM_S
+from daq_app.gap.rocking_model.tolerances.walls import IMPACT_FORM_S
 
 MOST = 14
 """Impacts used: the first ones are the loudest."""

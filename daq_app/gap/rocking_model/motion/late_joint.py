@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.motion_grid import MASK_S, Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Rotation, coarse, sooner
-from daq_app.gap.rocking_model.tolerances import MOST_LATE_S
+from daq_app.gap.rocking_model.tolerances.sensors import MOST_LATE_S
 
 
 @dataclass(frozen=True, slots=True)

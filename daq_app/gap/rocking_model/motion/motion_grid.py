@@ -14,7 +14,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.rotation import coarse
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import Survey
-from daq_app.gap.rocking_model.tolerances import AS_FROM_REST
+from daq_app.gap.rocking_model.tolerances.walls import AS_FROM_REST
 
 SMOOTH_HZ = 30.0
 POLYNOMIAL_DEGREE = 8

@@ -14,7 +14,7 @@ import numpy as np
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import Survey
-from daq_app.gap.rocking_model.tolerances import RELEASE_SPEED_RAD_S
+from daq_app.gap.rocking_model.tolerances.walls import RELEASE_SPEED_RAD_S
 
 BEFORE_S, AFTER_S = 0.06, 0.10
 SEARCHED_S = 0.05

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.records import GapRun, Sensor, Vector3
-from daq_app.gap.rocking_model.tolerances import FEWEST_LVDTS, LVDT_MISFIT
+from daq_app.gap.rocking_model.tolerances.sensors import FEWEST_LVDTS, LVDT_MISFIT
 from daq_app.rocking.geometry.joint import BaseJoint, at_range_end
 from daq_app.rocking.geometry.noise import timing_noise
 from daq_app.rocking.geometry.wires import wire_rotation, wire_shortening

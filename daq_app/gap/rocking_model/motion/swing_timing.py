@@ -11,13 +11,13 @@ from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import gridded, straight_line
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
-from daq_app.gap.rocking_model.tolerances import (
+from daq_app.gap.rocking_model.tolerances.sensors import (
     ACCELEROMETER_SPREAD_M,
     DELAY_FORM,
     DELAY_WITHOUT_ONE,
     LATE_S,
-    MIDDLE_OF_IMPACT_S,
 )
+from daq_app.gap.rocking_model.tolerances.walls import MIDDLE_OF_IMPACT_S
 
 _ROUNDS = 3
 

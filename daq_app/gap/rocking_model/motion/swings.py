@@ -13,7 +13,7 @@ from scipy.signal import butter, sosfiltfilt
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.rotation import HOLD_S
-from daq_app.gap.rocking_model.tolerances import SMALLEST_RAD
+from daq_app.gap.rocking_model.tolerances.walls import SMALLEST_RAD
 from sim_hardware.dynamics.parameters import REST_AMPLITUDE_RAD
 
 FRACTIONS = (0.85, 0.5, 0.15)

@@ -19,7 +19,7 @@ from daq_app.gap.rocking_model.prediction.true_motion import pause_at_impact, tr
 from daq_app.gap.rocking_model.prediction.vector import half_cycle_table, kernel_vector, restitution_of
 from daq_app.gap.rocking_model.prediction.wires_alone import times_carry
 from daq_app.gap.rocking_model.records import Survey
-from daq_app.gap.rocking_model.tolerances import PUSH_RAD_S
+from daq_app.gap.rocking_model.tolerances.walls import PUSH_RAD_S
 from sim_hardware.dynamics import shooting
 
 SCATTER_R = "scatter of r"

@@ -28,7 +28,8 @@ from daq_app.gap.rocking_model.motion.rigid_body import across_axes
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.motion.swing_timing import swing_delay
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, Survey
-from daq_app.gap.rocking_model.tolerances import CALIBRATION, MIDDLE_OF_IMPACT_S, MOUNT_RAD
+from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, MOUNT_RAD
+from daq_app.gap.rocking_model.tolerances.walls import MIDDLE_OF_IMPACT_S
 
 _TURNED = "turned_accelerometers"
 """Parameter of the mean angle by which the accelerometers along x are turned on their mounts, rad."""

@@ -22,7 +22,7 @@ from daq_app.gap.rocking_model.motion.late_joint import in_step
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Rotation, coarse
 from daq_app.gap.rocking_model.records import GapRun, Survey
-from daq_app.gap.rocking_model.tolerances import CALIBRATION, SKEW_S
+from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, SKEW_S
 
 FACE_SKEW = "face_skew"
 """Parameter by which the two faces are sampled apart: the face that opens is the one that tells the time."""

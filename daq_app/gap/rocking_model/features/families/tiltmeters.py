@@ -26,7 +26,7 @@ from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.records import Survey
-from daq_app.gap.rocking_model.tolerances import CALIBRATION, SHORTEST_TILT_S, SKEW_S, TILT_CONSTANT
+from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, SHORTEST_TILT_S, SKEW_S, TILT_CONSTANT
 
 _ROUNDS = 12
 _DELAY = "tilt_delay"

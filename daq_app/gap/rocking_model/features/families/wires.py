@@ -44,7 +44,7 @@ from daq_app.gap.rocking_model.motion.rotation import (
     wall_rotation,
 )
 from daq_app.gap.rocking_model.records import GapRun, Survey
-from daq_app.gap.rocking_model.tolerances import CALIBRATION, OTHER_WIRES
+from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, OTHER_WIRES
 
 _TURNS = 8
 """Impacts at which a turn about the vertical is looked for: those with most speed."""

@@ -21,7 +21,7 @@ from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.quiet import quiet
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
-from daq_app.gap.rocking_model.tolerances import FLOOR_GAIN
+from daq_app.gap.rocking_model.tolerances.walls import FLOOR_GAIN
 
 FREQUENCIES_HZ = np.arange(0.4, 6.0, 0.02)
 _REST_MARGIN_S = 0.3

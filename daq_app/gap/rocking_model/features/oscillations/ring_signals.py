@@ -14,7 +14,8 @@ from daq_app.gap.rocking_model.motion.impact_timing import acceleration_delay
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Rotation, coarse, gridded, wall_rotation
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
-from daq_app.gap.rocking_model.tolerances import CALIBRATION, MIDDLE_OF_IMPACT_S, RING_LATE_S
+from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, RING_LATE_S
+from daq_app.gap.rocking_model.tolerances.walls import MIDDLE_OF_IMPACT_S
 
 DISPLACEMENT_MASK_S = 0.02
 """A base that gives way takes milliseconds to turn after an impact: a quick decay, but no ring-down."""

@@ -21,7 +21,7 @@ from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal
 from daq_app.gap.rocking_model.features.response import resonator
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
-from daq_app.gap.rocking_model.tolerances import RING_SD, VAGUE_DAMPING
+from daq_app.gap.rocking_model.tolerances.walls import RING_SD, VAGUE_DAMPING
 
 ComplexArray = NDArray[np.complex128]
 Columns = TypeVar("Columns", FloatArray, ComplexArray)
