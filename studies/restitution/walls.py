@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -24,10 +24,16 @@ class Wall:
 
     effect: str
     parameters: Mapping[str, float]
+    ends_s: float | None = None
+    """How long after the last impact the recording ends; as the rig file says if None."""
 
     def test(self, rig: Rig, seed: int) -> LaboratoryTest:
         """The laboratory of `seed` with this wall."""
-        return draw_test(rig, seed, effects={self.effect: self.parameters} if self.effect else {})
+        test = draw_test(rig, seed, effects={self.effect: self.parameters} if self.effect else {})
+        if self.ends_s is None:
+            return test
+        end = round((test.truth["impact_time_s"][-1] + self.ends_s) * test.rate_hz)
+        return replace(test, si=test.si[:, :end])
 
     @property
     def changes_r(self) -> bool:
@@ -38,7 +44,8 @@ class Wall:
     def name(self) -> str:
         """For a table."""
         told = ", ".join(f"{key} {value:g}" for key, value in self.parameters.items())
-        return f"{self.effect} {told}" if self.effect else "rigid block"
+        ends = "" if self.ends_s is None else f", ends {self.ends_s:g} s"
+        return f"{self.effect} {told}{ends}" if self.effect else "rigid block"
 
 
 def mean_r_of_impacts(test: LaboratoryTest) -> float:
@@ -65,6 +72,10 @@ WALLS = (
     *(Wall("dwell", {"tau": size}) for size in (0.002, 0.008)),
     *(Wall("compliance", {"phi": size}) for size in (0.0005, 0.002)),
     *(Wall("flexible_wall", {"gain": size}) for size in (0.001, 0.005)),
+    *(
+        Wall("flexible_wall", {"gain": size, "frequency": 4.6, "zeta": 0.005}, ends_s=0.7)
+        for size in (0.02, 0.2)
+    ),
     *(Wall("twist", {"kick": size}) for size in (0.01, 0.05)),
     *(Wall("residual_cable", {"k": size}) for size in (0.01, 0.05)),
     *(Wall("slow_release", {"tau": size}) for size in (0.02, 0.1)),

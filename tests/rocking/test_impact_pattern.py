@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from daq_app.rocking.families.block_checks import weaker_change_by_speed
 from daq_app.rocking.families.verdict import with_change_by_speed
 from daq_app.rocking.motion.impact_pattern import Coefficient, ImpactPattern, impact_pattern
 from daq_app.rocking.motion.swings import MotionSettings, MotionTrack
@@ -42,6 +43,13 @@ def test_the_same_change_counts_for_less_the_more_impacts_were_asked():
 def test_a_change_within_its_error_or_not_known_adds_nothing():
     assert pattern(0.004, 0.005, 0.4).sigma_r_by_speed == 0.0
     assert ImpactPattern(None, None, None, None, math.nan, math.nan, math.nan).sigma_r_by_speed == 0.0
+
+
+@pytest.mark.parametrize(("change", "severity"), [(0.006, "info"), (0.02, "warning")])
+def test_a_change_that_scatter_may_make_is_a_warning_from_what_it_adds_to_the_error_on(change, severity):
+    (told,) = weaker_change_by_speed(pattern(change, 0.002, 0.02))
+
+    assert (told.kind, told.severity) == ("speed", severity)
 
 
 def test_intervals_of_r_that_scatters_hold_the_share_that_they_promise():

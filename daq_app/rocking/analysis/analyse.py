@@ -71,8 +71,8 @@ def _analyse(
     options: AnalysisOptions,
 ) -> TestAnalysis:
     signals, times = instruments.signals, instruments.times
-    slow = any(finding.kind == "slow" for finding in instruments.findings)
-    tracks = follow_families(signals, times, fuse=not slow)
+    alone = any(finding.kind in ("slow", "bending") for finding in instruments.findings)
+    tracks = follow_families(signals, times, fuse=not alone)
     track = tracks.lead
     side = 1 if track.theta0_rad > 0 else -1
     peaks = filtered_peaks(signals.time_s, velocity, track.impacts_s)
@@ -80,9 +80,11 @@ def _analyse(
     estimates = estimates_of(series)
     onsets = _onsets(instruments.record, signals, track)
     fit = _fit(signals, track, estimates, instruments.gain_sigma) if options.fit else None
-    theta0 = theta0_by_family(signals, track, instruments.gains)
+    theta0 = theta0_by_family(signals, track, instruments.gains, instruments.bent_at_rest_rad)
     joint = summarise_joint(instruments.record, signals, track) if signals.joint is not None else None
-    further = levels_apart(theta0)
+    bends = instruments.bending is not None
+    # Wires and tiltmeters share the bending: that they agree speaks for neither.
+    further = [] if bends else levels_apart(theta0)
     pattern = pattern_of(instruments, tracks, further)
     by_speed = pattern.sigma_r_by_speed
     further += wall_findings(instruments, tracks, joint, further, pattern)
@@ -94,7 +96,7 @@ def _analyse(
         for name, estimate in estimates.items()
     }
     fit = None if fit is None else _for_this_wall(fit, findings, by_speed)
-    headline = theta0.get("tiltmeters", theta0["wires"])
+    headline = theta0[signals.lead] if bends else theta0.get("tiltmeters", theta0["wires"])
     bias = _bias(record, signals, track, estimates, velocity_filter, options)
     analysis = TestAnalysis(
         label=record.label,

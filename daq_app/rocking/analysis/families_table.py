@@ -22,6 +22,7 @@ from daq_app.rocking.families.verdict import (
     families_apart,
     judge,
     methods_apart,
+    with_alpha_of_survey,
     with_change_by_speed,
 )
 from daq_app.rocking.motion.swings import MotionTrack
@@ -31,6 +32,7 @@ from daq_app.rocking.theory.block import RigidBlock
 
 LEADS = {"wires": "wires", "lvdts": "LVDTs"}
 """Families that a motion can be read from: the reader's word by the key."""
+_FOLLOWS_BADLY = ("slow", "late", "drift", "bending")
 
 
 def families_of(
@@ -149,6 +151,7 @@ def verdict_of(
         disagreements.append(disagreement)
         findings.append(words.not_housner(disagreement))
     eav, crt = (with_change_by_speed(estimates[name], sigma_by_speed) for name in ("eav", "crt_exact"))
+    crt = with_alpha_of_survey(crt, findings)
     verdict = judge(eav, crt, LEADS[lead], findings, disagreements)
     return verdict, tuple(findings)
 
@@ -156,6 +159,8 @@ def verdict_of(
 def other_is_blamed(findings: Sequence[FamilyFinding], other: str) -> bool:
     """Whether the family that does not lead, ``wires`` or ``lvdts``, is known to follow the wall badly."""
     return any(
-        f.kind in ("slow", "late", "drift") and LEADS[other] in f.family and f.treatment != "put in step"
+        f.kind in ("slow", "late", "drift", "bending")
+        and LEADS[other] in f.family
+        and f.treatment != "put in step"
         for f in findings
     )

@@ -16,24 +16,32 @@ from daq_app.rocking.motion.swings import MotionTrack, steady_level
 _NAMES = {"tiltmeters": "tiltmeters", "wires": "wires", "lvdts": "LVDTs"}
 
 
-def theta0_by_family(signals: Signals, track: MotionTrack, gains: FamilyGains) -> dict[str, ValueWithSigma]:
-    """θ0 over the last half second of the still hold (slow tiltmeters have settled), and the best."""
+def theta0_by_family(
+    signals: Signals, track: MotionTrack, gains: FamilyGains, bent_rad: float = 0.0
+) -> dict[str, ValueWithSigma]:
+    """θ0 over the last half second of the still hold (slow tiltmeters have settled), and the best.
+
+    `bent_rad`: what a wall that bends adds to the zeros of wires and tiltmeters.
+    """
     hold, rate = hold_samples(signals, track.held_until_s), signals.record.rate_hz
     zero = signals.settings.zero_sigma_rad
+    bent_zero = math.hypot(zero, bent_rad)
     theta0: dict[str, ValueWithSigma] = {}
     tilts = signals.tilts_rad[:, hold]
     value = signals.geometry.tilt(tilts, track.theta0_rad)
     if math.isfinite(value):
         _, noise = steady_level(tilts.mean(axis=0), rate)
-        theta0["tiltmeters"] = _level(value, math.hypot(noise, zero), gains.tiltmeters)
-    theta0[signals.lead] = _level(track.theta0_rad, track.sigma_theta0_rad, gains.of(signals.lead))
+        theta0["tiltmeters"] = _level(value, math.hypot(noise, bent_zero), gains.tiltmeters)
+    sigma = math.hypot(track.sigma_theta0_rad, bent_rad if signals.lead == "wires" else 0.0)
+    theta0[signals.lead] = _level(track.theta0_rad, sigma, gains.of(signals.lead))
     others = {"wires": signals.wire_rotation_rad}
     if signals.joint is not None:
         others["lvdts"] = signals.joint.rotation_rad
     for name, rotation in others.items():
         value, noise = steady_level(rotation[hold], rate)
         if name != signals.lead and math.isfinite(value):
-            theta0[name] = _level(value, math.hypot(noise, zero), gains.of(name))
+            own_zero = bent_zero if name == "wires" else zero
+            theta0[name] = _level(value, math.hypot(noise, own_zero), gains.of(name))
     theta0["best"] = best_value(theta0)
     return theta0
 

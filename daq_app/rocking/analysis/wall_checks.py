@@ -16,6 +16,7 @@ from daq_app.rocking.analysis.results import JointSummary
 from daq_app.rocking.analysis.tracks import FamilyTracks
 from daq_app.rocking.families import words
 from daq_app.rocking.families.block_checks import (
+    alpha_findings,
     duration_findings,
     pattern_findings,
     pivot_findings,
@@ -88,6 +89,7 @@ def wall_findings(
         found += weaker_hop(pattern)
     if any(f.kind == "drift" and f.treatment == "none" and LEADS[lead] in f.family for f in findings):
         found = [finding for finding in found if finding.kind not in _MADE_BY_A_DRIFT]
+    found += alpha_findings(bodies[LEADS[lead]], tracks.lead)
     if not tracks.lead.fell_freely:
         share = tracks.lead.release.residual_rad / abs(tracks.lead.theta0_rad)
         found.append(words.slow_release(share if math.isfinite(share) else 1.0))

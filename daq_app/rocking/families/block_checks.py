@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Final
 
-from daq_app.rocking.estimators import RestitutionEstimate
+from daq_app.rocking.estimators import RestitutionEstimate, estimate_all
 from daq_app.rocking.families import words
 from daq_app.rocking.families.body import BodyEstimate
 from daq_app.rocking.families.finding import FamilyFinding
@@ -20,6 +20,7 @@ from daq_app.rocking.theory.block import RigidBlock
 
 if TYPE_CHECKING:
     from daq_app.rocking.motion.motion_fit import MotionFit
+    from daq_app.rocking.motion.swings import MotionTrack
 
 R_TOLERANCE: Final = 0.002
 """What r may be off by with nothing said. Changes of r within a test count from twice this on, for the r of
@@ -44,6 +45,13 @@ _DURATION_SIGMAS: Final = 4.0
 """rms by which durations deviate from the block's, in their own errors, that is named; sound ones reach 2."""
 _FEWEST_DURATIONS: Final = 6
 """Half-cycles below which α and p take up what deviates."""
+_ALPHA_SHARE: Final = 0.03
+"""Difference of the motion's α from the survey's that is looked at: bodies that are off by 1 % (assumed) and
+a calibration stay below it. Lowering it tells what moves CRT by less than 0.0002."""
+_ALPHA_SIGMAS: Final = 4.0
+_CRT_TOLD: Final = 2e-4
+"""What α makes of CRT that is told and counted in its error; half of `R_TOLERANCE` is a warning, for scatter
+of r between impacts comes to it."""
 
 ORDINARY_SCATTER: Final = 0.006
 """Relative scatter of r from impact to impact up to which nothing is said (assumed: `campaign simulate` draws
@@ -87,15 +95,16 @@ def pattern_findings(pattern: ImpactPattern) -> list[FamilyFinding]:
 def weaker_change_by_speed(pattern: ImpactPattern) -> list[FamilyFinding]:
     """A change of r with speed in a finished test that `pattern_findings` does not name.
 
-    It is named where chance seldom makes it, and told wherever it widens the stated error of r by more than
-    what may go unsaid.
+    It is named where chance seldom makes it, and told wherever half of it is more than what may go unsaid: as
+    a warning where it adds as much to the standard error of r, however likely chance makes it.
     """
     speed = pattern.by_speed
     if speed is None or 0.5 * pattern.change_with_speed <= R_TOLERANCE:
         return []
     if speed.chance < _CHANCE_OF_SPEED:
         return [words.r_by_speed(pattern.r_fast, pattern.r_slow)]
-    return [words.r_perhaps_by_speed(pattern.r_fast, pattern.r_slow, speed.sigma)]
+    notable = pattern.sigma_r_by_speed > R_TOLERANCE
+    return [words.r_perhaps_by_speed(pattern.r_fast, pattern.r_slow, speed.sigma, notable=notable)]
 
 
 def weaker_hop(pattern: ImpactPattern) -> list[FamilyFinding]:
@@ -159,6 +168,26 @@ def duration_findings(bodies: Mapping[str, BodyEstimate | None]) -> list[FamilyF
         if sigmas > _DURATION_SIGMAS:
             findings.append(words.not_housner_durations(family, sigmas))
     return findings
+
+
+def alpha_findings(body: BodyEstimate | None, track: MotionTrack) -> list[FamilyFinding]:
+    """A survey whose α is not that of the motion, told where CRT is off by it, and named where by much.
+
+    Only durations that a block explains tell an α.
+    """
+    survey_rad = track.settings.alpha_rad
+    if body is None or not math.sqrt(body.misfit) <= _DURATION_SIGMAS:
+        return []
+    off_rad = abs(body.alpha_rad - survey_rad)
+    if not off_rad > max(_ALPHA_SHARE * survey_rad, _ALPHA_SIGMAS * body.sigma_alpha_rad):
+        return []
+    series = [track.crt_exact_series(), track.crt_exact_series(alpha_rad=body.alpha_rad)]
+    by_survey, by_motion = (estimate.r for estimate in estimate_all(series))
+    if by_survey is None or by_motion is None or abs(by_survey - by_motion) <= _CRT_TOLD:
+        return []
+    shift = by_survey - by_motion
+    share = body.alpha_rad / survey_rad - 1.0
+    return [words.alpha_of_survey(share, shift, notable=abs(shift) > 0.5 * R_TOLERANCE)]
 
 
 def pivot_findings(block: RigidBlock, inset_left_m: float, inset_right_m: float) -> list[FamilyFinding]:

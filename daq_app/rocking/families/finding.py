@@ -9,7 +9,7 @@ Family = Literal["wires", "LVDTs", "tiltmeters", "accelerometers", "survey", "wa
 Kind = Literal[
     "slow", "late", "gain", "zero", "hum", "reversed", "unit", "drift", "motion",
     "speed", "side", "loss", "pause", "hop", "duration", "scatter", "release",
-    "misfit", "pivot",
+    "misfit", "pivot", "bending", "alpha",
 ]  # fmt: skip
 Treatment = Literal["none", "left out", "put in step", "put right", "removed"]
 
@@ -25,7 +25,7 @@ class FamilyFinding:
     kind: Kind
     size: float
     """SI; a share for gain, loss, pause, hop, scatter and release, the factor for unit, a change of r for
-    speed and side, standard errors for duration."""
+    speed, side and alpha, standard errors for duration."""
     unit: str
     treatment: Treatment
     severity: Literal["info", "warning"]

@@ -123,7 +123,16 @@ def with_change_by_speed(estimate: RestitutionEstimate, sigma: float) -> Restitu
 def with_findings(estimate: RestitutionEstimate, findings: Sequence[FamilyFinding]) -> RestitutionEstimate:
     """The estimate for r at the impacts, where the wall does what is in `findings`: as in the verdict."""
     shares = [_share_of_r(finding, estimate.r) for finding in findings] if estimate.r is not None else []
-    return _widened(estimate, *shares)
+    return _widened(with_alpha_of_survey(estimate, findings), *shares)
+
+
+def with_alpha_of_survey(
+    estimate: RestitutionEstimate, findings: Sequence[FamilyFinding]
+) -> RestitutionEstimate:
+    """CRT with the error of a survey whose α is not the wall's; any other estimate as it is."""
+    if not estimate.method.startswith("CRT"):
+        return estimate
+    return _widened(estimate, *(finding.size for finding in findings if finding.kind == "alpha"))
 
 
 def _widened(estimate: RestitutionEstimate, *errors: float) -> RestitutionEstimate:
@@ -180,9 +189,10 @@ def judge(
 def _touches_r(finding: FamilyFinding) -> bool:
     """Whether r may be off by it: a gain cancels in EAV and moves CRT by 0.0001 for 1 %; no time is in r.
 
-    What a scatter makes of r is in its error, and a misfit is in the error of r by the fit alone.
+    What a scatter makes of r is in its error, what the survey's α makes of it in that of CRT, and a misfit is
+    in the error of r by the fit alone.
     """
-    return finding.kind not in ("gain", "late", "scatter", "misfit") and finding.family not in (
+    return finding.kind not in ("gain", "late", "scatter", "misfit", "alpha") and finding.family not in (
         "tiltmeters",
         "accelerometers",
     )

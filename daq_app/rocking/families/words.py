@@ -88,6 +88,22 @@ def slow(family: str, time_constant_s: float, *, left_out: bool) -> FamilyFindin
     )
 
 
+def bending(frequency_hz: float, rms_rad: float, *, left_out: bool) -> FamilyFinding:
+    """Wires that ring with a wall that bends; LVDTs at its base do not."""
+    done = (
+        "r and θ0 are taken from the LVDTs"
+        if left_out
+        else "r is off by it: the LVDTs do not reach far enough to take their place"
+    )
+    text = (
+        f"wires ring at {frequency_hz:.1f} Hz about the LVDTs at the base, {rms_rad * 1e3:.2f} mrad rms: the "
+        f"wall bends, and tiltmeters follow that as well; {done}"
+    )
+    return FamilyFinding(
+        "wires", (), "bending", rms_rad, "rad", "left out" if left_out else "none", "warning", text
+    )
+
+
 def late(family: str, by_s: float, others: str) -> FamilyFinding:
     word = "late" if by_s > 0 else "early"
     text = f"{family} are {abs(by_s) * 1e3:.1f} ms {word} against {others}: a delay unknown to the task plan"
@@ -141,13 +157,25 @@ def r_by_speed(r_fast: float, r_slow: float) -> FamilyFinding:
     return FamilyFinding("wall", (), "speed", r_slow - r_fast, "1", "none", "warning", text)
 
 
-def r_perhaps_by_speed(r_fast: float, r_slow: float, sigma: float) -> FamilyFinding:
-    """r may change with the size of the motion; the stated errors hold it."""
+def r_perhaps_by_speed(r_fast: float, r_slow: float, sigma: float, *, notable: bool) -> FamilyFinding:
+    """r may change with the size of the motion; the errors hold it. A warning where it is `notable`."""
+    severity: Literal["info", "warning"] = "warning" if notable else "info"
     text = (
         f"r may change with speed: {r_fast:.3f} at the fastest impacts, {r_slow:.3f} at the slowest. The "
         f"change is known to ± {sigma:.3f}, and scatter alone may make it; the error of r holds it"
     )
-    return FamilyFinding("wall", (), "speed", r_slow - r_fast, "1", "none", "info", text)
+    return FamilyFinding("wall", (), "speed", r_slow - r_fast, "1", "none", severity, text)
+
+
+def alpha_of_survey(share: float, shift: float, *, notable: bool) -> FamilyFinding:
+    """The wall rocks with another α than the survey's; a warning where CRT is off by what is `notable`."""
+    severity: Literal["info", "warning"] = "warning" if notable else "info"
+    text = (
+        f"the wall rocks like a block whose α is {share:+.1%} off the survey's: r by the peaks (CRT) counts "
+        f"with the survey's and is {shift:+.4f} off that with the wall's own; its error holds that. Usual "
+        "causes: round or broken edges, pivots inside them, a survey of another wall"
+    )
+    return FamilyFinding("survey", (), "alpha", shift, "1", "none", severity, text)
 
 
 def r_by_side(r_right: float, r_left: float) -> FamilyFinding:

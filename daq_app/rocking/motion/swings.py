@@ -212,9 +212,11 @@ class MotionTrack:
         """What `crt` is found from."""
         return crt_series(self.peaks_rad, self._sigmas_in_decay, self.settings.alpha_rad, method=method)
 
-    def crt_exact_series(self, method: str = "CRT exact potential") -> DecaySeries:
-        """What `crt_exact` is found from."""
-        alpha = self.settings.alpha_rad
+    def crt_exact_series(
+        self, method: str = "CRT exact potential", *, alpha_rad: float | None = None
+    ) -> DecaySeries:
+        """What `crt_exact` is found from; with another α than the survey's where one is given."""
+        alpha = self.settings.alpha_rad if alpha_rad is None else alpha_rad
         return crt_series(self.peaks_rad, self._sigmas_in_decay, alpha, exact=True, method=method)
 
     @property

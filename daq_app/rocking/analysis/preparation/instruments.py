@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.rocking.analysis.preparation.bending import Bending, find_bending
 from daq_app.rocking.analysis.preparation.gains import FamilyGains, gains_of
 from daq_app.rocking.analysis.preparation.signals import (
     Lead,
@@ -67,6 +68,13 @@ class Instruments:
     """How the wires follow the LVDTs after all corrections."""
     shocks: ShockTiming | None
     gains: FamilyGains
+    bending: Bending | None = None
+    """How the wall bends, where it does: its wires and tiltmeters are then off by it."""
+
+    @property
+    def bent_at_rest_rad(self) -> float:
+        """Standard uncertainty by bending of a zero that wires and tiltmeters took from the rest."""
+        return self.bending.last_rad if self.bending is not None and self.signals.zeroed_at_rest else 0.0
 
     @property
     def gain_sigma(self) -> float:
@@ -87,12 +95,16 @@ def prepare(record: TestRecord, *, from_rest: bool) -> Instruments:
     return _in_step(corrected, signals, times, findings, from_rest=from_rest)
 
 
-def _as_recorded(record: TestRecord, lead: Lead = "wires") -> tuple[Signals, TestTimes]:
+def _as_recorded(
+    record: TestRecord, lead: Lead = "wires", *, ask_tiltmeters: bool = True
+) -> tuple[Signals, TestTimes]:
     signals = read_signals(record, lead)
-    return signals, find_phases(signals)
+    return signals, find_phases(signals, ask_tiltmeters=ask_tiltmeters)
 
 
-def _zeroed_at_rest(record: TestRecord, lead: Lead = "wires") -> tuple[Signals, TestTimes]:
+def _zeroed_at_rest(
+    record: TestRecord, lead: Lead = "wires", *, ask_tiltmeters: bool = True
+) -> tuple[Signals, TestTimes]:
     """With every sensor's zero from the rest after the test; as recorded where no rest shows a test.
 
     Offsets of a run without a tare may be so large that no hold is recognised, so the end of the record
@@ -100,13 +112,14 @@ def _zeroed_at_rest(record: TestRecord, lead: Lead = "wires") -> tuple[Signals, 
     """
     signals = read_signals(record, lead)
     end = quiet_end(signals)
-    times = find_phases(signals if end is None else signals.zeroed(end))
+    guess = signals if end is None else signals.zeroed(end)
+    times = find_phases(guess, ask_tiltmeters=ask_tiltmeters)
     if times.rest is None:
-        times = find_phases(signals)
+        times = find_phases(signals, ask_tiltmeters=ask_tiltmeters)
     if times.rest is None:
         return signals, times
     signals = signals.zeroed(times.rest)
-    return signals, find_phases(signals)
+    return signals, find_phases(signals, ask_tiltmeters=ask_tiltmeters)
 
 
 # -- before the test is found ----------------------------------------------------------------------
@@ -201,23 +214,29 @@ def _in_step(
         changed = replace(changed, left_out=frozenset({name}))
     response = _follow(signals, times)
     shocks = _shocks(record, signals, times)
-    if response is not None:
+    bending = _bending(signals, times)
+    if bending is not None:
+        # Delays and first orders are no answer to what the wall does between the two families.
+        lead = "lvdts" if _lvdts_cover(signals, times) else "wires"
+        findings.append(words.bending(bending.frequency_hz, bending.rms_rad, left_out=lead == "lvdts"))
+    elif response is not None:
         timing, lead, earlier = _timing(record, signals, times, response, shocks)
         findings += timing
         changed = replace(changed, earlier_s=earlier)
     if changed.left_out or changed.earlier_s or lead != "wires":
         record = changed.applied(record)
-        again, times_again = read(record, lead)
+        # Tiltmeters on a wall that bends took a zero that may be off, and confirm no hold by it.
+        again, times_again = read(record, lead, ask_tiltmeters=bending is None)
         if times_again.impacts_s:
             signals, times = again, times_again
             wires = _single_wires(signals, times)
             response = _follow(signals, times)
             shocks = _shocks(record, signals, times)
-    if response is not None:
+    if response is not None and bending is None:
         findings += _levels(signals, times, response)
     return Instruments(
         record, _with_errors(signals, times), times, tuple(findings), response, shocks,
-        gains_of(signals, times, wires),
+        gains_of(signals, times, wires), bending,
     )  # fmt: skip
 
 
@@ -245,6 +264,22 @@ def _follow(signals: Signals, times: TestTimes) -> Response | None:
     return compare(signals.time_s[part], signals.joint.rotation_rad[part], signals.wire_rotation_rad[part])
 
 
+def _bending(signals: Signals, times: TestTimes) -> Bending | None:
+    """How the wires ring about the LVDTs through the motion."""
+    if signals.joint is None:
+        return None
+    part = _motion(signals, times)
+    rotations = signals.wire_rotation_rad[part], signals.joint.rotation_rad[part]
+    return find_bending(signals.time_s[part], *rotations, times.impacts_s)
+
+
+def _lvdts_cover(signals: Signals, times: TestTimes) -> bool:
+    """Whether the LVDTs know enough of the motion to take the wires' place."""
+    assert signals.joint is not None
+    known = np.isfinite(signals.joint.rotation_rad[_motion(signals, times)]).mean()
+    return bool(known >= _COVERED)
+
+
 def _shocks(record: TestRecord, signals: Signals, times: TestTimes) -> ShockTiming | None:
     ids = record.family("accelerometer")
 
@@ -260,9 +295,7 @@ def _timing(
 ) -> tuple[list[FamilyFinding], Lead, dict[str, float]]:
     """Slow and late families: findings, the family that leads, and by how much channels are moved earlier."""
     if response.response_s > SLOW_S:
-        assert signals.joint is not None
-        known = np.isfinite(signals.joint.rotation_rad[_motion(signals, times)]).mean()
-        lead: Lead = "lvdts" if known >= _COVERED else "wires"
+        lead: Lead = "lvdts" if _lvdts_cover(signals, times) else "wires"
         return [words.slow("wires", response.response_s, left_out=lead == "lvdts")], lead, {}
     if response.response_s < -SLOW_S:
         return [words.slow("LVDTs", -response.response_s, left_out=True)], "wires", {}

@@ -193,11 +193,12 @@ def _combine(
     )
 
 
-def find_phases(signals: Signals) -> TestTimes:
-    """Run the online detector over the whole record."""
+def find_phases(signals: Signals, *, ask_tiltmeters: bool = True) -> TestTimes:
+    """Run the online detector over the whole record; `ask_tiltmeters`: whether they must confirm a hold."""
     record = signals.record
     detector = PhaseDetector(signals.phase_settings, record.first_sample)
-    events = tuple(detector.process(signals.bridged_rad, signals.tilts_rad))
+    asked = signals.tilts_rad if ask_tiltmeters else signals.tilts_rad[:0]
+    events = tuple(detector.process(signals.bridged_rad, asked))
     offset = float(signals.time_s[0]) - signals.first_s if signals.time_s.size else 0.0
 
     def seconds(sample: float) -> float:
