@@ -21,7 +21,7 @@ from daq_app.rocking import AnalysisOptions, TestAnalysis, TestRecord, analyse_r
 from studies.restitution.faults import FAULTS, Fault
 from studies.restitution.foreign import foreign_tests
 from studies.restitution.laboratory import LaboratoryTest, draw_test
-from studies.restitution.walls import WALLS, Wall, mean_r_of_impacts
+from studies.restitution.walls import WALLS, Wall, mean_r_of_impacts, ringing_test
 
 RIG = Path(__file__).parents[2] / "configs" / "fr1.toml"
 _OPTIONS = AnalysisOptions(bias_runs=0, keep_series=False)
@@ -183,13 +183,15 @@ def main() -> None:
     parser.add_argument("--first-seed", type=int, default=5000)
     parser.add_argument("--foreign", type=Path, help="folder of labelled recordings instead")
     parser.add_argument("--cases", nargs="*", default=(), help="cases of that folder; all if none is named")
+    parser.add_argument("--ringing", action="store_true", help="coverage: walls that bend, recordings cut")
     kinds = sorted({fault.kind for fault in FAULTS})
     parser.add_argument("--kinds", nargs="*", choices=kinds, default=kinds, help="kinds of fault to put in")
     options = parser.parse_args()
     tests: Iterable[LaboratoryTest]
     if options.foreign is None:
         rig = load_rig(RIG)
-        tests = (draw_test(rig, options.first_seed + place) for place in range(options.tests))
+        draw = ringing_test if options.ringing else draw_test
+        tests = (draw(rig, options.first_seed + place) for place in range(options.tests))
     else:
         tests = foreign_tests(options.foreign, RIG.parent, tuple(options.cases))
     if options.table == "coverage":

@@ -48,6 +48,20 @@ class Wall:
         return f"{self.effect} {told}{ends}" if self.effect else "rigid block"
 
 
+def ringing_test(rig: Rig, seed: int) -> LaboratoryTest:
+    """A wall that bends, drawn by `seed` with its laboratory, whose recording ends before it stands still.
+
+    Its mode rings at 2.5 to 9 Hz for 1 to 20 s.
+    """
+    rng = np.random.default_rng([seed, 1])
+    parameters = {
+        "gain": float(np.exp(rng.uniform(np.log(0.01), np.log(0.3)))),
+        "frequency": float(rng.uniform(2.5, 9.0)),
+        "zeta": float(np.exp(rng.uniform(np.log(0.003), np.log(0.02)))),
+    }
+    return Wall("flexible_wall", parameters, ends_s=float(rng.uniform(0.4, 1.5))).test(rig, seed)
+
+
 def mean_r_of_impacts(test: LaboratoryTest) -> float:
     """Mean of |speed after| / |speed before| over the impacts that are not lost in the noise."""
     before = np.abs(test.truth["velocity_before_rad_s"])

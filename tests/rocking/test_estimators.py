@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from daq_app.rocking.estimators import crt, eav
+from daq_app.rocking.families.body import body_of_half_cycles
 from daq_app.rocking.motion.arcs import fit_arc
 from daq_app.rocking.motion.motion_fit import fit_motion
 from daq_app.rocking.motion.motion_model import FIXED, MotionModel
 from daq_app.rocking.motion.swings import MotionSettings, MotionTrack
-from daq_app.rocking.theory.housner import free_rocking
+from daq_app.rocking.theory.housner import exact_quarter_period, free_rocking
 
 P, ALPHA, RATE = 2.2, 0.215, 4000.0
 SETTINGS = MotionSettings(RATE, P, ALPHA)
@@ -279,3 +280,11 @@ def test_a_gain_that_differs_by_side_does_not_reach_eav():
     estimate = eav(speeds.tolist(), (1e-4 * speeds).tolist())
     assert estimate.r == pytest.approx(0.9, abs=1e-6)
     assert estimate.scatter == 0.0 and estimate.standard_error < 1e-4
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_half_cycles_to_one_side_alone_tell_no_alpha_and_p(side):
+    peaks_rad, noise_rad = np.array([0.04, 0.03, 0.02, 0.015, 0.01]), np.full(5, 1e-5)
+    durations_s = 2.0 * exact_quarter_period(peaks_rad, 2.2, 0.21)
+
+    assert body_of_half_cycles(side * peaks_rad, noise_rad, durations_s, noise_rad, 0.215, 2.2) is None

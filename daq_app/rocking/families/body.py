@@ -47,13 +47,14 @@ def body_of_half_cycles(
     """Least squares of T/2 = 2 K(peak; α, p) over whole half-cycles, arrays (n,); starts at nominal values.
 
     α may be another one at either side, for a base that tilts and a zero that is off; their mean is given.
-    None with fewer than four half-cycles, or where they lead to a wall that does not exist.
+    None with fewer than four half-cycles, where all are to one side, which tell only one of the two, or where
+    they lead to a wall that does not exist.
     """
     peaks, side = np.abs(peaks_rad), np.sign(peaks_rad)
     good = np.isfinite(peaks) & np.isfinite(durations_s) & (durations_s > 0.0) & (peaks > 0.02 * alpha_rad)
     good &= np.isfinite(sigma_peaks_rad) & np.isfinite(sigma_durations_s)
     peaks, durations, side = peaks[good], durations_s[good], side[good]
-    if peaks.size < _FEWEST:
+    if peaks.size < _FEWEST or abs(side.sum()) == side.size:
         return None
     # ln α, ln p, and ln of α at + over α at −.
     x = np.array([math.log(alpha_rad), math.log(p_rad_s), 0.0])
