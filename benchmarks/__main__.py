@@ -1,7 +1,7 @@
 """``python -m benchmarks [NAME…] [--json FILE] [--page FILE]``: runs benchmarks, prints a table, writes JSON.
 
-Each module ``benchmarks/bench_NAME.py`` has ``figures() -> list[Figure]``. Nothing here is a test:
-a missed aim is printed as missed. Figures of benchmarks that were not run stay as they are in the JSON.
+Each module ``benchmarks/bench_NAME.py`` has ``figures(effort: Effort) -> list[Figure]``. Nothing here is a
+test: a missed aim is printed as missed. Figures of benchmarks that were not run stay as they are in the JSON.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any
 
 from rich.console import Console
 
+from benchmarks.support.effort import Effort
 from benchmarks.support.figure import Figure
 from benchmarks.support.tables import page, terminal_table
 
@@ -30,9 +31,9 @@ def _available() -> list[str]:
     return sorted(path.stem.removeprefix("bench_") for path in Path(__file__).parent.glob("bench_*.py"))
 
 
-def _run(name: str, console: Console) -> list[Figure]:
+def _run(name: str, effort: Effort, console: Console) -> list[Figure]:
     console.print(f"[bold]{name}[/bold] …")
-    figures: list[Figure] = importlib.import_module(f"benchmarks.bench_{name}").figures()
+    figures: list[Figure] = importlib.import_module(f"benchmarks.bench_{name}").figures(effort)
     return figures
 
 
@@ -56,12 +57,19 @@ def main() -> int:
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"any of {', '.join(names)}; all if none")
     parser.add_argument("--json", type=Path, default=_DEFAULT_JSON, help="where to write the figures")
     parser.add_argument("--page", type=Path, help="a Markdown page to write all known figures to")
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="the least that shows that a benchmark works; needs a --json of its own",
+    )
     options = parser.parse_args()
+    if options.quick and (options.page or options.json == _DEFAULT_JSON):
+        parser.error("--quick takes a --json of its own and no --page: its figures say nothing about speed")
     unknown = [name for name in options.names if name not in names]
     if unknown:
         parser.error(f"no such benchmark: {', '.join(unknown)}; there are {', '.join(names)}")
     console = Console(width=None if sys.stdout.isatty() else 140)
-    results = {name: _run(name, console) for name in options.names or names}
+    results = {name: _run(name, Effort(options.quick), console) for name in options.names or names}
     console.print(terminal_table(results))
     machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, "
     machine += f"Python {platform.python_version()}"

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import psutil
 
+from benchmarks.support.effort import Effort
 from benchmarks.support.figure import Figure
 from daq_app.acquisition import AcquisitionProcess
 from daq_app.acquisition.messages.items import Begin, End, Item, Lost, SourceEnded, Started
@@ -47,12 +48,12 @@ class Throughput:
     """Left in the device's buffer at the end: small if the pace could be held for ever."""
 
 
-def fastest(folder: Path) -> list[Throughput]:
+def fastest(folder: Path, effort: Effort) -> list[Throughput]:
     """Faster and faster hardware clocks, up to the first that is not kept up with."""
     kept: list[Throughput] = []
-    for speed in _SPEEDS:
+    for speed in effort.of(_SPEEDS, _SPEEDS[:1]):
         with SimulatedServer(RIG, ["--speed", str(speed), "--wall", "commanded"]) as server:
-            run = sustained(server.connection, folder)
+            run = sustained(server.connection, folder, effort.of(_THROUGHPUT_S, 0.5))
         if run.lost_samples or run.backlog_samples > _BACKLOG_SAMPLES:
             break
         kept.append(run)
@@ -62,7 +63,7 @@ def fastest(folder: Path) -> list[Throughput]:
 def sustained(
     connection: str,
     folder: Path,
-    seconds: float = _THROUGHPUT_S,
+    seconds: float,
     *,
     hurry: bool = False,
     read_samples: int | None = None,
@@ -129,7 +130,7 @@ class RealRate:
     memory_mb: float
 
 
-def real_rate(connection: str, folder: Path, seconds: float = _REAL_RATE_S) -> RealRate:
+def real_rate(connection: str, folder: Path, seconds: float) -> RealRate:
     """Arm, record for `seconds`, and look at the processor time of the acquisition process alone."""
     process = AcquisitionProcess(["--rig", str(RIG), "--out", str(folder), "--connection", connection])
     with process.client() as client:
@@ -155,7 +156,7 @@ def real_rate(connection: str, folder: Path, seconds: float = _REAL_RATE_S) -> R
 
 
 def client_and_recorder_percent(
-    connection: str, folder: Path, seconds: float = _REAL_RATE_S, *, hurry: bool = False
+    connection: str, folder: Path, seconds: float, *, hurry: bool = False
 ) -> float:
     """Processor time of reader and recorder alone at the real rate, per cent of a core."""
     me = psutil.Process()
@@ -180,15 +181,16 @@ def _wait_for(receive: Callable[[float], object], right: Callable[[object], bool
     raise RuntimeError("the acquisition process did not start to sample")
 
 
-def figures() -> list[Figure]:
+def figures(effort: Effort) -> list[Figure]:
     """All figures of the acquisition."""
+    seconds = effort.of(_REAL_RATE_S, 2.0)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        kept = fastest(folder)
+        kept = fastest(folder, effort)
         with SimulatedServer(RIG, ["--speed", "1", "--wall", "commanded"]) as real:
-            lean = client_and_recorder_percent(real.connection, folder)
-            rocking = client_and_recorder_percent(real.connection, folder, hurry=True)
-            whole = real_rate(real.connection, folder / "runs")
+            lean = client_and_recorder_percent(real.connection, folder, seconds)
+            rocking = client_and_recorder_percent(real.connection, folder, seconds, hurry=True)
+            whole = real_rate(real.connection, folder / "runs", seconds)
     machine = f"server in its own process on the same {psutil.cpu_count()} cores"
     return [
         Figure(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.support.effort import Effort
 from benchmarks.support.figure import Figure
 from daq_app.config import Rig, Scaling, TaskPlan, load_rig, plan_tasks
 from daq_app.rocking import AnalysisOptions, LiveAnalyser, TestAnalysis, TestRecord, analyse_record
@@ -18,6 +19,9 @@ RIG = Path(__file__).parents[1] / "configs" / "fr1.toml"
 _BLOCK = 400
 _RECORD_S = 20.0
 _RUNS = 5
+_LEVELS = (("L1", 0.15, 0.01), ("L2", 0.25, 0.003), ("L3", 0.35, 0.003), ("L4", 0.40, 0.003))
+"""Name, φ, and the largest error of r that is aimed at."""
+_RESTITUTIONS = (0.82, 0.86, 0.895, 0.93, 0.95)
 
 
 def _tare(rig: Rig, test: SynthesisedTest) -> dict[str, float]:
@@ -54,12 +58,13 @@ def offline(record: TestRecord, options: AnalysisOptions) -> tuple[float, TestAn
     return time.perf_counter() - begun, analysis
 
 
-def _accuracy(rig: Rig, plan: TaskPlan) -> list[Figure]:
+def _accuracy(rig: Rig, plan: TaskPlan, effort: Effort) -> list[Figure]:
     """Largest |error| of r over r = 0.82 … 0.95, both estimators, online and offline."""
     figures = []
-    for name, phi, aim in (("L1", 0.15, 0.01), ("L2", 0.25, 0.003), ("L3", 0.35, 0.003), ("L4", 0.40, 0.003)):
+    restitutions = effort.of(_RESTITUTIONS, _RESTITUTIONS[:1])
+    for name, phi, aim in effort.of(_LEVELS, _LEVELS[:1]):
         online, after, theta0 = [0.0], [0.0], [0.0]
-        for seed, r in enumerate((0.82, 0.86, 0.895, 0.93, 0.95)):
+        for seed, r in enumerate(restitutions):
             test = synthesise_test(rig, plan, phi if seed % 2 else -phi, seed, restitution=r)
             _, estimate = live(rig, test)
             analysis = analyse_record(_record(rig, plan, test), AnalysisOptions(bias_runs=0, fit=False))
@@ -69,37 +74,39 @@ def _accuracy(rig: Rig, plan: TaskPlan) -> list[Figure]:
             assert isinstance(truth, float)
             theta0.append(abs(estimate.theta0_rad - truth) / rig.specimen.alpha0_rad)
         note = "largest of r = 0.82 … 0.95, both sides, EAV and CRT"
-        figures.append(Figure(f"error of r online, {name}", max(online), "", 10, aim, note=note))
-        figures.append(Figure(f"error of r offline, {name}", max(after), "", 10, aim, note=note))
-        figures.append(Figure(f"error of θ0/α, {name}", max(theta0), "", 5, 0.005))
+        runs = 2 * len(restitutions)
+        figures.append(Figure(f"error of r online, {name}", max(online), "", runs, aim, note=note))
+        figures.append(Figure(f"error of r offline, {name}", max(after), "", runs, aim, note=note))
+        figures.append(Figure(f"error of θ0/α, {name}", max(theta0), "", len(restitutions), 0.005))
     return figures
 
 
-def figures() -> list[Figure]:
+def figures(effort: Effort) -> list[Figure]:
     """All figures of the analysis."""
     rig = load_rig(RIG)
     plan = plan_tasks(rig)
+    runs = effort.of(_RUNS, 1)
     test = synthesise_test(rig, plan, 0.35, 1, restitution=0.895)
-    extra = max(0.5, _RECORD_S - test.readings.shape[1] / test.rate_hz + rig.acquisition.post_rest_s)
+    extra = max(
+        0.5, effort.of(_RECORD_S, 0.0) - test.readings.shape[1] / test.rate_hz + rig.acquisition.post_rest_s
+    )
     test = synthesise_test(rig, plan, 0.35, 1, restitution=0.895, post_rest_s=extra)
     seconds = test.readings.shape[1] / test.rate_hz
     live(rig, test)  # first calls import and compile
-    online = [live(rig, test)[0] for _ in range(_RUNS)]
+    online = [live(rig, test)[0] for _ in range(runs)]
     record = _record(rig, plan, test)
-    whole = [offline(record, AnalysisOptions())[0] for _ in range(_RUNS)]
-    bare = [offline(record, AnalysisOptions(bias_runs=0, keep_series=False))[0] for _ in range(_RUNS)]
+    whole = [offline(record, AnalysisOptions())[0] for _ in range(runs)]
+    bare = [offline(record, AnalysisOptions(bias_runs=0, keep_series=False))[0] for _ in range(runs)]
     begun = time.process_time()
     offline(record, AnalysisOptions())
     processor = time.process_time() - begun
     note = f"41 × 4000 Hz, L3, {seconds:.0f} s"
     return [
         Figure(
-            "online analysis, share of a core", 100 * statistics.median(online), "%", _RUNS, 3.0, note=note
+            "online analysis, share of a core", 100 * statistics.median(online), "%", runs, 3.0, note=note
         ),
-        Figure(
-            "analysis of a 20 s run", statistics.median(whole), "s", _RUNS, 0.3, note=note + ", with bias"
-        ),
+        Figure("analysis of a 20 s run", statistics.median(whole), "s", runs, 0.3, note=note + ", with bias"),
         Figure("processor time of it", processor, "s", note="one run; BLAS threads included"),
-        Figure("the same without simulated bias", statistics.median(bare), "s", _RUNS, 1.0),
-        *_accuracy(rig, plan),
+        Figure("the same without simulated bias", statistics.median(bare), "s", runs, 1.0),
+        *_accuracy(rig, plan, effort),
     ]

@@ -11,44 +11,63 @@ import time
 from pathlib import Path
 
 from benchmarks.support.byte_code import surroundings
+from benchmarks.support.effort import Effort
 from benchmarks.support.figure import Figure
 
 _ROOT = Path(__file__).parents[1]
 _REPORTS = 3
+_PLAN = _ROOT / "configs" / "campaigns" / "costa.toml"
+_TWO_TESTS = f"""
+name = "two tests"
+[levels]
+L1 = 0.15
+[rigs]
+FR1 = "{(_ROOT / "configs" / "fr1.toml").as_posix()}"
+[[sequence]]
+specimen = "FR1"
+level = "L1"
+tests = 2
+"""
+_SUMMANDS = 20_000_000
 
 
-def figures() -> list[Figure]:
+def figures(effort: Effort) -> list[Figure]:
     """Start of the program, all cores, every file of the report included; of the reports the median."""
+    reports = effort.of(_REPORTS, 1)
     with tempfile.TemporaryDirectory() as name:
         runs, code = Path(name) / "runs", Path(name) / "code"
-        simulated = _seconds("simulate", runs, code)
+        plan = effort.of(_PLAN, Path(name) / "plan.toml")
+        if effort.quick:
+            plan.write_text(_TWO_TESTS, encoding="utf-8")
+        simulated = _seconds("simulate", runs, code, "--plan", str(plan))
         size = sum(path.stat().st_size for path in runs.glob("*.h5")) / 1e6
-        reported = statistics.median(_seconds("report", runs, code) for _ in range(_REPORTS))
-        anew = statistics.median(_seconds("report", runs, code, "--anew") for _ in range(_REPORTS))
+        report = ("report", runs, code, "--plan", str(plan))
+        reported = statistics.median(_seconds(*report) for _ in range(reports))
+        anew = statistics.median(_seconds(*report, "--anew") for _ in range(reports))
         count = len(list(runs.glob("*.h5")))
         assert (runs / "report" / "report.pdf").exists()
     cores = f"{os.cpu_count()} cores"
     return [
         Figure(
             "what all cores do at once",
-            _all_cores_over_one(),
+            _all_cores_over_one(effort.of(_SUMMANDS, 100_000)),
             "× one core",
             note=f"the same arithmetic in one process and in {os.cpu_count()}; virtual cores may share one",
         ),
-        Figure("campaign simulate, 36 tests", simulated, "s", note=f"{count} runs, {size:.0f} MB, {cores}"),
+        Figure(f"campaign simulate, {count} tests", simulated, "s", note=f"{size:.0f} MB, {cores}"),
         Figure(
-            "campaign report of 36 runs",
+            f"campaign report of {count} runs",
             reported,
             "s",
-            _REPORTS,
+            reports,
             aim=4,
             note=f"analyses kept beside the runs, HTML, PDF, CSV, {cores}, byte code there",
         ),
         Figure(
-            "campaign report of 36 runs, --anew",
+            f"campaign report of {count} runs, --anew",
             anew,
             "s",
-            _REPORTS,
+            reports,
             aim=20,
             note=f"analysis with simulated bias as well, {cores}, byte code there",
         ),
@@ -56,19 +75,21 @@ def figures() -> list[Figure]:
 
 
 _ARITHMETIC = """
-import time
+import sys, time
 started = time.perf_counter()
-sum(i * i for i in range(20_000_000))
+sum(i * i for i in range(int(sys.argv[1])))
 print(time.perf_counter() - started)
 """
 
 
-def _all_cores_over_one() -> float:
+def _all_cores_over_one(summands: int) -> float:
     """How much more work all cores do than one: says what to expect of anything that runs on all."""
 
     def slowest(processes: int) -> float:
         running = [
-            subprocess.Popen([sys.executable, "-c", _ARITHMETIC], stdout=subprocess.PIPE, text=True)
+            subprocess.Popen(
+                [sys.executable, "-c", _ARITHMETIC, str(summands)], stdout=subprocess.PIPE, text=True
+            )
             for _ in range(processes)
         ]
         return max(float(process.communicate()[0]) for process in running)

@@ -21,6 +21,7 @@ from nidaqmx.constants import AcquisitionType
 from nidaqmx.grpc_session_options import GrpcSessionOptions
 from nidaqmx.stream_readers import AnalogMultiChannelReader
 
+from benchmarks.support.effort import Effort
 from benchmarks.support.figure import Figure
 from daq_app.config import load_rig
 
@@ -30,8 +31,9 @@ _SECONDS = 5.0
 _RUNS = 3
 
 
-def figures() -> list[Figure]:
+def figures(effort: Effort) -> list[Figure]:
     """Multiples of real time for reads of 0.1 s and of 1 s; processor time of client and server."""
+    count, seconds = effort.of(_RUNS, 1), effort.of(_SECONDS, 0.3)
     server = subprocess.Popen(
         [sys.executable, "-m", "sim_hardware.daqmx_server", "--config", str(_RIG), "--speed", "max"],
         stdout=subprocess.PIPE,
@@ -44,19 +46,19 @@ def figures() -> list[Figure]:
             raise RuntimeError("the simulated device server did not start")
         out = []
         for samples in (400, 4000):
-            runs = [bare_loop(match[1], samples, psutil.Process(server.pid)) for _ in range(_RUNS)]
+            runs = [bare_loop(match[1], samples, psutil.Process(server.pid), seconds) for _ in range(count)]
             multiple, client, served = (float(np.median(column)) for column in zip(*runs, strict=True))
             name = f"41 channels through nidaqmx, {samples} samples a read"
-            out.append(Figure(name, multiple, "x 4000 Hz", _RUNS, 40.0, "high"))
-            out.append(Figure(f"{name}: client", client * 1e3, "ms of CPU per s of record", _RUNS, 25.0))
-            out.append(Figure(f"{name}: server", served * 1e3, "ms of CPU per s of record", _RUNS, 25.0))
+            out.append(Figure(name, multiple, "x 4000 Hz", count, 40.0, "high"))
+            out.append(Figure(f"{name}: client", client * 1e3, "ms of CPU per s of record", count, 25.0))
+            out.append(Figure(f"{name}: server", served * 1e3, "ms of CPU per s of record", count, 25.0))
         return out
     finally:
         server.terminate()
         server.wait()
 
 
-def bare_loop(port: str, samples: int, server: psutil.Process) -> tuple[float, float, float]:
+def bare_loop(port: str, samples: int, server: psutil.Process, seconds: float) -> tuple[float, float, float]:
     """A bare loop of reads: (multiple of real time, CPU s of the client, of the server per s of record)."""
     rig = load_rig(_RIG)
     options = [("grpc.max_receive_message_length", -1)]
@@ -76,7 +78,7 @@ def bare_loop(port: str, samples: int, server: psutil.Process) -> tuple[float, f
         reader.read_many_sample(data, samples)
         start, blocks = time.perf_counter(), 0
         client, served = time.process_time(), sum(server.cpu_times()[:2])
-        while time.perf_counter() - start < _SECONDS:
+        while time.perf_counter() - start < seconds:
             reader.read_many_sample(data, samples)
             blocks += 1
         lasted = time.perf_counter() - start

@@ -6,14 +6,15 @@ import os
 import resource
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.bench_simulation import least_s, scipy_run, trajectory_s
+from benchmarks.bench_simulation import SCIPY_RUNS, TRAJECTORIES, least_s, scipy_run, trajectory_s
 from benchmarks.support.byte_code import byte_code_of
+from benchmarks.support.effort import Effort
 from benchmarks.support.figure import Figure
 from daq_app.config import load_rig, plan_tasks
 from daq_app.config.scaling import Scaling
@@ -30,9 +31,11 @@ _RIG = Path(__file__).parents[1] / "configs" / "fr1.toml"
 _LEVELS = (0.15, -0.25, 0.35, -0.40)
 _RUNS = 12
 _DIAGNOSES = 3
+_GROWTH = ((3, 1.0), (6, 1.0), (12, 1.0), (6, 0.25), (6, 0.5))
+"""Diagnoses that show how the cost grows: number of runs, share of the library."""
 
 
-def _runs() -> list[GapRun]:
+def _runs(count: int) -> list[GapRun]:
     rig = load_rig(_RIG)
     quick = {"upright_s": 0.5, "pull_s": 0.5, "hold_s": 1.2, "restitution_scatter": 0.004}
     rig = rig.model_copy(update={"simulation": rig.simulation.model_copy(update=quick)})
@@ -42,7 +45,7 @@ def _runs() -> list[GapRun]:
         for planned in task.channels:
             offsets[planned.rig_index] = planned.time_offset_s
     runs = []
-    for number in range(_RUNS):
+    for number in range(count):
         level = _LEVELS[number % len(_LEVELS)]
         test = synthesise_test(
             rig, plan, level, seed=number, effects={"viscous": {"zeta": 0.006}}, post_rest_s=1.0
@@ -70,12 +73,12 @@ def _median_ms(action: Callable[[], object], count: int) -> float:
     return statistics.median(times)
 
 
-def _growth(prepared: list[RockingRun]) -> list[Figure]:
+def _growth(prepared: list[RockingRun], diagnoses: Sequence[tuple[int, float]]) -> list[Figure]:
     """Fits of a diagnosis in processor time of one core: by number of runs, and by size of the library."""
     model, library = model_and_library(prepared)
     names = [effect.name for effect in library.named]
     found = []
-    for runs, share in ((3, 1.0), (6, 1.0), (12, 1.0), (6, 0.25), (6, 0.5)):
+    for runs, share in diagnoses:
         kept = library.without(*names[round(share * len(names)) :])
         fresh = [replace(run, cache=RunCache()) for run in prepared[:runs]]
         start = time.process_time()
@@ -86,9 +89,11 @@ def _growth(prepared: list[RockingRun]) -> list[Figure]:
     return found
 
 
-def figures() -> list[Figure]:
+def figures(effort: Effort) -> list[Figure]:
     """Measured on all cores of the machine."""
-    runs = _runs()
+    count, diagnoses = effort.of(_RUNS, 3), effort.of(_DIAGNOSES, 2)
+    considered = effort.of((), ("viscous",))
+    runs = _runs(count)
     features = [extract(run) for run in runs[:2]]
     model = RockingModel(features[0].survey)
     found = fit(model, features)
@@ -102,38 +107,43 @@ def figures() -> list[Figure]:
     cores = os.cpu_count() or 1
     times = []
     with byte_code_of("daq_app.gap.rocking_model.study"):
-        for _ in range(_DIAGNOSES):
+        for _ in range(diagnoses):
             start = time.perf_counter()
-            result = diagnose_runs(runs, Options(workers=cores))
+            result = diagnose_runs(runs, Options(workers=cores), considered)
             times.append(time.perf_counter() - start)
     memory = [
         resource.getrusage(who).ru_maxrss / 1e3 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     ]
     named = " + ".join(result.best) or "nothing missing"
-    slow, fast = trajectory_s(200.0), trajectory_s(4000.0)
-    scipy_s = least_s(lambda: scipy_run(1e-9, 200.0, 55), 3)
+    repetitions, scipy_runs = effort.of(TRAJECTORIES, 1), effort.of(SCIPY_RUNS, 1)
+    slow, fast = trajectory_s(200.0, repetitions), trajectory_s(4000.0, repetitions)
+    scipy_s = least_s(lambda: scipy_run(1e-9, 200.0, 55), scipy_runs)
     return [
         Figure("features of a run, 41 channels", _median_ms(lambda: extract(runs[0]), 5), "ms", 5),
         Figure(
             "prediction of a run, half-cycles and all channels", _median_ms(predict, 300), "ms", 300, aim=0.5
         ),
-        Figure("10 s simulated, θ at 200 Hz", slow * 1e3, "ms", 60, aim=0.1, note="least"),
-        Figure("10 s simulated, θ at 4 kHz", fast * 1e3, "ms", 60, aim=0.5, note="least"),
+        Figure("10 s simulated, θ at 200 Hz", slow * 1e3, "ms", repetitions, aim=0.1, note="least"),
+        Figure("10 s simulated, θ at 4 kHz", fast * 1e3, "ms", repetitions, aim=0.5, note="least"),
         Figure(
-            "solve_ivp with events / this simulator", scipy_s / slow, "×", 3, note="DOP853, rtol 1e-9, 200 Hz"
+            "solve_ivp with events / this simulator",
+            scipy_s / slow,
+            "×",
+            scipy_runs,
+            note="DOP853, rtol 1e-9, 200 Hz",
         ),
         Figure(
-            f"diagnosis of {_RUNS} runs, full library, all channels",
+            f"diagnosis of {count} runs, full library, all channels",
             times[0],
             "s",
             1,
             aim=5.0,
             note=f"{cores} cores, features and start of all included; {result.decision.verdict}: {named}",
         ),
-        Figure("the same once more, processes there", statistics.median(times[1:]), "s", _DIAGNOSES - 1),
+        Figure("the same once more, processes there", statistics.median(times[1:]), "s", diagnoses - 1),
         Figure(
-            "largest memory of the process that leads", memory[0], "MB", 1, note=f"{_RUNS} runs in memory"
+            "largest memory of the process that leads", memory[0], "MB", 1, note=f"{count} runs in memory"
         ),
         Figure("largest memory of a process that fits", memory[1], "MB", 1),
-        *_growth(prepare(runs)[0]),
+        *_growth(prepare(runs)[0], effort.of(_GROWTH, ((3, 0.05),))),
     ]

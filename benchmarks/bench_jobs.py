@@ -7,9 +7,10 @@ import shutil
 import statistics
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from benchmarks.support.effort import Effort
 from benchmarks.support.figure import Figure
 from daq_app.acquisition.closing.derive import derive_imported
 from daq_app.campaign.plan import load_campaign
@@ -23,16 +24,18 @@ from daq_app.runfile.importers import import_file
 
 _RIG = Path(__file__).parents[1] / "configs" / "fr1.toml"
 _LEVELS = {"L1": 0.15, "L2": 0.25, "L3": 0.35, "L4": 0.40}
+_TWO_LEVELS = {"L1": 0.15, "L3": 0.35}
 _TESTS_A_LEVEL = 3
 _REPEATS = 3
 _RUNS = 1000
 
 
-def figures() -> list[Figure]:
+def figures(effort: Effort) -> list[Figure]:
     """One process with one thread; the first job of a kind, which loads its libraries, is left out."""
+    repeats = effort.of(_REPEATS, 1)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        simulating = _simulate(folder)
+        simulating = _simulate(folder, effort.of(_LEVELS, _TWO_LEVELS), effort.of(_TESTS_A_LEVEL, 1))
         runs = tuple(sorted(folder.glob("*.h5")))
         foreign, rig_text, out = (
             export_run(runs[0], folder, "npz", units="raw"),
@@ -50,12 +53,15 @@ def figures() -> list[Figure]:
         campaign = Specimen(folder, "FR1", runs, ())
         found = {
             "a test simulated and saved": (simulating, 1),
-            "a file imported and judged": (_spent(bring_in), 1),
+            "a file imported and judged": (_spent(bring_in, repeats), 1),
             "a run analysed, with bias": (
-                _spent(lambda: read_and_summarise(runs[0], {}, options, use_kept=False)),
+                _spent(lambda: read_and_summarise(runs[0], {}, options, use_kept=False), repeats),
                 1,
             ),
-            f"a specimen of {len(runs)} runs diagnosed": (_spent(lambda: diagnose_one(campaign)), len(runs)),
+            f"a specimen of {len(runs)} runs diagnosed": (
+                _spent(lambda: diagnose_one(campaign), repeats),
+                len(runs),
+            ),
         }
     return [figure for name, (times, share) in found.items() for figure in _two(name, times, share)]
 
@@ -70,11 +76,11 @@ def _two(name: str, times: list[float], runs_a_job: int) -> list[Figure]:
     ]
 
 
-def _simulate(folder: Path) -> list[float]:
+def _simulate(folder: Path, ratios: Mapping[str, float], tests_a_level: int) -> list[float]:
     series = [
-        f'[[sequence]]\nspecimen = "FR1"\nlevel = "{level}"\ntests = {_TESTS_A_LEVEL}\n' for level in _LEVELS
+        f'[[sequence]]\nspecimen = "FR1"\nlevel = "{level}"\ntests = {tests_a_level}\n' for level in ratios
     ]
-    levels = "\n".join(f"{level} = {ratio}" for level, ratio in _LEVELS.items())
+    levels = "\n".join(f"{level} = {ratio}" for level, ratio in ratios.items())
     plan = folder / "plan.toml"
     plan.write_text(
         f'name = "jobs"\n[levels]\n{levels}\n[rigs]\nFR1 = "{_RIG.as_posix()}"\n{"".join(series)}', "utf-8"
@@ -90,9 +96,9 @@ def _simulate(folder: Path) -> list[float]:
     return times[1:]
 
 
-def _spent(job: Callable[[], object]) -> list[float]:
+def _spent(job: Callable[[], object], repeats: int) -> list[float]:
     times = []
-    for _ in range(_REPEATS + 1):
+    for _ in range(repeats + 1):
         started = time.process_time()
         job()
         times.append(time.process_time() - started)

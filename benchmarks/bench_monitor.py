@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 
+from benchmarks.support.effort import Effort
 from benchmarks.support.figure import Figure
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -24,6 +25,8 @@ RIG = Path(__file__).parents[1] / "configs" / "fr1.toml"
 SIZES = ((1366, 768), (1920, 1080))
 FRAMES_S = 10.0
 LATENCY_TESTS = 3
+SETTLING_S = 2.0
+WARMING_UP_S = 15.0
 
 
 class Bench:
@@ -86,17 +89,17 @@ class Bench:
         self.acquisition.kill()
 
 
-def frames(bench: Bench, size: tuple[int, int]) -> list[Figure]:
+def frames(bench: Bench, size: tuple[int, int], effort: Effort) -> list[Figure]:
     """Painted frames of the two large plots and of the strips per second, CPU and longest stall."""
     window = bench.window
     window.resize(*size)
-    bench.live_for(2.0)
+    bench.live_for(effort.of(SETTLING_S, 0.2))
     plots = (window.live.motion.rotation, window.live.motion.velocity)
     before = [plot.paints for plot in plots]
     strips = window.live.strips.paints
     window.longest_stall_s = 0.0
     started, cpu = time.monotonic(), time.process_time()
-    bench.live_for(FRAMES_S)
+    bench.live_for(effort.of(FRAMES_S, 1.0))
     elapsed, used = time.monotonic() - started, time.process_time() - cpu
     rate = min(plot.paints - count for plot, count in zip(plots, before, strict=True)) / elapsed
     place = f"{size[0]}×{size[1]}"
@@ -119,15 +122,16 @@ def _load() -> str:
     return f"load {psutil.getloadavg()[0]:.1f} on {psutil.cpu_count()} cores"
 
 
-def latency(bench: Bench) -> list[Figure]:
+def latency(bench: Bench, effort: Effort) -> list[Figure]:
     """From each impact of the simulated wall to the paint of the r that it completes, over some tests."""
     window = bench.window
     assert window.link is not None
     window.link.request("tare")
     bench.until(lambda: bool(window.prepare.zero.record))
-    delays = [delay for number in range(1, LATENCY_TESTS + 1) for delay in _delays(bench, f"FR1-L3-{number}")]
+    tests = effort.of(LATENCY_TESTS, 1)
+    delays = [delay for number in range(1, tests + 1) for delay in _delays(bench, f"FR1-L3-{number}")]
     milliseconds = 1e3 * np.asarray(delays)
-    note = f"from the wall's own clock, over {LATENCY_TESTS} tests; {_load()}"
+    note = f"from the wall's own clock, over {tests} tests; {_load()}"
     return [
         Figure(
             f"impact to r on screen, p{share}",
@@ -185,28 +189,29 @@ def _delays(bench: Bench, test: str) -> list[float]:
     return [painted_s - (wall_began_s + truth[n - 1]) for n, (_, painted_s) in painted.items()]
 
 
-def memory(bench: Bench) -> list[Figure]:
+def memory(bench: Bench, effort: Effort) -> list[Figure]:
     """Growth of the window's memory on the live page."""
-    minutes = float(os.environ.get("ROCKING_MEMORY_MINUTES", "1"))
+    minutes = float(os.environ.get("ROCKING_MEMORY_MINUTES", effort.of("1", "0.01")))
+    warming_up_s = effort.of(WARMING_UP_S, 0.5)
     process = psutil.Process()
-    bench.live_for(15.0)
+    bench.live_for(warming_up_s)
     gc.collect()
     before = process.memory_info().rss
     bench.live_for(60.0 * minutes)
     gc.collect()
     grown = (process.memory_info().rss - before) / 1e6
-    note = f"over {minutes:g} min after 15 s of warming up; rss before {before / 1e6:.0f} MB"
+    note = f"over {minutes:g} min after {warming_up_s:g} s of warming up; rss before {before / 1e6:.0f} MB"
     return [Figure("memory growth of the window", grown, "MB", aim=20.0, note=note)]
 
 
-def figures() -> list[Figure]:
+def figures(effort: Effort) -> list[Figure]:
     """All figures of the window, on one acquisition."""
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(Path(folder))
         try:
-            found = [figure for size in SIZES for figure in frames(bench, size)]
-            found += latency(bench)
-            found += memory(bench)
+            found = [figure for size in effort.of(SIZES, SIZES[:1]) for figure in frames(bench, size, effort)]
+            found += latency(bench, effort)
+            found += memory(bench, effort)
         finally:
             bench.close()
     return found

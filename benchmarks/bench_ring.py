@@ -14,6 +14,7 @@ from pathlib import Path
 import psutil
 
 from benchmarks.bench_acquisition import RIG
+from benchmarks.support.effort import Effort
 from benchmarks.support.figure import Figure
 from daq_app.acquisition.messages.items import Item, Lost, SourceEnded
 from daq_app.acquisition.pipeline.reader import Reader
@@ -30,7 +31,7 @@ _BLOCKS = 150
 _WARM_BLOCKS = 10
 
 
-def _processor_percent(connection: str, folder: Path | None) -> float:
+def _processor_percent(connection: str, folder: Path | None, blocks: int) -> float:
     """Share of a core that this process takes while it reads; `folder`: where a ring is kept, or None."""
     rig = load_rig(RIG)
     plan = plan_tasks(rig)
@@ -47,7 +48,7 @@ def _processor_percent(connection: str, folder: Path | None) -> float:
             ended.set()
         elif taken == _WARM_BLOCKS:
             warm.set()
-        elif taken == _WARM_BLOCKS + _BLOCKS:
+        elif taken == _WARM_BLOCKS + blocks:
             enough.set()
 
     def header_of(run_id: str) -> RunHeader:
@@ -78,7 +79,7 @@ def _processor_percent(connection: str, folder: Path | None) -> float:
     if lost or trouble:
         raise RuntimeError(f"{sum(lost)} samples were lost; the ring says {trouble or 'nothing'}")
     used_s = (after.user - before.user) + (after.system - before.system)
-    return 100.0 * used_s / (_BLOCKS * plan.read_samples / plan.rate_hz)
+    return 100.0 * used_s / (blocks * plan.read_samples / plan.rate_hz)
 
 
 def _wait_for(event: threading.Event) -> None:
@@ -86,21 +87,22 @@ def _wait_for(event: threading.Event) -> None:
         raise RuntimeError("the simulated server gave no samples")
 
 
-def figures() -> list[Figure]:
+def figures(effort: Effort) -> list[Figure]:
     """Processor time without the ring, with it, and the median difference of the rounds."""
+    rounds, blocks = effort.of(_ROUNDS, 1), effort.of(_BLOCKS, 5)
     without, with_ring = [], []
     with (
         tempfile.TemporaryDirectory() as name,
         SimulatedServer(RIG, ["--speed", "1", "--wall", "commanded"]) as server,
     ):
-        for number in range(_ROUNDS):
-            without.append(_processor_percent(server.connection, None))
-            with_ring.append(_processor_percent(server.connection, Path(name) / str(number)))
+        for number in range(rounds):
+            without.append(_processor_percent(server.connection, None, blocks))
+            with_ring.append(_processor_percent(server.connection, Path(name) / str(number), blocks))
     added = [high - low for high, low in zip(with_ring, without, strict=True)]
     unit = "% of a core"
     note = f"median of rounds of {', '.join(f'{value:.2f}' for value in added)} %; processor time"
     return [
-        Figure("reader and recorder without the ring", statistics.median(without), unit, _ROUNDS),
-        Figure("the same with the ring", statistics.median(with_ring), unit, _ROUNDS),
-        Figure("the ring adds", statistics.median(added), unit, _ROUNDS, aim=2.0, note=note),
+        Figure("reader and recorder without the ring", statistics.median(without), unit, rounds),
+        Figure("the same with the ring", statistics.median(with_ring), unit, rounds),
+        Figure("the ring adds", statistics.median(added), unit, rounds, aim=2.0, note=note),
     ]

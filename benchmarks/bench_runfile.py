@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.support.effort import Effort
 from benchmarks.support.figure import Figure
 from daq_app.config import Rig, load_rig
 from daq_app.runfile import JournalWriter, RunHeader, finalise, verify
@@ -28,6 +29,8 @@ SECONDS = 60
 FLUSH_S = 0.1
 LSB = 20 / 65536
 RUNS = 3
+IN_TIME_BLOCKS = 100
+IMPORTED_MB = 100.0
 
 _MEASURED_IMPORT = """
 import sys, threading, time, psutil
@@ -52,16 +55,18 @@ print(elapsed, (peak - before) / 1e6)
 """
 
 
-def figures() -> list[Figure]:
+def figures(effort: Effort) -> list[Figure]:
     """All figures; the disk is that of the system's folder for temporary files."""
     rig = load_rig(RIG)
-    readings = _readings(len(rig.channels), SECONDS * RATE_HZ)
+    runs = effort.of(RUNS, 1)
+    readings = _readings(len(rig.channels), effort.of(SECONDS, 1) * RATE_HZ)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        found = [*_journal(folder, rig, readings), _latency(folder, rig, readings)]
-        found += _saving(folder, rig, readings)
-        found += _exports(folder)
-        found += _import(folder, rig, readings)
+        found = _journal(folder, rig, readings, runs)
+        found += [_latency(folder, rig, readings, effort.of(IN_TIME_BLOCKS, 5))]
+        found += _saving(folder, readings, runs)
+        found += _exports(folder, _seconds(readings))
+        found += _import(folder, rig, readings, effort.of(IMPORTED_MB, 2.0))
     return found
 
 
@@ -95,41 +100,50 @@ def _write(path: Path, rig: Rig, readings: NDArray[np.float64]) -> None:
         writer.sync()
 
 
-def _timed(action: Callable[[int], object]) -> float:
-    """Median seconds of `RUNS` runs."""
+def _timed(action: Callable[[int], object], runs: int) -> float:
+    """Median seconds of `runs` runs."""
     times = []
-    for number in range(RUNS):
+    for number in range(runs):
         started = time.perf_counter()
         action(number)
         times.append(time.perf_counter() - started)
     return statistics.median(times)
 
 
-def _journal(folder: Path, rig: Rig, readings: NDArray[np.float64]) -> list[Figure]:
-    seconds = _timed(lambda number: _write(folder / f"speed-{number}.journal", rig, readings))
+def _seconds(readings: NDArray[np.float64]) -> float:
+    return readings.shape[1] / RATE_HZ
+
+
+def _journal(folder: Path, rig: Rig, readings: NDArray[np.float64], runs: int) -> list[Figure]:
+    seconds = _timed(lambda number: _write(folder / f"speed-{number}.journal", rig, readings), runs)
     megabytes = readings.nbytes / 1e6
     return [
         Figure(
             "journal with CRC, flushed ten times a second",
             megabytes / seconds,
             "MB/s",
-            RUNS,
+            runs,
             aim=52.5,
             better="high",
             note="aim: 40 × 41 channels × 4000 Hz",
         ),
         Figure(
-            "the same as a multiple of the real rate", SECONDS / seconds, "×", RUNS, aim=40, better="high"
+            "the same as a multiple of the real rate",
+            _seconds(readings) / seconds,
+            "×",
+            runs,
+            aim=40,
+            better="high",
         ),
     ]
 
 
-def _latency(folder: Path, rig: Rig, readings: NDArray[np.float64]) -> Figure:
-    """Block handed over → flushed, at the real rate for ten seconds."""
+def _latency(folder: Path, rig: Rig, readings: NDArray[np.float64], blocks: int) -> Figure:
+    """Block handed over → flushed, at the real rate."""
     latencies = []
     with JournalWriter(folder / "latency.journal", _header(rig)) as writer:
         started = time.perf_counter()
-        for number in range(100):
+        for number in range(blocks):
             time.sleep(max(0.0, started + number * BLOCK / RATE_HZ - time.perf_counter()))
             begin = time.perf_counter()
             writer.append_block(number * BLOCK, readings[:, number * BLOCK : (number + 1) * BLOCK])
@@ -139,43 +153,44 @@ def _latency(folder: Path, rig: Rig, readings: NDArray[np.float64]) -> Figure:
         "block to disk at the real rate, p99",
         1e3 * float(np.percentile(latencies, 99)),
         "ms",
-        100,
+        blocks,
         aim=30,
         note=f"median {1e3 * statistics.median(latencies):.2f} ms",
     )
 
 
-def _saving(folder: Path, rig: Rig, readings: NDArray[np.float64]) -> list[Figure]:
+def _saving(folder: Path, readings: NDArray[np.float64], runs: int) -> list[Figure]:
     journal = folder / "speed-0.journal"
-    saved = _timed(lambda number: finalise(journal, folder / f"run-{number}.h5"))
+    saved = _timed(lambda number: finalise(journal, folder / f"run-{number}.h5"), runs)
     run = folder / "run-0.h5"
-    proven = _timed(lambda number: verify(run))
+    proven = _timed(lambda number: verify(run), runs)
     size = run.stat().st_size / 1e6
+    lasting = f"a run of {_seconds(readings):g} s"
     return [
-        Figure("finalising a run of 60 s", saved, "s", RUNS, aim=3, note="written, read back, compared"),
-        Figure("verifying a run of 60 s", proven, "s", RUNS),
-        Figure("run file of 60 s", size, "MB", note=f"journal {readings.nbytes / 1e6:.0f} MB"),
+        Figure(f"finalising {lasting}", saved, "s", runs, aim=3, note="written, read back, compared"),
+        Figure(f"verifying {lasting}", proven, "s", runs),
+        Figure(f"file of {lasting}", size, "MB", note=f"journal {readings.nbytes / 1e6:.0f} MB"),
     ]
 
 
-def _exports(folder: Path) -> list[Figure]:
+def _exports(folder: Path, lasting_s: float) -> list[Figure]:
     found = []
     for format_ in FORMATS:
         started = time.perf_counter()
         path = export_run(folder / "run-0.h5", folder / "exported", format_)  # type: ignore[arg-type]
         seconds = time.perf_counter() - started
         note = f"{path.stat().st_size / 1e6:.0f} MB"
-        found.append(Figure(f"export of 60 s to {format_}", seconds, "s", note=note))
+        found.append(Figure(f"export of {lasting_s:g} s to {format_}", seconds, "s", note=note))
         path.unlink()
     return found
 
 
-def _import(folder: Path, rig: Rig, readings: NDArray[np.float64]) -> list[Figure]:
-    """A TDMS of about 100 MB in segments of a second, as LabVIEW streams it, in a process of its own."""
+def _import(folder: Path, rig: Rig, readings: NDArray[np.float64], megabytes: float) -> list[Figure]:
+    """A TDMS of about `megabytes` in segments of a second, as LabVIEW streams it, in a process of its own."""
     from nptdms import ChannelObject, TdmsWriter
 
     source = folder / "large.tdms"
-    n_samples = int(100e6 / (8 * readings.shape[0]))
+    n_samples = int(1e6 * megabytes / (8 * readings.shape[0]))
     properties = {"wf_increment": 1 / RATE_HZ, "unit_string": "V"}
     with TdmsWriter(str(source)) as writer:
         for first in range(0, n_samples, RATE_HZ):
@@ -188,7 +203,7 @@ def _import(folder: Path, rig: Rig, readings: NDArray[np.float64]) -> list[Figur
             )
     command = [sys.executable, "-c", _MEASURED_IMPORT, str(RIG), str(source), str(folder / "imported.h5")]
     answer = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
-    seconds, megabytes = map(float, answer)
+    seconds, added_mb = map(float, answer)
     size = source.stat().st_size / 1e6
     return [
         Figure(
@@ -198,5 +213,5 @@ def _import(folder: Path, rig: Rig, readings: NDArray[np.float64]) -> list[Figur
             better="high",
             note=f"{size:.0f} MB in {seconds:.1f} s, proven",
         ),
-        Figure("memory that the import adds", megabytes, "MB", note="peak over the start of the import"),
+        Figure("memory that the import adds", added_mb, "MB", note="peak over the start of the import"),
     ]

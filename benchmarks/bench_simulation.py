@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from benchmarks.support.effort import Effort
 from benchmarks.support.figure import Figure
 from daq_app.config import load_rig, plan_tasks
 from daq_app.config.rig import Rig
@@ -38,6 +39,10 @@ _RELEASE = Release(0.35 * 0.215)
 _RESTITUTION = Restitution(0.931)
 """An L3 release of FR1 that rocks for 10.3 s, with 57 impacts."""
 _RUN_S = 10.0
+TRAJECTORIES = 60
+SCIPY_RUNS = 3
+_RECORDS = 5
+_TESTS = 4
 _NONE = np.empty(0)
 
 
@@ -53,7 +58,7 @@ def least_s(action: Callable[[], object], repetitions: int, inner: int = 1) -> f
     return best
 
 
-def trajectory_s(rate_hz: float) -> float:
+def trajectory_s(rate_hz: float, repetitions: int) -> float:
     """Seconds for one run from a parameter vector to θ at `rate_hz`."""
     workspace = Workspace()
     vector = motion_vector(_BODY, _RELEASE, _RESTITUTION)
@@ -63,7 +68,7 @@ def trajectory_s(rate_hz: float) -> float:
     def run() -> None:
         pc.evaluate(workspace.run(vector).pieces, times, theta, _NONE, _NONE)
 
-    return least_s(run, 60, 10)
+    return least_s(run, repetitions, 10)
 
 
 def scipy_run(rtol: float, rate_hz: float, n_impacts: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -115,7 +120,7 @@ def accuracy() -> tuple[float, float, Motion]:
     return late, drift, motion
 
 
-def synthesis_times_real(rig: Rig) -> float:
+def synthesis_times_real(rig: Rig, repetitions: int) -> float:
     """Seconds of 41 channels per second, all on one clock, over a whole test with noise."""
     wall = VirtualRig.from_rig(rig)
     terminals = tuple(channel.physical_channel for channel in rig.channels)
@@ -125,31 +130,56 @@ def synthesis_times_real(rig: Rig) -> float:
         for block in blocks:
             wall.volts(terminals, block)
 
-    return 24.0 / least_s(run, 5)
+    return 24.0 / least_s(run, repetitions)
 
 
-def direct_times_real(rig: Rig) -> float:
+def direct_times_real(rig: Rig, repetitions: int) -> float:
     """Seconds of a whole test per second: motion, every channel's own skew, converters."""
     plan = plan_tasks(rig)
     test = synthesise_test(rig, plan)
-    return test.readings.shape[1] / test.rate_hz / least_s(lambda: synthesise_test(rig, plan), 4)
+    least = least_s(lambda: synthesise_test(rig, plan), repetitions)
+    return test.readings.shape[1] / test.rate_hz / least
 
 
-def figures() -> list[Figure]:
+def figures(effort: Effort) -> list[Figure]:
     """Every figure of the simulator."""
-    slow, fast = trajectory_s(200.0), trajectory_s(4000.0)
-    scipy_s = least_s(lambda: scipy_run(1e-9, 200.0, 55), 3)
+    runs, scipy_runs = effort.of(TRAJECTORIES, 1), effort.of(SCIPY_RUNS, 1)
+    records, tests = effort.of(_RECORDS, 1), effort.of(_TESTS, 1)
+    slow, fast = trajectory_s(200.0, runs), trajectory_s(4000.0, runs)
+    scipy_s = least_s(lambda: scipy_run(1e-9, 200.0, 55), scipy_runs)
     late, drift, motion = accuracy()
     rig = load_rig(RIG)
     lasts = f"{motion.end_s:.1f} s, {len(motion.impact_time_s)} impacts"
     return [
-        Figure("10 s trajectory, θ at 200 Hz", slow * 1e3, "ms", 60, 0.1, note=f"least; motion of {lasts}"),
-        Figure("10 s trajectory, θ at 4 kHz", fast * 1e3, "ms", 60, 0.5, note="least"),
-        Figure("trajectories per second", 1.0 / slow, "1/s", 60, 1000.0, "high", "200 Hz, one core"),
-        Figure("solve_ivp with events, same run", scipy_s * 1e3, "ms", 3, note="DOP853, rtol 1e-9, 200 Hz"),
-        Figure("solve_ivp / this kernel", scipy_s / slow, "×", 3, note="same machine, same minute"),
+        Figure("10 s trajectory, θ at 200 Hz", slow * 1e3, "ms", runs, 0.1, note=f"least; motion of {lasts}"),
+        Figure("10 s trajectory, θ at 4 kHz", fast * 1e3, "ms", runs, 0.5, note="least"),
+        Figure("trajectories per second", 1.0 / slow, "1/s", runs, 1000.0, "high", "200 Hz, one core"),
+        Figure(
+            "solve_ivp with events, same run",
+            scipy_s * 1e3,
+            "ms",
+            scipy_runs,
+            note="DOP853, rtol 1e-9, 200 Hz",
+        ),
+        Figure("solve_ivp / this kernel", scipy_s / slow, "×", scipy_runs, note="same machine, same minute"),
         Figure("largest error of an impact time", late * 1e6, "µs", 1, 1.0, note="25 impacts, DOP853 1e-12"),
         Figure("energy lost between impacts", drift, "", 1, 1e-9, note="largest, relative"),
-        Figure("41 channels with noise", synthesis_times_real(rig), "× real", 5, 100.0, "high", "one core"),
-        Figure("whole test, direct path", direct_times_real(rig), "× real", 4, 100.0, "high", "one core"),
+        Figure(
+            "41 channels with noise",
+            synthesis_times_real(rig, records),
+            "× real",
+            records,
+            100.0,
+            "high",
+            "one core",
+        ),
+        Figure(
+            "whole test, direct path",
+            direct_times_real(rig, tests),
+            "× real",
+            tests,
+            100.0,
+            "high",
+            "one core",
+        ),
     ]

@@ -17,6 +17,7 @@ from pathlib import Path
 import psutil
 
 from benchmarks.support.byte_code import byte_code_of
+from benchmarks.support.effort import Effort
 from benchmarks.support.figure import Figure
 from daq_app.acquisition.messages.published import State, StateMessage
 from daq_app.acquisition.viewers.launcher import AcquisitionProcess
@@ -66,8 +67,9 @@ def _start(address: str, token: str, folder: Path) -> tuple[float, float]:
     return ready_s, float(used)
 
 
-def figures() -> list[Figure]:
+def figures(effort: Effort) -> list[Figure]:
     """Median and longest start, and the processor time that one takes."""
+    starts = effort.of(_STARTS, 1)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         acquisition = AcquisitionProcess(["--rig", str(RIG), "--out", str(folder)])
@@ -82,7 +84,7 @@ def figures() -> list[Figure]:
                         break
             with byte_code_of("daq_app.monitor.window.app"):
                 _start(acquisition.address, acquisition.token, folder)
-                measured = [_start(acquisition.address, acquisition.token, folder) for _ in range(_STARTS)]
+                measured = [_start(acquisition.address, acquisition.token, folder) for _ in range(starts)]
         finally:
             acquisition.kill()
     ready, used = zip(*measured, strict=True)
@@ -92,7 +94,7 @@ def figures() -> list[Figure]:
     note += f"{psutil.cpu_count()} cores"
     return [
         Figure(
-            "start of the window to its live picture", statistics.median(ready), "s", _STARTS, 2.0, note=note
+            "start of the window to its live picture", statistics.median(ready), "s", starts, 2.0, note=note
         ),
-        Figure("processor time of it", statistics.median(used), "s", _STARTS),
+        Figure("processor time of it", statistics.median(used), "s", starts),
     ]

@@ -1,1 +1,1 @@
-"""What benchmarks share: a figure with its aim, tables of figures, byte code for programs that are timed."""
+"""What benchmarks share: figures with their aims and tables of them, how much is measured, byte code."""

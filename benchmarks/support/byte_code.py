@@ -13,25 +13,31 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+_FORBIDDING = "PYTHONDONTWRITEBYTECODE"
+_PLACE = "PYTHONPYCACHEPREFIX"
+
 
 def surroundings(folder: Path) -> dict[str, str]:
-    """Environment of a process that keeps its byte code in `folder` and finds it there."""
-    kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-    return kept | {"PYTHONPYCACHEPREFIX": str(folder)}
+    """Environment of a process that finds its byte code: in `folder` where the usual place is forbidden."""
+    if _FORBIDDING not in os.environ:
+        return dict(os.environ)
+    kept = {name: value for name, value in os.environ.items() if name != _FORBIDDING}
+    return kept | {_PLACE: str(folder)}
 
 
 @contextmanager
 def byte_code_of(*modules: str) -> Iterator[None]:
     """Processes that are started meanwhile find the byte code of `modules` and of all that these import."""
-    before = os.environ.get("PYTHONPYCACHEPREFIX")
+    before = os.environ.get(_PLACE)
     with tempfile.TemporaryDirectory() as name:
+        environment = surroundings(Path(name))
         command = [sys.executable, "-c", f"import {', '.join(modules)}"]
-        subprocess.run(command, check=True, env=surroundings(Path(name)))
-        os.environ["PYTHONPYCACHEPREFIX"] = name
+        subprocess.run(command, check=True, env=environment)
+        if _PLACE in environment:
+            os.environ[_PLACE] = environment[_PLACE]
         try:
             yield
         finally:
-            if before is None:
-                del os.environ["PYTHONPYCACHEPREFIX"]
-            else:
-                os.environ["PYTHONPYCACHEPREFIX"] = before
+            os.environ.pop(_PLACE, None)
+            if before is not None:
+                os.environ[_PLACE] = before

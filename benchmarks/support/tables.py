@@ -46,7 +46,8 @@ def page(document: Mapping[str, Any], earlier: str = "") -> str:
         "python -m benchmarks [NAME…] --page docs/reference/benchmarks.md",
         "```",
         "",
-        "which replaces the tables of the benchmarks that were run.",
+        "which replaces the tables of the benchmarks that were run. "
+        "`--quick --json FILE` measures as little as shows that each works.",
     ]
     kept = {part.split("\n", 1)[0]: f"## {part.rstrip()}" for part in earlier.split("\n## ")[1:]}
     made = {name: _section(name, entry) for name, entry in document["benchmarks"].items()}
