@@ -224,7 +224,8 @@ def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float, 
     rows = np.stack([np.column_stack([s.values, s.levels, index]) for s in together])[:, None]
     walk = np.broadcast_to(_SCATTERS**2, (len(together), _SCATTERS.size))
     state, spread = np.zeros((*walk.shape, rows.shape[-1])), np.zeros(walk.shape)
-    whitened, log_spread = np.zeros((*walk.shape, usable.shape[1], rows.shape[-1])), np.zeros(walk.shape)
+    errors = np.zeros((*walk.shape, usable.shape[1], rows.shape[-1]))
+    totals = np.ones((usable.shape[1], *walk.shape))
     for k in range(usable.shape[1]):
         spread = spread + walk if k else spread
         there = usable[:, k, None]
@@ -234,8 +235,9 @@ def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float, 
         gain = np.where(there, spread / total, 0.0)
         state = state + gain[..., None] * error
         spread = spread * (1.0 - gain)
-        whitened[:, :, k] = error / np.sqrt(total)[..., None]
-        log_spread += np.log(total)
+        errors[:, :, k], totals[k] = error, total
+    whitened = errors / np.moveaxis(np.sqrt(totals), 0, 2)[..., None]
+    log_spread = np.log(totals).sum(axis=0)
     target, design = whitened[..., :1], whitened[..., 1:]
     normal = np.swapaxes(design, 2, 3) @ design
     # A level that no usable value counts from has no column: a one in its place changes nothing.

@@ -50,7 +50,8 @@ def find_hum(rows: Floats, noises: Sequence[float], rate_hz: float) -> Hum | Non
     if not rows.shape[0] or groups < _SHORTEST_S * rate or rate < 2.5 * _BANDS_HZ[-1][1]:
         return None
     noise = np.asarray(noises)[:, None]
-    means = np.nan_to_num(rows[:, : groups * size]).reshape(rows.shape[0], groups, size).mean(axis=2) / noise
+    known = rows if np.isfinite(rows).all() else np.nan_to_num(rows)
+    means = known[:, : groups * size].reshape(rows.shape[0], groups, size).mean(axis=2) / noise
     window = np.hanning(groups)
     length = 1 << int(4 * groups - 1).bit_length()
     spectrum = np.fft.rfft((means - means.mean(axis=1, keepdims=True)) * window, length, axis=1)

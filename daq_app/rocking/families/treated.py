@@ -43,14 +43,21 @@ class Corrections:
 
 
 def held_in_memory(record: TestRecord, held: tuple[str, ...]) -> TestRecord:
-    """The same record with some channels read once, however often they are asked for."""
+    """The same record with some channels read once, however often they are asked for.
+
+    Neighbours in `held` come as views, which cannot be written to: they are most of the data.
+    """
     rows = {channel_id: row for row, channel_id in enumerate(held)}
     values = record.load(held) if held else np.empty((0, record.n_samples))
+    values.flags.writeable = False
 
     def load(ids: tuple[str, ...], start: int = 0, stop: int | None = None) -> Floats:
         if any(channel_id not in rows for channel_id in ids):
             return record.load(ids, start, stop)
-        return values[[rows[channel_id] for channel_id in ids], start:stop]
+        wanted = [rows[channel_id] for channel_id in ids]
+        if wanted and wanted == list(range(wanted[0], wanted[0] + len(wanted))):
+            return values[wanted[0] : wanted[0] + len(wanted), start:stop]
+        return values[wanted, start:stop]
 
     return replace(record, load=load)
 
@@ -60,7 +67,7 @@ def without_hum(record: TestRecord, searched: tuple[str, ...], hum: Hum) -> Test
     rows = {channel_id: row for row, channel_id in enumerate(searched) if hum.amplitude[row]}
 
     def load(ids: tuple[str, ...], start: int = 0, stop: int | None = None) -> Floats:
-        values = record.load(ids, start, stop)
+        values = record.load(ids, start, stop).copy()
         first, last, _ = slice(start, stop).indices(record.n_samples)
         for place, channel_id in enumerate(ids):
             if channel_id in rows:

@@ -7,7 +7,7 @@ the joint is in contact from there to the edge that the wall turns on; where the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +60,8 @@ class BaseJoint:
     ranges_m: Floats
     """(lvdts, 2)"""
     half_width_m: float
+    _inverses: dict[bytes, Floats] = field(default_factory=dict, repr=False, compare=False)
+    """Those of `_inverse`, which cost a short stretch more than all else."""
 
     @classmethod
     def from_rig(cls, rig: Rig, ids: tuple[str, ...] | None = None) -> BaseJoint:
@@ -119,8 +121,10 @@ class BaseJoint:
         pattern = np.repeat(pattern_of_start, np.diff(starts, append=plane.shape[1]))
         for k, used in enumerate(patterns.T):
             if min(self.places_on_face(side, used) for side in (-1, 1)) >= 2:
-                samples = pattern == k
-                plane[:, samples] = self.plane(openings_m[np.ix_(used, samples)], used)
+                samples, openings = np.flatnonzero(pattern == k), openings_m[used]
+                if samples.size < plane.shape[1]:
+                    openings = openings.take(samples, axis=1)
+                plane[:, samples] = self.plane(openings, used)
         return plane
 
     def plane(self, openings_m: Floats, used: Bools | slice = slice(None)) -> Floats:
@@ -128,7 +132,7 @@ class BaseJoint:
 
         A point at the height z above the joint sinks by z (1 − cos θ) as the wall turns, which is put back.
         """
-        inverse = np.linalg.pinv(self._design(used))
+        inverse = self._inverse(used)
         plane = inverse @ openings_m
         height = self.position_m[used, 2]
         if height.any():
@@ -138,12 +142,11 @@ class BaseJoint:
 
     def rotation_weights(self, used: Bools | slice = slice(None)) -> Floats:
         """d(sin θ)/d(opening) of the LVDTs `used`, (k,), 1/m."""
-        return np.asarray(np.linalg.pinv(self._design(used))[1])
+        return np.asarray(self._inverse(used)[1])
 
     def misfit(self, openings_m: Floats, used: Bools) -> Floats:
         """(k, n) what the plane through the openings (k, n) of the LVDTs `used` leaves of each, m."""
-        design = self._design(used)
-        return np.asarray(openings_m - design @ (np.linalg.pinv(design) @ openings_m))
+        return np.asarray(openings_m - self._design(used) @ (self._inverse(used) @ openings_m))
 
     def find_outliers(self, openings_m: Floats, valid: Bools, tolerated_m: Floats | float) -> list[int]:
         """Places of the LVDTs that do not fit the plane through the others.
@@ -159,14 +162,15 @@ class BaseJoint:
             whole = valid[good].all(axis=0)
             if not whole.any():
                 break
-            design, openings = self._design(good), openings_m[good][:, slice(None) if whole.all() else whole]
+            openings = openings_m[good][:, slice(None) if whole.all() else whole]
             moments = openings @ openings.T / openings.shape[1]
             # Each beside what the others alone make of it.
-            left = _rms_left(design, moments)
-            off = left / np.maximum(1.0 - np.diag(design @ np.linalg.pinv(design)), 1e-9)
+            fitting = self._design(good) @ self._inverse(good)
+            off = _rms_left(fitting, moments) / np.maximum(1.0 - np.diag(fitting), 1e-9)
             worst = int(np.argmax(off))
             others = np.delete(np.arange(good.size), worst)
-            usual = float(np.median(_rms_left(design[others], moments[np.ix_(others, others)])))
+            fitting = self._design(good[others]) @ self._inverse(good[others])
+            usual = float(np.median(_rms_left(fitting, moments[np.ix_(others, others)])))
             if off[worst] <= max(_OUTLIER_RATIO * usual, tolerated[good[worst]]):
                 break
             found.append(int(good[worst]))
@@ -177,10 +181,20 @@ class BaseJoint:
         x, y, _ = self.position_m[used].T
         return np.column_stack([np.ones_like(x), -x, -x * y])
 
+    def _inverse(self, used: Bools | NDArray[np.intp] | slice) -> Floats:
+        """(3, k) from the openings of the k LVDTs `used` to (u, sin θ, κ), found once for each set."""
+        key = np.arange(len(self.ids))[used].tobytes()
+        if key not in self._inverses:
+            self._inverses[key] = np.linalg.pinv(self._design(used)).astype(np.float64)
+        return self._inverses[key]
 
-def _rms_left(design: Floats, moments: Floats) -> Floats:
-    """(k,) rms of what the plane through k openings leaves of each; `moments` (k, k): their mean products."""
-    leaves = np.eye(design.shape[0]) - design @ np.linalg.pinv(design)
+
+def _rms_left(fitting: Floats, moments: Floats) -> Floats:
+    """(k,) rms of what the plane through k openings leaves of each.
+
+    `fitting` (k, k) makes the plane's openings of them; `moments` (k, k): their mean products.
+    """
+    leaves = np.eye(fitting.shape[0]) - fitting
     return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", leaves, moments, leaves).clip(min=0.0)))
 
 

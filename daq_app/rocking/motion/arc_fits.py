@@ -50,19 +50,19 @@ class ArcFits:
     """(arcs, 7, 7)"""
 
     def rows(self, x: Floats) -> tuple[Floats, Floats, Floats]:
-        """Value, first and second derivative by x of every column at one place of each arc: (arcs, 7)."""
+        """Value, first and second derivative by x (…, arcs) of every column: (…, arcs, 7) each."""
         k = self.kappa
         c, s = np.cosh(k * x), np.sinh(k * x)
         even, odd = np.cosh(k) - 1.0, np.sinh(k)
-        value, slope, curve = (np.zeros((x.size, _COLUMNS)) for _ in range(3))
-        value[:, 0] = 1.0
-        value[:, 1], slope[:, 1], curve[:, 1] = (c - 1.0) / even, k * s / even, k * k * c / even
-        value[:, 2], slope[:, 2], curve[:, 2] = s / odd, k * c / odd, k * k * s / odd
+        value, slope, curve = (np.zeros((*x.shape, _COLUMNS)) for _ in range(3))
+        value[..., 0] = 1.0
+        value[..., 1], slope[..., 1], curve[..., 1] = (c - 1.0) / even, k * s / even, k * k * c / even
+        value[..., 2], slope[..., 2], curve[..., 2] = s / odd, k * c / odd, k * k * s / odd
         power = x.copy()  # x to the (n − 2)
         for column, n in enumerate(ALL_POWERS, start=STIFF):
-            curve[:, column] = n * (n - 1) * power
-            slope[:, column] = n * power * x
-            value[:, column] = power * x * x
+            curve[..., column] = n * (n - 1) * power
+            slope[..., column] = n * power * x
+            value[..., column] = power * x * x
             power = power * x
         return value, slope, curve
 
@@ -181,13 +181,14 @@ def _best(squares: Floats, count: NDArray[np.intp], variance: Floats) -> NDArray
     return np.where(clearly, best, 0)
 
 
-def crossings(fits: ArcFits, guess: float, half_s: Floats, zero_sigma: float) -> Floats:
-    """(4, arcs): x of the zero near `guess`, its sigma, the signed speed there (1/s) and its sigma.
+def crossings(fits: ArcFits, half_s: Floats, zero_sigma: float) -> Floats:
+    """(2, 4, arcs), start and end: x of the zero there, its sigma, the signed speed (1/s) and its sigma.
 
     NaN where there is no zero within a quarter of the half length.
     """
-    x = np.full(half_s.size, guess)
-    moving = np.ones(x.size, dtype=bool)
+    guess = np.repeat([[-1.0], [1.0]], half_s.size, axis=1)
+    x = guess
+    moving = np.ones(x.shape, dtype=bool)
     with np.errstate(all="ignore"):
         for _ in range(8):
             value, slope, curve = fits.rows(x)
@@ -200,13 +201,12 @@ def crossings(fits: ArcFits, guess: float, half_s: Floats, zero_sigma: float) ->
             x = np.where(np.abs(x - guess) <= 0.25, x, np.nan)
         curvature = _dot(curve, fits.coefficients)
         # The speed is read where the fit crosses zero: its error counts through the shift of that place.
-        gradient = slope - (curvature / speed)[:, None] * value
+        gradient = slope - (curvature / speed)[..., None] * value
         shift = np.hypot(np.sqrt(_square(value, fits.covariance)), zero_sigma) / np.abs(speed)
         variance = np.maximum(_square(gradient, fits.covariance), 0.0)
         sigma = np.sqrt(variance + (curvature / speed * zero_sigma) ** 2 + (_MODEL_SHARE * speed) ** 2)
-    zeros = np.stack([x, shift, speed / half_s, sigma / half_s])
-    zeros[:, ~np.isfinite(zeros).all(axis=0)] = np.nan
-    return zeros
+    zeros = np.stack([x, shift, speed / half_s, sigma / half_s], axis=1)
+    return np.where(np.isfinite(zeros).all(axis=1, keepdims=True), zeros, np.nan)
 
 
 def speed_kept(fits: ArcFits, ends: Floats) -> Floats:
@@ -215,14 +215,12 @@ def speed_kept(fits: ArcFits, ends: Floats) -> Floats:
     `ends` (2, arcs): x of both zeros. They are those of the chosen basis: the rotation there is what the odd
     one says, so that the speed is read at its own zero to first order.
     """
-    log_speed, gradient = [], []
     with np.errstate(all="ignore"):
-        for x in ends:
-            value, slope, curve = fits.rows(x)
-            speed, curvature = _dot(slope, fits.odd_coefficients), _dot(curve, fits.odd_coefficients)
-            at_zero = slope - (curvature / speed)[:, None] * value
-            log_speed.append(np.log(np.abs(_dot(at_zero, fits.odd_coefficients))))
-            gradient.append(at_zero / speed[:, None])
+        value, slope, curve = fits.rows(ends)
+        speed, curvature = _dot(slope, fits.odd_coefficients), _dot(curve, fits.odd_coefficients)
+        at_zero = slope - (curvature / speed)[..., None] * value
+        log_speed = np.log(np.abs(_dot(at_zero, fits.odd_coefficients)))
+        gradient = at_zero / speed[..., None]
         kept = log_speed[1] - log_speed[0]
         sigma = np.sqrt(np.maximum(_square(gradient[1] - gradient[0], fits.odd_covariance), 0.0))
     log_ratio = np.stack([kept, sigma])
@@ -254,8 +252,8 @@ def extrema(fits: ArcFits) -> Floats:
 
 
 def _dot(rows: Floats, coefficients: Floats) -> Floats:
-    return np.asarray(np.einsum("ak,ak->a", rows, coefficients))
+    return np.asarray(np.einsum("...ak,ak->...a", rows, coefficients))
 
 
 def _square(rows: Floats, covariance: Floats) -> Floats:
-    return np.asarray(np.einsum("ak,ak->a", (rows[:, None, :] @ covariance)[:, 0], rows))
+    return np.asarray(np.einsum("...k,...k->...", (rows[..., None, :] @ covariance)[..., 0, :], rows))

@@ -159,8 +159,7 @@ class _Stack:
         points = present.sum(axis=1)
         middle = np.maximum(alpha_rad - np.abs(y).sum(axis=1) / points, 0.0)
         fits = fit_stack(x, y, present, p_rad_s * np.sqrt(np.cos(middle)) * self.half_s, self.noise_rad)
-        ending = crossings(fits, 1.0, self.half_s, zero_sigma_rad)
-        starting = crossings(fits, -1.0, self.half_s, zero_sigma_rad)
+        starting, ending = crossings(fits, self.half_s, zero_sigma_rad)
         peak = extrema(fits)
         fall = self.index == 0
         # The fall has neither a crossing at its start nor a peak of its own: its peak is the hold.

@@ -119,11 +119,9 @@ class PhaseDetector:
 
     def process(self, rotation_rad: Floats, tilts_rad: Floats) -> list[PhaseEvent]:
         """Continue with rotation (n,) and tiltmeters (k, n), k may be 0; the events that are new."""
-        joined = (
-            np.concatenate((self._pending, np.vstack((rotation_rad[None], tilts_rad))), axis=1)
-            if (self._pending.shape[1])
-            else np.vstack((rotation_rad[None], tilts_rad))
-        )
+        joined = np.concatenate((rotation_rad[None], tilts_rad))
+        if self._pending.shape[1]:
+            joined = np.concatenate((self._pending, joined), axis=1)
         size = self.settings.frame_samples
         count = joined.shape[1] // size
         whole = joined[:, : count * size].reshape(joined.shape[0], count, size)
@@ -175,8 +173,8 @@ class PhaseDetector:
                     self._check_rest()
 
     def _step_waiting(self, tick: bool) -> None:
-        if tick and self._steady():
-            self._enter_hold()
+        if tick and (level := self._steady_level()) is not None:
+            self._enter_hold(level)
         elif self.side:
             self._check_crossing(released=False)
 
@@ -210,15 +208,16 @@ class PhaseDetector:
 
     # -- hold ------------------------------------------------------------------------------------
 
-    def _steady(self) -> bool:
+    def _steady_level(self) -> float | None:
+        """Mean of the last window where the wall is held steady through it; None where it is not."""
         frames = self._frames.last(self._window)[0]
         level = float(frames.mean())
         if not abs(level) >= self.settings.smallest_hold * self.settings.alpha_rad:
-            return False
+            return None
         ticks = frames.reshape(-1, _TICK).mean(axis=1)
-        if not np.ptp(ticks) < self.settings.steady_rad:
-            return False
-        return self._tilts_agree(level)
+        if not np.ptp(ticks) < self.settings.steady_rad or not self._tilts_agree(level):
+            return None
+        return level
 
     def _tilts_agree(self, level: float) -> bool:
         """Whether some tiltmeter shows the same steady rotation; True where there is none to ask."""
@@ -231,14 +230,13 @@ class PhaseDetector:
         still = np.abs(last - first) < self.settings.steady_rad
         return bool(np.any(near & still))
 
-    def _remember_hold(self) -> None:
-        frames = self._frames.last(self._window)[0]
-        self._hold_rad = float(frames.mean())
-        differences = np.diff(frames)
+    def _remember_hold(self, level: float) -> None:
+        self._hold_rad = level
+        differences = np.diff(self._frames.last(self._window)[0])
         self._noise = max(self.settings.frame_noise_rad, float(differences.std()) / math.sqrt(2.0))
 
-    def _enter_hold(self) -> None:
-        self._remember_hold()
+    def _enter_hold(self, level: float) -> None:
+        self._remember_hold(level)
         self.phase, self._lost_ticks, self._fast_frames = Phase.HOLDING, 0, 0
         self.side = self._crossing_side = 1 if self._hold_rad > 0 else -1
         share = abs(self._hold_rad) / self.settings.alpha_rad
@@ -246,8 +244,8 @@ class PhaseDetector:
         self._say("hold", start, f"held steady at {self._hold_rad * 1e3:.1f} mrad (θ/α = {share:.3f})")
 
     def _follow_hold(self) -> None:
-        if self._steady():
-            self._remember_hold()
+        if (level := self._steady_level()) is not None:
+            self._remember_hold(level)
             self._lost_ticks = 0
             return
         recent = float(self._frames.last(_TICK)[0].mean())

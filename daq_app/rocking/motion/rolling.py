@@ -51,7 +51,8 @@ class RollingArray:
 
     def slice(self, start: int, stop: int) -> Floats:
         """(rows, n) view of absolute indices [start, stop), cut to what is kept."""
-        low, high = max(start, self.start) - self.start, min(stop, self._end) - self.start
+        oldest = self._end - self._used
+        low, high = max(start - oldest, 0), min(stop, self._end) - oldest
         return self._data[:, low : max(high, low)]
 
     def last(self, n: int) -> Floats:

@@ -71,7 +71,7 @@ class MotionTrack:
     arcs: list[Arc | None] = field(default_factory=list)
     """Arc n ends at impact n + 1; None where it could not be fitted."""
     _impacts: list[ImpactTime] = field(default_factory=list, init=False, repr=False, compare=False)
-    """Found when first asked for; the next half-cycle changes the last of them."""
+    """Those that were asked for so far; the next half-cycle changes the last of them."""
 
     @classmethod
     def begin(
@@ -117,7 +117,7 @@ class MotionTrack:
         )
         self.crossings_s.extend(crossings_s)
         self.arcs.extend(arcs)
-        self._impacts = []
+        self._impacts = self._impacts[:-1]
         return arcs
 
     def fitted_again(
@@ -137,8 +137,8 @@ class MotionTrack:
     @property
     def impacts(self) -> list[ImpactTime]:
         """Impact times with their errors."""
-        if len(self._impacts) != len(self.crossings_s):
-            self._impacts = [self._impact(index) for index in range(len(self.crossings_s))]
+        further = range(len(self._impacts), len(self.crossings_s))
+        self._impacts = [*self._impacts, *(self._impact(index) for index in further)]
         return self._impacts
 
     def _impact(self, index: int) -> ImpactTime:
