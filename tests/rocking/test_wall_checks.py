@@ -250,7 +250,12 @@ def test_a_slow_release_does_not_count_in_the_level_that_the_wall_was_held_at():
 
 @pytest.mark.parametrize(
     ("effect", "parameters"),
-    [("restitution_asymmetry", {"d": 0.02}), ("coulomb", {"mu": 0.02}), ("winkler", {"theta_c": 9e-4})],
+    [
+        ("restitution_asymmetry", {"d": 0.02}),
+        ("coulomb", {"mu": 0.02}),
+        ("winkler", {"theta_c": 9e-4}),
+        ("flexible_wall", {"gain": 0.2, "frequency": 4.6, "zeta": 0.005}),
+    ],
 )
 def test_p_and_alpha_of_a_wall_that_is_no_rigid_block_have_no_stated_error(effect, parameters):
     test = draw_test(RIG, SEED, effects={effect: parameters})

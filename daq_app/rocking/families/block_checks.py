@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 R_TOLERANCE: Final = 0.002
 """What r may be off by with nothing said. Changes of r within a test count from twice this on, for the r of
 the whole lies between its ends."""
-_NO_RIGID_BLOCK: Final = frozenset({"speed", "side", "loss", "pause", "hop", "duration"})
+_NO_RIGID_BLOCK: Final = frozenset({"speed", "side", "loss", "pause", "hop", "duration", "bending"})
 """Kinds of finding by which the wall is no rigid block with one r, so that a fit finds no p and α of it."""
 _CHANCE: Final = 0.001
 """Probability by which scatter alone may name a change: four are looked for, and of sound tests fewer than
