@@ -34,6 +34,10 @@ _CHANCE_OF_SPEED: Final = 0.005
 """The same for a change of r with speed in a finished test: while the wall rocks it is looked for at every
 impact, and chance has many turns. Of 900 sound tests 11 have a chance below 0.01 for a change that counts,
 and 5 below this. Raising it names sound walls whose impacts happen to differ."""
+_SPEED_IN_ERROR: Final = 0.0025
+"""What a change of r with speed adds to the standard error of r that is a warning, however likely chance
+makes it. Slopes of 0.05 s/rad add 0.003 and more; chance makes 0.002 in one sound test of a hundred, and this
+in none of 391."""
 _CHANCE_OF_HOP: Final = 0.01
 """The same for a hop in a finished test, which noise makes more seldom than it should: of 900 sound tests one
 has a chance below 0.02. Lowering it leaves hops of 2 ms, which move r by 0.01, to a note in noisy
@@ -96,14 +100,14 @@ def weaker_change_by_speed(pattern: ImpactPattern) -> list[FamilyFinding]:
     """A change of r with speed in a finished test that `pattern_findings` does not name.
 
     It is named where chance seldom makes it, and told wherever half of it is more than what may go unsaid: as
-    a warning where it adds as much to the standard error of r, however likely chance makes it.
+    a warning where it adds much to the standard error of r, however likely chance makes it.
     """
     speed = pattern.by_speed
     if speed is None or 0.5 * pattern.change_with_speed <= R_TOLERANCE:
         return []
     if speed.chance < _CHANCE_OF_SPEED:
         return [words.r_by_speed(pattern.r_fast, pattern.r_slow)]
-    notable = pattern.sigma_r_by_speed > R_TOLERANCE
+    notable = pattern.sigma_r_by_speed > _SPEED_IN_ERROR
     return [words.r_perhaps_by_speed(pattern.r_fast, pattern.r_slow, speed.sigma, notable=notable)]
 
 
