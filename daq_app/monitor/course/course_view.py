@@ -30,7 +30,6 @@ TRACE_S: Final = 12.0
 _MOVED: Final = frozenset({State.RELEASED, State.ROCKING, State.AT_REST})
 _AFTERWARDS: Final = frozenset({State.SAVING, State.SAVED, State.FAILED})
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-_CENTRE = Qt.AlignmentFlag.AlignCenter
 
 
 def figures(session: Session) -> dict[str, TileText]:

@@ -159,8 +159,6 @@ def verdict_of(
 def other_is_blamed(findings: Sequence[FamilyFinding], other: str) -> bool:
     """Whether the family that does not lead, ``wires`` or ``lvdts``, is known to follow the wall badly."""
     return any(
-        f.kind in ("slow", "late", "drift", "bending")
-        and LEADS[other] in f.family
-        and f.treatment != "put in step"
+        f.kind in _FOLLOWS_BADLY and LEADS[other] in f.family and f.treatment != "put in step"
         for f in findings
     )

@@ -33,8 +33,6 @@ class WireRotation:
     """(n,) weighted least-squares rotation; NaN where fewer than two wires are usable."""
     twist_rad: Floats
     """(n,) rotation of the top about the vertical axis, from wires at different y."""
-    misfit_rad: Floats
-    """(wires, n) each wire's own rotation minus the common one (twist taken out)."""
     excluded: Bools
     """(wires, n) wires left out, because they are not finite or disagree with the others."""
 
@@ -197,9 +195,7 @@ class RotationGeometry:
                     weights = self.weights(tuple(bool(flag) for flag in pattern))
                     good = np.where(pattern[:, None], own[:, columns], 0.0)
                     combined[:, columns] = _combine(weights, good)
-        lever = (self.wires.position_m[:, 1] / self.wires.lever_m)[:, None]
-        misfit = own - combined[0] + lever * combined[1]
-        return WireRotation(combined[0], combined[1], misfit, ~used)
+        return WireRotation(combined[0], combined[1], ~used)
 
     def _agreeing(self, own: Floats) -> Bools:
         """(wires, frames) which wires agree with the median of all."""

@@ -23,11 +23,7 @@ class Onset:
 
     time_s: float
     """Median over the channels that show it, known time offsets taken out."""
-    spread_s: float
-    """Median absolute deviation of those channels."""
     channels: int
-    strength_sigmas: float
-    """Largest shock over the noise before it, of the clearest channel."""
 
 
 def find_onsets(
@@ -73,7 +69,7 @@ def find_onsets(
             )
             for row, (sample, strength) in zip(rows, _picks(parts), strict=True):
                 if strength >= _SHOCK_SIGMAS:
-                    picks.append((first_s + (places[row][0] + sample) / rate_hz + offsets_s[row], strength))
+                    picks.append(first_s + (places[row][0] + sample) / rate_hz + offsets_s[row])
         onsets.append(_agreement(picks))
     return onsets
 
@@ -103,14 +99,13 @@ def _picks(windows: Floats) -> list[tuple[float, float]]:
     return list(zip((best + 0.5).tolist(), strength.tolist(), strict=True))
 
 
-def _agreement(picks: list[tuple[float, float]]) -> Onset | None:
-    if len(picks) < 2:
+def _agreement(picks_s: list[float]) -> Onset | None:
+    """The onset that at least half of the picks, one of each channel that shows a shock, agree on."""
+    if len(picks_s) < 2:
         return None
-    times = np.array([time for time, _ in picks])
+    times = np.array(picks_s)
     middle = float(np.median(times))
     near = np.abs(times - middle) <= _AGREE_S
     if np.count_nonzero(near) < max(2, (times.size + 1) // 2):
         return None
-    time = float(np.median(times[near]))
-    spread = float(np.median(np.abs(times[near] - time)))
-    return Onset(time, spread, int(np.count_nonzero(near)), max(strength for _, strength in picks))
+    return Onset(float(np.median(times[near])), int(np.count_nonzero(near)))
