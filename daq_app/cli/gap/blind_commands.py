@@ -112,8 +112,7 @@ def make(
         with _progress("making", cases) as advance:
             before = sum((out / f"case_{k + 1:04d}" / "seal.json").exists() for k in range(cases))
             advance(before)
-            for _ in make_cases(order, range(cases), _workers(workers)):
-                advance(1)
+            make_cases(order, range(cases), _workers(workers), lambda _count, _index: advance(1))
         echo(f"{cases} sealed cases in {out}; labels in {kept}: keep them away from the diagnosis")
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,6 +22,7 @@ from daq_app.gap.blind.world.campaign import MadeRun, World, draw_world, in_labo
 from daq_app.gap.blind.world.contact.motion import require_engine
 from daq_app.gap.blind.world.laboratories.numerics import Engine
 from daq_app.gap.blind.world.laboratories.table import Laboratory, laboratory
+from daq_app.workers import run_all
 
 _EPOCH_UTC_NS: Final = 1_767_225_600 * 10**9
 """2026-01-01: campaigns start within the hundred days after it."""
@@ -62,8 +62,10 @@ def case_name(index: int) -> str:
     return f"{CASE_PREFIX}{index + 1:04d}"
 
 
-def make_cases(order: Order, indices: Sequence[int], workers: int) -> Iterator[str]:
-    """Make the cases that are not there yet, on `workers` processes; yields names as they are done.
+def make_cases(
+    order: Order, indices: Sequence[int], workers: int, done: Callable[[int, int], None] | None = None
+) -> None:
+    """Make the cases that are not there yet, on `workers` processes; `done` as `workers.run_all` calls it.
 
     A case that is sealed already is left alone, so that an interrupted making goes on where it stopped.
     Raises `ValueError` for labels within reach, `EngineMissing` where a contact engine is wanted.
@@ -73,18 +75,7 @@ def make_cases(order: Order, indices: Sequence[int], workers: int) -> Iterator[s
     if any(order.engine_of(index) == "contact" for index in indices):
         require_engine()
     todo = [index for index in indices if not (order.out / case_name(index) / SEAL_FILE).exists()]
-    if workers <= 1:
-        for index in todo:
-            yield make_case(order, index)
-        return
-    # spawn on every platform: a forked child of a program with threads may hang.
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        jobs = [pool.submit(make_case, order, index) for index in todo]
-        try:
-            for job in as_completed(jobs):
-                yield job.result()
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+    run_all(partial(make_case, order), todo, workers, done)
 
 
 def check_apart(out: Path, labels: Path) -> None:

@@ -21,6 +21,7 @@ from daq_app.gap.blind.layout import CASE_PREFIX, RESULTS, SEAL_FILE
 from daq_app.gap.blind.running.apart import Apart
 from daq_app.gap.blind.seal import check_files, read_seal
 from daq_app.runfile.digest import file_sha256
+from daq_app.runfile.durable import write_whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,9 +98,7 @@ def save_outcome(folder: Path, outcome: Outcome, kept: str = RESULTS) -> None:
     """Keep an outcome; a name appears only with its whole content."""
     path = result_path(folder, outcome.case, kept)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_suffix(".tmp")
-    temporary.write_text(json.dumps(asdict(outcome), ensure_ascii=False), encoding="utf-8")
-    temporary.replace(path)
+    write_whole(path, json.dumps(asdict(outcome), ensure_ascii=False))
 
 
 def diagnose_apart(case: Path, diagnoser: str, timeout_s: float, apart: Apart | None = None) -> Outcome:

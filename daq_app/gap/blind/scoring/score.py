@@ -14,12 +14,11 @@ from daq_app.gap.blind.layout import RESULTS, SEAL_FILE
 from daq_app.gap.blind.running.runner import case_folders, read_outcome
 from daq_app.gap.blind.scoring.judge import Judged, judge
 from daq_app.gap.blind.scoring.statistics import (
-    NOTHING,
     Value,
     at_false_alarms,
     auroc_interval,
     bootstrap,
-    calibration_error,
+    calibration,
     calibration_error_by_chance,
     share,
 )
@@ -130,7 +129,7 @@ def table(judged: Sequence[Judged]) -> list[Row]:
             high=1.5,
         ),
         Row("wrong at p > 0.95", share([wrong_and_sure(j) for j in speaking]), high=0.01),
-        Row("expected calibration error", _calibration(judged), high=0.05),
+        Row("expected calibration error", calibration(*claims(judged)), high=0.05),
         Row("calibration error by chance alone", calibration_error_by_chance(claims(judged)[0])),
         *_outside_rows(judged),
         Row("nothing hidden, yet blamed on an effect", share([j.blames for j in nulls]), high=0.05),
@@ -222,20 +221,6 @@ def claims(judged: Sequence[Judged]) -> tuple[list[float], list[bool]]:
     spoken = [j for j in judged if j.decision not in ("failed", "none_of_these")]
     kept = [j for j in spoken if not math.isnan(j.claimed)]
     return [j.claimed for j in kept], [j.first_right for j in kept]
-
-
-def _calibration(judged: Sequence[Judged]) -> Value:
-    claimed, right = claims(judged)
-    if not claimed:
-        return NOTHING
-    rng = np.random.default_rng(0)
-    p, hit = np.array(claimed), np.array(right)
-    draws = []
-    for _ in range(500):
-        pick = rng.integers(0, p.size, p.size)
-        draws.append(calibration_error(p[pick].tolist(), hit[pick].tolist()))
-    low, high = np.quantile(draws, [0.025, 0.975])
-    return Value(calibration_error(claimed, right), float(low), float(high), p.size)
 
 
 def _finite(value: Any) -> Any:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 _Z95: Final = 1.959963984540054
 _RESAMPLES: Final = 2000
+_DEAR_RESAMPLES: Final = 500
+"""Of statistics that cost more than a median."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +46,18 @@ def bootstrap(
 ) -> Value:
     """A statistic of numbers with its percentile bootstrap interval (2000 resamples, fixed seed)."""
     data = np.array([v for v in values if math.isfinite(v)], dtype=np.float64)
-    if data.size == 0:
-        return NOTHING
+    return _resampled(statistic, data) if data.size else NOTHING
+
+
+def _resampled(statistic: Callable[..., float], *groups: NDArray[Any], resamples: int = _RESAMPLES) -> Value:
+    """A statistic of one or several groups of cases, each drawn anew by itself (first axis)."""
     rng = np.random.default_rng(0)
-    draws = [float(statistic(data[rng.integers(0, data.size, data.size)])) for _ in range(_RESAMPLES)]
+    draws = [
+        float(statistic(*(group[rng.integers(0, len(group), len(group))] for group in groups)))
+        for _ in range(resamples)
+    ]
     low, high = np.quantile(draws, [0.025, 0.975])
-    return Value(float(statistic(data)), float(low), float(high), data.size)
+    return Value(float(statistic(*groups)), float(low), float(high), sum(map(len, groups)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +90,14 @@ def calibration_error(claimed: Sequence[float], right: Sequence[bool], bins: int
     return sum(b.found.n * abs(b.claimed - b.found.value) for b in found) / n if n else math.nan
 
 
+def calibration(claimed: Sequence[float], right: Sequence[bool]) -> Value:
+    """Expected calibration error with its bootstrap interval over the cases."""
+    cases = np.column_stack([claimed, right])
+    if not len(cases):
+        return NOTHING
+    return _resampled(lambda drawn: calibration_error(*drawn.T), cases, resamples=_DEAR_RESAMPLES)
+
+
 def calibration_error_by_chance(claimed: Sequence[float], bins: int = 10) -> Value:
     """Calibration error of answers that are right exactly as often as they claim: mean and 95 % range.
 
@@ -110,17 +126,9 @@ def auroc(positive: Sequence[float], negative: Sequence[float]) -> float:
 
 def auroc_interval(positive: Sequence[float], negative: Sequence[float]) -> Value:
     """AUROC with its bootstrap interval over both groups."""
-    centre = auroc(positive, negative)
-    if math.isnan(centre):
+    if not (positive and negative):
         return NOTHING
-    rng = np.random.default_rng(0)
-    a, b = np.asarray(positive), np.asarray(negative)
-    draws = [
-        auroc(a[rng.integers(0, a.size, a.size)].tolist(), b[rng.integers(0, b.size, b.size)].tolist())
-        for _ in range(500)
-    ]
-    low, high = np.quantile(draws, [0.025, 0.975])
-    return Value(centre, float(low), float(high), a.size + b.size)
+    return _resampled(auroc, np.asarray(positive), np.asarray(negative), resamples=_DEAR_RESAMPLES)
 
 
 def at_false_alarms(positive: Sequence[float], negative: Sequence[float], share_of_false: float) -> float:
