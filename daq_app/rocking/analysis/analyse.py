@@ -91,10 +91,7 @@ def _analyse(
     others = [*instruments.findings, *further]
     further += scatter_findings(estimates["eav"], estimates["crt"], others) + misfit_findings(fit, others)
     verdict, findings = verdict_of(instruments, tracks, series, estimates, further, by_speed)
-    estimates = {
-        name: with_findings(with_change_by_speed(estimate, by_speed), findings)
-        for name, estimate in estimates.items()
-    }
+    estimates = _with_what_was_found(estimates, findings, by_speed)
     fit = None if fit is None else _for_this_wall(fit, findings, by_speed)
     headline = theta0[signals.lead] if bends else theta0.get("tiltmeters", theta0["wires"])
     bias = _bias(record, signals, track, estimates, velocity_filter, options)
@@ -136,6 +133,16 @@ def _for_this_wall(fit: MotionFit, findings: Sequence[FamilyFinding], by_speed: 
     if fit.explains_the_motion and is_rigid_block(findings):
         return fit
     return replace(fit, sigma_p_rad_s=math.nan, sigma_alpha_rad=math.nan)
+
+
+def _with_what_was_found(
+    estimates: Mapping[str, RestitutionEstimate], findings: Sequence[FamilyFinding], by_speed: float
+) -> dict[str, RestitutionEstimate]:
+    """The same r with errors that hold for the findings and for a change with the speed of impacts."""
+    return {
+        name: with_findings(with_change_by_speed(estimate, by_speed), findings)
+        for name, estimate in estimates.items()
+    }
 
 
 def _onsets(record: TestRecord, signals: Signals, track: MotionTrack) -> list[Onset | None]:
