@@ -66,8 +66,9 @@ def slow(values: Floats) -> Floats:
         lambda values: values + 3e-4 * TIME_S,
         lambda values: values + 2e-4 * np.tanh(values / 1e-3),
         lambda values: values + 3e-4 * np.sin(2.0 * np.pi * 50.0 * TIME_S),
+        lambda values: values + 3e-4 * np.sin(100.0 * np.pi * TIME_S) + 3e-5 * np.sin(88.0 * np.pi * TIME_S),
     ],
-    ids=["sound", "slow", "late", "gain", "drift", "yields at its base", "hum"],
+    ids=["sound", "slow", "late", "gain", "drift", "yields at its base", "hum", "hum with a side band"],
 )
 def test_what_else_sets_wires_and_lvdts_apart_is_no_bending(change: Callable[[Floats], Floats]):
     assert bending(seen(change(THETA_RAD), 1), seen(THETA_RAD, 2)) is None

@@ -18,8 +18,9 @@ Floats = NDArray[np.float64]
 
 _RATE_HZ: Final = 500.0
 _LOWEST_HZ: Final = 1.5
-_HIGHEST_HZ: Final = 45.0
-"""Modes are looked for up to here: below the mains, and faster ones move no half-cycle."""
+_HIGHEST_HZ: Final = 36.0
+"""Modes are looked for up to here, so that the band of the fastest ends below the mains; faster ones move no
+half-cycle."""
 _PERIODS: Final = 10.0
 """Periods that what is compared must hold: the window's main lobe is then within the band of the mode."""
 _BAND: Final = (0.8, 1.25)
