@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import leastsq
+from scipy.optimize import least_squares
 
 from daq_app.rocking.theory.housner import exact_quarter_period, half_cycle_rotation
 
@@ -18,8 +18,6 @@ _SHARE: Final = 0.001
 """Misfit, as a share of θ0, that weighs as much as one sigma of the time scale."""
 _SCALE_SIGMA: Final = 0.02
 _STEP_RAD: Final = 1e-7
-_TOLERANCES: Final = {"ftol": 1e-8, "xtol": 1e-8, "gtol": 1e-8}
-"""Relative changes of the sum of squares, of the unknowns and of the slope at which the search ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,12 +69,9 @@ class _Fall:
     def fitted(self) -> tuple[float, float, float]:
         """start / quarter, height / α, and the rms misfit in rad."""
         start = np.array([0.0, self.level_rad / self.alpha_rad, 1.0])
-        # MINPACK by its short way: `least_squares` spends as long on three unknowns as the search itself.
-        x, _, search, *_ = leastsq(
-            self._residual, start, Dfun=self._jacobian, full_output=True, **_TOLERANCES, maxfev=60
-        )
-        rms = math.sqrt(float(np.mean(search["fvec"][:-1] ** 2))) * _SHARE * self.level_rad
-        return float(x[0]), float(x[1]), rms
+        solution = least_squares(self._residual, start, jac=self._jacobian, method="lm", max_nfev=60)
+        rms = math.sqrt(float(np.mean(solution.fun[:-1] ** 2))) * _SHARE * self.level_rad
+        return float(solution.x[0]), float(solution.x[1]), rms
 
     def _elapsed(self, x: Floats) -> tuple[Floats, Floats]:
         """Time in the fall, and whether it lies within what the model knows."""
