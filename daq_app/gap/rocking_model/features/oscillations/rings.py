@@ -10,7 +10,6 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,6 @@ from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 from daq_app.gap.rocking_model.tolerances.walls import RING_SD, VAGUE_DAMPING
 
 ComplexArray = NDArray[np.complex128]
-Columns = TypeVar("Columns", FloatArray, ComplexArray)
 BEND_HZ = np.geomspace(2.0, 42.0, 61)
 TURN_HZ = np.geomspace(1.5, 14.0, 40)
 DAMPING = (0.01, 0.04)
@@ -117,7 +115,7 @@ def _smooth_curves(count: int) -> FloatArray:
     return np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, count), _DEGREE + 1))[0]
 
 
-def _clean(values: Columns, bases: list[tuple[NDArray[np.intp], FloatArray]]) -> Columns:
+def _clean(values: FloatArray, bases: list[tuple[NDArray[np.intp], FloatArray]]) -> FloatArray:
     """What the bases leave of the columns of `values` (m, k), at their samples."""
     parts = [values[part] - basis @ (basis.T @ values[part]) for part, basis in bases]
     return np.concatenate(parts) if parts else values[:0]
@@ -186,23 +184,45 @@ def _score(
             bases = cleaner(grid, signal.pick, slow)
             values = _clean(signal.values[:, None], bases)[:, 0]
             if values.size >= 60:
-                score += _gains(values, _clean(waves, bases)).reshape(score.shape)
+                score += _gains(values, waves, bases).reshape(score.shape)
     return score
 
 
-def _gains(values: FloatArray, waves: ComplexArray) -> FloatArray:
-    """Gain in log likelihood of sine and cosine of each wave; residuals' own correlation is allowed for."""
-    power = float(values @ values)
-    a, b = waves.imag, waves.real
-    aa, bb, ab = (np.einsum("nk,nk->k", first, second) for first, second in ((a, a), (b, b), (a, b)))
-    along = values @ waves
-    av, bv = along.imag, along.real
-    determinant = np.maximum(aa * bb - ab**2, 1e-12 * aa * bb + 1e-300)
-    explained = (bb * av**2 - 2 * ab * av * bv + aa * bv**2) / determinant
-    share = np.clip(explained / max(power, 1e-300), 0.0, 0.9999)
+def _gains(
+    values: FloatArray, waves: ComplexArray, bases: list[tuple[NDArray[np.intp], FloatArray]]
+) -> FloatArray:
+    """Gain in log likelihood of sine and cosine of each wave (m, k); residuals' own correlation is allowed for.
+
+    `values` (n,) are free of the bases. What these leave of a wave is not worked out: its products are the wave's
+    own less those of its coefficients, and its product with the values is the wave's.
+    """
+    count = waves.shape[1]
+    squares, along = np.zeros(2 * count), np.zeros(2 * count)
+    crossed = np.zeros(count)
+    start = 0
+    for part, basis in bases:
+        wave = waves[_span(part)].view(np.float64)  # cosine and sine take turns
+        squares += np.einsum("nk,nk->k", wave, wave)
+        crossed += np.einsum("nk,nk->k", wave[:, ::2], wave[:, 1::2])
+        known = basis.T @ wave
+        squares -= np.einsum("nk,nk->k", known, known)
+        crossed -= np.einsum("nk,nk->k", known[:, ::2], known[:, 1::2])
+        along += values[start : start + part.size] @ wave
+        start += part.size
+    bb, aa = squares.reshape(count, 2).T
+    bv, av = along.reshape(count, 2).T
+    determinant = np.maximum(aa * bb - crossed**2, 1e-12 * aa * bb + 1e-300)
+    explained = (bb * av**2 - 2 * crossed * av * bv + aa * bv**2) / determinant
+    share = np.clip(explained / max(float(values @ values), 1e-300), 0.0, 0.9999)
     fraction = max(independent_fraction(values), 0.2)
     gains: FloatArray = -0.5 * fraction * values.size * np.log1p(-share)
     return gains
+
+
+def _span(places: NDArray[np.intp]) -> slice | NDArray[np.intp]:
+    """The same places without a copy where they follow each other."""
+    first, last = int(places[0]), int(places[-1]) + 1
+    return slice(first, last) if last - first == places.size else places
 
 
 def _colour(
