@@ -24,6 +24,11 @@ class Policy:
     less than its impacts scatter, and shaken cables show 0.07 in development laboratories; raising it hides
     weak traffic."""
 
+    finding_ringing: float = 0.15
+    """Size of a single channel's ring after the fastest impact over the rms noise of one reading, from which it
+    is material: walls that ring leave 0.07 of it in a channel of their own in development laboratories; raising
+    it hides loose brackets."""
+
     finding_crossed: float = 0.1
     """Share of the rotation across an instrument's axis from which it is material: a mount that is turned by
     6°, three sd of what a rough laboratory has (assumed); raising it hides crosstalk."""

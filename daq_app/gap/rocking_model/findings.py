@@ -13,11 +13,12 @@ from daq_app.gap.core.policy import POLICY
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_findings import EFFECT_SIZES, RunFinding
 
-_IN_NOISE = ("hum", "quantisation")
+_IN_NOISE = ("hum", "quantisation", "ringing")
 """Conditions whose size counts over the noise."""
 _LEAST = {
     "hum": POLICY.finding_in_noise,
     "quantisation": POLICY.finding_in_noise,
+    "ringing": POLICY.finding_ringing,
     "shaking": POLICY.finding_shaking,
     "crossed": POLICY.finding_crossed,
 }

@@ -24,6 +24,7 @@ from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.inspection.channel_faults import channel_block, find_outlier_channels
 from daq_app.gap.rocking_model.inspection.conditions import conditions_of, findings_per_run, without_hum
 from daq_app.gap.rocking_model.inspection.floor_bursts import floor_bursts
+from daq_app.gap.rocking_model.inspection.lone_rings import lone_rings
 from daq_app.gap.rocking_model.inspection.quantisation import with_quantisation_errors
 from daq_app.gap.rocking_model.inspection.saturation import saturated
 from daq_app.gap.rocking_model.inspection.second_axis import second_axis
@@ -168,8 +169,11 @@ def without_outlier_channels(
         )
         for family, names in outliers.several.items()
     ]
-    turned = second_axis([e.run for e in again], [e.features.grid for e in again])
-    rows = [[*row, *disagreements, *own] for row, own in zip(findings, turned, strict=True)]
+    final = [e.run for e in again], [e.features.grid for e in again]
+    rows = [
+        [*row, *disagreements, *turned, *rings]
+        for row, turned, rings in zip(findings, second_axis(*final), lone_rings(*final), strict=True)
+    ]
     return again, outliers.single, rows
 
 

@@ -200,6 +200,18 @@ What the wall does otherwise (an edge that is not where the survey has it) is in
 blames one accelerometer for what the wall does.
 """
 
+IN_PHASE = 20.0
+"""Gain, nats, of a ring that begins in one phase at all impacts over any phases, from which a channel rings.
+
+Chance gives e⁻²⁰ to each of some thousand channels, frequencies and signs. Raising it hides loose brackets.
+"""
+
+LONE = 0.8
+"""Share of a ring in all channels of a family, 1, that one of them must explain to ring by itself.
+
+A wall that bends moves all. Lowering it blames one wire for what the wall does.
+"""
+
 TURNED = 0.03
 """Share of the rotation, 1, that a second axis may show: a mount that is turned by 1.7° (assumed).
 

@@ -89,6 +89,34 @@ def test_a_burst_of_shaking_is_found_in_the_run_that_has_it() -> None:
     assert finding.where == "1 of 2 runs"
 
 
+def _knocked(channel: str, size_m: float, *, in_phase: bool) -> list[GapRun]:
+    """A channel that rings at 30 Hz after every impact, in one phase or in any."""
+    runs = simulate({}, (0.25, -0.35, 0.45, -0.3))
+    rng = np.random.default_rng(5)
+    for run, known in zip(runs, prepare(runs)[0], strict=True):
+        place = next(i for i, sensor in enumerate(run.sensors) if sensor.id == channel)
+        t = np.arange(run.channels.shape[1]) / run.rate_hz - known.swings.release_s
+        for impact_s, jump in zip(known.grid.impact_s, known.grid.jumps, strict=True):
+            since = np.maximum(t - impact_s, 0.0)
+            phase = 0.0 if in_phase else rng.uniform(0.0, 2.0 * np.pi)
+            ring = np.exp(-since / 0.1) * np.sin(2.0 * np.pi * 30.0 * since + phase)
+            run.channels[place] += size_m * abs(jump) * np.where(t > impact_s, ring, 0.0)
+    return runs
+
+
+@pytest.mark.parametrize(("channel", "size_m"), [("WP-5", 5e-3), ("LV-A04", 5e-4)])
+def test_a_channel_that_rings_by_itself_after_impacts_is_named(channel: str, size_m: float) -> None:
+    prepared, _ = prepare(_knocked(channel, size_m, in_phase=True))
+    assert conditions_found(prepared).keys() == {f"ringing@{channel}"}
+    (finding,) = findings_of(prepared)
+    assert "ringing at 29 Hz after impacts" in finding.words
+    assert channel in finding.words
+
+
+def test_a_cable_that_impacts_whip_in_any_phase_does_not_ring() -> None:
+    assert conditions_found(prepare(_knocked("WP-5", 5e-3, in_phase=False))[0]) == {}
+
+
 @pytest.mark.parametrize("levels", [(-0.35,), (0.25, -0.35), (0.25, -0.35, 0.45)])
 def test_nothing_missing_is_not_said_over_channels_that_disagree(levels: tuple[float, ...]) -> None:
     result = diagnose_runs(

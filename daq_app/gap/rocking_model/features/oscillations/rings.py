@@ -191,10 +191,10 @@ def _score(
 def _gains(
     values: FloatArray, waves: ComplexArray, bases: list[tuple[NDArray[np.intp], FloatArray]]
 ) -> FloatArray:
-    """Gain in log likelihood of sine and cosine of each wave (m, k); residuals' own correlation is allowed for.
+    """Gain in log likelihood of sine and cosine of each wave (m, k); residuals' correlation is allowed for.
 
-    `values` (n,) are free of the bases. What these leave of a wave is not worked out: its products are the wave's
-    own less those of its coefficients, and its product with the values is the wave's.
+    `values` (n,) are free of the bases. What these leave of a wave is not worked out: its products are
+    the wave's own less those of its coefficients, and its product with the values is the wave's.
     """
     count = waves.shape[1]
     squares, along = np.zeros(2 * count), np.zeros(2 * count)
