@@ -7,6 +7,7 @@ import numpy as np
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
+from daq_app.gap.rocking_model.tolerances.sensors import PLAY_RAD
 
 UPRIGHT_RAD = 1e-4
 """Rotation over which the reaction goes from one edge to the other."""
@@ -42,6 +43,20 @@ def slip_shape(grid: Grid) -> FloatArray:
     """
     shape: FloatArray = _after(grid) @ grid.approach - float(np.sum(grid.approach))
     return shape
+
+
+def play_shape(theta: FloatArray) -> FloatArray:
+    """What a play adds to a reading of the rotation, (m,), over that play: −½ … ½.
+
+    The reading stays where the rotation turns back until the play is taken up, and follows half of it behind;
+    before the release it is in the middle.
+    """
+    half, held = 0.5 * PLAY_RAD, float(theta[0])
+    shown = np.empty_like(theta)
+    for k, value in enumerate(theta.tolist()):
+        held = min(max(held, value - half), value + half)
+        shown[k] = held
+    return (shown - theta) / PLAY_RAD
 
 
 def turned_shape(grid: Grid, *, alternating: bool) -> FloatArray:

@@ -1,4 +1,4 @@
-"""What wires show besides the wall's rotation, where they are the reference: slips, bending, crosstalk.
+"""What wires show besides the wall's rotation, where they are the reference: slips, bending, play, crosstalk.
 
 The motion is read from them where the LVDTs are late or go in steps, and then every peak and every crossing
 carries it.
@@ -17,7 +17,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE
 from daq_app.gap.rocking_model.features.oscillations.ring_response import bent_form, bent_share, bent_wall
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.features.shapes import slip_shape
+from daq_app.gap.rocking_model.features.shapes import play_shape, slip_shape
 from daq_app.gap.rocking_model.features.turns import turn_share, turned, turns
 from daq_app.gap.rocking_model.motion.swings import TOP_DEGREE
 
@@ -52,6 +52,8 @@ def times_carry(run: RockingRun, values: Mapping[str, float]) -> FloatArray | fl
 def _forms(run: RockingRun, values: Mapping[str, float]) -> Iterator[tuple[float, _Carried]]:
     if run.reference != "wire":
         return
+    if play := values["wire_play"]:
+        yield play, _carried(run, "play")
     if share := values.get(CROSSTALK_SHARE, 0.0):
         yield share, _carried(run, "crosstalk")
     if slip := values.get("sliding.c", 0.0):
@@ -71,6 +73,8 @@ def _work_out(run: RockingRun, form: str) -> _Carried:
     match form:
         case "crosstalk":
             series = run.leaked
+        case "play":
+            series = play_shape(grid.theta)
         case "slip":
             series = slip_shape(grid)
         case "corner_twist.on" | "corner_twist.back":

@@ -22,6 +22,13 @@ Multiplexed modules leave 0.1–1 % behind long cables (assumed). Raising it hid
 in the shape of another family's signal.
 """
 
+PLAY_RAD = 1e-4
+"""Prior sd of the play of the wires' drums in the rotation that they show together, rad.
+
+Assumed: 0.02 % of a travel of 0.9 m, at a height of 2 m. Raising it hides small differences between the times
+of fall and rise where the motion is read from the wires.
+"""
+
 MOUNT_RAD = 0.02
 """Sd of the angle, rad, by which an accelerometer is turned on its mount: a degree by eye (assumed).
 

@@ -30,7 +30,13 @@ from daq_app.gap.rocking_model.features.oscillations.ring_response import (
 )
 from daq_app.gap.rocking_model.features.pivots import travel
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape, turn_shape
+from daq_app.gap.rocking_model.features.shapes import (
+    moment_shape,
+    play_shape,
+    side_of,
+    slip_shape,
+    turn_shape,
+)
 from daq_app.gap.rocking_model.features.turns import turn_share, turn_terms
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
@@ -44,7 +50,7 @@ from daq_app.gap.rocking_model.motion.rotation import (
     wall_rotation,
 )
 from daq_app.gap.rocking_model.records import GapRun, Survey
-from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, OTHER_WIRES
+from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, OTHER_WIRES, PLAY_RAD
 
 _TURNS = 8
 """Impacts at which a turn about the vertical is looked for: those with most speed."""
@@ -149,6 +155,7 @@ def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) ->
         (-face_gain(values, "face_a"), "positive", lambda: np.maximum(theta, 0.0)),
         (-face_gain(values, "face_b"), "negative", lambda: np.minimum(theta, 0.0)),
         (values["wire_even"], "even", lambda: theta**2),
+        (values["wire_play"], "play", lambda: play_shape(theta)),
         (values.get("sliding.c", 0.0) / run.wire_height_m, "slip", partial(slip_shape, run.grid)),
         *_moved_apart(run, values, of_base=False),
     )
@@ -208,6 +215,7 @@ def _priors(survey: Survey) -> tuple[Parameter, ...]:
         Parameter("cal_wire", 0.0, CALIBRATION / math.sqrt(5), "1", meaning="calibration of the wires"),
         known("base_follow", 4e-3, "1", "translation from wire calibrations"),
         known("wire_even", 5e-3, "1/rad", "even part from wire anchors"),
+        Parameter("wire_play", 0.0, PLAY_RAD, "rad", meaning="play of the wires' drums"),
     )
 
 
