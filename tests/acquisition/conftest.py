@@ -200,11 +200,12 @@ class Live:
         assert isinstance(message, StateMessage)
         return message
 
-    def wait_for_event(self, kind: str, **data: str) -> EventMessage:
+    def wait_for_event(self, kind: str, *, severity: str = "", **data: str) -> EventMessage:
         def right(message: Message) -> bool:
             return (
                 isinstance(message, EventMessage)
                 and message.kind == kind
+                and severity in ("", message.severity)
                 and all(message.data.get(key) == value for key, value in data.items())
             )
 

@@ -126,11 +126,10 @@ def test_after_a_failure_the_preview_starts_again(live: Lives, wall_test: Any) -
 def test_silence_is_an_alarm_within_a_second_and_ends_when_samples_come(live: Lives) -> None:
     lab = live()
     lab.zero_and_arm()
-    began = lab.wait_for_event("alarm", alarm="silence")  # the stage gives nothing more by itself
-    assert began.severity == "error"
+    # The stage gives nothing more by itself. On a busy machine a silence may have begun and ended before.
+    lab.wait_for_event("alarm", severity="error", alarm="silence")
     lab.driver.let(lab.driver._allowed + 4000)
-    ended = lab.wait_for_event("alarm", alarm="silence")
-    assert ended.severity == "info"
+    lab.wait_for_event("alarm", severity="info", alarm="silence")
 
 
 def test_silence_for_too_long_ends_the_run_in_good_order(live: Lives) -> None:

@@ -1,0 +1,49 @@
+"""Play of the wires' drums, where the motion is read from them: falls seem to begin late."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from daq_app.gap.core import Diagnosis
+from daq_app.gap.rocking_model.study import diagnose_runs
+from tests.support.simulated_wall import simulate
+
+LEVELS = (0.25, -0.35, 0.45)
+
+
+def _behind(values: NDArray[np.float64], play: float) -> NDArray[np.float64]:
+    """A reading that moves only once the slack on one side is used up."""
+    shown, held = np.empty_like(values), values[0]
+    for k, value in enumerate(values.tolist()):
+        held = min(max(held, value - 0.5 * play), value + 0.5 * play)
+        shown[k] = held
+    return shown
+
+
+def _diagnosed(play_m: float) -> tuple[Diagnosis, float]:
+    """The diagnosis of late LVDTs beside wires with that play, and the play in the rotation of the wires.
+
+    The drum follows the wall, and the noise of the reading comes after it.
+    """
+    runs = simulate({"lag@lvdt": {"tau": 0.02}}, LEVELS)
+    wires = runs[0].indices("wire")
+    heights = runs[0].positions(wires)[:, 2]
+    for run in runs:
+        smooth = butter(4, 15.0, fs=run.rate_hz, output="sos")
+        for i in wires:
+            moved = sosfiltfilt(smooth, run.channels[i])
+            run.channels[i] += _behind(moved, play_m) - moved
+    result = diagnose_runs(runs, only=("lag@lvdt", "gain@lvdt"))
+    return result, play_m * float(heights.sum() / (heights @ heights))
+
+
+@pytest.mark.parametrize("play_m", [0.0, 2e-4])
+def test_play_is_estimated_and_hides_no_cause(play_m: float) -> None:
+    result, play_rad = _diagnosed(play_m)
+    found = next(p for p in result.parameters if p.name == "wire_play")
+    assert found.value == pytest.approx(play_rad, abs=2e-5)
+    assert result.decision.effects == ("lag@lvdt",)
+    assert result.rest.unknown < 0.1
