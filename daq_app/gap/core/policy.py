@@ -89,6 +89,12 @@ class Policy:
     hides what a strong cause outshines."""
     unknown_steepness: float = 4.0
     """Slope of the logistic in the logarithm of each; raising it makes the gate a step."""
+    lone_instruments: int = 2
+    """Single instruments that may be off at once, each by a fault of its own (assumed)."""
+    common_cause: float = 0.95
+    """Probability that more of them have a cause in common, which no effect of the library is. Three causes are
+    one hypothesis in fifty, and that each of them sits in one instrument by chance is one of a hundred of these;
+    lowering it names crosstalk between three channels as three gains."""
     form_nats: float = 6.0
     """Gain of a free form on top of the best hypothesis, in log posterior, that is as likely another form
     as not ..."""

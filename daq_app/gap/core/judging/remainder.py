@@ -54,6 +54,8 @@ class Remainder:
     """Probability that something is there that is not in the library."""
     form: str = ""
     """Family of which another form gains most on top of the best hypothesis, where that matters."""
+    together: int = 0
+    """How many single instruments the best hypothesis has off at once, where that asks for one cause of all."""
 
     def known(self, policy: Policy) -> float:
         """Probability that the answer is among the hypotheses, which share it."""
@@ -62,6 +64,8 @@ class Remainder:
     @property
     def words(self) -> str:
         """The remainder with its place."""
+        if self.together:
+            return f"{self.together} single instruments are off at once, which asks for one cause of them all"
         if not self.groups or self.nats < 1.0:
             return "nothing remains beyond noise, scatter and what the model is usually wrong by"
         worst = self.groups[0]
@@ -99,7 +103,12 @@ def remainder(
         other = policy.chance(gain, bar)
         rest = 1.0 - (1.0 - rest) * (1.0 - other)
         form = max(forms, key=lambda f: f.excess).family if other > policy.refused else ""
-    return Remainder(nominal, before, after, nats, share, groups, rest, form)
+    together = sum(1 for name in best.effects if library[name].part_of)
+    if together > policy.lone_instruments:
+        rest = 1.0 - (1.0 - rest) * (1.0 - policy.common_cause)
+    else:
+        together = 0
+    return Remainder(nominal, before, after, nats, share, groups, rest, form, together)
 
 
 def _unknown(share: float, nats: float, largest: float, policy: Policy) -> float:

@@ -17,7 +17,7 @@ from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.noise import coefficient_covariance
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Wire
 from daq_app.gap.rocking_model.tolerances.inspection import REMAINS_SD, SOUND
-from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION
+from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, CERTIFIED
 
 _SHAPES = ("gain", "lag", "curvature", "drift")
 _GAIN, _CURVATURE = _SHAPES.index("gain"), _SHAPES.index("curvature")
@@ -148,9 +148,32 @@ def usual_remains(of_channels: Sequence[float]) -> float:
     return max(float(np.median(of_channels)), 0.0)
 
 
-def block_of(name: str, family: Family, beside: Others, usual: float, wire: Wire | None = None) -> Block:
-    """Block of the coefficients of a channel; `usual` is what remains (`Deviation`) of a sound one."""
+def usual_gain(of_channels: Sequence[tuple[Others, Deviation]]) -> float:
+    """Relative sd of the calibration of one channel, as a family's sound channels and the certificate say it.
+
+    The certificate counts as `CERTIFIED` channels: where many agree it is they that say how well.
+    """
+    if not of_channels:
+        return CALIBRATION
+    shares = [misfit.values[_GAIN] / beside.spread for beside, misfit in of_channels]
+    seen = 1.48 * float(np.median(np.abs(shares)))  # the sd of a Gaussian, whatever a few are off by
+    weights = np.array([CERTIFIED, len(shares)]) / (CERTIFIED + len(shares))
+    return float(np.sqrt(weights @ np.square([CALIBRATION, seen])))
+
+
+def block_of(
+    name: str,
+    family: Family,
+    beside: Others,
+    sound: Sequence[tuple[Others, Deviation]],
+    wire: Wire | None = None,
+) -> Block:
+    """Block of the coefficients of a channel; `sound` are the others of its family, each beside the others.
+
+    Without any, the certificate says what a sound one is off by, and what remains is as it should be.
+    """
     misfit = deviation(beside)
+    usual = usual_remains([other.remains for _, other in sound] or [misfit.remains])
     k = len(SHAPES[family])
     covariance = np.zeros((k + 1, k + 1))
     covariance[:k, :k] = misfit.covariance
@@ -170,13 +193,13 @@ def block_of(name: str, family: Family, beside: Others, usual: float, wire: Wire
         noise=misfit.noise * float(np.exp(usual)),
         wire=wire,
         tags={name: family},
-        levers=_levers(family, beside),
+        levers=_levers(family, beside, usual_gain(sound)),
     )
 
 
-def _levers(family: Family, beside: Others) -> tuple[float, ...]:
-    """What a sound channel is off by from the others' prediction (sd), by shape."""
+def _levers(family: Family, beside: Others, gain: float) -> tuple[float, ...]:
+    """What a sound channel is off by from the others' prediction (sd), by shape; `gain` is its calibration's."""
     usual = SOUND * beside.spread * np.array(TOLERANCE[family])
-    usual[_GAIN] = CALIBRATION * beside.spread
+    usual[_GAIN] = gain * beside.spread
     usual[_CURVATURE] *= max(beside.curved / beside.spread, 1.0)
     return tuple(usual.tolist())

@@ -45,18 +45,22 @@ def slip_shape(grid: Grid) -> FloatArray:
     return shape
 
 
-def play_shape(theta: FloatArray) -> FloatArray:
-    """What a play adds to a reading of the rotation, (m,), over that play: −½ … ½.
+def with_play(values: FloatArray, play: float) -> FloatArray:
+    """What is read of values (m,) through a play in their unit, from the middle of it on.
 
-    The reading stays where the rotation turns back until the play is taken up, and follows half of it behind;
-    before the release it is in the middle.
+    The reading stays where they turn back until the play is taken up, and follows half of it behind.
     """
-    half, held = 0.5 * PLAY_RAD, float(theta[0])
-    shown = np.empty_like(theta)
-    for k, value in enumerate(theta.tolist()):
+    half, held = 0.5 * play, float(values[0])
+    shown = np.empty_like(values)
+    for k, value in enumerate(values.tolist()):
         held = min(max(held, value - half), value + half)
         shown[k] = held
-    return (shown - theta) / PLAY_RAD
+    return shown
+
+
+def play_shape(theta: FloatArray) -> FloatArray:
+    """What a small play adds to a reading of the rotation, (m,), over that play: −½ … ½."""
+    return (with_play(theta, PLAY_RAD) - theta) / PLAY_RAD
 
 
 def turned_shape(grid: Grid, *, alternating: bool) -> FloatArray:

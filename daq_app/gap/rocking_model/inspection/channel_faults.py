@@ -235,8 +235,8 @@ def channel_block(run: GapRun, grid: Grid, family: Family, name: str, step: floa
     if data is None or name not in data.ids:
         return None
     others = beside(data, name, (name,))
-    usual = usual_remains([deviation(beside(data, n, (name,))).remains for n in data.ids if n != name])
-    return block_of(name, family, others, usual, _wire(run, name) if family == "wire" else None)
+    sound = [(row, deviation(row)) for row in (beside(data, n, (name,)) for n in data.ids if n != name)]
+    return block_of(name, family, others, sound, _wire(run, name) if family == "wire" else None)
 
 
 def _wire(run: GapRun, name: str) -> Wire:

@@ -25,6 +25,7 @@ from daq_app.gap.rocking_model.inspection.channel_faults import channel_block, f
 from daq_app.gap.rocking_model.inspection.conditions import conditions_of, findings_per_run, without_hum
 from daq_app.gap.rocking_model.inspection.floor_bursts import floor_bursts
 from daq_app.gap.rocking_model.inspection.lone_rings import lone_rings
+from daq_app.gap.rocking_model.inspection.play import plays
 from daq_app.gap.rocking_model.inspection.quantisation import with_quantisation_errors
 from daq_app.gap.rocking_model.inspection.saturation import saturated
 from daq_app.gap.rocking_model.inspection.second_axis import second_axis
@@ -170,9 +171,10 @@ def without_outlier_channels(
         for family, names in outliers.several.items()
     ]
     final = [e.run for e in again], [e.features.grid for e in again]
+    unexplained = zip(second_axis(*final), lone_rings(*final), plays(*final, outliers.ids), strict=True)
     rows = [
-        [*row, *disagreements, *turned, *rings]
-        for row, turned, rings in zip(findings, second_axis(*final), lone_rings(*final), strict=True)
+        [*row, *disagreements, *(finding for found in own for finding in found)]
+        for row, own in zip(findings, unexplained, strict=True)
     ]
     return again, outliers.single, rows
 

@@ -19,7 +19,6 @@ from daq_app.gap.rocking_model.features.channel_shapes import (
     Others,
     block_of,
     deviation,
-    usual_remains,
 )
 from daq_app.gap.rocking_model.inspection.channel_families import smoothed
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
@@ -59,7 +58,7 @@ def vertical_block(run: GapRun, grid: Grid, name: str, late_s: float) -> Block |
     beside = _vertical(run.including((name,)), grid, late_s).get(name)
     if beside is None:
         return None
-    return block_of(name, "accelerometer", beside, usual_remains([deviation(beside).remains]))
+    return block_of(name, "accelerometer", beside, ())
 
 
 def _vertical(run: GapRun, grid: Grid, late_s: float) -> dict[str, Others]:

@@ -212,6 +212,18 @@ LONE = 0.8
 A wall that bends moves all. Lowering it blames one wire for what the wall does.
 """
 
+PLAY_M = 5e-4
+"""Least play of a wire, m, that is looked for: twice what the drum of a sound one has.
+
+Raising it hides a drum that is loose.
+"""
+
+PLAY_GAIN = 0.5
+"""Share, 1, of what gain, lag, curvature, side and drift leave of a wire that its play must explain.
+
+In development laboratories sound wires stay below 0.2. Raising it hides loose drums in noise.
+"""
+
 TURNED = 0.03
 """Share of the rotation, 1, that a second axis may show: a mount that is turned by 1.7° (assumed).
 

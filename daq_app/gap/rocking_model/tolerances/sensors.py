@@ -9,6 +9,12 @@ CALIBRATION = 3e-3
 Raising it hides gain errors of single channels and of families below three times its value.
 """
 
+CERTIFIED = 8.0
+"""Channels of a family, 1, whose agreement says as much of their calibration as the certificate (assumed).
+
+Raising it blames a gain where a whole family is calibrated worse than its certificate says.
+"""
+
 OTHER_WIRES = 2e-3
 """Relative sd of the calibration of the mean of some wires against that of all, 1 (assumed).
 

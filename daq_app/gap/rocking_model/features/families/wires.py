@@ -54,6 +54,10 @@ from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, OTHER_WIRE
 
 _TURNS = 8
 """Impacts at which a turn about the vertical is looked for: those with most speed."""
+_TURN_SCATTER_S = 1e-4
+"""What such a turn repeats by, from a pair of wires a metre apart …"""
+_TURN_LEVER_1_M = math.sqrt(2.0)
+"""… whose turn is this many times, 1/m, what one of them steps by."""
 
 
 def _wire_block(scene: Scene) -> Block | None:
@@ -129,7 +133,8 @@ def _turn_block(scene: Scene) -> Block | None:
     design = np.column_stack([np.ones_like(y), z, y])
     if len(chosen) < len(run.indices("wire")) or np.linalg.matrix_rank(design) < 3 or len(chosen) < 4:
         return None
-    turned = -np.linalg.pinv(design)[2] @ _beyond_rigid(run, grid, chosen)
+    weights = -np.linalg.pinv(design)[2]
+    turned = weights @ _beyond_rigid(run, grid, chosen)
     theta, count = grid.theta, min(_TURNS, grid.impact_s.size - 1)
     absorbed = {
         "gain": (theta, "1"),
@@ -145,7 +150,12 @@ def _turn_block(scene: Scene) -> Block | None:
     block = regress("turn", turned - turned[pick].mean(), columns, pick, tuple(absorbed))
     sides = {name: "+" if grid.approach[k] > 0.0 else "−" for k, name in enumerate(turns)}
     labels = {name: ("turn", f"turn per speed at impacts to {side}") for name, side in sides.items()}
-    return block and replace(block, said=labels)
+    if block is None:
+        return None
+    # Without one wire of a pair the turn hangs on a longer lever, and with it on what every wire steps by.
+    lever = float(weights @ weights) / _TURN_LEVER_1_M**2
+    steps = max(lever - 1.0, 0.0) * _TURN_SCATTER_S**2 * np.eye(count)
+    return replace(block, said=labels, covariance=block.covariance + steps)
 
 
 def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
@@ -230,7 +240,7 @@ FAMILY = SensorFamily(
         ("wire", "drift"): Size(2e-6, 5e-6, "rad/s"),
         ("base", "slip per speed"): Size(5e-5, 1e-4, "m s/rad"),
         ("base", "follows rotation"): Size(3e-4),
-        **{("turn", f"impact {k + 1}"): Size(1e-4) for k in range(_TURNS)},
+        **{("turn", f"impact {k + 1}"): Size(_TURN_SCATTER_S) for k in range(_TURNS)},
     },
     _priors,
     {"wire": ("sensor", 5), "base": ("contact", 2), "turn": ("structure", _TURNS)},

@@ -1,0 +1,80 @@
+"""Play of a single wire: its reading stays where the wall turns back, and follows behind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.run_findings import RunFinding
+from daq_app.gap.rocking_model.features.shapes import with_play
+from daq_app.gap.rocking_model.inspection.channel_families import ChannelFamily, beside, channel_family
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
+from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.tolerances.inspection import PLAY_GAIN, PLAY_M
+
+_PLAYS_M = np.geomspace(PLAY_M, 16.0 * PLAY_M, 9)
+
+
+@dataclass(frozen=True, slots=True)
+class _Play:
+    """The play that explains most of what one wire of one run shows beyond the others."""
+
+    size_m: float
+    sd_m: float
+    explained: float
+    """Share of what gain, lag, curvature, side and drift leave."""
+
+
+def plays(
+    runs: Sequence[GapRun], grids: Sequence[Grid], examined: Sequence[str] = ()
+) -> list[list[RunFinding]]:
+    """Findings of wires with more play than a sound drum has, run by run. No effect explains them.
+
+    `examined` are the channels that are not used with their family.
+    """
+    findings: list[list[RunFinding]] = [[] for _ in runs]
+    families = [
+        channel_family(run, grid, "wire", include=tuple(examined))
+        for run, grid in zip(runs, grids, strict=True)
+    ]
+    data = [family for family in families if family is not None]
+    if len(data) < len(runs) or any(family.ids != data[0].ids for family in data):
+        return findings
+    for name in data[0].ids:
+        without = tuple(other for other in examined if other != name)
+        seen = [_play(family, name, without) for family in data]
+        if float(np.median([play.explained for play in seen])) < PLAY_GAIN:
+            continue
+        for row, play in zip(findings, seen, strict=True):
+            row.append(RunFinding(f"play@{name}", "play", "m", play.size_m, play.sd_m))
+    return findings
+
+
+def _play(data: ChannelFamily, name: str, without: tuple[str, ...]) -> _Play:
+    other = beside(data, name, without)
+    e, pick = other.expected, other.pick
+    columns = np.column_stack(
+        [e, np.gradient(e, 1.0 / GRID_HZ), e**2, np.abs(e), np.arange(e.size), np.ones_like(e)]
+    )[pick]
+    basis = np.linalg.qr(columns / np.abs(columns).max(axis=0))[0]
+
+    def beyond(values: FloatArray) -> FloatArray:
+        picked = values[pick]
+        return np.asarray(picked - basis @ (basis.T @ picked))
+
+    left = beyond(other.measured - e)
+    power = max(float(left @ left), 1e-300)
+    best = _Play(0.0, PLAY_M, 0.0)
+    for size in _PLAYS_M.tolist():
+        shape = beyond(with_play(e, size) - e)
+        square = max(float(shape @ shape), 1e-300)
+        share = float(shape @ left) / square
+        explained = share**2 * square / power if share > 0.0 else 0.0
+        if explained > best.explained:
+            noise = np.sqrt(power * (1.0 - explained) / left.size / square)
+            best = _Play(size * share, float(size * noise), explained)
+    return best
