@@ -25,9 +25,9 @@ class Policy:
     weak traffic."""
 
     finding_ringing: float = 0.15
-    """Size of a single channel's ring after the fastest impact over the rms noise of one reading, from which it
-    is material: walls that ring leave 0.07 of it in a channel of their own in development laboratories; raising
-    it hides loose brackets."""
+    """Size of a single channel's ring after the fastest impact over the rms noise of one reading, from which
+    it is material: walls that ring leave 0.07 of it in one channel in development laboratories; raising it
+    hides loose brackets."""
 
     finding_crossed: float = 0.1
     """Share of the rotation across an instrument's axis from which it is material: a mount that is turned by
@@ -92,15 +92,16 @@ class Policy:
     lone_instruments: int = 2
     """Single instruments that may be off at once, each by a fault of its own (assumed)."""
     common_cause: float = 0.95
-    """Probability that more of them have a cause in common, which no effect of the library is. Three causes are
-    one hypothesis in fifty, and that each of them sits in one instrument by chance is one of a hundred of these;
+    """Probability that more of them have a cause in common, which no effect of the library is. One hypothesis
+    in fifty has three causes, and of these one in a hundred has each in an instrument of its own (assumed);
     lowering it names crosstalk between three channels as three gains."""
-    form_nats: float = 6.0
+    form_nats: float = 11.0
     """Gain of a free form on top of the best hypothesis, in log posterior, that is as likely another form
     as not ..."""
     form_share: float = 0.1
-    """... or this share of what is explained, whichever is more; no effect's model is better. In three
-    development laboratories right answers gain 1.0 of these bars at most, other forms 3.7 or more."""
+    """... or this share of what is explained, whichever is more; no effect's model is better. In development
+    laboratories right answers gain 7 at most, other forms 17 or more; raising either names a law that is only
+    near."""
     own_form: float = 0.05
     """Departure from its own form, as a share of another form's, that our model of an effect may have."""
     listed: float = 0.05

@@ -55,7 +55,7 @@ class Remainder:
     form: str = ""
     """Family of which another form gains most on top of the best hypothesis, where that matters."""
     together: int = 0
-    """How many single instruments the best hypothesis has off at once, where that asks for one cause of all."""
+    """How many single instruments the best hypothesis has off at once, where they ask for one cause."""
 
     def known(self, policy: Policy) -> float:
         """Probability that the answer is among the hypotheses, which share it."""

@@ -198,7 +198,7 @@ def block_of(
 
 
 def _levers(family: Family, beside: Others, gain: float) -> tuple[float, ...]:
-    """What a sound channel is off by from the others' prediction (sd), by shape; `gain` is its calibration's."""
+    """What a sound channel is off by from the others' prediction (sd), by shape; `gain`: its calibration."""
     usual = SOUND * beside.spread * np.array(TOLERANCE[family])
     usual[_GAIN] = gain * beside.spread
     usual[_CURVATURE] *= max(beside.curved / beside.spread, 1.0)

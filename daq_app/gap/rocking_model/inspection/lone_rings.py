@@ -1,7 +1,7 @@
 """A channel that rings by itself after impacts: a loose bracket, which no motion of the wall explains.
 
-What the others of its family leave of a channel is correlated with a ring-down after each impact. A ring begins
-at every impact in the same phase; noise and a cable that an impact whips begin in any.
+What the others of its family leave of a channel is correlated with a ring-down after each impact. A ring
+begins at every impact in the same phase; noise and a cable that an impact whips begin in any.
 """
 
 from __future__ import annotations

@@ -2,40 +2,24 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core import Diagnosis
 from daq_app.gap.rocking_model.study import diagnose_runs
+from tests.support.gap.play import behind
 from tests.support.simulated_wall import simulate
 
 LEVELS = (0.25, -0.35, 0.45)
 
 
-def _behind(values: NDArray[np.float64], play: float) -> NDArray[np.float64]:
-    """A reading that moves only once the slack on one side is used up."""
-    shown, held = np.empty_like(values), values[0]
-    for k, value in enumerate(values.tolist()):
-        held = min(max(held, value - 0.5 * play), value + 0.5 * play)
-        shown[k] = held
-    return shown
-
-
 def _diagnosed(play_m: float) -> tuple[Diagnosis, float]:
-    """The diagnosis of late LVDTs beside wires with that play, and the play in the rotation of the wires.
-
-    The drum follows the wall, and the noise of the reading comes after it.
-    """
+    """The diagnosis of late LVDTs beside wires with that play, and the play in the rotation of the wires."""
     runs = simulate({"lag@lvdt": {"tau": 0.02}}, LEVELS)
     wires = runs[0].indices("wire")
     heights = runs[0].positions(wires)[:, 2]
     for run in runs:
-        smooth = butter(4, 15.0, fs=run.rate_hz, output="sos")
         for i in wires:
-            moved = sosfiltfilt(smooth, run.channels[i])
-            run.channels[i] += _behind(moved, play_m) - moved
+            run.channels[i] = behind(run.channels[i], play_m, run.rate_hz)
     result = diagnose_runs(runs, only=("lag@lvdt", "gain@lvdt"))
     return result, play_m * float(heights.sum() / (heights @ heights))
 

@@ -11,6 +11,7 @@ from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import diagnose_runs, model_and_library, prepare
 from tests.support.gap.conditions import conditions_found
+from tests.support.gap.play import behind
 from tests.support.simulated_wall import simulate
 
 LEVEL = (-0.35,)
@@ -117,6 +118,55 @@ def test_a_channel_that_rings_by_itself_after_impacts_is_named(channel: str, siz
 
 def test_a_cable_that_impacts_whip_in_any_phase_does_not_ring() -> None:
     assert conditions_found(prepare(_knocked("WP-5", 5e-3, in_phase=False))[0]) == {}
+
+
+def test_play_of_a_single_wire_is_named() -> None:
+    runs = simulate({}, (0.25, -0.35))
+    (place,) = (i for i in runs[0].indices("wire") if runs[0].sensors[i].id == "WP-2")
+    for run in runs:
+        run.channels[place] = behind(run.channels[place], 2e-3, run.rate_hz)
+    prepared, _ = prepare(runs)
+    assert conditions_found(prepared) == {"play@WP-2": "wire"}
+    (finding,) = findings_of(prepared)
+    assert "play of 2" in finding.words
+    assert finding.size == pytest.approx(2e-3, rel=0.15)
+
+
+@pytest.mark.parametrize("effect", ["lag@WP-2", "slow_response@WP-2", "filter_delay@WP-2"])
+def test_a_late_wire_has_no_play(effect: str) -> None:
+    assert conditions_found(prepare(simulate({effect: {"tau": 0.02}}, (0.25, -0.35)))[0]) == {}
+
+
+def test_three_instruments_that_are_off_at_once_ask_for_one_cause() -> None:
+    names = ("gain@LV-A03", "gain@WP-2", "gain@AC-6")
+    runs = simulate({name: {"error": 0.07} for name in names}, (0.25, -0.35, 0.45))
+    assert len(found_channels(prepare(runs)[0])) == 3
+    result = diagnose_runs(runs, only=names)
+    assert result.decision.verdict == "none_of_these"
+    assert "3 single instruments are off at once" in result.decision.sentence
+    two = diagnose_runs(simulate({n: {"error": 0.07} for n in names[:2]}, (0.25, -0.35, 0.45)), only=names)
+    assert two.decision.effects == ("gain@LV-A03", "gain@WP-2")
+
+
+def test_a_gain_counts_against_how_well_its_family_is_calibrated() -> None:
+    """LVDTs that scatter by 0.6 % leave one of them more room than the certificate of 0.3 % says."""
+    rng = np.random.default_rng(3)
+    scatter = {f"LV-{face}{n:02d}": 1.0 + 0.006 * rng.standard_normal() for face in "AB" for n in range(1, 13)}
+    room = []
+    for factors in ({"LV-A03": 1.04}, scatter | {"LV-A03": 1.04}):
+        (run,) = prepare(_scaled(factors))[0]
+        block = next(b for b in run.blocks if b.family == "LV-A03")
+        room.append(block.levers[block.names.index("gain")])
+    assert room[1] > 1.4 * room[0]
+
+
+def test_a_turn_is_less_sure_without_one_wire_of_the_pair_that_shows_it() -> None:
+    sure = []
+    for off in ({}, {"WP-5": 1.06}):
+        prepared, _ = prepare(_scaled(off))
+        turn = next(b for b in prepared[0].blocks if b.family == "turn")
+        sure.append(float(np.sqrt(np.diag(turn.covariance)).min()))
+    assert sure[1] > 2.0e-4 > sure[0]
 
 
 @pytest.mark.parametrize("levels", [(-0.35,), (0.25, -0.35), (0.25, -0.35, 0.45)])
