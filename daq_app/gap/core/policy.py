@@ -95,12 +95,12 @@ class Policy:
     """Probability that more of them have a cause in common, which no effect of the library is. One hypothesis
     in fifty has three causes, and of these one in a hundred has each in an instrument of its own (assumed);
     lowering it names crosstalk between three channels as three gains."""
-    form_nats: float = 11.0
-    """Gain of a free form on top of the best hypothesis, in log posterior, that is as likely another form
-    as not ..."""
+    form_nats: float = 4.5
+    """Gain of a free form on top of the best hypothesis beyond one nat per coefficient, in log posterior,
+    that is as likely another form as not ..."""
     form_share: float = 0.1
     """... or this share of what is explained, whichever is more; no effect's model is better. In development
-    laboratories right answers gain 7 at most, other forms 17 or more; raising either names a law that is only
+    laboratories right answers gain 3.7 at most, other forms 16 or more; raising either names a law that is only
     near."""
     own_form: float = 0.05
     """Departure from its own form, as a share of another form's, that our model of an effect may have."""

@@ -36,7 +36,8 @@ class FreeForm:
     p_value: float
     """Probability of a gain as large by chance, where the named form is the right one."""
     excess: float
-    """Gain beyond what chance gives: half a nat for each coefficient that the runs determine."""
+    """Gain less one nat for each coefficient that the runs determine (Akaike, IEEE Trans. Autom. Control 19,
+    1974): half of it is what chance gives, the other half what the next runs would lose again."""
     log_bayes: float = math.nan
     """Log of how much likelier what is seen is under another form of the family than under the named one.
     NaN for what is no departure."""
@@ -57,7 +58,7 @@ class FreeForm:
             form.equation,
             score.gain,
             chance,
-            score.gain - 0.5 * score.determined,
+            score.gain - score.determined,
             _log_bayes(score, form.typical * abs(strength)),
         )
 
