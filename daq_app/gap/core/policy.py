@@ -98,7 +98,7 @@ class Policy:
     form_nats: float = 4.5
     """Gain of a free form on top of the best hypothesis beyond one nat per coefficient, in log posterior,
     that is as likely another form as not ..."""
-    form_share: float = 0.1
+    form_share: float = 0.02
     """... or this share of what is explained, whichever is more; no effect's model is better. In development
     laboratories right answers gain 3.7 at most, other forms 16 or more; raising either names a law that is only
     near."""
