@@ -171,7 +171,9 @@ def without_outlier_channels(
         for family, names in outliers.several.items()
     ]
     final = [e.run for e in again], [e.features.grid for e in again]
-    unexplained = zip(second_axis(*final), lone_rings(*final), plays(*final, outliers.ids), strict=True)
+    unexplained = zip(
+        second_axis(*final), lone_rings(*final, outliers.ids), plays(*final, outliers.ids), strict=True
+    )
     rows = [
         [*row, *disagreements, *(finding for found in own for finding in found)]
         for row, own in zip(findings, unexplained, strict=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,9 @@ from daq_app.gap.rocking_model.features.oscillations.rings import cleaner
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.inspection.channel_families import channel_family
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
-from daq_app.gap.rocking_model.motion.rotation import sample_noise
+from daq_app.gap.rocking_model.motion.rotation import gridded, sample_noise
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances.inspection import IN_PHASE, LONE
+from daq_app.gap.rocking_model.tolerances.inspection import BY_ITSELF, IN_PHASE, LONE
 
 ComplexArray = NDArray[np.complex128]
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire")
@@ -31,82 +31,123 @@ _DECAY_S = 0.1
 
 @dataclass(frozen=True, slots=True)
 class _Kicks:
-    """What the channels of a family do after the impacts of all runs."""
+    """What k channels do after the impacts of all runs."""
 
-    ids: tuple[str, ...]
-    apart: FloatArray
-    """What each channel shows of a signal of each alone, (k, k)."""
     shown: ComplexArray
     """Correlation with a ring-down of unit size, (k, impacts, frequencies), SI, in units of equal noise."""
     pushes: FloatArray
     """Jump of the speed, rad/s, times the size of that ring-down, (impacts, frequencies)."""
-    largest: tuple[float, ...]
-    """Largest jump of each run, rad/s."""
+
+    @classmethod
+    def of(cls, seen: Sequence[tuple[Grid, NDArray[np.bool_], FloatArray]]) -> _Kicks | None:
+        """`seen`: grid, samples used (m,) and signals (k, m) of each run; None without an impact to use."""
+        shown: list[ComplexArray] = []
+        pushes: list[FloatArray] = []
+        for grid, pick, signals in seen:
+            for part, basis in cleaner(grid, pick, slow=False):
+                impact = int(np.searchsorted(grid.impact_s, grid.time_s[part[0]], side="right")) - 1
+                if impact < 0:
+                    continue
+                since = grid.time_s[part] - grid.impact_s[impact]
+                wave = np.exp((2j * np.pi * _HZ - 1.0 / _DECAY_S) * since[:, None])
+                wave -= basis @ (basis.T @ wave)
+                size = np.sqrt(np.sum(np.abs(wave) ** 2, axis=0))
+                shown.append(signals[:, part] @ wave.conj() / size)
+                pushes.append(grid.jumps[impact] * size)
+        return cls(np.stack(shown, axis=1), np.array(pushes)) if shown else None
+
+    def sizes(self, *, turned: bool) -> ComplexArray:
+        """Ring per jump, (k, frequencies), SI per rad/s; `turned`: its sign is that of the jump."""
+        pushes = self.pushes if turned else np.abs(self.pushes)
+        along = np.einsum("kif,if->kf", self.shown, pushes)
+        return np.asarray(along / np.sum(pushes**2, axis=0))
+
+    def gains(self, *, turned: bool) -> FloatArray:
+        """Power of one phase over that of any phases, (k, frequencies): 1 where none is common."""
+        pushes = self.pushes if turned else np.abs(self.pushes)
+        along = np.einsum("kif,if->kf", self.shown, pushes)
+        usual = np.einsum("kif,if->kf", np.abs(self.shown) ** 2, pushes**2)
+        return np.asarray(np.abs(along) ** 2 / np.maximum(usual, 1e-300))
 
 
-def lone_rings(runs: Sequence[GapRun], grids: Sequence[Grid]) -> list[list[RunFinding]]:
-    """Findings of channels that ring by themselves, run by run. No effect explains them."""
+@dataclass(frozen=True, slots=True)
+class _Ring:
+    """The clearest ring of one channel: size in m per rad/s, gain in nats."""
+
+    name: str
+    frequency_hz: float
+    size: float
+    gain: float
+
+
+def lone_rings(
+    runs: Sequence[GapRun], grids: Sequence[Grid], examined: Sequence[str] = ()
+) -> list[list[RunFinding]]:
+    """Findings of channels that ring by themselves, run by run. No effect explains them.
+
+    `examined` are the channels that are not used with their family.
+    """
     findings: list[list[RunFinding]] = [[] for _ in runs]
     for family in _FAMILIES:
-        kicks = _kicks(runs, grids, family)
-        found = _lone(kicks) if kicks is not None else None
-        if kicks is None or found is None:
+        ring = _lone(runs, grids, family, tuple(examined))
+        if ring is None:
             continue
-        name, frequency_hz, size, gain = found
-        index = next(i for i, sensor in enumerate(runs[0].sensors) if sensor.id == name)
+        index = next(i for i, sensor in enumerate(runs[0].sensors) if sensor.id == ring.name)
         noise = float(np.median([sample_noise(run.channels[index], run.rate_hz) for run in runs]))
-        words = f"ringing at {frequency_hz:.0f} Hz after impacts"
-        for row, jump in zip(findings, kicks.largest, strict=True):
-            value = size * jump
-            sd = value / np.sqrt(2.0 * gain)
-            row.append(RunFinding(f"ringing@{name}", words, "m", value, sd, noise=noise))
+        words = f"ringing at {ring.frequency_hz:.0f} Hz after impacts"
+        for row, grid in zip(findings, grids, strict=True):
+            value = ring.size * float(np.abs(grid.jumps).max(initial=0.0))
+            sd = value / np.sqrt(2.0 * ring.gain)
+            row.append(RunFinding(f"ringing@{ring.name}", words, "m", value, sd, noise=noise))
     return findings
 
 
-def _kicks(runs: Sequence[GapRun], grids: Sequence[Grid], family: Family) -> _Kicks | None:
-    """None where a run has too few channels, or all have no impacts that are followed by half a cycle."""
-    shown: list[ComplexArray] = []
-    pushes: list[FloatArray] = []
-    ids: tuple[str, ...] = ()
-    for run, grid in zip(runs, grids, strict=True):
-        data = channel_family(run, grid, family)
-        if data is None or (ids and data.ids != ids):
-            return None
-        ids = data.ids
-        apart = np.eye(len(ids)) - data.design @ np.linalg.pinv(data.design)
-        left = apart @ data.signals
-        for part, basis in cleaner(grid, data.pick, slow=False):
-            impact = int(np.searchsorted(grid.impact_s, grid.time_s[part[0]], side="right")) - 1
-            if impact < 0:
-                continue
-            since = grid.time_s[part] - grid.impact_s[impact]
-            wave = np.exp((2j * np.pi * _HZ - 1.0 / _DECAY_S) * since[:, None])
-            wave -= basis @ (basis.T @ wave)
-            size = np.sqrt(np.sum(np.abs(wave) ** 2, axis=0))
-            shown.append(left[:, part] @ wave.conj() / size)
-            pushes.append(grid.jumps[impact] * size)
-    if not shown:
+def _lone(
+    runs: Sequence[GapRun], grids: Sequence[Grid], family: Family, examined: tuple[str, ...]
+) -> _Ring | None:
+    families = [
+        channel_family(run, grid, family, include=examined) for run, grid in zip(runs, grids, strict=True)
+    ]
+    data = [one for one in families if one is not None]
+    if len(data) < len(runs) or any(one.ids != data[0].ids for one in data):
         return None
-    largest = tuple(float(np.abs(grid.jumps).max(initial=0.0)) for grid in grids)
-    return _Kicks(ids, apart, np.stack(shown, axis=1), np.array(pushes), largest)
-
-
-def _lone(kicks: _Kicks) -> tuple[str, float, float, float] | None:
-    """Channel, frequency in Hz, size in m per rad/s and gain in nats of the clearest ring of one channel."""
-    best: tuple[str, float, float, float] | None = None
-    power = np.abs(kicks.shown) ** 2
-    for pushes in (kicks.pushes, np.abs(kicks.pushes)):
-        # Of phases that have nothing to do with each other this is 1 in the mean, of any sizes.
-        along = np.einsum("kif,if->kf", kicks.shown, pushes)
-        gains = np.abs(along) ** 2 / np.maximum(np.einsum("kif,if->kf", power, pushes**2), 1e-300)
-        sizes = along / np.sum(pushes**2, axis=0)
-        for place, column in itertools.product(range(len(kicks.ids)), range(_HZ.size)):
+    places = {sensor.id: sensor.position_m for sensor in runs[0].sensors}
+    beside = np.array([places[name][1] for name in data[0].ids])[:, None]
+    design = data[0].design
+    apart, unturned = (_beyond(columns) for columns in (design, np.hstack([design, beside])))
+    kicks = _Kicks.of([(grid, one.pick, apart @ one.signals) for grid, one in zip(grids, data, strict=True)])
+    wall = _Kicks.of([_accelerations(run, grid) for run, grid in zip(runs, grids, strict=True)])
+    if kicks is None or wall is None:
+        return None
+    still = replace(kicks, shown=np.einsum("jk,kif->jif", unturned, kicks.shown))
+    best: _Ring | None = None
+    for turned in (True, False):
+        # Nor a wall that turns about the vertical, which two wires at its ends show the most of.
+        gains = np.minimum(kicks.gains(turned=turned), still.gains(turned=turned))
+        sizes = kicks.sizes(turned=turned)
+        # A wall that rings accelerates by ω² times what it moves, at all its places.
+        moved = wall.sizes(turned=turned) / (2.0 * np.pi * _HZ) ** 2
+        of_wall = np.median(np.abs(moved), axis=0)
+        for place, column in itertools.product(range(len(gains)), range(_HZ.size)):
             gain = float(gains[place, column])
-            if gain < max(IN_PHASE, best[3] if best else 0.0):
+            if gain < max(IN_PHASE, best.gain if best else 0.0):
                 continue
-            pattern = kicks.apart[:, place]
-            size = pattern @ sizes[:, column] / (pattern @ pattern)
-            share = abs(size) ** 2 * (pattern @ pattern) / np.sum(np.abs(sizes[:, column]) ** 2)
-            if share > LONE:
-                best = kicks.ids[place], float(_HZ[column]), float(abs(size)), gain
+            pattern = apart[:, place]
+            size = float(np.abs(pattern @ sizes[:, column]) / (pattern @ pattern))
+            share = size**2 * float(pattern @ pattern) / float(np.sum(np.abs(sizes[:, column]) ** 2))
+            if share > LONE and size > BY_ITSELF * of_wall[column]:
+                best = _Ring(data[0].ids[place], float(_HZ[column]), size, gain)
     return best
+
+
+def _beyond(design: FloatArray) -> FloatArray:
+    """What is left of signals, (k, k), by a motion in which each has its row of the design (k, n)."""
+    return np.asarray(np.eye(len(design)) - design @ np.linalg.pinv(design))
+
+
+def _accelerations(run: GapRun, grid: Grid) -> tuple[Grid, NDArray[np.bool_], FloatArray]:
+    """Grid, samples away from the shocks (m,), and what the accelerometers along the motion show, (k, m)."""
+    rows = [gridded(run, i) for i in run.steady_accelerometers("x")]
+    signals = np.array(rows, dtype=np.float64).reshape(-1, grid.time_s.size)
+    moving = (grid.time_s > 0.0) & (grid.time_s < grid.rest_s)
+    return grid, moving & ~grid.near_impact, signals
