@@ -24,9 +24,9 @@ class Policy:
     less than its impacts scatter, and shaken cables show 0.07 in development laboratories; raising it hides
     weak traffic."""
 
-    finding_ringing: float = 0.15
+    finding_ringing: float = 0.3
     """Size of a single channel's ring after the fastest impact over the rms noise of one reading, from which
-    it is material: walls that ring leave 0.07 of it in one channel in development laboratories; raising it
+    it is material: walls that ring leave 0.14 of it in one channel in development laboratories; raising it
     hides loose brackets."""
 
     finding_crossed: float = 0.1
@@ -100,8 +100,8 @@ class Policy:
     that is as likely another form as not ..."""
     form_share: float = 0.02
     """... or this share of what is explained, whichever is more; no effect's model is better. In development
-    laboratories right answers gain 3.7 at most, other forms 16 or more; raising either names a law that is only
-    near."""
+    laboratories right answers gain 3.7 at most, other forms 16 or more; raising either names a law that is
+    only near."""
     own_form: float = 0.05
     """Departure from its own form, as a share of another form's, that our model of an effect may have."""
     listed: float = 0.05

@@ -60,7 +60,9 @@ class _Kicks:
         """Ring per jump, (k, frequencies), SI per rad/s; `turned`: its sign is that of the jump."""
         pushes = self.pushes if turned else np.abs(self.pushes)
         along = np.einsum("kif,if->kf", self.shown, pushes)
-        return np.asarray(along / np.sum(pushes**2, axis=0))
+        return np.asarray(
+            2.0 * along / np.sum(pushes**2, axis=0)
+        )  # a sine is half of the wave and its conjugate
 
     def gains(self, *, turned: bool) -> FloatArray:
         """Power of one phase over that of any phases, (k, frequencies): 1 where none is common."""
