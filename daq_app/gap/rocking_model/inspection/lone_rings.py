@@ -26,7 +26,9 @@ from daq_app.gap.rocking_model.tolerances.inspection import BY_ITSELF, IN_PHASE,
 ComplexArray = NDArray[np.complex128]
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire")
 _HZ = np.arange(8.0, 62.0, 3.0)
+"""Steps of a ring's own width; above it a reading averaged over 5 ms shows little."""
 _DECAY_S = 0.1
+"""A ring of any damping from a few per cent up has most of its power in common with one that dies so soon."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +62,8 @@ class _Kicks:
         """Ring per jump, (k, frequencies), SI per rad/s; `turned`: its sign is that of the jump."""
         pushes = self.pushes if turned else np.abs(self.pushes)
         along = np.einsum("kif,if->kf", self.shown, pushes)
-        return np.asarray(
-            2.0 * along / np.sum(pushes**2, axis=0)
-        )  # a sine is half of the wave and its conjugate
+        # A sine is half a wave of positive frequency and half one of negative.
+        return np.asarray(2.0 * along / np.sum(pushes**2, axis=0))
 
     def gains(self, *, turned: bool) -> FloatArray:
         """Power of one phase over that of any phases, (k, frequencies): 1 where none is common."""
@@ -119,8 +120,8 @@ def _lone(
     apart, unturned = (_beyond(columns) for columns in (design, np.hstack([design, beside])))
     kicks = _Kicks.of([(grid, one.pick, apart @ one.signals) for grid, one in zip(grids, data, strict=True)])
     wall = _Kicks.of([_accelerations(run, grid) for run, grid in zip(runs, grids, strict=True)])
-    if kicks is None or wall is None:
-        return None
+    if kicks is None or wall is None or not len(wall.shown):
+        return None  # without accelerometers a bracket is not told from a wall
     still = replace(kicks, shown=np.einsum("jk,kif->jif", unturned, kicks.shown))
     best: _Ring | None = None
     for turned in (True, False):

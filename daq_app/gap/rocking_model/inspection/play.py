@@ -47,7 +47,8 @@ def plays(
     for name in data[0].ids:
         without = tuple(other for other in examined if other != name)
         seen = [_play(family, name, without) for family in data]
-        if float(np.median([play.explained for play in seen])) < PLAY_GAIN:
+        explained, size_m = np.median([(play.explained, play.size_m) for play in seen], axis=0)
+        if explained < PLAY_GAIN or size_m < PLAY_M:
             continue
         for row, play in zip(findings, seen, strict=True):
             row.append(RunFinding(f"play@{name}", "play", "m", play.size_m, play.sd_m))

@@ -124,16 +124,24 @@ def test_a_cable_that_impacts_whip_in_any_phase_does_not_ring() -> None:
     assert conditions_found(prepare(_knocked("WP-5", 5e-3, in_phase=False))[0]) == {}
 
 
-def test_play_of_a_single_wire_is_named() -> None:
+def _loose(play_m: float) -> list[GapRun]:
     runs = simulate({}, (0.25, -0.35))
     (place,) = (i for i in runs[0].indices("wire") if runs[0].sensors[i].id == "WP-2")
     for run in runs:
-        run.channels[place] = behind(run.channels[place], 2e-3, run.rate_hz)
-    prepared, _ = prepare(runs)
+        run.channels[place] = behind(run.channels[place], play_m, run.rate_hz)
+    return runs
+
+
+def test_play_of_a_single_wire_is_named() -> None:
+    prepared, _ = prepare(_loose(2e-3))
     assert conditions_found(prepared) == {"play@WP-2": "wire"}
     (finding,) = findings_of(prepared)
     assert "play of 2" in finding.words
     assert finding.size == pytest.approx(2e-3, rel=0.15)
+
+
+def test_the_play_of_a_sound_drum_is_not_named() -> None:
+    assert conditions_found(prepare(_loose(3e-4))[0]) == {}
 
 
 @pytest.mark.parametrize("effect", ["lag@WP-2", "slow_response@WP-2", "filter_delay@WP-2"])
