@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 from daq_app.config.rig import Rig
 from daq_app.rocking.estimators import RestitutionEstimate
 from daq_app.rocking.families import words
-from daq_app.rocking.families.block_checks import pattern_findings
+from daq_app.rocking.families.block_checks import pattern_findings, survey_off
+from daq_app.rocking.families.body import body_of
 from daq_app.rocking.families.levels import level_outlier
 from daq_app.rocking.families.response import LATE_S, SLOW_S, compare
 from daq_app.rocking.families.shocks import LATE_SHOCKS_S, shock_timing
 from daq_app.rocking.families.verdict import compare_series, families_apart, methods_apart
 from daq_app.rocking.geometry.joint import BaseJoint
+from daq_app.rocking.motion.bending import find_bending
 from daq_app.rocking.motion.impact_pattern import impact_pattern
 from daq_app.rocking.motion.rolling import RollingArray
 from daq_app.rocking.motion.swings import MotionTrack
@@ -33,6 +35,8 @@ _TIMED_AT: Final = (6, 12)
 """Impacts after which timing is looked at: it costs more than all else, and six impacts tell it."""
 _COMPARED_AT: Final = (5, 8, 11, 14, 17)
 """Impacts after which values of r are compared; later half-cycles are small and tell little more."""
+_SURVEYED_AT: Final = (8, 14)
+"""Impacts after which α of the survey is asked about: fewer half-cycles know it worse than what is named."""
 _HOLD_S: Final = 1.0
 """So much of the hold is shown to the other families."""
 
@@ -60,7 +64,9 @@ class LiveFamilies:
         """A new release: what was found about the last one is gone."""
         self._track: MotionTrack | None = None
         self._level: tuple[str, ...] = ()
+        self._bends = False
         self._timing: tuple[str, ...] = ()
+        self._survey: tuple[str, ...] = ()
         self._values: tuple[str, ...] = ()
 
     def append(self, first_sample: int, rotation_rad: Floats, values: Floats) -> None:
@@ -85,7 +91,7 @@ class LiveFamilies:
     @property
     def doubts(self) -> tuple[str, ...]:
         """What speaks against r, as far as was looked."""
-        return (*self._level, *self._timing, *self._values)
+        return (*self._level, *self._timing, *self._survey, *self._values)
 
     def _compare(
         self, wires: MotionTrack, tilt_rad: float, eav: RestitutionEstimate, crt: RestitutionEstimate
@@ -95,7 +101,9 @@ class LiveFamilies:
         if self._joint is not None and impacts <= _COMPARED_AT[-1]:
             self._follow(wires, tilt_rad, self._joint)
         if impacts in _TIMED_AT:
-            self._timing = (*self._lag_of_families(wires), *self._lag_of_shocks(wires))
+            self._timing = (*self._between_families(wires), *self._lag_of_shocks(wires))
+        if impacts in _SURVEYED_AT:
+            self._survey = self._alpha(self._wall(wires))
         if impacts in _COMPARED_AT:
             self._values = self._restitution(wires, eav, crt)
 
@@ -121,7 +129,7 @@ class LiveFamilies:
         self, wires: MotionTrack, eav: RestitutionEstimate, crt: RestitutionEstimate
     ) -> tuple[str, ...]:
         """Where wires and LVDTs, or EAV and CRT, give r that differ beyond their errors, and impacts do."""
-        found = pattern_findings(impact_pattern(wires))
+        found = pattern_findings(impact_pattern(self._wall(wires)))
         # A nominal p or α that is 1 % off makes crossings look like a hop's: it is asked after the test.
         said = [methods_apart(eav, crt), *(f.text for f in found if f.kind != "hop")]
         lvdts = self._track
@@ -133,12 +141,29 @@ class LiveFamilies:
             said += [families_apart(method, compare_series(own, other)) for method, own, other in pairs]
         return tuple(sentence for sentence in said if sentence is not None)
 
-    def _lag_of_families(self, wires: MotionTrack) -> tuple[str, ...]:
-        """Wires and LVDTs that are slow or late against each other."""
+    def _wall(self, wires: MotionTrack) -> MotionTrack:
+        """The motion that the wall itself is judged by: wires on a wall that bends ring with it."""
+        lvdts = self._track
+        followed = lvdts is not None and len(lvdts.arcs) == len(wires.arcs)
+        return lvdts if self._bends and followed and lvdts is not None else wires
+
+    def _alpha(self, wall: MotionTrack) -> tuple[str, ...]:
+        """A survey whose α is not that of the motion, where CRT is off by much."""
+        off = survey_off(body_of(wall, 0.0), wall)
+        return (words.alpha_while_live(off.share, off.shift),) if off is not None and off.is_notable else ()
+
+    def _between_families(self, wires: MotionTrack) -> tuple[str, ...]:
+        """Wires that ring about the LVDTs, or wires and LVDTs that are slow or late against each other."""
         if self._joint is None:
             return ()
         time, kept = self._between(wires.release.time_s - 0.3, wires.crossings_s[-1])
         rotation = self._joint.motion(kept[self._lvdts]).rotation_rad
+        inside = [crossing for crossing in wires.crossings_s if crossing >= time[0]]
+        bending = find_bending(time, kept[0], rotation, inside)
+        self._bends = bending is not None
+        if bending is not None:
+            # Delays and first orders are no answer to what the wall does between the two families.
+            return (words.bending_while_live(bending.frequency_hz, bending.rms_rad),)
         found = compare(time, rotation, kept[0])
         if found is None:
             return ()

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from daq_app.rocking.analysis.preparation.bending import Bending, find_bending
+from daq_app.rocking.motion.bending import Bending, find_bending
 from daq_app.rocking.theory.housner import free_rocking
 
 Floats = NDArray[np.float64]

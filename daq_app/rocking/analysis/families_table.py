@@ -13,7 +13,7 @@ from daq_app.rocking.analysis.results import ValueWithSigma
 from daq_app.rocking.analysis.tracks import FamilyTracks
 from daq_app.rocking.estimators import DecaySeries, RestitutionEstimate
 from daq_app.rocking.families import words
-from daq_app.rocking.families.body import BodyEstimate, body_of_half_cycles
+from daq_app.rocking.families.body import body_of
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.verdict import (
     FamilyView,
@@ -96,24 +96,6 @@ def _rotation_view(
         interval95_crt=crt.interval95(),
         used=track is lead,
     )
-
-
-def body_of(track: MotionTrack, gain_sigma: float) -> BodyEstimate | None:
-    """α and p by the half-cycles of one family; the error of its gain counts for α."""
-    arcs = [arc for arc in track.arcs[1:] if arc is not None]
-    columns = np.array(
-        [
-            (arc.peak_rad, arc.sigma_peak_rad, arc.duration_s, math.hypot(arc.sigma_start_s, arc.sigma_end_s))
-            for arc in arcs
-        ]
-    ).reshape(-1, 4)
-    peaks, sigma_peaks, durations, sigma_durations = columns.T
-    body = body_of_half_cycles(
-        peaks, sigma_peaks, durations, sigma_durations, track.settings.alpha_rad, track.settings.p_rad_s
-    )
-    if body is None:
-        return None
-    return replace(body, sigma_alpha_rad=math.hypot(body.sigma_alpha_rad, gain_sigma * body.alpha_rad))
 
 
 def _remarks(family: str, findings: Sequence[FamilyFinding]) -> tuple[str, ...]:

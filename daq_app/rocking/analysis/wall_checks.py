@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.analysis.families_table import LEADS, body_of, other_is_blamed
+from daq_app.rocking.analysis.families_table import LEADS, other_is_blamed
 from daq_app.rocking.analysis.preparation.instruments import Instruments
 from daq_app.rocking.analysis.results import JointSummary
 from daq_app.rocking.analysis.tracks import FamilyTracks
@@ -23,6 +23,7 @@ from daq_app.rocking.families.block_checks import (
     weaker_change_by_speed,
     weaker_hop,
 )
+from daq_app.rocking.families.body import body_of
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.motion.impact_pattern import ImpactPattern, impact_pattern
 from daq_app.rocking.motion.swings import MotionTrack

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from daq_app.rocking.estimators import RestitutionEstimate, estimate_all
@@ -175,23 +176,44 @@ def duration_findings(bodies: Mapping[str, BodyEstimate | None]) -> list[FamilyF
 
 
 def alpha_findings(body: BodyEstimate | None, track: MotionTrack) -> list[FamilyFinding]:
-    """A survey whose α is not that of the motion, told where CRT is off by it, and named where by much.
+    """A survey whose α is not that of the motion, told where CRT is off by it, and named where by much."""
+    off = survey_off(body, track)
+    if off is None:
+        return []
+    return [words.alpha_of_survey(off.share, off.shift, notable=off.is_notable)]
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyOff:
+    """The α that the wall rocks with against the survey's."""
+
+    share: float
+    """α of the motion over that of the survey, less one."""
+    shift: float
+    """CRT with the survey's α less CRT with the motion's."""
+
+    @property
+    def is_notable(self) -> bool:
+        """Whether it is a warning: scatter of r between impacts comes to half of that."""
+        return abs(self.shift) > 0.5 * R_TOLERANCE
+
+
+def survey_off(body: BodyEstimate | None, track: MotionTrack) -> SurveyOff | None:
+    """How far the survey's α, that of `track`, is off the motion's; None where CRT is hardly off by it.
 
     Only durations that a block explains tell an α.
     """
     survey_rad = track.settings.alpha_rad
     if body is None or not math.sqrt(body.misfit) <= _DURATION_SIGMAS:
-        return []
+        return None
     off_rad = abs(body.alpha_rad - survey_rad)
     if not off_rad > max(_ALPHA_SHARE * survey_rad, _ALPHA_SIGMAS * body.sigma_alpha_rad):
-        return []
+        return None
     series = [track.crt_exact_series(), track.crt_exact_series(alpha_rad=body.alpha_rad)]
     by_survey, by_motion = (estimate.r for estimate in estimate_all(series))
     if by_survey is None or by_motion is None or abs(by_survey - by_motion) <= _CRT_TOLD:
-        return []
-    shift = by_survey - by_motion
-    share = body.alpha_rad / survey_rad - 1.0
-    return [words.alpha_of_survey(share, shift, notable=abs(shift) > 0.5 * R_TOLERANCE)]
+        return None
+    return SurveyOff(body.alpha_rad / survey_rad - 1.0, by_survey - by_motion)
 
 
 def pivot_findings(block: RigidBlock, inset_left_m: float, inset_right_m: float) -> list[FamilyFinding]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.rocking.motion.swings import MotionTrack
 from daq_app.rocking.theory.housner import exact_quarter_period
 
 Floats = NDArray[np.float64]
@@ -34,6 +35,24 @@ class BodyEstimate:
     """χ² per degree of freedom of the durations about those of the fitted block."""
     half_cycles: int
     """How many the fit is through."""
+
+
+def body_of(track: MotionTrack, gain_sigma: float) -> BodyEstimate | None:
+    """α and p by the half-cycles of one family; the error of its gain counts for α."""
+    arcs = [arc for arc in track.arcs[1:] if arc is not None]
+    columns = np.array(
+        [
+            (arc.peak_rad, arc.sigma_peak_rad, arc.duration_s, math.hypot(arc.sigma_start_s, arc.sigma_end_s))
+            for arc in arcs
+        ]
+    ).reshape(-1, 4)
+    peaks, sigma_peaks, durations, sigma_durations = columns.T
+    body = body_of_half_cycles(
+        peaks, sigma_peaks, durations, sigma_durations, track.settings.alpha_rad, track.settings.p_rad_s
+    )
+    if body is None:
+        return None
+    return replace(body, sigma_alpha_rad=math.hypot(body.sigma_alpha_rad, gain_sigma * body.alpha_rad))
 
 
 def body_of_half_cycles(

@@ -293,3 +293,19 @@ def late_while_live(family: str, by_s: float, others: str) -> str:
     """A family that is late, said during the test: r is not off by it, times are."""
     late = f"{family} are {by_s * 1e3:.1f} ms late against {others}"
     return f"{late}: impact times are off by as much, r is not"
+
+
+def bending_while_live(frequency_hz: float, rms_rad: float) -> str:
+    """Wires that ring with a wall that bends, said during the test."""
+    return (
+        f"wires ring at {frequency_hz:.1f} Hz about the LVDTs at the base, {rms_rad * 1e3:.2f} mrad rms: the "
+        "wall bends; r from the wires is off by it, and the analysis after the test takes r from the LVDTs"
+    )
+
+
+def alpha_while_live(share: float, shift: float) -> str:
+    """A survey whose α is not that of the motion, said during the test."""
+    return (
+        f"the wall rocks like a block whose α is {share:+.1%} off the survey's: r by the peaks (CRT) counts "
+        f"with the survey's and is {shift:+.4f} off that with the wall's own, r by EAV is not"
+    )

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.analysis.preparation.bending import Bending, find_bending
 from daq_app.rocking.analysis.preparation.gains import FamilyGains, gains_of
 from daq_app.rocking.analysis.preparation.signals import (
     Lead,
@@ -34,6 +33,7 @@ from daq_app.rocking.families.single_wires import SingleWires, compare_wires
 from daq_app.rocking.families.treated import Corrections, held_in_memory, without_hum
 from daq_app.rocking.geometry.joint import BaseJoint
 from daq_app.rocking.geometry.kinematics import RotationGeometry
+from daq_app.rocking.motion.bending import Bending, find_bending
 from daq_app.rocking.motion.swings import REST_ZERO_SIGMA_RAD
 from daq_app.rocking.record import TestRecord
 

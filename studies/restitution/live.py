@@ -1,0 +1,96 @@
+"""``python -m studies.restitution.live --tests 12``: what is told beside r while the wall still rocks.
+
+Sound laboratories, walls that bend and walls with round edges, as the recorder analyses them: zeroed, in
+blocks of 0.1 s.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Final
+
+from daq_app.config import Rig, Scaling, load_rig
+from daq_app.rocking import LiveAnalyser
+from daq_app.rocking.live import Estimate
+from studies.restitution.laboratory import LaboratoryTest, draw_test
+from studies.restitution.walls import Wall, ringing_test
+
+RIG: Final = Path(__file__).parents[2] / "configs" / "fr1.toml"
+_BLOCK_S: Final = 0.1
+_TOLD: Final = {
+    "the wall bends": "bending",
+    "off the survey's": "survey alpha",
+    "give EAV": "wires and LVDTs apart",
+    "give CRT": "wires and LVDTs apart",
+    "EAV and CRT differ": "EAV and CRT apart",
+}
+"""What a sentence is counted as, by words in it."""
+
+
+def round_edges(rig: Rig, seed: int) -> LaboratoryTest:
+    """The laboratory of `seed` whose wall rolls on edges with a radius of a tenth of its width."""
+    return Wall("rounded_edge", {"rho": 0.1}).test(rig, seed)
+
+
+WALLS: Final[dict[str, Callable[[Rig, int], LaboratoryTest]]] = {
+    "sound": draw_test,
+    "bends": ringing_test,
+    "round edges": round_edges,
+}
+
+
+def live_estimates(test: LaboratoryTest) -> list[Estimate]:
+    """The estimate after each impact, or after several of one block, while the test runs."""
+    readings = Scaling.of(test.rig.channels).to_readings(test.si)
+    analyser = LiveAnalyser(test.rig, test.rate_hz, {channel.id: 0.0 for channel in test.rig.channels})
+    size = round(_BLOCK_S * test.rate_hz)
+    blocks = (
+        analyser.process(start, readings[:, start : start + size])
+        for start in range(0, readings.shape[1], size)
+    )
+    return [block.estimate for block in blocks if block.estimate is not None and block.impacts]
+
+
+def row_of(name: str, tests: Sequence[LaboratoryTest]) -> str:
+    """One line: tests with a doubt, the latest impact that brings the first, errors of r, what is told."""
+    doubted, latest = 0, 0
+    largest = [0.0, 0.0]
+    told: Counter[str] = Counter()
+    for test in tests:
+        estimates = live_estimates(test)
+        true_r = test.truth["restitution"]
+        for place, found in enumerate((estimates[-1].eav, estimates[-1].crt)):
+            if found.r is not None:
+                largest[place] = max(largest[place], abs(found.r - true_r))
+        impacts = [len(estimate.impact_samples) for estimate in estimates if estimate.doubts]
+        doubted += bool(impacts)
+        latest = max([latest, *impacts[:1]])
+        said = [doubt for estimate in estimates for doubt in estimate.doubts]
+        told.update({_kind(doubt) for doubt in said})
+    errors = " ".join(f"{error:.4f}" for error in largest)
+    return f"{name:12s} {doubted:3d} of {len(tests):<5d} {latest:6d}  {errors}  {dict(told)}"
+
+
+def _kind(doubt: str) -> str:
+    return next((kind for words, kind in _TOLD.items() if words in doubt), doubt)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(prog="python -m studies.restitution.live", description=__doc__)
+    parser.add_argument("--tests", type=int, default=12, help="laboratories for each wall")
+    parser.add_argument("--first-seed", type=int, default=91000)
+    parser.add_argument("--walls", nargs="*", choices=list(WALLS), default=list(WALLS))
+    options = parser.parse_args()
+    rig = load_rig(RIG)
+    print("wall         in doubt     from impact  largest error of r, EAV and CRT; told in how many tests")
+    for name in options.walls:
+        tests = [WALLS[name](rig, options.first_seed + place) for place in range(options.tests)]
+        print(row_of(name, tests), flush=True)
+
+
+if __name__ == "__main__":
+    main()

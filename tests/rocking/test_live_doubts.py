@@ -1,0 +1,66 @@
+"""While a wall rocks: what it does that a rigid block with the survey's α does not is told beside r."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from daq_app.config import load_rig
+from daq_app.rocking.live import Estimate
+from studies.restitution.laboratory import LaboratoryTest, draw_test
+from studies.restitution.live import live_estimates, round_edges
+from studies.restitution.walls import ringing_test
+
+RIG = load_rig(Path(__file__).parents[2] / "configs" / "fr1.toml")
+RINGING_SEED = 91001
+"""Wires ring at 7 Hz; by their half-cycles alone impacts would seem to take time."""
+
+
+@cache
+def ringing() -> tuple[LaboratoryTest, list[Estimate]]:
+    test = ringing_test(RIG, RINGING_SEED)
+    return test, live_estimates(test)
+
+
+@cache
+def on_round_edges() -> tuple[LaboratoryTest, list[Estimate]]:
+    test = round_edges(RIG, 91000)
+    return test, live_estimates(test)
+
+
+def test_a_wall_that_bends_is_told_while_it_rocks_and_its_r_stays_in_doubt():
+    test, estimates = ringing()
+    later = [estimate for estimate in estimates if len(estimate.impact_samples) >= 6]
+
+    assert abs(later[-1].eav.r - test.truth["restitution"]) > 0.02
+    assert all("the wall bends" in estimate.doubts[0] for estimate in later)
+
+
+def test_a_wall_that_bends_is_judged_by_the_lvdts_at_its_base_and_no_family_is_called_slow_or_late():
+    _, estimates = ringing()
+    told = " ".join(doubt for estimate in estimates for doubt in estimate.doubts)
+
+    assert not any(word in told for word in ("impacts take", "hops", "are slow", "late against"))
+
+
+def test_a_survey_whose_alpha_is_not_the_walls_is_told_with_what_it_makes_of_crt():
+    _, estimates = on_round_edges()
+    (doubt,) = estimates[-1].doubts
+
+    assert "α is -26" in doubt and "CRT" in doubt
+
+
+def test_doubts_of_the_wall_come_with_the_impact_that_shows_them_and_not_before():
+    _, estimates = on_round_edges()
+    first = next(estimate for estimate in estimates if estimate.doubts)
+
+    assert len(first.impact_samples) == 8
+
+
+@pytest.mark.parametrize("seed", [92000, 92001, 92002])
+def test_a_rigid_block_in_an_ordinary_laboratory_raises_no_doubt_while_it_rocks(seed):
+    test = draw_test(RIG, seed)
+
+    assert {estimate.doubts for estimate in live_estimates(test)} == {()}
