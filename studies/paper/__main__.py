@@ -10,7 +10,7 @@ from itertools import groupby
 
 from daq_app.config import load_rig
 from daq_app.rocking import RigidBlock, amplitude_after, period, period_after, restitution_from_peaks
-from studies.paper.numbers import CONFIGS, Number, bodies, numbers
+from studies.paper.tables import CONFIGS, Number, bodies, numbers
 
 
 def table(name: str, rows: Iterable[Number]) -> list[str]:

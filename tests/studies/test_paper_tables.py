@@ -9,7 +9,7 @@ import pytest
 
 from daq_app.rocking import RigidBlock
 from studies.paper import __main__ as command
-from studies.paper.numbers import Number, bodies, numbers
+from studies.paper.tables import Number, bodies, numbers
 
 PAGE = Path(__file__).parents[2] / "docs" / "explanation" / "analysis.md"
 DIFFERENT = {
