@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from daq_app.config.rig import Rig
 from daq_app.config.scaling import Scaling
 from daq_app.rocking.estimators import RestitutionEstimate
+from daq_app.rocking.families.noise import slow_noise
 from daq_app.rocking.geometry.kinematics import RotationGeometry
 from daq_app.rocking.live_families import LiveFamilies
 from daq_app.rocking.motion.phases import Phase, PhaseDetector, PhaseEvent, PhaseSettings
@@ -27,6 +28,8 @@ _MEMORY_S = 15.0
 _PIECE_FRAMES = 100
 _TILT_WINDOW_S = (0.5, 0.02)
 """θ0 is read from the tiltmeters over this span before the release."""
+_STILL_S = (1.0, 0.02)
+"""Slow noise is looked for over this span before the release."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,6 +214,7 @@ class LiveAnalyser:
         if event.kind == "release":
             self._release, self._track = event, None
             self._theta0_tilt = self._tilt_before(event.sample)
+            self._motion_settings = self._with_slow_noise(event.sample)
             self._families.forget()
         elif event.kind == "caught":
             self._release = self._track = None
@@ -244,6 +248,14 @@ class LiveAnalyser:
         stop = min(math.ceil(stop_sample) - self._first + 1, self._log.end)
         time = (self._first + np.arange(start, stop)) / self._rate
         return time, self._log.slice(start, stop)[0]
+
+    def _with_slow_noise(self, release_sample: float) -> MotionSettings:
+        """Half-cycles judged by what long means of the hold scatter by, as after the test."""
+        start, stop = (round(release_sample - span * self._rate) - self._first for span in _STILL_S)
+        noise = slow_noise(self._log.slice(start, stop)[0], self._rate)
+        if not math.isfinite(noise):
+            return self._motion_settings
+        return replace(self._motion_settings, slow_noise_rad=max(noise, self.geometry.rotation_noise_rad()))
 
     def _tilt_before(self, release_sample: float) -> float:
         start, stop = (round(release_sample - span * self._rate) - self._first for span in _TILT_WINDOW_S)

@@ -1,4 +1,7 @@
-"""While a wall rocks: what it does that a rigid block with the survey's α does not is told beside r."""
+"""While a wall rocks, what it does that a rigid block with the survey's α does not is told beside r.
+
+Slow noise is in the weights of the live r.
+"""
 
 from __future__ import annotations
 
@@ -64,3 +67,16 @@ def test_a_rigid_block_in_an_ordinary_laboratory_raises_no_doubt_while_it_rocks(
     test = draw_test(RIG, seed)
 
     assert {estimate.doubts for estimate in live_estimates(test)} == {()}
+
+
+def test_the_last_half_cycles_which_slow_noise_hides_do_not_lead_the_live_r_astray():
+    """By what points scatter about a curve alone, the speed before the last impact seems well known."""
+    test = draw_test(RIG, 92021)
+    errors = [
+        abs(estimate.eav.r - test.truth["restitution"])
+        for estimate in live_estimates(test)
+        if estimate.eav.r is not None
+    ]
+
+    assert len(errors) > 10
+    assert max(errors) < 0.005
