@@ -101,7 +101,9 @@ class LiveFamilies:
         if self._joint is not None and impacts <= _COMPARED_AT[-1]:
             self._follow(wires, tilt_rad, self._joint)
         if impacts in _TIMED_AT:
-            self._timing = (*self._between_families(wires), *self._lag_of_shocks(wires))
+            self._timing = self._between_families(wires)
+            if not self._bends:  # ringing moves the crossings of the wires: shocks then tell no delay
+                self._timing += self._lag_of_shocks(wires)
         if impacts in _SURVEYED_AT:
             self._survey = self._alpha(self._wall(wires))
         if impacts in _COMPARED_AT:

@@ -14,7 +14,7 @@ from daq_app.config import load_rig
 from daq_app.rocking.live import Estimate
 from studies.restitution.laboratory import LaboratoryTest, draw_test
 from studies.restitution.live import live_estimates, round_edges
-from studies.restitution.walls import ringing_test
+from studies.restitution.walls import Wall, ringing_test
 
 RIG = load_rig(Path(__file__).parents[2] / "configs" / "fr1.toml")
 RINGING_SEED = 91001
@@ -46,6 +46,15 @@ def test_a_wall_that_bends_is_judged_by_the_lvdts_at_its_base_and_no_family_is_c
     told = " ".join(doubt for estimate in estimates for doubt in estimate.doubts)
 
     assert not any(word in told for word in ("impacts take", "hops", "are slow", "late against"))
+
+
+def test_zero_crossings_that_ringing_moves_are_not_taken_for_a_delay_of_the_wires():
+    """They come up to 35 ms after the shocks, and "impact times are off, r is not" would be wrong."""
+    mode = {"gain": 0.2, "frequency": 4.6, "zeta": 0.005}
+    estimates = live_estimates(Wall("flexible_wall", mode, ends_s=0.7).test(RIG, 91000))
+
+    assert "the wall bends" in estimates[-1].doubts[0]
+    assert not any("late against" in doubt for estimate in estimates for doubt in estimate.doubts)
 
 
 def test_a_survey_whose_alpha_is_not_the_walls_is_told_with_what_it_makes_of_crt():
