@@ -26,6 +26,7 @@ from daq_app.gap.core.judging.other_forms import with_other_forms
 from daq_app.gap.core.judging.remainder import remainder
 from daq_app.gap.core.judging.where import gap_map
 from daq_app.gap.core.model import Model
+from daq_app.gap.core.policy import NORMAL_95
 from daq_app.gap.core.result import CannotDiagnose, Cause, Detection, Diagnosis, Estimate
 
 PER_RUN = " (mean of the runs; each has its own)"
@@ -99,7 +100,7 @@ class _Study(Hypotheses):
         return Diagnosis(
             model=self.experiment.model.name,
             runs=tuple(run.name for run in self.experiment.runs),
-            where=gap_map(null.residuals, scales, self.experiment.runs),
+            where=gap_map(null.residuals, scales, self.experiment.runs, self.policy),
             which=tuple(replace(r, probability=known * r.probability) for r in ranked),
             set95=tuple(
                 r for answer in credible_set(classes, self.policy.set_content) for r in answer.alternatives
@@ -109,7 +110,7 @@ class _Study(Hypotheses):
             effect_parameters=self._estimates(fit, nuisance=False),
             scatter=self._scatter(fit),
             gap=gap,
-            remaining=gap_map(fit.residuals, scales, self.experiment.runs),
+            remaining=gap_map(fit.residuals, scales, self.experiment.runs, self.policy),
             rest=rest,
             causes=self._causes(ranked, fit, alone),
             free_forms=tuple(forms),
@@ -251,8 +252,8 @@ def _in_words(what: str, estimates: Sequence[Estimate]) -> str:
 def _mean_of_runs(fit: Fit, key: str) -> tuple[float, float, float]:
     """A parameter that every run has for itself: mean over the runs with the interval of that mean."""
     values = np.array([local[key] for local in fit.local_values if key in local])
-    sd = (values[:, 2] - values[:, 1]) / 3.92
+    sd = (values[:, 2] - values[:, 1]) / (2.0 * NORMAL_95)
     between = float(values[:, 0].std(ddof=1)) if len(values) > 1 else 0.0
-    half = 1.96 * math.sqrt((float(np.mean(sd**2)) + between**2) / len(values))
+    half = NORMAL_95 * math.sqrt((float(np.mean(sd**2)) + between**2) / len(values))
     middle = float(values[:, 0].mean())
     return middle, middle - half, middle + half

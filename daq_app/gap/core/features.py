@@ -82,6 +82,11 @@ class Run(Protocol):
     def features(self) -> FeatureSet: ...
 
 
+def robust_sd(deviations: FloatArray) -> float:
+    """Sd of a Gaussian, of which most deviations from its middle, (n,), are, whatever a few others are."""
+    return 1.48 * float(np.median(np.abs(deviations)))
+
+
 def independent_fraction(residual: FloatArray) -> float:
     """Share of independent samples in an autocorrelated residual, (n,): 1/τ, τ = 1 + 2 Σ ρ_k.
 

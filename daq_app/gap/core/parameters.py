@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from daq_app.gap.core.policy import NORMAL_95
+
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
@@ -68,10 +70,10 @@ class Parameter:
             low = self.unit_coordinate(self.low) if math.isfinite(self.low) else -math.inf
         return low, self.unit_coordinate(self.high) if math.isfinite(self.high) else math.inf
 
-    def interval(self, u: float, sd_u: float, quantile: float = 1.96) -> tuple[float, float]:
-        """Central interval of the value, `quantile` posterior sd to either side, within the bounds."""
+    def interval(self, u: float, sd_u: float) -> tuple[float, float]:
+        """Central interval of the value, 95 %, within the bounds."""
         low, high = self.unit_bounds
-        ends = (max(u - quantile * sd_u, low), min(u + quantile * sd_u, high))
+        ends = (max(u - NORMAL_95 * sd_u, low), min(u + NORMAL_95 * sd_u, high))
         return self.value(min(ends[0], high)), self.value(max(ends[1], low))
 
     def start_coordinates(self) -> tuple[float, ...]:

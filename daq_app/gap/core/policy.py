@@ -9,6 +9,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from scipy.special import expit
+
+NORMAL_95 = 1.96
+"""Half width of the interval that holds 95 % of a Gaussian, in standard deviations."""
+
 
 @dataclass(frozen=True, slots=True)
 class Policy:
@@ -110,6 +115,11 @@ class Policy:
     """Probability of something unknown from which the answer is "none of these"."""
     parameters_gap: float = 1.3
     """Gap at nominal parameters, over noise and scatter, from which the answer is "parameters"."""
+    within_noise: float = 1.5
+    """Rms of what a cell of the map leaves, over noise and scatter, below which the map says that nothing is
+    beyond noise (assumed); raising it passes over weak gaps."""
+    loud_share: float = 0.3
+    """Share of the largest cell of the map from which a channel is named beside it (assumed)."""
     cause_closes: float = 0.02
     """Share of the held-out gap below which a cause is listed and is not spoken of as material (assumed)."""
 
@@ -118,7 +128,7 @@ class Policy:
         if size <= 0.0:
             return 0.0
         distance = math.log(size / limit) if limit > 0.0 else math.inf
-        return 1.0 / (1.0 + math.exp(-self.unknown_steepness * min(max(distance, -50.0), 50.0)))
+        return float(expit(self.unknown_steepness * distance))
 
 
 POLICY = Policy()

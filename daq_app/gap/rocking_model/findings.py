@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import norm
 
 from daq_app.gap.core.findings import Finding
-from daq_app.gap.core.policy import POLICY
+from daq_app.gap.core.policy import NORMAL_95, POLICY
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_findings import EFFECT_SIZES, RunFinding
 
@@ -60,8 +60,8 @@ def _finding(key: str, findings: Sequence[RunFinding], runs: int) -> Finding:
         family="sensor",
         probability=1.0 - chance,
         size=size,
-        low=max(size - 1.96 * sd, 0.0),
-        high=size + 1.96 * sd,
+        low=max(size - NORMAL_95 * sd, 0.0),
+        high=size + NORMAL_95 * sd,
         unit=unit,
         where=where,
         material=matters >= POLICY.refused,

@@ -119,6 +119,10 @@ class GapRun:
             and sensor.id not in self.excluded
         ]
 
+    def place(self, name: str) -> int:
+        """Place of the channel of that id."""
+        return next(i for i, sensor in enumerate(self.sensors) if sensor.id == name)
+
     def before(self, place: int) -> int:
         """Place of the channel that is scanned before this one; −1 where there is none."""
         return self.scanned_before[place] if self.scanned_before else place - 1

@@ -36,14 +36,14 @@ def test_a_wall_that_bends_in_another_shape_is_no_floor_that_shakes(tmp_path: Pa
     """It bends with z to the 1.5th and not with the square: some of that has the shape of a shaking floor."""
     runs = _runs(tmp_path, 2, flexible_wall={"gain": 0.6, "frequency_hz": 12.0, "zeta": 0.01})
     assert _block(runs[0], "bending").ring[0] == pytest.approx(12.0, rel=0.02)
-    assert conditions_found(runs) == {}
+    assert conditions_found(runs) == set()
 
 
 def test_a_wall_that_is_let_go_slowly_strikes_slower_than_from_rest(tmp_path: Path) -> None:
     """So the first impact kicks it less; what bends is as strong in every run."""
     bends = {"gain": 0.25, "frequency_hz": 12.0, "zeta": 0.012}
     runs = _runs(tmp_path, 4, flexible_wall=bends, slow_release={"tau_s": 0.35})
-    assert conditions_found(runs) == {}
+    assert conditions_found(runs) == set()
     kicks = [
         float(np.hypot(*(_block(run, "bending").values[k] for k in (2, 3))))  # sine, cosine in accelerometers
         for run in runs

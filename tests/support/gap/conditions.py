@@ -7,6 +7,6 @@ from collections.abc import Sequence
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 
 
-def conditions_found(runs: Sequence[RockingRun]) -> dict[str, str]:
-    """Keys of all findings of any size in any run, each with the family of its channels."""
-    return {finding.key: finding.family for run in runs for finding in run.findings if finding.value > 0.0}
+def conditions_found(runs: Sequence[RockingRun]) -> set[str]:
+    """Keys of all findings of any size in any run."""
+    return {finding.key for run in runs for finding in run.findings if finding.value > 0.0}

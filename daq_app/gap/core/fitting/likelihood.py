@@ -25,6 +25,8 @@ from daq_app.gap.core.policy import POLICY
 LOG_2PI = math.log(2 * math.pi)
 _SMALLEST = 1e-6
 """Square of a discrepancy below which it is none."""
+_LARGEST_STEP = 100.0
+"""Factor by which one step changes the square of a discrepancy at most."""
 
 
 class Covariance:
@@ -175,5 +177,5 @@ class Sizes:
                 log_scatter[k] += np.clip(0.5 * math.log(above / below), -1.0, 1.0)
         usual = POLICY.usual_discrepancy**2
         ratio = grown[1] / (held[1] + 2.0 / (usual + self.discrepancy))
-        square = self.discrepancy * np.clip(ratio, 0.01, 100.0)
+        square = self.discrepancy * np.clip(ratio, 1.0 / _LARGEST_STEP, _LARGEST_STEP)
         return Sizes(log_scatter, np.maximum(square, _SMALLEST))

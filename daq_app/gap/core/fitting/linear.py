@@ -18,6 +18,8 @@ from daq_app.gap.core.policy import POLICY
 Mask = NDArray[np.bool_]
 _PASSES = 3
 """Passes over the bounds of a linear solution."""
+_SETTLED = 0.01
+"""Share by which sizes move that have settled."""
 
 
 class Linear:
@@ -99,8 +101,8 @@ class Linear:
         low, high = self.problem.low, self.problem.high
         return np.asarray(~(((u <= low) & (gradient > 0)) | ((u >= high) & (gradient < 0))))
 
-    def solution(self, held: Mask | None = None, damping: float = 0.0) -> FloatArray:
-        """The lowest point, (p,), within the bounds in unit coordinates; `held` unknowns stay where they are.
+    def solution(self, damping: float = 0.0) -> FloatArray:
+        """The lowest point, (p,), within the bounds in unit coordinates.
 
         `damping`: share of the diagonal of the Hessian that is added to it (Levenberg and Marquardt).
         """
@@ -109,8 +111,6 @@ class Linear:
         for _ in range(_PASSES):
             gradient = self.gradient + self.hessian @ (u - self.u)
             free = self.free(gradient, u)
-            if held is not None:
-                free &= ~held
             if free.all():
                 step = dense.solve(self.factor if not damping else dense.factor(matrix), gradient)
                 moved = u - step
@@ -168,19 +168,18 @@ class Linear:
         return Linear(self.problem, self.u, self.lines, sizes, self._stacked)
 
 
-def relaxed(linear: Linear, rounds: int, settled: float = 0.01) -> tuple[Linear, FloatArray]:
+def relaxed(linear: Linear, rounds: int) -> tuple[Linear, FloatArray]:
     """Alternate the lowest point and the sizes; the linearisation at the last sizes and its lowest point.
 
-    Ends early once no size of a discrepancy that counts moves by more than the share `settled`.
+    Ends early once no size of a discrepancy that counts moves by more than `_SETTLED`.
     """
     u = linear.solution()
     for _ in range(rounds):
         sizes = linear.updated_sizes(u)
         before, after = linear.sizes.discrepancy, sizes.discrepancy
         moved = np.abs(after - before) / (0.1 + before)
-        steady = np.all(moved < settled) and np.all(
-            np.abs(sizes.log_scatter - linear.sizes.log_scatter) < settled
-        )
+        changes = np.append(moved, np.abs(sizes.log_scatter - linear.sizes.log_scatter))
+        steady = np.all(changes < _SETTLED)
         linear = linear.under(sizes)
         u = linear.solution()
         if steady:

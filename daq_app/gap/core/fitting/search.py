@@ -16,6 +16,8 @@ TOLERANCE = 1e-2
 """A change of the log posterior below this ends a search."""
 _SIZE_ROUNDS = 8
 _TRIALS = 8
+_DAMPING = 1e-3
+"""Least damping that there is: below it there is none, and a step that fails begins with it."""
 
 
 class Search:
@@ -74,7 +76,7 @@ class Search:
         for _ in range(_TRIALS):
             trial = linear.solution(damping=self._damping)
             if not np.all(np.isfinite(trial)):  # the equations are singular at so little damping
-                self._damping = max(self._damping * 10, 1e-3)
+                self._damping = max(self._damping * 10, _DAMPING)
                 continue
             if self.objective - linear.objective_at(trial) < 0.1 * TOLERANCE:
                 return 0.0
@@ -85,9 +87,9 @@ class Search:
                 self.u, self.predictions, self.objective = trial, predictions, objective
                 self._linear = None
                 # Down to nothing: any damping left would leave a stiff direction short of its optimum.
-                self._damping = 0.0 if self._damping < 1e-3 else self._damping / 10
+                self._damping = 0.0 if self._damping < _DAMPING else self._damping / 10
                 return gain
-            self._damping = max(self._damping * 10, 1e-3)
+            self._damping = max(self._damping * 10, _DAMPING)
         return 0.0
 
     def walk(self, steps: int, tolerance: float = TOLERANCE) -> float:
@@ -100,9 +102,9 @@ class Search:
                 break
         return gained
 
-    def update_sizes(self, rounds: int = _SIZE_ROUNDS) -> float:
+    def update_sizes(self) -> float:
         """Sizes at the optimum of the linearisation; returns by how much the marginal falls."""
-        linear, _ = relaxed(self.linear, rounds)
+        linear, _ = relaxed(self.linear, _SIZE_ROUNDS)
         before = self.linear.marginal_at(self.linear.solution())
         self.sizes, self._linear = linear.sizes, linear
         self.objective = self.value_at(self.u, self.predictions)

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 from daq_app.gap.core.effects import Effect, Library
 from daq_app.gap.core.fitting.fit import Fit
-from daq_app.gap.core.policy import POLICY, Policy
+from daq_app.gap.core.policy import NORMAL_95, POLICY, Policy
 
 Hypothesis = tuple[str, ...]
 """Names of the effects that are missing, sorted."""
 NULL: Hypothesis = ()
 
 
-def log_prior(effects: Hypothesis, library: Library, policy: Policy = POLICY) -> float:
+def log_prior(effects: Hypothesis, library: Library, policy: Policy) -> float:
     """ln prior probability of a hypothesis.
 
     What "nothing missing" leaves is shared by how many causes there are, then equally among the families, and
@@ -53,7 +53,7 @@ class Ranked:
 def rank(
     evidence: Mapping[Hypothesis, float],
     library: Library,
-    policy: Policy = POLICY,
+    policy: Policy,
     *,
     measured: bool = False,
 ) -> list[Ranked]:
@@ -143,7 +143,7 @@ def strength(found: Fit, effect: Effect) -> float:
     if zeros:
         return found.strength(effect.name, zeros)
     widths = [
-        math.log(high / low) / 3.92
+        math.log(high / low) / (2.0 * NORMAL_95)
         for _, low, high in (found.values[effect.key(p)] for p in effect.shared if p.scale == "log")
         if low > 0.0
     ]

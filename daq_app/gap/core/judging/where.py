@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray, Run
+from daq_app.gap.core.policy import Policy
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +44,12 @@ class GapMap:
     sentence: str
 
 
-def gap_map(residuals: Sequence[FloatArray], scales: Sequence[FloatArray], runs: Sequence[Run]) -> GapMap:
+def gap_map(
+    residuals: Sequence[FloatArray],
+    scales: Sequence[FloatArray],
+    runs: Sequence[Run],
+    policy: Policy,
+) -> GapMap:
     """The map of residuals; `scales`, (n,) for each run, is what features scatter by if nothing is missing.
 
     Take the scales from the best hypothesis: those of a hypothesis that misfits have grown to
@@ -59,7 +65,7 @@ def gap_map(residuals: Sequence[FloatArray], scales: Sequence[FloatArray], runs:
                 )
             )
     cells = sorted((_cell(key, values) for key, values in rows.items()), key=lambda c: -c.in_noise)
-    return GapMap(tuple(cells), _sentence(cells))
+    return GapMap(tuple(cells), _sentence(cells, policy))
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,17 +127,18 @@ def _rank_correlation(first: FloatArray, second: FloatArray) -> float:
     return float(np.corrcoef(ranks[0], ranks[1])[0, 1])
 
 
-def _sentence(cells: Sequence[Cell]) -> str:
+def _sentence(cells: Sequence[Cell], policy: Policy) -> str:
     """What the map says, in one sentence."""
     if not cells:
         return "There is nothing to compare."
     worst = cells[0]
-    if worst.in_noise < 1.5:
+    if worst.in_noise < policy.within_noise:
         return (
             f"Everywhere within noise and scatter; the largest cell, {worst.observable} of {worst.channel} "
             f"({worst.phase}), is {worst.in_noise:.1f} times its noise."
         )
-    loud = [c for c in cells if c.in_noise >= min(max(2.0, 0.3 * worst.in_noise), worst.in_noise)]
+    loudest = worst.in_noise
+    loud = [c for c in cells if c.in_noise >= min(max(2.0, policy.loud_share * loudest), loudest)]
     channels = {c.channel for c in loud}
     spread = f"{worst.channel} alone" if len(channels) == 1 else f"{len(channels)} channels or families"
     trend = ""

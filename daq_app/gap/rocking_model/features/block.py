@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.noise import coefficient_covariance
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
-from daq_app.gap.rocking_model.motion.rotation import Wire
+from daq_app.gap.rocking_model.motion.rotation import Wire, pseudo_inverse
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +71,8 @@ class Block:
     """Delay of accelerometers (of a ring-down) or LVDTs (of the joint) that was undone before."""
     systematic: Mapping[str, FloatArray] = field(default_factory=dict)
     """What parameters that all runs share add to the coefficients at a value of one, (k,) each."""
-    tags: Mapping[str, str] = field(default_factory=dict)
-    """Sensor family behind a channel or a finding."""
+    sensor_family: str = ""
+    """Family of a single channel."""
     said: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     """(channel, observable) under which a coefficient is spoken of, where not the block's and its name."""
 
@@ -105,9 +105,7 @@ def regress(
     if pick.sum() < 20 * len(columns):
         return None
     design = np.column_stack([column[pick] for column, _ in columns.values()])
-    scale = np.sqrt(np.mean(design**2, axis=0)) + 1e-300
-    scaled = np.linalg.pinv(design / scale, rcond=1e-8)
-    projection = scaled / scale[:, None]
+    projection = pseudo_inverse(design)
     values = projection @ difference[pick]
     residual = difference[pick] - design @ values
     covariance = coefficient_covariance(residual, projection, pick, len(columns))
@@ -117,9 +115,7 @@ def regress(
     return Block(family, names, units, values[kept], covariance[np.ix_(kept, kept)], projection[kept], pick)
 
 
-def scalar_block(
-    family: str, entries: Sequence[tuple[str, str, float, float]], grid: Grid, kind: str = ""
-) -> Block:
+def scalar_block(family: str, entries: Sequence[tuple[str, str, float, float]], grid: Grid) -> Block:
     """A block of plain numbers: (name, unit, value, variance) each."""
     return Block(
         family,
@@ -129,5 +125,4 @@ def scalar_block(
         np.diag([e[3] for e in entries]),
         np.zeros((len(entries), grid.valid.size)),
         np.ones(grid.valid.size, dtype=bool),
-        kind=kind,
     )

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.config.rig import Family
-from daq_app.gap.core.features import FloatArray
+from daq_app.gap.core.features import FloatArray, robust_sd
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.noise import coefficient_covariance
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Wire
@@ -85,10 +85,10 @@ class Deviation:
     noise: float
 
 
-def deviation(beside: Others) -> Deviation:
-    """Regress what a channel shows beyond the others' prediction on the shapes."""
+def shape_columns(beside: Others) -> FloatArray:
+    """The shapes in which a channel may differ at the samples used, (n, k + 1); the last is its zero."""
     e = beside.expected
-    columns = np.column_stack(
+    columns: FloatArray = np.column_stack(
         [
             e,
             -np.gradient(e, 1.0 / GRID_HZ),
@@ -98,6 +98,12 @@ def deviation(beside: Others) -> Deviation:
             np.ones_like(e),
         ]
     )[beside.pick]
+    return columns
+
+
+def deviation(beside: Others) -> Deviation:
+    """Regress what a channel shows beyond the others' prediction on the shapes."""
+    e, columns = beside.expected, shape_columns(beside)
     scale = np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
     basis, triangle = np.linalg.qr(columns / scale)
     inverse = np.linalg.pinv(triangle, rcond=1e-9) @ basis.T / scale[:, None]
@@ -156,7 +162,7 @@ def usual_gain(of_channels: Sequence[tuple[Others, Deviation]]) -> float:
     if not of_channels:
         return CALIBRATION
     shares = [misfit.values[_GAIN] / beside.spread for beside, misfit in of_channels]
-    seen = 1.48 * float(np.median(np.abs(shares)))  # the sd of a Gaussian, whatever a few are off by
+    seen = robust_sd(np.array(shares))
     weights = np.array([CERTIFIED, len(shares)]) / (CERTIFIED + len(shares))
     return float(np.sqrt(weights @ np.square([CALIBRATION, seen])))
 
@@ -192,7 +198,7 @@ def block_of(
         design=misfit.design,
         noise=misfit.noise * float(np.exp(usual)),
         wire=wire,
-        tags={name: family},
+        sensor_family=family,
         levers=_levers(family, beside, usual_gain(sound)),
     )
 

@@ -67,7 +67,7 @@ def _added_by(
             return np.interp(time_s - value, time_s, theta) - theta
         case "drift":
             scale = {"wire": run.wire_height_m, "lvdt": np.inf}.get(family, 1.0)
-            return value / scale * (time_s - (run.swings.rest_s - run.swings.release_s))
+            return value / scale * (time_s - run.grid.rest_s)
         case "wire_anchor":
             return anchors_turn(run.wires, theta, value)
         case "wire_cosine":

@@ -16,6 +16,7 @@ from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Rotation
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
+from daq_app.gap.rocking_model.tolerances.motion import AROUND_TEST_S, HELD_STILL, HELD_UNTIL_S
 from daq_app.gap.rocking_model.tolerances.walls import SWAY_SHARE
 
 Predict = Callable[[RockingRun, Block, Mapping[str, float]], FloatArray]
@@ -56,7 +57,7 @@ class Scene:
     def rocking(self) -> NDArray[np.bool_]:
         """Samples from just before the release until just after the wall comes to rest, (m,)."""
         time_s = self.grid.time_s
-        return (time_s > -0.2) & (time_s < self.swings.rest_s - self.swings.release_s + 0.2)
+        return (time_s > -AROUND_TEST_S) & (time_s < self.grid.rest_s + AROUND_TEST_S)
 
     @property
     def in_range(self) -> NDArray[np.bool_]:
@@ -70,9 +71,9 @@ class Scene:
         A held wall that sways accelerates more than its gravity differs from the model's: it is not used.
         """
         grid = self.grid
-        before = grid.time_s < -0.1
+        before = grid.time_s < -HELD_UNTIL_S
         middle = float(np.median(grid.raw[before])) if before.any() else 0.0
-        held = self.calm & (np.abs(grid.raw - middle) < 0.01 * abs(middle))
+        held = self.calm & (np.abs(grid.raw - middle) < HELD_STILL * abs(middle))
         mean_error = 3.0 * self.swings.hold_rate_sd / max(float(held.sum()) / GRID_HZ, 0.05)
         still: NDArray[np.bool_] = held & (mean_error < SWAY_SHARE * GRAVITY_M_S2 * abs(middle))
         return still

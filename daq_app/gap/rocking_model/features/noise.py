@@ -11,9 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.tolerances.motion import LEAST_INDEPENDENT
 
 _CELL = 8
 """Samples of the grid, 40 ms, that are averaged before increments are taken: averages out white noise."""
+_ALL = 0.9999
+"""Share of its squares beyond which nothing more is said to be explained of a record."""
 _LAGS = (2, 4, 8, 16)
 """Lags in cells, 0.08–0.64 s: longer ones are absorbed by the shapes of the regression."""
 
@@ -52,7 +55,7 @@ def coefficient_covariance(
     `residual`: (n,) what the regression leaves at those samples; `shapes`: how many shapes it has.
     """
     places = np.flatnonzero(pick)
-    fraction = max(independent_fraction(residual), 0.01)
+    fraction = max(independent_fraction(residual), LEAST_INDEPENDENT)
     variance = float(residual @ residual) / max(residual.size - shapes, 1) / fraction
     walk = walk_variance(residual, places)
     covariance: FloatArray = variance * projection @ projection.T
@@ -62,3 +65,14 @@ def coefficient_covariance(
         moved = np.cumsum(projection[:, ::-1], axis=1)[:, ::-1]
         covariance = covariance + walk * (moved * steps) @ moved.T
     return covariance
+
+
+def nats_explained(values: FloatArray, explained: FloatArray, at_least: float) -> FloatArray:
+    """Gain in log likelihood, (k,), of shapes that explain so much, (k,), of the squares of values, (n,).
+
+    `at_least`: share of the samples that count as independent, however alike neighbours are.
+    """
+    share = np.clip(explained / max(float(values @ values), 1e-300), 0.0, _ALL)
+    fraction = max(independent_fraction(values), at_least)
+    gains: FloatArray = -0.5 * fraction * values.size * np.log1p(-share)
+    return gains

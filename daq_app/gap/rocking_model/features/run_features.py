@@ -45,9 +45,9 @@ class Examined:
         return replace(self, run=replace(self.run, impacts_before=impacts), features=features)
 
 
-def extract(run: GapRun, reference: str = "") -> RockingRun:
+def extract(run: GapRun) -> RockingRun:
     """Features of a run. Raises `CannotDiagnose` where it holds no rocking motion."""
-    return examine(run, reference).features
+    return examine(run).features
 
 
 def examine(run: GapRun, reference: str = "") -> Examined:
@@ -69,7 +69,7 @@ def examine(run: GapRun, reference: str = "") -> Examined:
         blocks = (*blocks, scalar_block("release", (entry,), grid))
     values, sds, labels, places = _times(swings, reference, run.survey)
     peaks = np.arange(1, swings.peak_s.size)
-    amplitude, order = swings.peak_rad, swings.peak_s / max(swings.peak_s[-1], 1e-9)
+    amplitude, order = swings.peak_rad, swings.peak_s / swings.peak_s[-1]
     for k in peaks:
         values.append(float(np.log(abs(amplitude[k]))))
         relative = [swings.peak_sd[j] / abs(amplitude[j]) for j in (k, k - 1)]
@@ -122,7 +122,7 @@ def _times(
     labels: list[Label] = []
     places: list[tuple[int, int, int, int]] = []
     count = swings.levels.shape[1]
-    last = max(swings.peak_s[-1], 1e-9)
+    last = swings.peak_s[-1]
 
     def crossing(k: int, place: int) -> tuple[float, float]:
         if place < count:

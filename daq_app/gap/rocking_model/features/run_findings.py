@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 EFFECT_SIZES: dict[str, str] = {
@@ -26,7 +28,20 @@ class RunFinding:
     unit: str
     value: float
     sd: float
-    family: str = ""
-    """Family of the channel."""
     noise: float = math.nan
     """Rms noise of one reading of the family, in `unit`; NaN where it has another unit."""
+
+    @property
+    def target(self) -> str:
+        """The channel or family that has it; empty for a condition of the rig."""
+        return self.key.partition("@")[2]
+
+    @property
+    def spoils(self) -> bool:
+        """Whether the readings of who has it are not fit to be used."""
+        return self.value > 0.0 and self.key.startswith(("quantisation", "dropout", "saturation", "spikes"))
+
+
+def merged(*findings: Sequence[Sequence[RunFinding]]) -> list[list[RunFinding]]:
+    """Findings of all runs, each run's own in the order given."""
+    return [list(itertools.chain.from_iterable(rows)) for rows in zip(*findings, strict=True)]

@@ -17,6 +17,7 @@ from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rigid_body import across_axes
 from daq_app.gap.rocking_model.motion.rotation import coarse, gridded, sooner, wall_rotation, zeroed
 from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.tolerances.motion import AROUND_TEST_S
 from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, CROSSTALK, MOUNT_RAD
 
 _SMOOTH_S = 0.04
@@ -45,7 +46,7 @@ def channel_family(
 ) -> ChannelFamily | None:
     """A family of one run, with the channels of `include` though they are excluded; None of too few."""
     whole = run.including(include)
-    moving = (grid.time_s > -0.5) & (grid.time_s < grid.rest_s + 0.2)
+    moving = (grid.time_s > -0.5) & (grid.time_s < grid.rest_s + AROUND_TEST_S)
     match family:
         case "lvdt":
             chosen, pick = [i for i in whole.indices("lvdt") if whole.reads(i)], moving & grid.valid
@@ -68,6 +69,17 @@ def channel_family(
         leaked=CROSSTALK * crosstalk(run, chosen),
         turned=MOUNT_RAD * across_axes(run, grid, chosen) if family == "accelerometer" else None,
     )
+
+
+def alike_in_all(
+    runs: Sequence[GapRun], grids: Sequence[Grid], family: Family, include: Sequence[str]
+) -> list[ChannelFamily]:
+    """A family of each run (`channel_family`); none of any unless all of them have the same channels."""
+    families = [
+        channel_family(r, g, family, include=tuple(include)) for r, g in zip(runs, grids, strict=True)
+    ]
+    data = [one for one in families if one is not None]
+    return data if len(data) == len(runs) and all(one.ids == data[0].ids for one in data) else []
 
 
 def _signals(run: GapRun, family: Family, chosen: Sequence[int]) -> FloatArray:

@@ -236,9 +236,5 @@ def channel_block(run: GapRun, grid: Grid, family: Family, name: str, step: floa
         return None
     others = beside(data, name, (name,))
     sound = [(row, deviation(row)) for row in (beside(data, n, (name,)) for n in data.ids if n != name)]
-    return block_of(name, family, others, sound, _wire(run, name) if family == "wire" else None)
-
-
-def _wire(run: GapRun, name: str) -> Wire:
-    sensor = next(sensor for sensor in run.sensors if sensor.id == name)
-    return Wire(sensor, run.survey.half_base_m)
+    wire = Wire(run.sensors[run.place(name)], run.survey.half_base_m) if family == "wire" else None
+    return block_of(name, family, others, sound, wire)

@@ -28,28 +28,29 @@ from daq_app.gap.rocking_model.inspection.spikes import (
 )
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.tolerances.inspection import (
+    A_STEP,
+    BESIDE_STEPS,
+    BEYOND_HUM,
     CONVERTER_STEP,
     FEWEST_STEPS,
     FROZEN_S,
+    FROZEN_SD,
     GOES_ON_STEPS,
     HUM_SD,
+    IN_STEPS,
+    OFF_STEP,
     RANGE_MARGIN,
     SMALLEST_STEP,
+    SPIKES_SD_PER_S,
     SPIKY_PER_S,
     STANDS_OUT,
+    STEP_SD,
     USUAL_HUM,
 )
 
 MAINS_HZ = 50.0
 _SLOW_S = 0.1
 """Means over which a record that is turned back by the mains frequency keeps 0.6 Hz to a per cent."""
-LOUD = 4.0
-"""Size beyond that of noise and hum together from which a sample belongs to an impact …"""
-_STEP_SD = 0.02
-"""Error of a step, as a share of it."""
-_FROZEN_SD = 1e-3
-"""Error of a share of frozen samples: that of reading it off one record, and not of what a few moments say of
-other records. A sound channel never freezes, and each run has a share of its own."""
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer")
 
 
@@ -107,7 +108,7 @@ def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray |
     # Over the whole record the frequency is sharp enough for the phase to hold.
     high = values - sosfiltfilt(butter(2, 25.0, fs=rate_hz, output="sos"), values)
     # An impact has some of every frequency: its own share, taken for hum, would ring around every impact.
-    loud = np.abs(high) > LOUD * float(np.hypot(noise, amplitude))
+    loud = np.abs(high) > BEYOND_HUM * float(np.hypot(noise, amplitude))
     calm = ~maximum_filter1d(loud, 2 * round(AROUND_S * rate_hz) + 1, mode="constant")
     calm = calm if calm.sum() > count else np.ones_like(calm)
     waves = _waves(values.size, rate_hz, _sharpened(np.where(calm, high, 0.0), rate_hz))
@@ -159,13 +160,13 @@ def _quantisation_step(values: FloatArray, noise_si: float) -> float:
     """
     change = np.abs(np.diff(values))
     top = _quantile(change, 0.9995)
-    large = change > 0.4 * top
+    large = change > A_STEP * top
     if top <= 0.0 or np.mean(large) < FEWEST_STEPS:
         return 0.0
     step = float(np.median(change[large]))
     rest = float(np.sqrt(np.mean(change[~large] ** 2)))
     whole = change[large] / step
-    if rest > 0.05 * step or np.mean(np.abs(whole - np.round(whole)) < 0.15) < 0.9:
+    if rest > BESIDE_STEPS * step or np.mean(np.abs(whole - np.round(whole)) < OFF_STEP) < IN_STEPS:
         return 0.0
     own = step < CONVERTER_STEP * noise_si or step < SMALLEST_STEP * float(np.ptp(values))
     return 0.0 if own else step  # the converter's own step is none
@@ -247,43 +248,45 @@ def findings_per_run(
         noise = float(np.median([[c.noise_si for c in row] for row in rows]))
         # Every channel has a lone sample now and then: what counts is how many it has in all runs.
         spiky = np.mean([[c.spikes_per_s for c in row] for row in rows], axis=0) > SPIKY_PER_S
-        table = {
-            "hum": [[(c.hum_si, c.hum_sd, c.hum_si > 0.0) for c in row] for row in rows],
-            "quantisation": [[(c.step_si, _STEP_SD * c.step_si, c.step_si > 0) for c in row] for row in rows],
-            "dropout": [
-                [(c.frozen_share, _FROZEN_SD, c.frozen_share > _FROZEN_SD) for c in row] for row in rows
-            ],
-            "spikes": [
-                [(c.spikes_per_s, 0.05, often) for c, often in zip(row, spiky, strict=True)] for row in rows
-            ],
-        }
-        for name, cells in table.items():
+        seen = [[_seen(c, often) for c, often in zip(row, spiky, strict=True)] for row in rows]
+        for name, words in _WORDS.items():
             if family == "accelerometer" and name not in ("hum", "spikes"):
                 continue
+            cells = [[of_channel[name] for of_channel in row] for row in seen]
+            unit = _UNITS.get(name) or ("m/s²" if family == "accelerometer" else "m")
             rms = noise if name in ("hum", "quantisation") else math.nan
             for key, chosen in _attribute_condition(family, ids, cells):
                 for run_findings, row in zip(findings, cells, strict=True):
                     value, sd = _median_with_sd(name, [row[k] for k in chosen] if chosen else row)
-                    run_findings.append(
-                        RunFinding(f"{name}@{key}", *_WORDS[name][family], value, sd, family, rms)
-                    )
+                    run_findings.append(RunFinding(f"{name}@{key}", words, unit, value, sd, rms))
     return findings
 
 
-_WORDS: dict[str, dict[str, tuple[str, str]]] = {
-    "hum": {
-        "lvdt": ("hum of the mains", "m"),
-        "wire": ("hum of the mains", "m"),
-        "accelerometer": ("hum of the mains", "m/s²"),
-    },
-    "quantisation": {"lvdt": ("step of the reading", "m"), "wire": ("step of the reading", "m")},
-    "dropout": {"lvdt": ("share of frozen samples", "1"), "wire": ("share of frozen samples", "1")},
-    "spikes": dict.fromkeys(_FAMILIES, ("lone samples", "1/s")),
+_WORDS = {
+    "hum": "hum of the mains",
+    "quantisation": "step of the reading",
+    "dropout": "share of frozen samples",
+    "spikes": "lone samples",
 }
+_UNITS = {"dropout": "1", "spikes": "1/s"}
+"""Units of the conditions that have not that of the channel."""
+_Seen = tuple[float, float, bool]
+"""Size of a condition, its sd, and whether the channel has it."""
+
+
+def _seen(condition: Condition, often: bool) -> dict[str, _Seen]:
+    """What each condition of one channel in one run is; `often`: it has lone samples often, in all runs."""
+    c = condition
+    return {
+        "hum": (c.hum_si, c.hum_sd, c.hum_si > 0.0),
+        "quantisation": (c.step_si, STEP_SD * c.step_si, c.step_si > 0.0),
+        "dropout": (c.frozen_share, FROZEN_SD, c.frozen_share > FROZEN_SD),
+        "spikes": (c.spikes_per_s, SPIKES_SD_PER_S, often),
+    }
 
 
 def _attribute_condition(
-    family: str, ids: Sequence[str], cells: Sequence[Sequence[tuple[float, float, bool]]]
+    family: str, ids: Sequence[str], cells: Sequence[Sequence[_Seen]]
 ) -> list[tuple[str, list[int]]]:
     """(name, places) of who has a condition: one channel, or the family when several or none have it.
 
@@ -301,7 +304,7 @@ def _attribute_condition(
     return [(family, having)]
 
 
-def _median_with_sd(name: str, cells: Sequence[tuple[float, float, bool]]) -> tuple[float, float]:
+def _median_with_sd(name: str, cells: Sequence[_Seen]) -> tuple[float, float]:
     """(value, sd) over the channels chosen: their median, or nothing where none has it."""
     having = np.array([(value, sd) for value, sd, seen in cells if seen])
     if not having.size:
@@ -312,5 +315,5 @@ def _median_with_sd(name: str, cells: Sequence[tuple[float, float, bool]]) -> tu
     return middle, math.hypot(sd, spread) + 1e-3 * middle
 
 
-_NONE = {"quantisation": 1e-5, "dropout": 1e-3, "spikes": 0.05}
+_NONE = {"quantisation": 1e-5, "dropout": FROZEN_SD, "spikes": SPIKES_SD_PER_S}
 """Error of "there is none": well below what would be found."""

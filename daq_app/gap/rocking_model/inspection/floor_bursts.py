@@ -20,6 +20,7 @@ from daq_app.gap.rocking_model.features.oscillations.rings import Ring, cleaner,
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
+from daq_app.gap.rocking_model.tolerances.sensors import SPREAD_ALONG_M
 from daq_app.gap.rocking_model.tolerances.walls import BURST_SD, SHAKEN_POWER
 
 WINDOW_S = 0.5
@@ -101,7 +102,7 @@ def _half_cycles(run: GapRun, grid: Grid, survey: Survey, ring: Ring | None) -> 
         return []
     _, y, z = run.positions(chosen).T
     follows = survey.p_rad_s**2 / GRAVITY_M_S2 * np.cos(survey.alpha_rad)
-    shapes = [1.0 - follows * z, z**2, *([y * z] if np.ptp(y) > 0.2 else [])]
+    shapes = [1.0 - follows * z, z**2, *([y * z] if np.ptp(y) > SPREAD_ALONG_M else [])]
     if z.size <= len(shapes):
         return []
     seen = accelerations(run, grid, chosen)

@@ -6,7 +6,7 @@ findings of the run; what channels, ring-downs and the floor show becomes blocks
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from daq_app.gap.rocking_model.features.oscillations.rings import Ring, ring_blo
 from daq_app.gap.rocking_model.features.oscillations.vibration import Vibration
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined, examine
-from daq_app.gap.rocking_model.features.run_findings import RunFinding
+from daq_app.gap.rocking_model.features.run_findings import RunFinding, merged
 from daq_app.gap.rocking_model.inspection.channel_faults import channel_block, find_outlier_channels
 from daq_app.gap.rocking_model.inspection.conditions import conditions_of, findings_per_run, without_hum
 from daq_app.gap.rocking_model.inspection.floor_bursts import floor_bursts
@@ -35,9 +35,6 @@ from daq_app.gap.rocking_model.records import GapRun, Wiring
 from daq_app.gap.rocking_model.tolerances.inspection import COUNT_SD
 from daq_app.gap.rocking_model.tolerances.sensors import LATE_S
 from daq_app.gap.rocking_model.tolerances.walls import MIDDLE_OF_IMPACT_S
-
-_SPOILING = ("quantisation", "dropout", "saturation", "spikes")
-_FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer", "tiltmeter")
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,30 +57,17 @@ def inspect(runs: Sequence[GapRun]) -> Inspected:
     # Readings that stand still or go in steps must be seen as they were; all else is put on one clock.
     clean = [without_hum(run, c).at_clock() for run, c in zip(mended, conditions, strict=True)]
     families: dict[str, Family] = {s.id: s.family for s in runs[0].sensors}
-    single = {
-        finding.key.partition("@")[2]
-        for row in findings
-        for finding in row
-        if finding.value > 0 and _spoils(finding, families)
-    }
-    clean = [run.excluding(single) for run in clean]
+    clean = [run.excluding(_spoiled(findings, families)) for run in clean]
     clean, limits = saturated(clean, _steps(findings))
-    findings = [[*row, *more] for row, more in zip(findings, limits, strict=True)]
-    clipped = {
-        finding.key.partition("@")[2]
-        for row in limits
-        for finding in row
-        if finding.value > 0 and finding.key.partition("@")[2] in families
-    }
-    clean = [run.excluding(clipped) for run in clean]
-    findings = [[*row, *_wiring_findings(wiring, families)] for row in findings]
+    clean = [run.excluding(_spoiled(limits, families)) for run in clean]
+    findings = merged(findings, limits, [_wiring_findings(wiring, families)] * len(clean))
     coarse_lvdts = any(m.key == "quantisation@lvdt" and m.value > 0 for row in findings for m in row)
     return Inspected(clean, findings, "wire" if coarse_lvdts else "", wiring)
 
 
-def _spoils(finding: RunFinding, families: dict[str, Family]) -> bool:
-    name, _, target = finding.key.partition("@")
-    return name in _SPOILING and target in families
+def _spoiled(findings: Sequence[Sequence[RunFinding]], channels: Collection[str]) -> list[str]:
+    """Single channels whose readings are not fit to be used with their family, in any run."""
+    return [f.target for row in findings for f in row if f.spoils and f.target in channels]
 
 
 def _wiring_findings(wiring: Wiring, families: dict[str, Family]) -> list[RunFinding]:
@@ -171,13 +155,13 @@ def without_outlier_channels(
         for family, names in outliers.several.items()
     ]
     final = [e.run for e in again], [e.features.grid for e in again]
-    unexplained = zip(
-        second_axis(*final), lone_rings(*final, outliers.ids), plays(*final, outliers.ids), strict=True
+    rows = merged(
+        findings,
+        [disagreements] * len(again),
+        second_axis(*final),
+        lone_rings(*final, outliers.ids),
+        plays(*final, outliers.ids),
     )
-    rows = [
-        [*row, *disagreements, *(finding for found in own for finding in found)]
-        for row, own in zip(findings, unexplained, strict=True)
-    ]
     return again, outliers.single, rows
 
 
@@ -205,7 +189,7 @@ def _steps(findings: Sequence[Sequence[RunFinding]]) -> dict[str, float]:
     seen: dict[str, list[float]] = {}
     for finding in (finding for row in findings for finding in row):
         if finding.key.startswith("quantisation") and finding.value > 0:
-            seen.setdefault(finding.key.partition("@")[2], []).append(finding.value)
+            seen.setdefault(finding.target, []).append(finding.value)
     return {target: float(np.median(values)) for target, values in seen.items()}
 
 
@@ -242,11 +226,10 @@ def completed(
         examined[0].features.survey,
         bending,
     )
-    findings = [[*row, *own] for row, own in zip(findings, bursts, strict=True)]
     runs = []
     known = with_quantisation_errors(examined, steps)
     for row, entry, vibration, seen, read in zip(
-        blocks_by_run, examined, vibrations, findings, known, strict=True
+        blocks_by_run, examined, vibrations, merged(findings, bursts), known, strict=True
     ):
         grid = entry.features.grid
         if vibration is not None:
@@ -258,10 +241,7 @@ def completed(
                 ("frequency", "Hz", vibration.frequency_hz, len(examined) * vibration.frequency_sd**2),
             )
             row.append(scalar_block("floor", entries, grid))
-        families: dict[str, str] = {s.id: s.family for s in entry.run.sensors}
-        families |= {family: family for family in _FAMILIES}
-        named = tuple(replace(m, family=families.get(m.key.partition("@")[2], "")) for m in seen)
-        features = replace(read, vibration=vibration, wiring=wiring, findings=named)
+        features = replace(read, vibration=vibration, wiring=wiring, findings=tuple(seen))
         runs.append(features.with_blocks(row))
     return runs
 
@@ -301,7 +281,7 @@ def _add_rings(
 
 def found_channels(runs: Sequence[RockingRun]) -> dict[str, str]:
     """Channels with a block of their own, and their families."""
-    return {b.family: b.tags[b.family] for run in runs for b in run.blocks if b.kind == "channel"}
+    return {b.family: b.sensor_family for run in runs for b in run.blocks if b.kind == "channel"}
 
 
 def calibrations(runs: Sequence[RockingRun]) -> dict[str, dict[str, float]]:

@@ -17,7 +17,7 @@ from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.oscillations.rings import cleaner
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
-from daq_app.gap.rocking_model.inspection.channel_families import channel_family
+from daq_app.gap.rocking_model.inspection.channel_families import alike_in_all
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import gridded, sample_noise
 from daq_app.gap.rocking_model.records import GapRun
@@ -95,7 +95,7 @@ def lone_rings(
         ring = _lone(runs, grids, family, tuple(examined))
         if ring is None:
             continue
-        index = next(i for i, sensor in enumerate(runs[0].sensors) if sensor.id == ring.name)
+        index = runs[0].place(ring.name)
         noise = float(np.median([sample_noise(run.channels[index], run.rate_hz) for run in runs]))
         words = f"ringing at {ring.frequency_hz:.0f} Hz after impacts"
         for row, grid in zip(findings, grids, strict=True):
@@ -108,14 +108,10 @@ def lone_rings(
 def _lone(
     runs: Sequence[GapRun], grids: Sequence[Grid], family: Family, examined: tuple[str, ...]
 ) -> _Ring | None:
-    families = [
-        channel_family(run, grid, family, include=examined) for run, grid in zip(runs, grids, strict=True)
-    ]
-    data = [one for one in families if one is not None]
-    if len(data) < len(runs) or any(one.ids != data[0].ids for one in data):
+    data = alike_in_all(runs, grids, family, examined)
+    if not data:
         return None
-    places = {sensor.id: sensor.position_m for sensor in runs[0].sensors}
-    beside = np.array([places[name][1] for name in data[0].ids])[:, None]
+    beside = runs[0].positions([runs[0].place(name) for name in data[0].ids])[:, 1:2]
     design = data[0].design
     apart, unturned = (_beyond(columns) for columns in (design, np.hstack([design, beside])))
     kicks = _Kicks.of([(grid, one.pick, apart @ one.signals) for grid, one in zip(grids, data, strict=True)])

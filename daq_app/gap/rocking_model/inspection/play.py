@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.channel_shapes import shape_columns
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.features.shapes import with_play
-from daq_app.gap.rocking_model.inspection.channel_families import ChannelFamily, beside, channel_family
+from daq_app.gap.rocking_model.inspection.channel_families import ChannelFamily, alike_in_all, beside
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
-from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.tolerances.inspection import PLAY_GAIN, PLAY_M
 
@@ -37,14 +37,8 @@ def plays(
     `examined` are the channels that are not used with their family.
     """
     findings: list[list[RunFinding]] = [[] for _ in runs]
-    families = [
-        channel_family(run, grid, "wire", include=tuple(examined))
-        for run, grid in zip(runs, grids, strict=True)
-    ]
-    data = [family for family in families if family is not None]
-    if len(data) < len(runs) or any(family.ids != data[0].ids for family in data):
-        return findings
-    for name in data[0].ids:
+    data = alike_in_all(runs, grids, "wire", examined)
+    for name in data[0].ids if data else ():
         without = tuple(other for other in examined if other != name)
         seen = [_play(family, name, without) for family in data]
         explained, size_m = np.median([(play.explained, play.size_m) for play in seen], axis=0)
@@ -58,9 +52,7 @@ def plays(
 def _play(data: ChannelFamily, name: str, without: tuple[str, ...]) -> _Play:
     other = beside(data, name, without)
     e, pick = other.expected, other.pick
-    columns = np.column_stack(
-        [e, np.gradient(e, 1.0 / GRID_HZ), e**2, np.abs(e), np.arange(e.size), np.ones_like(e)]
-    )[pick]
+    columns = shape_columns(other)
     basis = np.linalg.qr(columns / np.abs(columns).max(axis=0))[0]
 
     def beyond(values: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined
-from daq_app.gap.rocking_model.motion.rotation import straight_line, wall_rotation
+from daq_app.gap.rocking_model.motion.rotation import opening, straight_line, wall_rotation
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION
 
@@ -52,7 +52,7 @@ def _rounded(entry: Examined, family: str, step: float) -> dict[str, FloatArray]
     if family == "wire":
         readings = places[:, 2, None, None] * theta
     else:
-        readings = run.survey.half_base_m * np.abs(theta) - places[:, 0, None, None] * theta
+        readings = opening(theta, places[:, 0, None, None], run.survey.half_base_m)
     # One seed for all runs: a channel keeps its zero and its calibration from run to run.
     chance = np.random.default_rng(1)
     # All zeros alike: where they are not, less remains of the steps of sensors that move alike.

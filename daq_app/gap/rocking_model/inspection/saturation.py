@@ -17,17 +17,24 @@ from daq_app.gap.rocking_model.motion.rotation import (
     Wire,
     coarse,
     gridded,
+    opening,
     reaches_its_range,
+    rotation_of_faces,
     zeroed,
 )
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.tolerances.inspection import (
+    AS_FAR,
     BEYOND_FAMILY,
     FLAT_TOP,
     GOES_ON,
     IN_PROPORTION,
     LIMIT_SD,
     SAME_LIMIT,
+    SHORTEST_TOP_S,
+    STANDS_STILL,
+    TOP_OF_REACH,
+    TRAVELS_ON,
 )
 
 _OTHER: dict[Family, Family] = {"lvdt": "wire", "wire": "lvdt"}
@@ -74,7 +81,7 @@ def saturated(
             }
         # Where several clip, those that travel furthest stand for them; zeros differ, so their middle does.
         furthest = max((limits[ids[k]] for k in clipped), default=0.0)
-        chosen = [k for k in clipped if limits[ids[k]] > 0.9 * furthest]
+        chosen = [k for k in clipped if limits[ids[k]] > AS_FAR * furthest]
         for run_findings, row in zip(findings, table, strict=True):
             seen = [row[k, 0] for k in chosen if row[k, 0] > 0.0]
             usual = float(np.median(row[chosen or slice(None), 1])) if len(ids) else 0.0
@@ -115,11 +122,7 @@ def _rotation(run: GapRun, family: Family) -> FloatArray | None:
         rows.append((sensor.position_m[0], values))
     if family == "wire":
         return np.median([v for _, v in rows], axis=0) if len(rows) >= 2 else None
-    faces = [[v for x, v in rows if side * x > 0] for side in (-1.0, 1.0)]
-    if min(len(face) for face in faces) < 2:
-        return None
-    middle = np.median(faces[0], axis=0) - np.median(faces[1], axis=0)
-    return np.asarray(middle / (2.0 * run.survey.half_base_m), dtype=float)
+    return rotation_of_faces([v for _, v in rows], [x for x, _ in rows], run.survey.half_base_m, fewest=2)
 
 
 def _in_step(mine: FloatArray | None, other: FloatArray | None) -> FloatArray | None:
@@ -150,7 +153,7 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None, rough: float) ->
 
     `rough` is the share of its largest by which the rotation itself goes in steps.
     """
-    i = next(k for k, sensor in enumerate(run.sensors) if sensor.id == name)
+    i = run.place(name)
     sensor = run.sensors[i]
     if rotation is None or not run.reads(i):
         return 0.0, 0.0
@@ -162,7 +165,7 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None, rough: float) ->
     if sensor.family == "wire" and sensor.anchor_m is not None:
         expected = np.abs(Wire(sensor, half).shortening(rotation))
     else:
-        expected = half * np.abs(rotation) - sensor.position_m[0] * rotation
+        expected = opening(rotation, sensor.position_m[0], half)
     if reaches_its_range(run.aligned(i), sensor.range_si):
         return 0.0, furthest
     # On the side of its largest reading only: the other side may have another gain, and where the zero
@@ -172,15 +175,16 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None, rough: float) ->
     largest = float(mine[same].max(initial=0.0))
     below = same & (mine > IN_PROPORTION[0] * largest) & (mine < IN_PROPORTION[1] * largest)
     top = same & (mine > FLAT_TOP * largest)
-    if below.sum() < 20 or top.sum() < round(0.05 * GRID_HZ):
+    if below.sum() < 20 or top.sum() < round(SHORTEST_TOP_S * GRID_HZ):
         return 0.0, furthest
     gain = float(np.median(mine[below] / np.maximum(expected[below], 1e-9)))
     reach = gain * expected[top]
-    if float(np.quantile(reach, 0.98)) <= (GOES_ON + rough) * largest:
+    if float(np.quantile(reach, TOP_OF_REACH)) <= (GOES_ON + rough) * largest:
         return 0.0, furthest
     # Standing still while the rotation moves on is clipping; following at another rate is not.
     noise = float(np.std(mine[-40:]))
     travel = float(np.ptp(np.quantile(reach, (0.01, 0.99))))
     moved = float(np.ptp(np.quantile(mine[top], (0.05, 0.95))))
-    steady = travel > (0.02 + rough) * largest + 3.0 * noise and moved < 0.5 * travel + 2.0 * noise
-    return (float(np.median(reading[top])) if steady else 0.0), furthest
+    goes_on = travel > (TRAVELS_ON[0] + rough) * largest + TRAVELS_ON[1] * noise
+    stopped = goes_on and moved < STANDS_STILL[0] * travel + STANDS_STILL[1] * noise
+    return (float(np.median(reading[top])) if stopped else 0.0), furthest

@@ -15,7 +15,7 @@ from scipy.signal import butter, sosfiltfilt
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.response import first_order
 from daq_app.gap.rocking_model.motion.late_joint import common_lateness
-from daq_app.gap.rocking_model.motion.rotation import zeroed
+from daq_app.gap.rocking_model.motion.rotation import opening, rotation_of_faces, zeroed
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Sensor, Wiring
 from daq_app.gap.rocking_model.tolerances.inspection import (
     EXCHANGE_EACH,
@@ -26,6 +26,7 @@ from daq_app.gap.rocking_model.tolerances.inspection import (
     FAR_FROM_UPRIGHT,
     LIVELY,
     REVERSED_BELOW,
+    WITHIN_RANGE,
 )
 
 WORK_HZ = 100.0
@@ -104,9 +105,9 @@ def _slope(run: GapRun, name: str, measured: FloatArray, expected: FloatArray) -
 
     A reversed LVDT runs into its stop at once: only what it shows before that tells its sign.
     """
-    low, high = next(sensor.range_si for sensor in run.sensors if sensor.id == name)
+    low, high = run.sensors[run.place(name)].range_si
     free = (
-        (measured > 0.8 * low) & (measured < 0.8 * high)
+        (measured > WITHIN_RANGE * low) & (measured < WITHIN_RANGE * high)
         if np.isfinite([low, high]).all()
         else measured < np.inf
     )
@@ -206,14 +207,11 @@ def _thin(values: FloatArray, step: int) -> FloatArray:
 
 def _median_rotation(run: GapRun, smooth: dict[int, FloatArray]) -> FloatArray | None:
     """θ from the medians of both faces; from the wires where there are no LVDTs."""
-    faces = [
-        [smooth[i] for i in run.indices("lvdt") if i in smooth and side * run.sensors[i].position_m[0] > 0]
-        for side in (-1.0, 1.0)
-    ]
-    if all(len(face) >= 3 for face in faces):
-        width = 2.0 * run.survey.half_base_m
-        opening = np.median(faces[0], axis=0) - np.median(faces[1], axis=0)
-        return np.asarray(opening / width, dtype=float)
+    lvdts = [i for i in run.indices("lvdt") if i in smooth]
+    openings, x_m = [smooth[i] for i in lvdts], run.positions(lvdts)[:, 0].tolist()
+    theta = rotation_of_faces(openings, x_m, run.survey.half_base_m, fewest=3)
+    if theta is not None:
+        return theta
     wires = [smooth[i] / run.sensors[i].position_m[2] for i in run.indices("wire") if i in smooth]
     return np.asarray(np.median(wires, axis=0), dtype=float) if len(wires) >= 3 else None
 
@@ -225,7 +223,7 @@ def _expected(run: GapRun, i: int, theta: FloatArray, acceleration: FloatArray) 
     half = run.survey.half_base_m
     match sensor.family:
         case "lvdt":
-            return half * np.abs(theta) - x * theta
+            return opening(theta, x, half)
         case "wire":
             toward = 1.0 if sensor.anchor_m is None or sensor.anchor_m[0] > x else -1.0
             return toward * z * theta

@@ -9,6 +9,7 @@ import numpy as np
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Rotation, coarse, joint_rotation
 from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.tolerances.motion import AFTER_PULL_S, AT_ROTATION, MAY_BE_HELD, STILL_PULLED
 
 BEFORE_RELEASE_S = 2.0
 """Longest part of the hold that belongs to the test."""
@@ -30,16 +31,16 @@ def from_hold(run: GapRun) -> tuple[GapRun, Rotation]:
         )
     below = np.flatnonzero(theta < 0.5 * largest)
     # The release ends the first stay near the largest rotation; a later peak never comes that high.
-    after = below[below > np.flatnonzero(theta > 0.98 * largest)[0]]
+    after = below[below > np.flatnonzero(theta > AT_ROTATION * largest)[0]]
     fall = int(after[0]) if after.size else theta.size
     # A wall that is pulled quickly overshoots and sways about the rotation at which it is then held.
-    near = np.flatnonzero(theta[:fall] > 0.85 * largest)
+    near = np.flatnonzero(theta[:fall] > MAY_BE_HELD * largest)
     plateau = float(np.median(theta[near]))
-    release = int(near[theta[near] > 0.98 * plateau][-1])
+    release = int(near[theta[near] > AT_ROTATION * plateau][-1])
     # The pull must not be taken for the hold: at most as long as the wall has been held still.
-    pulled = np.flatnonzero(theta[:release] < 0.93 * plateau)
+    pulled = np.flatnonzero(theta[:release] < STILL_PULLED * plateau)
     still = release - int(pulled[-1]) if pulled.size else release
-    wanted = min(BEFORE_RELEASE_S * run.rate_hz, max(still * step - 0.1 * run.rate_hz, run.rate_hz))
+    wanted = min(BEFORE_RELEASE_S * run.rate_hz, max(still * step - AFTER_PULL_S * run.rate_hz, run.rate_hz))
     start = int(release * step - wanted)
     if start < 0.5 * run.rate_hz:
         return run, joint

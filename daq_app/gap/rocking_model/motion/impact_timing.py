@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.gap.core.features import FloatArray
+from daq_app.gap.core.features import FloatArray, robust_sd
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.parabola import vertex
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
-from daq_app.gap.rocking_model.tolerances.walls import IMPACT_FORM_S
+from daq_app.gap.rocking_model.tolerances.walls import ALONE, IMPACT_FORM_S, SHARP_S
 
 MOST = 14
 """Impacts used: the first ones are the loudest."""
@@ -20,8 +21,6 @@ REACH_S = 0.065
 _SLOW_SHAPES = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, 2 * round(WINDOW_S * GRID_HZ)), 5))[0]
 """Powers of time that are free around each impact, an orthonormal base of them over a window, (samples, 5):
 as much as a wall does that rings below 7 Hz."""
-_SHARP_S = 8e-3
-"""Half width of the misfit's dip up to which it is that of impacts, whatever their form."""
 _NEAR_S = 3e-3
 """How far from its lowest point the shape of a sharp dip is read."""
 
@@ -62,7 +61,7 @@ def acceleration_delay(run: GapRun, grid: Grid) -> tuple[float, float] | None:
     lowest = _middle if dip.broad else _minimum
     shift = lowest(fine_delays, tables.sum(axis=1))
     each = np.array([lowest(fine_delays, tables[:, k]) for k in range(tables.shape[1])])
-    spread = 1.48 * float(np.median(np.abs(each - np.median(each))))
+    spread = robust_sd(each - np.median(each))
     form = dip.lopsided_s if dip.broad else 0.0
     return shift, 1.57 * spread**2 / len(windows) + IMPACT_FORM_S**2 + form**2
 
@@ -74,7 +73,7 @@ def _windows(grid: Grid) -> NDArray[np.intp]:
     gaps = np.diff(grid.impact_s, append=grid.impact_s[-1] + 0.5)
     for k, (time, gap) in enumerate(zip(grid.impact_s, gaps, strict=True)):
         before = time - grid.impact_s[k - 1] if k else 1.0
-        if min(gap, before) < 1.6 * WINDOW_S:
+        if min(gap, before) < ALONE * WINDOW_S:
             break
         centre = int(np.searchsorted(grid.time_s, time))
         if centre < half or centre + half > grid.time_s.size:
@@ -107,7 +106,7 @@ class _Dip:
     def broad(self) -> bool:
         """Whether the accelerometers' response is longer than an impact: 5 to 6 ms as they are, 17 behind a
         filter of 20 ms."""
-        return min(self.sooner_s, self.later_s) > _SHARP_S
+        return min(self.sooner_s, self.later_s) > SHARP_S
 
     @property
     def lopsided_s(self) -> float:
@@ -125,7 +124,6 @@ def _middle(where: FloatArray, values: FloatArray) -> float:
 
 def _minimum(where: FloatArray, values: FloatArray) -> float:
     """Lowest point of a sampled curve, by a parabola through its lowest sample and both neighbours."""
-    k = min(max(int(np.argmin(values)), 1), values.size - 2)
-    bend = values[k - 1] - 2.0 * values[k] + values[k + 1]
-    shift = 0.5 * (values[k - 1] - values[k + 1]) / bend if bend > 0 else 0.0
-    return float(where[k] + np.clip(shift, -1.0, 1.0) * (where[1] - where[0]))
+    k, shift, bend = vertex(values, int(np.argmin(values)))
+    between = np.clip(shift, -1.0, 1.0) if bend > 0 else 0.0
+    return float(where[k] + between * (where[1] - where[0]))

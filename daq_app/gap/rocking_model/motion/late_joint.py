@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.motion_grid import MASK_S, Grid
+from daq_app.gap.rocking_model.motion.parabola import vertex
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Rotation, coarse, sooner
 from daq_app.gap.rocking_model.tolerances.sensors import MOST_LATE_S
 
@@ -62,10 +63,8 @@ def _correlation(mine: FloatArray, other: FloatArray, most: int) -> FloatArray:
 
 def _largest(correlation: FloatArray) -> float:
     """Place of the maximum from the middle, by a parabola through it and its neighbours."""
-    k = min(max(int(np.argmax(correlation)), 1), correlation.size - 2)
-    bend = float(correlation[k - 1] - 2.0 * correlation[k] + correlation[k + 1])
-    between = 0.5 * float(correlation[k - 1] - correlation[k + 1]) / bend if bend < 0.0 else 0.0
-    return k - correlation.size // 2 + between
+    k, shift, bend = vertex(correlation, int(np.argmax(correlation)))
+    return k - correlation.size // 2 + (shift if bend < 0.0 else 0.0)
 
 
 def in_step(joint: Rotation, grid: Grid, rate_hz: float) -> InStep:

@@ -14,11 +14,10 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.rotation import coarse
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import Survey
-from daq_app.gap.rocking_model.tolerances.walls import AS_FROM_REST
+from daq_app.gap.rocking_model.tolerances.motion import AS_FROM_REST, SMALLEST_GRID_RAD
 
 SMOOTH_HZ = 30.0
 POLYNOMIAL_DEGREE = 8
-SMALLEST_GRID_RAD = 8e-4
 MASK_S = 0.05
 """Accelerations near an impact are left out."""
 SETTLING_S = 0.02
@@ -94,7 +93,7 @@ def make_grid(
         alpha[whole] = fitted.deriv(2)(position) * scale**2
     time_s = coarse(np.arange(n) / rate_hz, rate_hz) - swings.release_s
     impact_s = np.array(crossings) / rate_hz - swings.release_s
-    good = coarse(valid.astype(float), rate_hz) > 0.999
+    good = coarse(valid.astype(float), rate_hz) == 1.0  # at every sample
     rotation, rate, acceleration = (coarse(v, rate_hz) for v in (smooth, omega, alpha))
     before, after = _speeds(np.abs(rotation), rate, time_s, impact_s, survey)
     side = np.sign(np.interp(impact_s - 0.02, time_s, rotation))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.tolerances.motion import KNOCK, KNOCK_S
 
 
 def quiet(run: GapRun, grid: Grid) -> NDArray[np.bool_]:
@@ -19,5 +20,5 @@ def quiet(run: GapRun, grid: Grid) -> NDArray[np.bool_]:
             cells = run.channels[i, : spread.size * step].reshape(spread.size, step)
             deviation = cells.std(axis=1)
             spread = np.maximum(spread, deviation / max(float(np.median(deviation[-60:])), 1e-12))
-    loud = np.convolve(spread > 2.5, np.ones(round(0.12 * GRID_HZ)), "same") > 0
+    loud = np.convolve(spread > KNOCK, np.ones(round(KNOCK_S * GRID_HZ)), "same") > 0
     return np.asarray(~loud)

@@ -144,10 +144,33 @@ def reaches_its_range(values: FloatArray, limits: tuple[float, float]) -> bool:
     return bool(at_range_end(values, *limits).any())
 
 
+def opening(theta: FloatArray, x_m: FloatArray | float, half_base_m: float) -> FloatArray:
+    """Opening of the joint at `x_m` from its middle at a small rotation θ, rad, in their common shape, m."""
+    return np.asarray(half_base_m * np.abs(theta) - x_m * theta)
+
+
+def rotation_of_faces(
+    openings: Sequence[FloatArray], x_m: Sequence[float], half_base_m: float, fewest: int
+) -> FloatArray | None:
+    """θ, (n,), rad, from the middle opening, (n,), of either face; None where a face has too few."""
+    faces = [[row for row, x in zip(openings, x_m, strict=True) if side * x > 0] for side in (-1.0, 1.0)]
+    if min(map(len, faces)) < fewest:
+        return None
+    first, second = (np.median(face, axis=0) for face in faces)
+    return np.asarray((first - second) / (2.0 * half_base_m))
+
+
 def straight_line(heights: FloatArray) -> FloatArray:
     """Weights, (2, k), of readings at these heights, (k,), m: value at the foot and slope of their line."""
     weights: FloatArray = np.linalg.pinv(np.column_stack([np.ones_like(heights), heights]))
     return weights
+
+
+def pseudo_inverse(design: FloatArray) -> FloatArray:
+    """That of shapes of whatever sizes and units, (n, k): coefficients = (k, n) @ samples (n,)."""
+    scale = np.sqrt(np.mean(design**2, axis=0)) + 1e-300
+    inverse: FloatArray = np.linalg.pinv(design / scale, rcond=1e-8) / scale[:, None]
+    return inverse
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
-from daq_app.gap.rocking_model.motion.rotation import gridded, straight_line
+from daq_app.gap.rocking_model.motion.rotation import gridded, pseudo_inverse, straight_line
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
+from daq_app.gap.rocking_model.tolerances.motion import FREE_FROM_S, LEAST_INDEPENDENT
 from daq_app.gap.rocking_model.tolerances.sensors import (
     ACCELEROMETER_SPREAD_M,
     DELAY_FORM,
@@ -75,19 +76,18 @@ class _Foot:
 
     @classmethod
     def of(cls, run: GapRun, grid: Grid, rows: FloatArray, chosen: list[int]) -> _Foot | None:
-        pick = (grid.time_s > 0.05) & (grid.time_s < grid.impact_s[-1]) & ~grid.near_impact & grid.valid
+        free = (grid.time_s > FREE_FROM_S) & (grid.time_s < grid.impact_s[-1])
+        pick = free & ~grid.near_impact & grid.valid
         theta, omega = grid.theta[pick], grid.omega[pick]
         gravity = -GRAVITY_M_S2 * np.sin(theta)
         columns = [np.ones_like(theta), gravity, grid.alpha[pick], GRAVITY_M_S2 * np.cos(theta) * omega]
         design = np.column_stack(columns)
         if len(design) < 20 * len(columns):
             return None
-        scale = np.sqrt(np.mean(design**2, axis=0)) + 1e-300
         places = run.positions(chosen)
         arms = places[:, :1] - np.sign(theta) * run.survey.half_base_m
         beyond = rows[:, pick] - gravity + omega**2 * arms
-        inverse = np.linalg.pinv(design / scale, rcond=1e-8) / scale[:, None]
-        return cls(beyond, places[:, 2], design, inverse)
+        return cls(beyond, places[:, 2], design, pseudo_inverse(design))
 
     def delay(self, used: NDArray[np.bool_]) -> tuple[float, float] | None:
         """(delay, variance), s, by some of the accelerometers, (k,); None for too few or too near ones."""
@@ -97,6 +97,6 @@ class _Foot:
         difference = straight_line(z)[0] @ self.rows[used]
         coefficients = self.inverse @ difference
         left = difference - self.design @ coefficients
-        fraction = max(independent_fraction(left), 0.01)
+        fraction = max(independent_fraction(left), LEAST_INDEPENDENT)
         variance = float(left @ left) / (left.size - self.design.shape[1]) / fraction
         return float(coefficients[-1]), variance * float(self.inverse[-1] @ self.inverse[-1])

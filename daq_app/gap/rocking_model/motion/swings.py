@@ -13,7 +13,13 @@ from scipy.signal import butter, sosfiltfilt
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.rotation import HOLD_S
-from daq_app.gap.rocking_model.tolerances.walls import SMALLEST_RAD
+from daq_app.gap.rocking_model.tolerances.motion import (
+    AT_REST_RAD,
+    FALLEN,
+    SHORTEST_HALF_CYCLE_S,
+    SMALLEST_RAD,
+    WITHIN_SWAY,
+)
 from sim_hardware.dynamics.parameters import REST_AMPLITUDE_RAD
 
 FRACTIONS = (0.85, 0.5, 0.15)
@@ -21,16 +27,18 @@ FRACTIONS = (0.85, 0.5, 0.15)
 RELEASE_FRACTIONS = (0.99, 0.96, 0.85, 0.5, 0.15)
 """The same for the quarter-cycle after the release, which is watched closer at its start."""
 TOP_DEGREE = 4
-"""Degree of the polynomial over the top of a half-cycle from which its peak is read."""
+"""Degree of the polynomial over the top of a half-cycle from which its peak is read …"""
+_TOP = 0.85
+"""… and the share of the peak from which on it is the top."""
 MOST = 30
 _LAST = 9
 """Peaks from which the fall from one to the next is taken, where it no longer depends on the amplitude."""
 _SMOOTH_HZ = 30.0
 _WINDOW_S = 0.015
-_FALLEN = 0.9
-"""Share of the largest rotation below which the wall is falling."""
+_HOLD_MEAN_S = 0.02
+"""Means over which a held wall is looked at, which end as long before the release."""
 _HELD_S = (0.6, 0.25)
-"""Before that, s: from when to when the wall is held; it falls to nine tenths within 0.1–0.2 s."""
+"""Before the wall is falling, s: from when to when it is held; it falls to nine tenths within 0.1–0.2 s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +123,7 @@ def find_swings(theta: FloatArray, noise_rad: float, rate_hz: float, name: str) 
         fall_sd=fall_sd,
         rise_s=rise - offset,
         rise_sd=rise_sd,
-        rest_s=float(np.flatnonzero(np.abs(smooth) > max(5 * noise_rad, 2e-4))[-1]) / rate_hz,
+        rest_s=float(np.flatnonzero(np.abs(smooth) > max(5 * noise_rad, AT_REST_RAD))[-1]) / rate_hz,
         hold_sd=sway,
         hold_rate_sd=sway_rate,
     )
@@ -137,7 +145,7 @@ def _level_times(
     for k, value in enumerate(peaks):
         folded, near = np.sign(value) * theta, np.sign(value) * smooth
         for j in range(levels.shape[1] if k == 0 else len(FRACTIONS)):
-            if k == 0 and RELEASE_FRACTIONS[j] > 1.0 - 6.0 * sway / abs(value):
+            if k == 0 and RELEASE_FRACTIONS[j] > 1.0 - WITHIN_SWAY * sway / abs(value):
                 continue  # the sway alone may keep the wall below this level
             level, begin = levels[k, j], samples[k]
             fall[k, j], fall_sd[k, j] = _crossing(folded, near, level, begin, after[k], noise, rate_hz)
@@ -151,9 +159,9 @@ def _hold(
     theta: FloatArray, release: float, noise: float, rate_hz: float
 ) -> tuple[float, float, float, float]:
     """(rotation just before the release, its noise, sway, speed of the sway) while the wall is held."""
-    end = max(int(release - 0.02 * rate_hz), int(0.3 * rate_hz))
+    end = max(int(release - _HOLD_MEAN_S * rate_hz), int(0.3 * rate_hz))
     start = max(int(end - HOLD_S * rate_hz), 0)
-    step = int(0.02 * rate_hz)
+    step = int(_HOLD_MEAN_S * rate_hz)
     count = (end - start) // step
     means = theta[end - count * step : end].reshape(count, step).mean(axis=1)
     mean_noise = noise / np.sqrt(step)
@@ -173,7 +181,7 @@ def _release(smooth: FloatArray, noise: float, first_crossing: int, rate_hz: flo
     move it by more than the first part of the fall does.
     """
     size = np.abs(smooth[:first_crossing])
-    fallen = int(np.flatnonzero(size > _FALLEN * size.max())[-1])
+    fallen = int(np.flatnonzero(size > FALLEN * size.max())[-1])
     first, last = (max(fallen - round(back * rate_hz), 0) for back in _HELD_S)
     held = float(np.median(size[first : max(last, first + 1)]))
     moved = held - size
@@ -194,14 +202,14 @@ def _peaks(
     peaks = []
     for start, stop in itertools.pairwise(crossings):
         part = smooth[start:stop]
-        if part.size < 0.04 * rate_hz:
+        if part.size < SHORTEST_HALF_CYCLE_S * rate_hz:
             continue
         at = int(start) + int(np.argmax(np.abs(part)))
         side = np.sign(smooth[at])
         size = abs(float(smooth[at]))
         if size < max(SMALLEST_RAD, 15 * noise):
             break
-        inside = np.flatnonzero(side * part > 0.85 * size) + int(start)
+        inside = np.flatnonzero(side * part > _TOP * size) + int(start)
         inside = np.arange(inside[0], inside[-1] + 1)
         t = (inside - at) / rate_hz
         scale = max(float(np.abs(t).max()), 1e-6)

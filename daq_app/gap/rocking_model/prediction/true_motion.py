@@ -24,9 +24,8 @@ def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
         gain = gain * (1.0 + np.where(side > 0, face_gain(values, "face_a"), face_gain(values, "face_b")))
     else:
         gain = gain * (1.0 + values["cal_wire"])
-    rest = run.swings.rest_s - run.swings.release_s
     drift = values.get("drift@wire.rate", 0.0) / run.wire_height_m if name == "wire" else 0.0
-    offset = values["zero"] + drift * (run.swings.peak_s - rest) + peaks_carry(run, values)
+    offset = values["zero"] + drift * (run.swings.peak_s - run.grid.rest_s) + peaks_carry(run, values)
     levels = side[:, None] * run.swings.levels
     true = peaks - offset - _bent(run, values, peaks)
     behind = levels - offset[:, None] - _bent(run, values, levels)

@@ -31,6 +31,8 @@ _DEFAULTS = {
 }
 PROBE_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45)
 """Knots of the free r(v), rad/s."""
+_RESTITUTION = (0.05, 1.2)
+"""Ends between which a fit may try coefficients of restitution: far beyond what walls have."""
 _MIDDLE_SPEED = 0.36
 """Share of p α: the mean speed of the impacts of a run. About it a curvature of r(v) has neither value nor
 slope, so that the priors of r and of its slope say nothing of it."""
@@ -97,4 +99,4 @@ def restitution_of(
         r = r + np.interp(speeds, PROBE_SPEEDS, knots) + sides * values["free_restitution.side"]
         r = r + values["free_restitution.order"] * impacts / 10.0
     r = r * (1.0 - values.get("restitution_wear.loss", 0.0) * 0.01 * (run.impacts_before + impacts))
-    return np.minimum(np.maximum(r, 0.05), 1.2)
+    return np.clip(r, *_RESTITUTION)

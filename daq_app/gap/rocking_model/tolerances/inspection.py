@@ -55,11 +55,44 @@ IN_PROPORTION = (0.3, 0.85)
 Widening it takes the bend of a limit for a gain.
 """
 
+WITHIN_RANGE = 0.8
+"""Share of a channel's range, 1, within which its sign is judged: beyond it, it may stand at its stop.
+
+Raising it takes what a stop makes of a reading for its slope.
+"""
+
 FLAT_TOP = 0.985
 """Share of its largest reading, 1, from which a channel may be at its end (assumed).
 
 Raising it leaves too few samples of a top to be called flat.
 """
+
+SHORTEST_TOP_S = 0.05
+"""Time, s, that a channel must be at its top for it to be looked at (assumed).
+
+Raising it overlooks channels that are stopped at the first peak only.
+"""
+
+TOP_OF_REACH = 0.98
+"""Share of the samples of a top, 1, above which the rotation may reach as far by chance (assumed).
+
+Raising it takes the noise of the rotation for motion that goes on.
+"""
+
+TRAVELS_ON = (0.02, 3.0)
+"""Share of a channel's largest reading and of its noise, 1, by which the rotation must go on at its top.
+
+Raising either overlooks limits just below the largest rotation.
+"""
+
+STANDS_STILL = (0.5, 2.0)
+"""Share of that travel and of the noise, 1, within which a channel that is stopped moves.
+
+Raising either takes a gain that is low at the top for a stop.
+"""
+
+AS_FAR = 0.9
+"""Share of the furthest limit of a family, 1, from which a channel's limit stands for it (assumed)."""
 
 SAME_LIMIT = 0.97
 """Share of the furthest reading of all runs, 1, below which a stop is none (assumed): it went beyond.
@@ -92,6 +125,39 @@ HUM_SD = 6.0
 Raising it leaves weak hum in the readings.
 """
 
+BEYOND_HUM = 4.0
+"""Size over that of noise and hum together, 1, from which a sample belongs to an impact and not to the hum.
+
+Raising it takes the share that an impact has of the mains frequency for hum.
+"""
+
+A_STEP = 0.4
+"""Share of the largest changes from sample to sample, 1, from which one is a step or some (assumed).
+
+Raising it takes single steps for noise where readings go on by several at once.
+"""
+
+BESIDE_STEPS = 0.05
+"""Rms of the other changes over a step, 1, up to which a reading stands still between steps (assumed).
+
+Raising it takes noise for steps.
+"""
+
+OFF_STEP = 0.15
+"""Distance from a whole number of steps, 1, up to which a change is one (assumed).
+
+Raising it takes noise for steps.
+"""
+
+IN_STEPS = 0.9
+"""Share of the large changes, 1, that must be whole numbers of steps (assumed).
+
+Raising it overlooks steps in readings with spikes.
+"""
+
+STEP_SD = 0.02
+"""Relative sd, 1, of the step of a reading (assumed)."""
+
 FEWEST_STEPS = 0.004
 """Share of samples, 1, at which a reading in steps goes on by a step at least.
 
@@ -114,6 +180,13 @@ GOES_ON_STEPS = 2.5
 """Steps of its converter, 1, by which a reading goes on after it stood still for it to have been frozen.
 
 A sound one goes on by one, or two with noise. Raising it overlooks drop-outs in slow motion.
+"""
+
+FROZEN_SD = 1e-3
+"""Sd, 1, of a share of frozen samples: that of reading it off one record. A sound channel never freezes.
+
+It is not that of what a few moments say of other records: each run has a share of its own. Raising it hides
+rare drop-outs.
 """
 
 FROZEN_S = 0.008
@@ -139,6 +212,9 @@ SPIKY_PER_S = 0.3
 
 Raising it overlooks a contact that is seldom loose.
 """
+
+SPIKES_SD_PER_S = 0.05
+"""Sd, 1/s, of the rate of lone samples in one run (assumed). Raising it hides contacts seldom loose."""
 
 LOUD_NOISE = 4.0
 """Distance of a sample from its neighbours over the noise, 1, from which an accelerometer is loud.

@@ -105,6 +105,12 @@ ACCELEROMETER_SPREAD_M = 0.5
 Raising it gives up the delay of accelerometers on low walls.
 """
 
+SPREAD_ALONG_M = 0.2
+"""Length along the wall, m, over which sensors must be spread to tell turning from bending (assumed).
+
+Raising it gives up the turning of short walls.
+"""
+
 DELAY_WITHOUT_ONE = 3.0
 """Standard deviations, 1, by which a delay may change without one accelerometer.
 

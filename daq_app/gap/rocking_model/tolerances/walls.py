@@ -1,20 +1,8 @@
-"""Tolerances of walls: their motion, release and impacts, the floor below them, and their survey."""
+"""Tolerances of walls: their hold, release and impacts, the floor below them, and their survey."""
 
 from __future__ import annotations
 
-# -- motion ----------------------------------------------------------------------------------------
-SMALLEST_RAD = 2e-3
-"""Peak, rad, from which half-cycles are used (assumed).
-
-Raising it refuses records of low levels, and leaves fewer half-cycles of the others.
-"""
-
-AS_FROM_REST = 0.01
-"""Relative difference, 1, of the first fall's speed up to which it counts as a fall from rest (assumed).
-
-Raising it takes a slow release for a clean one where kicks at impacts are looked for.
-"""
-
+# -- hold ------------------------------------------------------------------------------------------
 SWAY_SHARE = 0.005
 """Acceleration of the sway over that of gravity, 1, up to which a held wall shows gravity alone (assumed).
 
@@ -46,6 +34,39 @@ IMPACT_FORM_S = 3e-4
 """Sd, s, of that middle: how well the shape of an impact is known at all (assumed).
 
 Raising it hides delays of accelerometers below it.
+"""
+
+ALONE = 1.6
+"""Windows, 1, that an impact must be from its neighbours for its time to be read (assumed).
+
+Raising it leaves fewer impacts.
+"""
+
+SHARP_S = 8e-3
+"""Half width of the misfit's dip, s, up to which accelerometers are late by what the impacts themselves say.
+
+Prompt ones reach 6 ms, those behind a filter of 20 ms 17. Raising it reads the form of a filter for a delay.
+"""
+
+OSCILLATION_INDEPENDENT = 0.05
+"""Least share of independent samples, 1, in what a ring-down or a vibration of the floor leaves (assumed).
+
+Raising it makes weak ones surer than they are.
+"""
+
+SCANNED_INDEPENDENT = 0.2
+"""The same while frequency and damping are sought: one slow signal must not decide them (assumed)."""
+
+VAGUE_FREQUENCY = 0.3
+"""Largest relative sd, 1, of a ring-down's frequency (assumed): the scan has found it somewhere.
+
+Raising it lets a frequency go from the one that was found.
+"""
+
+SURE_DAMPING = 0.02
+"""Least relative sd, 1, of a ring-down's damping (assumed): no wall dies away by one oscillator's law.
+
+Raising it tells the damping less well.
 """
 
 VAGUE_DAMPING = 0.4

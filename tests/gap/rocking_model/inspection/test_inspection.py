@@ -59,7 +59,7 @@ def healthy() -> list[RockingRun]:
 
 
 def test_healthy_runs_carry_no_mark_and_no_suspect(healthy: list[RockingRun]) -> None:
-    assert conditions_found(healthy) == {}
+    assert conditions_found(healthy) == set()
     assert found_channels(healthy) == {}
     _, library = model_and_library(healthy)
     assert "ambient" not in library, "no vibration of the floor is seen, so none can explain anything"
@@ -75,7 +75,7 @@ def test_electronics_are_named_by_channel_with_their_size(healthy: list[RockingR
             "quantisation@LV-A09": {"step": 1e-3},
         }
     )
-    assert set(conditions_found(runs)) == {
+    assert conditions_found(runs) == {
         "polarity@LV-B06",
         "hum@WP-2",
         "dropout@LV-A02",
@@ -103,7 +103,7 @@ def test_a_wall_that_dwells_upright_under_a_coarse_converter_is_no_wire_that_fre
 
 def test_a_channel_with_far_more_pick_up_than_its_family_stands_for_itself() -> None:
     runs = _prepared({"hum@wire": {"amplitude": 2e-4}, "hum@WP-2": {"amplitude": 8e-4}})
-    assert set(conditions_found(runs)) == {"hum@wire", "hum@WP-2"}
+    assert conditions_found(runs) == {"hum@wire", "hum@WP-2"}
     for run in runs:
         assert _mark(run, "hum@wire") == pytest.approx(2e-4, rel=0.2)
         assert _mark(run, "hum@WP-2") > 5e-4
@@ -117,7 +117,7 @@ def test_exchanged_plugs_are_put_back() -> None:
     for run in plain:
         _exchange(run, "WP-1", "WP-4")
     crossed, _ = prepare(plain)
-    assert set(conditions_found(crossed)) == {"swap@wire"}
+    assert conditions_found(crossed) == {"swap@wire"}
     assert abs(_value(crossed[0], "wire", "gain")) < 5e-3
     assert "WP-1 and WP-4 exchanged" in _words(crossed)
 
@@ -179,7 +179,7 @@ def test_accelerometers_along_z_that_are_exchanged_are_put_back() -> None:
     for run in plain:
         _exchange(run, "AC-7", "AC-8")
     crossed, _ = prepare(plain)
-    assert set(conditions_found(crossed)) == {"swap@accelerometer"}
+    assert conditions_found(crossed) == {"swap@accelerometer"}
     assert "AC-7 and AC-8 exchanged" in _words(crossed)
 
 
@@ -194,7 +194,7 @@ def test_plugs_that_are_all_moved_on_are_put_back(target: str, places: float, wo
     """Two wires of one height show the same: which of these is which stays open, and needs no answer."""
     key = f"swap@{target}"
     crossed, _ = prepare(simulate({key: {"places": places}}, ONE))
-    assert set(conditions_found(crossed)) == {key}
+    assert conditions_found(crossed) == {key}
     assert _mark(crossed[0], key) == places
     assert abs(_value(crossed[0], "wire", "gain")) < 5e-3
     assert words in _words(crossed)
@@ -238,7 +238,7 @@ def test_a_drift_of_one_channel_is_no_curvature_of_its_family() -> None:
 def test_steps_of_all_wires_are_no_fault_of_one() -> None:
     """At rest such a reading shows no step, and in motion the same ones in every half-cycle."""
     runs = _prepared({"quantisation@wire": {"step": 7e-3}})
-    assert set(conditions_found(runs)) == {"quantisation@wire"}
+    assert conditions_found(runs) == {"quantisation@wire"}
     assert found_channels(runs) == {}
 
 
@@ -252,13 +252,13 @@ def test_an_lvdt_that_steps_out_of_time_with_its_face_is_no_fault() -> None:
             zero = run.channels[i, -600:].mean()
             run.channels[i] = np.round(gain * (run.channels[i] - zero) / step) * step
     prepared = prepare(runs)[0]
-    assert set(conditions_found(prepared)) == {"quantisation@lvdt"}
+    assert conditions_found(prepared) == {"quantisation@lvdt"}
     assert found_channels(prepared) == {}
 
 
 def test_a_family_that_stops_short_of_its_range_is_found_and_the_motion_read_elsewhere() -> None:
     runs = _prepared({"saturation@lvdt": {"limit": 0.04}})
-    assert set(conditions_found(runs)) == {"saturation@lvdt"}
+    assert conditions_found(runs) == {"saturation@lvdt"}
     by_amplitude = sorted(runs, key=lambda run: abs(run.swings.peak_rad[0]))
     assert 1.0 / _mark(by_amplitude[-1], "saturation@lvdt") == pytest.approx(0.04, rel=0.03)
     assert by_amplitude[-1].reference == "wire"
@@ -272,7 +272,7 @@ def test_a_limit_is_found_where_the_other_side_travels_further_from_a_zero_that_
     other_way = 0.155 / float(np.abs(raw[-400:].mean() - raw.min()))
     centred = raw - raw[-400:].mean()
     runs[0].channels[place] = np.minimum(np.where(centred < 0, other_way * centred, centred) + 0.02, 0.17)
-    assert set(conditions_found(prepare(runs)[0])) == {"saturation@WP-4"}
+    assert conditions_found(prepare(runs)[0]) == {"saturation@WP-4"}
 
 
 @pytest.mark.parametrize("fault", [{"lag@lvdt": {"tau": 0.049}}, {"slow_response@wire": {"tau": 0.047}}])
@@ -323,7 +323,7 @@ def test_a_very_slow_lvdt_at_the_end_of_its_row_is_told_from_its_neighbours() ->
     """It moves what three others are predicted by more than it leaves of its own fault."""
     runs = _prepared({"slow_response@LV-A12": {"tau": 0.03}, "base_tilt": {"beta": 0.0024}})
     assert found_channels(runs) == {"LV-A12": "lvdt"}
-    assert conditions_found(runs) == {}
+    assert conditions_found(runs) == set()
 
 
 def test_a_wire_that_is_half_a_millisecond_late_is_examined_on_its_own() -> None:

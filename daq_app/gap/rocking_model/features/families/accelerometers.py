@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core import Parameter
 from daq_app.gap.core.features import FloatArray
@@ -23,26 +22,25 @@ from daq_app.gap.rocking_model.features.response import delay
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.impact_timing import acceleration_delay
-from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rigid_body import across_axes
-from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
+from daq_app.gap.rocking_model.motion.rotation import gridded
+from daq_app.gap.rocking_model.motion.sway import sway
 from daq_app.gap.rocking_model.motion.swing_timing import swing_delay
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, Survey
+from daq_app.gap.rocking_model.tolerances.motion import FREE_FROM_S, HELD_UNTIL_S
 from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, MOUNT_RAD
 from daq_app.gap.rocking_model.tolerances.walls import MIDDLE_OF_IMPACT_S
 
 _TURNED = "turned_accelerometers"
 """Parameter of the mean angle by which the accelerometers along x are turned on their mounts, rad."""
-SWAY_HZ = 8.0
-"""Low-pass limit for the sway of a held wall, Hz (assumed); raising it adds noise to its acceleration."""
 
 
 def _acceleration_block(scene: Scene) -> Block | None:
     run, grid = scene.run, scene.grid
     last = grid.impact_s[-1] if grid.impact_s.size else 0.0
     # While the wall is held there is gravity alone: its gain is then known apart from inertia's.
-    pick = (scene.held & (grid.time_s < -0.1)) | (
-        scene.rocking & (grid.time_s > 0.05) & (grid.time_s < last) & ~grid.near_impact
+    pick = (scene.held & (grid.time_s < -HELD_UNTIL_S)) | (
+        scene.rocking & (grid.time_s > FREE_FROM_S) & (grid.time_s < last) & ~grid.near_impact
     )
     chosen = run.steady_accelerometers("x")
     if not chosen:
@@ -63,26 +61,15 @@ def _acceleration_block(scene: Scene) -> Block | None:
     leaked = crosstalk(run, chosen).mean(axis=0)
     if held.any():
         leaked[held] = leaked[held].mean()
-        swaying = height * float(_sway(grid)[held].mean())
+        # Its mean is the change of speed over the hold: 1 % of gravity for a few mrad/s, and well measured.
+        before = grid.time_s < 0.0
+        swaying = height * float(sway(grid.raw, before)[1][held[before]].mean())
         measured[held], gravity[held] = measured[held].mean() - swaying, gravity[held].mean()
         expected = gravity + inertia - grid.omega**2 * arm
         columns["gain of gravity"], columns["gain of inertia"] = (gravity, "1"), (inertia, "1")
     # No lag here: between impacts the specific force hardly changes. The impacts themselves tell it.
     block = with_crosstalk(regress("accelerometer", measured - expected, columns, pick, ("zero",)), leaked)
     return block and with_systematic(block, _TURNED, across_axes(run, grid, chosen).mean(axis=0))
-
-
-def _sway(grid: Grid) -> FloatArray:
-    """θ̈ of the held wall on the grid, (m,), rad/s²; 0 after the release.
-
-    Its mean is the change of speed over the hold: 1 % of gravity for a few mrad/s, and well measured.
-    """
-    theta_dd = np.zeros_like(grid.raw)
-    before = grid.time_s < 0.0
-    low_pass = butter(3, SWAY_HZ, fs=GRID_HZ, output="sos")
-    theta = sosfiltfilt(low_pass, grid.raw[before] - grid.raw[before].mean())
-    theta_dd[before] = np.gradient(np.gradient(theta, 1 / GRID_HZ), 1 / GRID_HZ)
-    return theta_dd
 
 
 def _predict(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:

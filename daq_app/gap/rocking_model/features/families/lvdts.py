@@ -62,7 +62,6 @@ def _predict_joint(run: RockingRun, block: Block, values: Mapping[str, float]) -
     size = np.abs(theta)
     inwards, apart = pivots(run, values)
     curved = 0.5 * (values.get("rounded_edge.rho", 0.0) - values["mount_height"])
-    rest = run.swings.rest_s - run.swings.release_s
     shapes: tuple[Term, ...] = (
         (inwards, "size", lambda: size),
         (apart, "theta", lambda: theta),
@@ -70,7 +69,7 @@ def _predict_joint(run: RockingRun, block: Block, values: Mapping[str, float]) -
         # The opening is told against |θ|, whose zero is where the wall came to rest: a wall that rests a
         # hundredth of a milliradian off upright makes a step from side to side of it.
         (-values["half_base"] * values["zero"], "sides", lambda: np.sign(theta)),
-        (values.get("drift@lvdt.rate", 0.0), "time", lambda: run.grid.time_s - rest),
+        (values.get("drift@lvdt.rate", 0.0), "time", lambda: run.grid.time_s - run.grid.rest_s),
     )
     coefficients = of_shapes(run, block, shapes)
     if "winkler.theta_c" in values:

@@ -20,7 +20,13 @@ from daq_app.gap.rocking_model.features.differences import (
     face_gain,
     of_shapes,
 )
-from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size, with_crosstalk
+from daq_app.gap.rocking_model.features.family import (
+    Scene,
+    SensorFamily,
+    Size,
+    with_crosstalk,
+    with_systematic,
+)
 from daq_app.gap.rocking_model.features.response import slow_response
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
@@ -57,11 +63,10 @@ def _tilt_block(scene: Scene) -> Block | None:
     block = with_crosstalk(block, crosstalk(run, chosen).mean(axis=0))
     if block is None:
         return None
-    later = -np.gradient(slow_response(grid.theta, slow), 1.0 / GRID_HZ)
-    systematic = {**block.systematic, _DELAY: block.coefficients(later)}
+    block = with_systematic(block, _DELAY, -np.gradient(slow_response(grid.theta, slow), 1.0 / GRID_HZ))
     values = block.values.copy()
     values[block.names.index("time constant")] += float(np.mean(slow / nominal - 1.0))
-    return replace(block, values=values, systematic=systematic, time_constants_s=tuple(slow.tolist()))
+    return replace(block, values=values, time_constants_s=tuple(slow.tolist()))
 
 
 def _columns(scene: Scene, slow: FloatArray, nominal: FloatArray) -> dict[str, tuple[FloatArray, str]]:
@@ -93,7 +98,7 @@ def _time_constant(scene: Scene, measured: FloatArray, nominal_s: float, pick: N
         design = np.column_stack([column[pick] for column, _ in columns.values()])
         difference = (measured - slow_response(scene.grid.theta, slow))[pick]
         step = np.linalg.lstsq(design, difference, rcond=None)[0][list(columns).index("time constant")]
-        slow = np.clip(slow + step * nominal_s, 0.5 * slow, 1.5 * slow)
+        slow = slow + np.clip(step * nominal_s, -0.5 * slow, 0.5 * slow)
         if abs(step) < 1e-4:
             break
     return float(slow[0])

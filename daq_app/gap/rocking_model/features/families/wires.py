@@ -130,7 +130,7 @@ def _turn_block(scene: Scene) -> Block | None:
     run, grid = scene.run, scene.grid
     _, chosen = wall_rotation(run)
     _, y, z = run.positions(chosen).T
-    design = np.column_stack([np.ones_like(y), z, y])
+    design = _turning_design(y, z)
     if len(chosen) < len(run.indices("wire")) or np.linalg.matrix_rank(design) < 3 or len(chosen) < 4:
         return None
     weights = -np.linalg.pinv(design)[2]
@@ -156,6 +156,11 @@ def _turn_block(scene: Scene) -> Block | None:
     lever = float(weights @ weights) / _TURN_LEVER_1_M**2
     steps = max(lever - 1.0, 0.0) * _TURN_SCATTER_S**2 * np.eye(count)
     return replace(block, said=labels, covariance=block.covariance + steps)
+
+
+def _turning_design(y: FloatArray, z: FloatArray) -> FloatArray:
+    """What wires at (y, z), (k,) each, show of a base that moves, a rotation and a turn, (k, 3)."""
+    return np.column_stack([np.ones_like(y), z, y])
 
 
 def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
@@ -209,9 +214,8 @@ def _rung(run: RockingRun, key: str) -> FloatArray:
     wave = turning_wave(run)
     if key == "yaw.kick":
         return wave
-    places = np.array([wire.sensor.position_m[1:] for wire in run.wires])
-    design = np.column_stack([np.ones(len(places)), places[:, 1], places[:, 0]])
-    return np.asarray(-np.linalg.pinv(design)[2] @ (places[:, 0] * places[:, 1]) * wave)
+    y, z = np.array([wire.sensor.position_m[1:] for wire in run.wires]).T
+    return np.asarray(-np.linalg.pinv(_turning_design(y, z))[2] @ (y * z) * wave)
 
 
 def _observe(scene: Scene) -> Iterator[Block | None]:

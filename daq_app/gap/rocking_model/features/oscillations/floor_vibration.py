@@ -12,19 +12,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.rocking_model.features.noise import nats_explained
 from daq_app.gap.rocking_model.features.oscillations.rings import Ring, ring_columns
 from daq_app.gap.rocking_model.features.oscillations.vibration import Vibration
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.quiet import quiet
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
+from daq_app.gap.rocking_model.motion.sway import sway
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
-from daq_app.gap.rocking_model.tolerances.walls import FLOOR_GAIN
+from daq_app.gap.rocking_model.tolerances.walls import FLOOR_GAIN, OSCILLATION_INDEPENDENT
 
 FREQUENCIES_HZ = np.arange(0.4, 6.0, 0.02)
-_REST_MARGIN_S = 0.3
+_MARGINS_S = (0.05, 0.3)
+"""Before the release and after the rest, where the wall may move already and still."""
 _SHORTEST, _ENOUGH = 60, 120
 """Samples of the grid in a part that is used, and in both."""
 
@@ -36,8 +38,6 @@ class _Quiet:
     time_s: FloatArray
     values: FloatArray
     basis: FloatArray
-    moving: NDArray[np.bool_]
-    """Samples of the swings: used to sharpen the frequency only."""
 
 
 def find_vibration(
@@ -93,7 +93,7 @@ def _quiet(run: GapRun, grid: Grid, ring: Ring | None) -> _Quiet | None:
     measured = np.mean([gridded(run, i) for i in chosen], axis=0)
     height = float(run.positions(chosen)[:, 2].mean())
     calm = quiet(run, grid)
-    held, resting = calm & (grid.time_s < -0.05), calm & (grid.time_s > grid.rest_s + _REST_MARGIN_S)
+    held, resting = calm & (grid.time_s < -_MARGINS_S[0]), calm & (grid.time_s > grid.rest_s + _MARGINS_S[1])
     # Too short a part says nothing, but the other may: a quick pull leaves a swaying wall.
     held, resting = held & (held.sum() >= _SHORTEST), resting & (resting.sum() >= _SHORTEST)
     pick = held | resting
@@ -106,7 +106,7 @@ def _quiet(run: GapRun, grid: Grid, ring: Ring | None) -> _Quiet | None:
     columns = np.column_stack([held, resting, *sway, *own])[pick].astype(float)
     columns[:, 2:] /= np.abs(columns[:, 2:]).max(axis=0) + 1e-30
     basis, _ = np.linalg.qr(columns[:, np.any(columns != 0.0, axis=0)])
-    return _Quiet(grid.time_s[pick], measured[pick], basis, resting[pick])
+    return _Quiet(grid.time_s[pick], measured[pick], basis)
 
 
 def _rings_on(grid: Grid, ring: Ring, resting: NDArray[np.bool_]) -> list[FloatArray]:
@@ -120,9 +120,7 @@ def _sway(rotation: FloatArray, part: NDArray[np.bool_], height: float) -> list[
     """What a rotation of the wall in one part of the run makes of the accelerometers, and of late ones."""
     shown = np.zeros((3, rotation.size))
     if part.sum() >= _SHORTEST:
-        low_pass = butter(3, 8.0, fs=GRID_HZ, output="sos")
-        theta = sosfiltfilt(low_pass, rotation[part] - rotation[part].mean())
-        twice = np.gradient(np.gradient(theta, 1 / GRID_HZ), 1 / GRID_HZ)
+        theta, twice = sway(rotation, part)
         shown[:, part] = -GRAVITY_M_S2 * theta, height * twice, np.gradient(height * twice, 1 / GRID_HZ)
     return list(shown)
 
@@ -130,9 +128,7 @@ def _sway(rotation: FloatArray, part: NDArray[np.bool_], height: float) -> list[
 def _gain(data: _Quiet, frequencies: FloatArray) -> FloatArray:
     """Gain in log likelihood of a sinusoid of each frequency."""
     values = data.values - data.basis @ (data.basis.T @ data.values)
-    fraction = max(independent_fraction(values), 0.05)
-    share = np.clip(_fit(data, values, frequencies)[1] / float(values @ values), 0.0, 0.9999)
-    return np.asarray(-0.5 * fraction * values.size * np.log1p(-share))
+    return nats_explained(values, _fit(data, values, frequencies)[1], OSCILLATION_INDEPENDENT)
 
 
 def _fit(
@@ -152,7 +148,7 @@ def _share(data: _Quiet, frequency: float, frequency_sd: float, found: bool) -> 
     values = data.values - data.basis @ (data.basis.T @ data.values)
     ((sine, cosine),), (explained,), (inverse,) = _fit(data, values, np.array([frequency]))
     left = max(float(values @ values) - float(explained), 0.0)
-    fraction = max(independent_fraction(values), 0.05) if not found else 0.3
+    fraction = max(independent_fraction(values), OSCILLATION_INDEPENDENT) if not found else 0.3
     variance = left / values.size / fraction
     sd = float(np.sqrt(variance * 0.5 * np.trace(inverse)))
     amplitude = float(np.hypot(sine, cosine))

@@ -31,12 +31,17 @@ def _ring_coefficients(
     natural = 2.0 * np.pi * frequency
     rate = natural * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
     for k, (name, shares) in enumerate(zip(block.names, block.shares, strict=False)):
-        family = name.partition(" in ")[2].removesuffix("s")
+        family = _family(name)
         undone = block.undone_s if family == "accelerometer" else 0.0
         early = np.exp(rate * (undone + delay(run.reference, values)))
         twice = -((1.0 - 2.0 * zeta**2) + 2j * zeta) if family == "accelerometer" else 1.0
         coefficients[k] = _size(shares, motion) * twice * transfer(rate, family, values) * early
     return coefficients
+
+
+def _family(coefficient: str) -> str:
+    """``sine in wires`` → ``wire``."""
+    return coefficient.partition(" in ")[2].removesuffix("s")
 
 
 def _forced(values: Mapping[str, float]) -> float:
@@ -164,7 +169,7 @@ def _forced_ring(run: RockingRun, block: Block, values: Mapping[str, float]) -> 
         return coefficients
     motion = _rung(block, values)
     for k, (name, shares) in enumerate(zip(block.names, block.shares, strict=False)):
-        family = name.partition(" in ")[2].removesuffix("s")
+        family = _family(name)
         columns = run.cache.constant(
             (block.family, "forced", family), partial(_forced_columns, run, block, family)
         )

@@ -12,9 +12,9 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Shares
 from daq_app.gap.rocking_model.motion.impact_timing import acceleration_delay
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
-from daq_app.gap.rocking_model.motion.rotation import Rotation, coarse, gridded, wall_rotation
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Rotation, coarse, gridded, wall_rotation
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
-from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, RING_LATE_S
+from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, RING_LATE_S, SPREAD_ALONG_M
 from daq_app.gap.rocking_model.tolerances.walls import MIDDLE_OF_IMPACT_S
 
 DISPLACEMENT_MASK_S = 0.02
@@ -47,7 +47,8 @@ def ring_signals(
     turning: list[Signal] = []
 
     def shapes(y: FloatArray, z: FloatArray) -> list[tuple[list[Signal], FloatArray]]:
-        return [(bending, (z / height_m) ** 2), *([(turning, y)] if float(np.ptp(y)) > 0.2 else [])]
+        turns = [(turning, y)] if float(np.ptp(y)) > SPREAD_ALONG_M else []
+        return [(bending, (z / height_m) ** 2), *turns]
 
     rows, wires = wall_rotation(run)
     if len(rows) >= 3:
@@ -132,6 +133,6 @@ def _between(grid: Grid, mask_s: float) -> NDArray[np.bool_]:
     if grid.impact_s.size < 2:
         return np.zeros(grid.time_s.size, dtype=bool)
     after = grid.time_s[:, None] - grid.impact_s[None, :]
-    near = np.any((after > -0.5 * mask_s - 0.005) & (after < mask_s), axis=1)
+    near = np.any((after > -0.5 * mask_s - 1.0 / GRID_HZ) & (after < mask_s), axis=1)
     inside = (grid.time_s > grid.impact_s[0]) & (grid.time_s < grid.impact_s[-1])
     return np.asarray(inside & ~near)

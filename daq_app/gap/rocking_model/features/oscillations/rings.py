@@ -14,13 +14,22 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.gap.core.features import FloatArray, independent_fraction
+from daq_app.gap.core.features import FloatArray, independent_fraction, robust_sd
 from daq_app.gap.rocking_model.features.block import Block, Shares
+from daq_app.gap.rocking_model.features.noise import nats_explained
 from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal
 from daq_app.gap.rocking_model.features.response import resonator
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.parabola import vertex
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
-from daq_app.gap.rocking_model.tolerances.walls import RING_SD, VAGUE_DAMPING
+from daq_app.gap.rocking_model.tolerances.walls import (
+    OSCILLATION_INDEPENDENT,
+    RING_SD,
+    SCANNED_INDEPENDENT,
+    SURE_DAMPING,
+    VAGUE_DAMPING,
+    VAGUE_FREQUENCY,
+)
 
 ComplexArray = NDArray[np.complex128]
 BEND_HZ = np.geomspace(2.0, 42.0, 61)
@@ -148,18 +157,16 @@ def scan(grids: Sequence[Grid], signals: Sequence[list[Signal]], *, slow: bool) 
         frequency,
         zeta,
         float(score.max()),
-        float(min(sd, 0.3 * frequency)),
-        float(np.clip(zeta_sd, 0.02, VAGUE_DAMPING)),
+        float(min(sd, VAGUE_FREQUENCY * frequency)),
+        float(np.clip(zeta_sd, SURE_DAMPING, VAGUE_DAMPING)),
     )
 
 
 def _vertex(values: FloatArray, k: int) -> tuple[float, float]:
     """(place, −second difference) of the top of a sampled curve near its sample `k`."""
-    inner = min(max(k, 1), values.size - 2)
-    bend = float(values[inner - 1] - 2.0 * values[inner] + values[inner + 1])
+    inner, shift, bend = vertex(values, k)
     if bend > -1e-9:
         return float(k), 0.0
-    shift = 0.5 * float(values[inner - 1] - values[inner + 1]) / bend
     return inner + float(np.clip(shift, -1.0, 1.0)), -bend
 
 
@@ -213,10 +220,7 @@ def _gains(
     bv, av = along.reshape(count, 2).T
     determinant = np.maximum(aa * bb - crossed**2, 1e-12 * aa * bb + 1e-300)
     explained = (bb * av**2 - 2 * crossed * av * bv + aa * bv**2) / determinant
-    share = np.clip(explained / max(float(values @ values), 1e-300), 0.0, 0.9999)
-    fraction = max(independent_fraction(values), 0.2)
-    gains: FloatArray = -0.5 * fraction * values.size * np.log1p(-share)
-    return gains
+    return nats_explained(values, explained, SCANNED_INDEPENDENT)
 
 
 def _span(places: NDArray[np.intp]) -> slice | NDArray[np.intp]:
@@ -241,7 +245,7 @@ def _colour(
     left = values - own @ np.linalg.lstsq(own, values, rcond=None)[0]
     size = np.sqrt(np.maximum((waves**2).sum(0), 1e-300))
     z = (waves.T @ left) / size / max(float(np.std(left)), 1e-300)
-    return max(1.0, 1.48 * float(np.median(np.abs(z))))
+    return max(1.0, robust_sd(z))
 
 
 def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, slow: bool) -> Block | None:
@@ -261,7 +265,7 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
         inverse: FloatArray = np.linalg.pinv(both[:, 1:]).astype(np.float64)
         coefficients = inverse @ both[:, 0]
         left = both[:, 0] - both[:, 1:] @ coefficients
-        fraction = max(independent_fraction(left), 0.05)
+        fraction = max(independent_fraction(left), OSCILLATION_INDEPENDENT)
         variance = float(left @ left) / max(left.size - 2, 1) / fraction * np.diag(inverse @ inverse.T)
         # What is left of the motion is no white noise: neighbouring frequencies say how large chance is.
         # And this frequency was chosen for its gain, which doubles it.
