@@ -26,7 +26,7 @@ from daq_app.gap.core.judging.other_forms import with_other_forms
 from daq_app.gap.core.judging.remainder import remainder
 from daq_app.gap.core.judging.where import gap_map
 from daq_app.gap.core.model import Model
-from daq_app.gap.core.policy import NORMAL_95
+from daq_app.gap.core.parameters import NORMAL_95
 from daq_app.gap.core.result import CannotDiagnose, Cause, Detection, Diagnosis, Estimate
 
 PER_RUN = " (mean of the runs; each has its own)"

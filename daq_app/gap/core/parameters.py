@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from daq_app.gap.core.policy import NORMAL_95
+NORMAL_95 = 1.96
+"""Half width of the interval that holds 95 % of a Gaussian, in standard deviations."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,9 +11,6 @@ from dataclasses import dataclass
 
 from scipy.special import expit
 
-NORMAL_95 = 1.96
-"""Half width of the interval that holds 95 % of a Gaussian, in standard deviations."""
-
 
 @dataclass(frozen=True, slots=True)
 class Policy:

@@ -9,7 +9,8 @@ import numpy as np
 from scipy.stats import norm
 
 from daq_app.gap.core.findings import Finding
-from daq_app.gap.core.policy import NORMAL_95, POLICY
+from daq_app.gap.core.parameters import NORMAL_95
+from daq_app.gap.core.policy import POLICY
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_findings import EFFECT_SIZES, RunFinding
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from daq_app.gap.core.effects import Effect, Library
 from daq_app.gap.core.fitting.fit import Fit
-from daq_app.gap.core.policy import NORMAL_95, POLICY, Policy
+from daq_app.gap.core.parameters import NORMAL_95
+from daq_app.gap.core.policy import POLICY, Policy
 
 Hypothesis = tuple[str, ...]
 """Names of the effects that are missing, sorted."""
