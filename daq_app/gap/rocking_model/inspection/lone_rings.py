@@ -58,19 +58,18 @@ class _Kicks:
                 pushes.append(grid.jumps[impact] * size)
         return cls(np.stack(shown, axis=1), np.array(pushes)) if shown else None
 
-    def sizes(self, *, turned: bool) -> ComplexArray:
-        """Ring per jump, (k, frequencies), SI per rad/s; `turned`: its sign is that of the jump."""
-        pushes = self.pushes if turned else np.abs(self.pushes)
-        along = np.einsum("kif,if->kf", self.shown, pushes)
-        # A sine is half a wave of positive frequency and half one of negative.
-        return np.asarray(2.0 * along / np.sum(pushes**2, axis=0))
+    def in_phase(self, *, turned: bool) -> tuple[ComplexArray, FloatArray]:
+        """What rings in one phase after all impacts, by channel and frequency, (k, frequencies) each.
 
-    def gains(self, *, turned: bool) -> FloatArray:
-        """Power of one phase over that of any phases, (k, frequencies): 1 where none is common."""
+        Its size per jump, SI per rad/s, and its power over that of any phases: 1 where none is common.
+        `turned`: its sign is that of the jump.
+        """
         pushes = self.pushes if turned else np.abs(self.pushes)
         along = np.einsum("kif,if->kf", self.shown, pushes)
         usual = np.einsum("kif,if->kf", np.abs(self.shown) ** 2, pushes**2)
-        return np.asarray(np.abs(along) ** 2 / np.maximum(usual, 1e-300))
+        # A sine is half a wave of positive frequency and half one of negative.
+        sizes = 2.0 * along / np.sum(pushes**2, axis=0)
+        return np.asarray(sizes), np.asarray(np.abs(along) ** 2 / np.maximum(usual, 1e-300))
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,11 +120,11 @@ def _lone(
     still = replace(kicks, shown=np.einsum("jk,kif->jif", unturned, kicks.shown))
     best: _Ring | None = None
     for turned in (True, False):
+        sizes, gains = kicks.in_phase(turned=turned)
         # Nor a wall that turns about the vertical, which two wires at its ends show the most of.
-        gains = np.minimum(kicks.gains(turned=turned), still.gains(turned=turned))
-        sizes = kicks.sizes(turned=turned)
+        gains = np.minimum(gains, still.in_phase(turned=turned)[1])
         # A wall that rings accelerates by ω² times what it moves, at all its places.
-        moved = wall.sizes(turned=turned) / (2.0 * np.pi * _HZ) ** 2
+        moved = wall.in_phase(turned=turned)[0] / (2.0 * np.pi * _HZ) ** 2
         of_wall = np.median(np.abs(moved), axis=0)
         for place, column in itertools.product(range(len(gains)), range(_HZ.size)):
             gain = float(gains[place, column])
