@@ -160,7 +160,7 @@ def without_outlier_channels(
         [disagreements] * len(again),
         second_axis(*final),
         lone_rings(*final, outliers.ids),
-        plays(*final, outliers.ids),
+        plays(*final, outliers.ids, _steps(findings)),
     )
     return again, outliers.single, rows
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,8 @@ from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.tolerances.inspection import PLAY_GAIN, PLAY_M
 
 _PLAYS_M = np.geomspace(PLAY_M, 16.0 * PLAY_M, 9)
+_OVER_STEPS = 2.0
+"""Steps of a reading up to which play is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,11 +32,12 @@ class _Play:
 
 
 def plays(
-    runs: Sequence[GapRun], grids: Sequence[Grid], examined: Sequence[str] = ()
+    runs: Sequence[GapRun], grids: Sequence[Grid], examined: Sequence[str], steps_m: Mapping[str, float]
 ) -> list[list[RunFinding]]:
     """Findings of wires with more play than a sound drum has, run by run. No effect explains them.
 
-    `examined` are the channels that are not used with their family.
+    `examined` are the channels that are not used with their family; `steps_m` those of families and channels
+    whose readings go in steps. Such a reading stays where the wall turns back as well, for a step.
     """
     findings: list[list[RunFinding]] = [[] for _ in runs]
     data = alike_in_all(runs, grids, "wire", examined)
@@ -42,7 +45,8 @@ def plays(
         without = tuple(other for other in examined if other != name)
         seen = [_play(family, name, without) for family in data]
         explained, size_m = np.median([(play.explained, play.size_m) for play in seen], axis=0)
-        if explained < PLAY_GAIN or size_m < PLAY_M:
+        step_m = max(steps_m.get("wire", 0.0), steps_m.get(name, 0.0))
+        if explained < PLAY_GAIN or size_m < max(PLAY_M, _OVER_STEPS * step_m):
             continue
         for row, play in zip(findings, seen, strict=True):
             row.append(RunFinding(f"play@{name}", "play", "m", play.size_m, play.sd_m))

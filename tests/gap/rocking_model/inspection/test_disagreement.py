@@ -111,7 +111,7 @@ def _knocked(channel: str, size_m: float, *, in_phase: bool) -> list[GapRun]:
     return runs
 
 
-@pytest.mark.parametrize(("channel", "size_m"), [("WP-2", 5e-3), ("LV-A04", 5e-4)])
+@pytest.mark.parametrize(("channel", "size_m"), [("WP-2", 5e-3), ("LV-A04", 1e-3)])
 def test_a_channel_that_rings_by_itself_after_impacts_is_named(channel: str, size_m: float) -> None:
     prepared, _ = prepare(_knocked(channel, size_m, in_phase=True))
     assert conditions_found(prepared) == {f"ringing@{channel}"}
@@ -142,6 +142,20 @@ def test_play_of_a_single_wire_is_named() -> None:
 
 def test_the_play_of_a_sound_drum_is_not_named() -> None:
     assert conditions_found(prepare(_loose(3e-4))[0]) == set()
+
+
+def test_readings_in_steps_have_no_play() -> None:
+    runs = simulate({}, (0.25, -0.35))
+    for run in runs:
+        for place in run.indices("wire"):
+            run.channels[place] = np.floor(run.channels[place] / 1.2e-2) * 1.2e-2
+    assert not any(key.startswith("play") for key in conditions_found(prepare(runs)[0]))
+
+
+@pytest.mark.parametrize(("channel", "tau_s"), [("LV-A08", 0.016), ("WP-3", 0.03)])
+def test_a_slow_channel_does_not_ring(channel: str, tau_s: float) -> None:
+    runs = simulate({f"slow_response@{channel}": {"tau": tau_s}}, (0.25, -0.35, 0.45, -0.3, 0.4, -0.45))
+    assert not any(key.startswith("ringing") for key in conditions_found(prepare(runs)[0]))
 
 
 @pytest.mark.parametrize("effect", ["lag@WP-2", "slow_response@WP-2", "filter_delay@WP-2"])
