@@ -93,8 +93,8 @@ def test_some_memory_is_left_for_the_last_words_where_the_system_gives_none() ->
         program = [sys.executable, "-c", _WITHOUT_ANY_LEFT, how]
         return float(subprocess.run(program, capture_output=True, text=True, check=True, env=alone).stdout)
 
-    # What is left goes in steps of 13.7 MB, as the size of the environment moves the end of the heap: with the
-    # reserve it is 20, 33 or 47 MB more; with one of nothing 14 less, as much, or 14 more.
+    # What is left goes in steps of 13.7 MB, as the size of the environment moves the end of the heap: with
+    # the reserve it is 20, 33 or 47 MB more; with one of nothing 14 less, as much, or 14 more.
     assert left_mb("reserve") > left_mb("none") + 16.7
 
 
