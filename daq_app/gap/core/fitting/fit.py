@@ -198,9 +198,12 @@ def bound_corrections(linear: Linear, covariance: FloatArray) -> float:
     """ln of the posterior mass inside the bounds over the prior mass inside them, summed over the unknowns.
 
     A strength that is too weak to be an effect (`Parameter.smallest`) is outside. Pressed against a bound the
-    gradient does not vanish; the Gaussian is then that of the Newton step beyond it.
+    gradient does not vanish; the Gaussian is then that of the Newton step beyond it. A fit that ended at no
+    number has no mass: NaN.
     """
     problem, u, gradient = linear.problem, linear.u, linear.gradient
+    if not np.isfinite(covariance).all():
+        return math.nan
     free = linear.free(gradient, u)
     corrections = []
     for k in np.flatnonzero(np.isfinite(problem.low) | np.isfinite(problem.high)):
