@@ -128,6 +128,7 @@ class LiveAnalyser:
         self._tilts = slice(self._n_wires, self._n_wires + len(self.geometry.tilt_ids))
         self._phase_settings = settings
         self._motion_settings = MotionSettings(rate_hz, settings.p_rad_s, settings.alpha_rad)
+        self._settings_of_test = self._motion_settings
         self._watch = self.geometry.watch()
         self._stream = VelocityStream(self.velocity_filter)
         self._log = RollingArray(round(_MEMORY_S * rate_hz), 1 + len(self.geometry.tilt_ids))
@@ -214,7 +215,7 @@ class LiveAnalyser:
         if event.kind == "release":
             self._release, self._track = event, None
             self._theta0_tilt = self._tilt_before(event.sample)
-            self._motion_settings = self._with_slow_noise(event.sample)
+            self._settings_of_test = self._with_slow_noise(event.sample)
             self._families.forget()
         elif event.kind == "caught":
             self._release = self._track = None
@@ -223,7 +224,7 @@ class LiveAnalyser:
             time, rotation = self._since(event.sample)
             if self._track is None:
                 self._track = MotionTrack.begin(
-                    self._motion_settings,
+                    self._settings_of_test,
                     time,
                     rotation,
                     self._release.sample / self._rate,

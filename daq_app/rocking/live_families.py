@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.config.rig import Rig
+from daq_app.config.wording import true_minus
 from daq_app.rocking.estimators import RestitutionEstimate
 from daq_app.rocking.families import words
 from daq_app.rocking.families.block_checks import pattern_findings, survey_off
@@ -91,7 +92,8 @@ class LiveFamilies:
     @property
     def doubts(self) -> tuple[str, ...]:
         """What speaks against r, as far as was looked."""
-        return (*self._level, *self._timing, *self._survey, *self._values)
+        said = (*self._level, *self._timing, *self._survey, *self._values)
+        return tuple(true_minus(sentence) for sentence in said)
 
     def _compare(
         self, wires: MotionTrack, tilt_rad: float, eav: RestitutionEstimate, crt: RestitutionEstimate

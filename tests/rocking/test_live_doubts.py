@@ -61,7 +61,7 @@ def test_a_survey_whose_alpha_is_not_the_walls_is_told_with_what_it_makes_of_crt
     _, estimates = on_round_edges()
     (doubt,) = estimates[-1].doubts
 
-    assert "α is -26" in doubt and "CRT" in doubt
+    assert "α is −26" in doubt and "CRT" in doubt
 
 
 def test_doubts_of_the_wall_come_with_the_impact_that_shows_them_and_not_before():

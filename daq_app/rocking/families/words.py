@@ -171,9 +171,8 @@ def alpha_of_survey(share: float, shift: float, *, notable: bool) -> FamilyFindi
     """The wall rocks with another α than the survey's; a warning where CRT is off by what is `notable`."""
     severity: Literal["info", "warning"] = "warning" if notable else "info"
     text = (
-        f"the wall rocks like a block whose α is {share:+.1%} off the survey's: r by the peaks (CRT) counts "
-        f"with the survey's and is {shift:+.4f} off that with the wall's own; its error holds that. Usual "
-        "causes: round or broken edges, pivots inside them, a survey of another wall"
+        f"{_alpha_off(share, shift)}; its error holds that. Usual causes: round or broken edges, pivots "
+        "inside them, a survey of another wall"
     )
     return FamilyFinding("survey", (), "alpha", shift, "1", "none", severity, text)
 
@@ -305,7 +304,11 @@ def bending_while_live(frequency_hz: float, rms_rad: float) -> str:
 
 def alpha_while_live(share: float, shift: float) -> str:
     """A survey whose α is not that of the motion, said during the test."""
+    return f"{_alpha_off(share, shift)}, r by EAV is not"
+
+
+def _alpha_off(share: float, shift: float) -> str:
     return (
         f"the wall rocks like a block whose α is {share:+.1%} off the survey's: r by the peaks (CRT) counts "
-        f"with the survey's and is {shift:+.4f} off that with the wall's own, r by EAV is not"
+        f"with the survey's and is {shift:+.4f} off that with the wall's own"
     )
