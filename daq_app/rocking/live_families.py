@@ -64,6 +64,7 @@ class LiveFamilies:
     def forget(self) -> None:
         """A new release: what was found about the last one is gone."""
         self._track: MotionTrack | None = None
+        self._release: tuple[str, ...] = ()
         self._level: tuple[str, ...] = ()
         self._bends = False
         self._timing: tuple[str, ...] = ()
@@ -92,7 +93,7 @@ class LiveFamilies:
     @property
     def doubts(self) -> tuple[str, ...]:
         """What speaks against r, as far as was looked."""
-        said = (*self._level, *self._timing, *self._survey, *self._values)
+        said = (*self._release, *self._level, *self._timing, *self._survey, *self._values)
         return tuple(true_minus(sentence) for sentence in said)
 
     def _compare(
@@ -100,6 +101,8 @@ class LiveFamilies:
     ) -> None:
         """What is due after this impact."""
         impacts = len(wires.crossings_s)
+        if impacts == 1 and not wires.fell_freely:
+            self._release = (words.slow_release(wires.misfit_of_fall).text,)
         if self._joint is not None and impacts <= _COMPARED_AT[-1]:
             self._follow(wires, tilt_rad, self._joint)
         if impacts in _TIMED_AT:

@@ -1,4 +1,4 @@
-"""Simulated tests of laboratories that differ: calibration, noise, hum, zero, body and position, all drawn.
+"""Simulated tests of laboratories that differ: calibration, noise, hum, zero, clock, body and places drawn.
 
 The analysis is given the nominal rig; the wall and its sensors are those of another rig, drawn about it.
 """
@@ -26,6 +26,10 @@ _BODY_SHARE = 0.01
 """Relative standard deviation of α, R and I of the wall about the survey's."""
 _POSITION_SIGMA_M = 0.001
 """Standard deviation of each coordinate of a sensor about the drawing."""
+_DATUM_SIGMA_M = 0.001
+"""Standard deviation of the level that the heights of all wires are measured from, about the wall's base."""
+_TIME_BASE_SIGMA_S = 2e-5
+"""Standard deviation of each family's time base about what the analysis is told of it."""
 _SLOW_SAMPLES = 20
 """Time constant of the slow part of the noise, samples."""
 
@@ -67,8 +71,8 @@ def draw_test(
 
     `effects`: what its wall does that Housner's block does not, by name with parameters.
     """
-    rng = np.random.default_rng(seed)
-    rig = _drawn_rig(nominal, rng) if ordinary else nominal
+    rng, of_all = np.random.default_rng(seed), np.random.default_rng([seed, 2])
+    rig = _drawn_rig(nominal, rng, _DATUM_SIGMA_M * of_all.standard_normal()) if ordinary else nominal
     timing = {"upright_s": 1.0, "pull_s": 1.0, "hold_s": float(rng.uniform(4.0, 6.0))}
     scatter = float(rng.uniform(0.001, 0.006)) if ordinary else 0.0
     rig = rig.model_copy(
@@ -83,11 +87,15 @@ def draw_test(
     si = Scaling.of(rig.channels, zeros).to_si(test.readings)
     if ordinary:
         _spoil(si, rig, test.rate_hz, rng)
-    offsets = {c.channel.id: c.time_offset_s for task in plan.tasks for c in task.channels}
+    families = dict.fromkeys(channel.family for channel in rig.channels)
+    off_s = {name: _TIME_BASE_SIGMA_S * of_all.standard_normal() if ordinary else 0.0 for name in families}
+    planned = [channel for task in plan.tasks for channel in task.channels]
+    offsets = {c.channel.id: c.time_offset_s + off_s[c.channel.family] for c in planned}
     return LaboratoryTest(nominal, test.rate_hz, si, offsets, test.truth)
 
 
-def _drawn_rig(rig: Rig, rng: np.random.Generator) -> Rig:
+def _drawn_rig(rig: Rig, rng: np.random.Generator, datum_m: float) -> Rig:
+    """`datum_m`: by how much all wires are higher than in the drawing."""
     specimen = rig.specimen
     share = 1.0 + _BODY_SHARE * rng.standard_normal(3)
     body = specimen.model_copy(
@@ -100,13 +108,17 @@ def _drawn_rig(rig: Rig, rng: np.random.Generator) -> Rig:
     # In the rig's order: a set's is another one in every process, and a seed would name several tests.
     families = dict.fromkeys(channel.family for channel in rig.channels)
     noise = {family: 2.0 ** rng.uniform(-1.0, 1.0) for family in families}
-    channels = tuple(_drawn_channel(channel, noise[channel.family], rng) for channel in rig.channels)
+    channels = tuple(
+        _drawn_channel(channel, noise[channel.family], datum_m if channel.family == "wire" else 0.0, rng)
+        for channel in rig.channels
+    )
     return rig.model_copy(update={"specimen": body, "channels": channels})
 
 
-def _drawn_channel(channel: Channel, noise: float, rng: np.random.Generator) -> Channel:
+def _drawn_channel(channel: Channel, noise: float, higher_m: float, rng: np.random.Generator) -> Channel:
     def moved(place: tuple[float, float, float]) -> tuple[float, ...]:
-        return tuple((np.asarray(place) + rng.normal(0.0, _POSITION_SIGMA_M, 3)).tolist())
+        by = rng.normal(0.0, _POSITION_SIGMA_M, 3) + np.array([0.0, 0.0, higher_m])
+        return tuple((np.asarray(place) + by).tolist())
 
     changes: dict[str, Any] = {"noise_si": channel.noise_si * noise, "position_m": moved(channel.position_m)}
     if channel.anchor_m is not None:

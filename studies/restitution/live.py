@@ -1,7 +1,7 @@
 """``python -m studies.restitution.live --tests 12``: what is told beside r while the wall still rocks.
 
-Sound laboratories, walls that bend and walls with round edges, as the recorder analyses them: zeroed, in
-blocks of 0.1 s.
+Sound laboratories, walls that bend, have round edges or are let go slowly, as the recorder analyses
+them: zeroed, in blocks of 0.1 s.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ _TOLD: Final = {
     "give EAV": "wires and LVDTs apart",
     "give CRT": "wires and LVDTs apart",
     "EAV and CRT differ": "EAV and CRT apart",
+    "no clean one": "release",
 }
 """What a sentence is counted as, by words in it."""
 
@@ -35,10 +36,16 @@ def round_edges(rig: Rig, seed: int) -> LaboratoryTest:
     return Wall("rounded_edge", {"rho": 0.1}).test(rig, seed)
 
 
+def slowly_released(rig: Rig, seed: int) -> LaboratoryTest:
+    """The laboratory of `seed` whose wall is let go within 100 ms."""
+    return Wall("slow_release", {"tau": 0.1}).test(rig, seed)
+
+
 WALLS: Final[dict[str, Callable[[Rig, int], LaboratoryTest]]] = {
     "sound": draw_test,
     "bends": ringing_test,
     "round edges": round_edges,
+    "slow release": slowly_released,
 }
 
 

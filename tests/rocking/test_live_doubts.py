@@ -13,7 +13,7 @@ import pytest
 from daq_app.config import load_rig
 from daq_app.rocking.live import Estimate
 from studies.restitution.laboratory import LaboratoryTest, draw_test
-from studies.restitution.live import live_estimates, round_edges
+from studies.restitution.live import live_estimates, round_edges, slowly_released
 from studies.restitution.walls import Wall, ringing_test
 
 RIG = load_rig(Path(__file__).parents[2] / "configs" / "fr1.toml")
@@ -69,6 +69,12 @@ def test_doubts_of_the_wall_come_with_the_impact_that_shows_them_and_not_before(
     first = next(estimate for estimate in estimates if estimate.doubts)
 
     assert len(first.impact_samples) == 8
+
+
+def test_a_slow_release_is_told_with_the_first_impact():
+    estimates = live_estimates(slowly_released(RIG, 91000))
+
+    assert "the release was no clean one" in estimates[0].doubts[0]
 
 
 @pytest.mark.parametrize("seed", [92000, 92001, 92002])

@@ -7,7 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-from daq_app.config import load_rig
+import numpy as np
+import pytest
+
+from daq_app.config import load_rig, plan_tasks
+from studies.restitution import laboratory
 from studies.restitution.laboratory import draw_test
 
 ROOT = Path(__file__).parents[2]
@@ -32,3 +36,35 @@ def test_a_seed_draws_the_same_test_in_every_process():
     here = draw_test(load_rig(ROOT / "configs" / "fr1.toml"), 5000)
 
     assert elsewhere.stdout.strip() == str([float(value) for value in here.si.std(axis=1).round(9)])
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return load_rig(ROOT / "configs" / "fr1.toml")
+
+
+def test_a_family_has_one_time_base_that_is_off_by_microseconds(rig):
+    planned = {c.channel.id: c.time_offset_s for task in plan_tasks(rig).tasks for c in task.channels}
+
+    told = draw_test(rig, 5000).offsets_s
+
+    for family in ("wire", "lvdt", "accelerometer"):
+        off_s = [told[channel.id] - planned[channel.id] for channel in rig.of_family(family)]
+        assert np.ptp(off_s) < 1e-12
+        assert 0.0 < abs(off_s[0]) < 2e-4
+
+
+def test_all_heights_of_wires_are_off_by_one_datum(rig, monkeypatch):
+    nominal = draw_test(rig, 5000)
+    monkeypatch.setattr(laboratory, "_DATUM_SIGMA_M", 0.1)
+
+    elsewhere = draw_test(rig, 5000)
+
+    def reach(test, family):
+        return np.ptp(test.si[test.rows(family)], axis=1)
+
+    levers_m = [channel.position_m[2] for channel in rig.of_family("wire")]
+    raised_m = (reach(elsewhere, "wire") / reach(nominal, "wire") - 1.0) * levers_m
+    assert np.all(np.abs(raised_m) > 5e-3)
+    assert np.ptp(raised_m) < 0.2 * np.abs(raised_m).mean()
+    np.testing.assert_allclose(reach(elsewhere, "lvdt"), reach(nominal, "lvdt"), rtol=1e-3)

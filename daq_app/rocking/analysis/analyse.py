@@ -40,9 +40,6 @@ from daq_app.rocking.theory.block import RigidBlock
 
 Floats = NDArray[np.float64]
 
-_GEOMETRY_SHARE_P = 2e-4
-"""Relative standard uncertainty of the fitted p from sensor places that are known to a millimetre (assumed)
-and bend the rotation's scale between small and large angles."""
 _NO_ESTIMATE = RestitutionEstimate("none", ())
 
 
@@ -164,7 +161,7 @@ def _typical_r(estimates: Mapping[str, RestitutionEstimate]) -> float:
 def _fit(
     signals: Signals, track: MotionTrack, estimates: Mapping[str, RestitutionEstimate], gain_sigma: float
 ) -> MotionFit | None:
-    """Housner's motion laid through the half-cycles; its errors hold gain and geometry of the family."""
+    """Housner's motion laid through the half-cycles; its errors hold the gain of the family."""
     fit = fit_motion(
         signals.time_s,
         signals.rotation_rad,
@@ -182,11 +179,7 @@ def _fit(
     )
     if fit is None:
         return None
-    return replace(
-        fit,
-        sigma_alpha_rad=math.hypot(fit.sigma_alpha_rad, gain_sigma * fit.alpha_rad),
-        sigma_p_rad_s=math.hypot(fit.sigma_p_rad_s, _GEOMETRY_SHARE_P * fit.p_rad_s),
-    )
+    return replace(fit, sigma_alpha_rad=math.hypot(fit.sigma_alpha_rad, gain_sigma * fit.alpha_rad))
 
 
 def _bias(

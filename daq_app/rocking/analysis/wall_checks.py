@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
@@ -92,8 +91,7 @@ def wall_findings(
         found = [finding for finding in found if finding.kind not in _MADE_BY_A_DRIFT]
     found += alpha_findings(bodies[LEADS[lead]], tracks.lead)
     if not tracks.lead.fell_freely:
-        share = tracks.lead.release.residual_rad / abs(tracks.lead.theta0_rad)
-        found.append(words.slow_release(share if math.isfinite(share) else 1.0))
+        found.append(words.slow_release(tracks.lead.misfit_of_fall))
     if joint is not None:
         block = RigidBlock.from_specimen(instruments.record.rig.specimen)
         found += pivot_findings(block, joint.inset_left_m, joint.inset_right_m)

@@ -24,6 +24,7 @@ from daq_app.rocking.motion.motion_model import (
     ZERO_PRIOR_RAD,
     MotionModel,
 )
+from daq_app.rocking.motion.swings import REST_ZERO_SIGMA_RAD
 from daq_app.rocking.theory.housner import exact_amplitude, exact_energy, exact_quarter_period
 
 Floats = NDArray[np.float64]
@@ -38,10 +39,6 @@ _NO_CLEAN_FALL = 4.0
 or kicked, falls as no free block does, and rocks on as one."""
 _HIGHEST = 0.99
 """Share of the energy at which a block falls over that a motion is begun with at most."""
-_ZERO_WALK_RAD = 1e-5
-"""By how much the zero of the rotation may walk over the fitted motion: what a zero from rest, seconds old,
-may be wrong by. The fit takes up a zero that stands still; one that walks bends late half-cycles against
-early ones, which p and α of small motions answer to."""
 _CORRELATED_POINTS = 12
 """Residuals this many points (0.1 s) apart may still be correlated: slow noise, hum, sway of the wall."""
 _LEAST_LEFT = 0.2
@@ -290,12 +287,15 @@ def _long_run_variance(residuals: Floats, jacobian: Floats) -> float:
 
 
 def _of_walking_zero(jacobian: Floats, points: int, sigma: float) -> Floats:
-    """Covariance that a zero adds which walks by `_ZERO_WALK_RAD` from the first fitted point to the last.
+    """Covariance that a zero adds which walks from the first fitted point to the last.
 
-    The parameters answer to the points by (JᵀJ)⁻¹Jᵀ; each step of the walk moves all points before it.
+    It walks by what a zero from rest, seconds old, may be wrong by. The fit takes up a zero that stands
+    still; one that walks bends late half-cycles against early ones, which p and α of small motions answer to.
+    The parameters answer to the points by (JᵀJ)⁻¹Jᵀ; each step of the walk moves all points before it. Places
+    of sensors that are a millimetre off make a tenth to a third of that in p and are left out.
     """
     answer = np.linalg.solve(jacobian.T @ jacobian, jacobian[:points].T) / sigma
-    steps = np.cumsum(answer, axis=1) * (_ZERO_WALK_RAD / math.sqrt(points))
+    steps = np.cumsum(answer, axis=1) * (REST_ZERO_SIGMA_RAD / math.sqrt(points))
     return np.asarray(steps @ steps.T)
 
 

@@ -225,6 +225,12 @@ class MotionTrack:
         return _is_free_fall(self.release, self.theta0_rad)
 
     @property
+    def misfit_of_fall(self) -> float:
+        """rms misfit of hold and free fall as a share of θ0; 1 where no fall was found."""
+        share = self.release.residual_rad / abs(self.theta0_rad)
+        return share if math.isfinite(share) else 1.0
+
+    @property
     def _sigmas_in_decay(self) -> list[float]:
         return self.sigma_peaks_rad if self.fell_freely else [math.nan, *self.sigma_peaks_rad[1:]]
 

@@ -1,0 +1,91 @@
+"""The stated error of the fitted p is as large as what makes it: a zero that walks, places that are off."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from daq_app.config import load_rig
+from daq_app.rocking.geometry.kinematics import RotationGeometry
+from daq_app.rocking.motion.motion_fit import fit_motion
+from daq_app.rocking.motion.swings import REST_ZERO_SIGMA_RAD
+from daq_app.rocking.theory.housner import free_rocking
+
+RATE_HZ, RELEASE_S, R = 500.0, 0.5, 0.88
+NOISE_RAD = 1e-6
+DRAWS = 16
+
+
+@pytest.fixture(scope="module")
+def rig(configs):
+    return load_rig(configs / "fr1.toml")
+
+
+def rocking(rig, share):
+    """Time, rotation and motion of a block let go at `share` of α."""
+    specimen = rig.specimen
+    theta0 = share * specimen.alpha0_rad
+    motion = free_rocking(
+        theta0,
+        np.full(40, R),
+        specimen.p_rad_s,
+        specimen.alpha0_rad,
+        release_s=RELEASE_S,
+        smallest_peak_rad=0.02 * theta0,
+        max_impacts=20,
+    )
+    time = np.arange(0.0, motion.impacts_s[-1] + 0.5, 1.0 / RATE_HZ)
+    return time, np.where(time < RELEASE_S, theta0, motion.at(time)[0]), motion
+
+
+def fitted(rig, time, rotation, motion):
+    impacts = [float(value) for value in motion.impacts_s]
+    return fit_motion(
+        time,
+        rotation,
+        release_s=RELEASE_S,
+        theta0_rad=float(rotation[0]),
+        impacts_s=impacts,
+        peaks_rad=[float(value) for value in np.abs(motion.peaks_rad)],
+        speeds_rad_s=[float(value) / R for value in np.abs(motion.speeds_after_rad_s)][: len(impacts)],
+        r=R,
+        scatter=3e-4,
+        noise_rad=NOISE_RAD,
+        p_rad_s=rig.specimen.p_rad_s,
+        alpha_rad=rig.specimen.alpha0_rad,
+    )
+
+
+def test_p_is_off_by_its_stated_error_where_the_zero_walks(rig):
+    time, rotation, motion = rocking(rig, 0.4)
+    exact = fitted(rig, time, rotation, motion).p_rad_s
+    rng = np.random.default_rng(5)
+    step = REST_ZERO_SIGMA_RAD / np.sqrt(np.count_nonzero(time > RELEASE_S))
+
+    walks = np.cumsum(rng.normal(0.0, step, (DRAWS, time.size)), axis=1)
+    fits = [fitted(rig, time, rotation + walk, motion) for walk in walks]
+
+    off = np.array([(fit.p_rad_s - exact) / fit.sigma_p_rad_s for fit in fits])
+    # Residuals hold a share of the walk as well, and widen the error by it.
+    assert 0.55 < np.sqrt(np.mean(off**2)) < 1.3
+
+
+def test_wires_a_millimetre_off_move_p_by_less_than_its_stated_error(rig):
+    geometry = RotationGeometry.from_rig(rig)
+    time, rotation, motion = rocking(rig, 0.25)
+    exact = fitted(rig, time, rotation, motion)
+    rng = np.random.default_rng(6)
+
+    def moved(places):
+        return places + rng.normal(0.0, 1e-3, places.shape)
+
+    off = []
+    for _ in range(DRAWS):
+        wires = geometry.wires
+        drawn = replace(wires, position_m=moved(wires.position_m), anchor_m=moved(wires.anchor_m))
+        seen = geometry.weights()[0] @ wires.rotation_of_each(drawn.shortening(rotation))
+        off.append(fitted(rig, time, seen, motion).p_rad_s - exact.p_rad_s)
+
+    assert np.sqrt(np.mean(np.square(off))) < exact.sigma_p_rad_s / 2.0
