@@ -32,6 +32,9 @@ Floats = NDArray[np.float64]
 
 _MEMORY_S: Final = 8.0
 """How far back the families are kept: hold and first impacts are compared at once."""
+_FOLLOWED_AT: Final = (1, 3, 5, 8, 11, 14, 17)
+"""Impacts after which the LVDTs' half-cycles since the last of them are fitted: before values of r are
+compared, and while their beginning is still kept. Several at once cost little more than one."""
 _TIMED_AT: Final = (6, 12)
 """Impacts after which timing is looked at: it costs more than all else, and six impacts tell it."""
 _COMPARED_AT: Final = (5, 8, 11, 14, 17)
@@ -75,7 +78,7 @@ class LiveFamilies:
         """Rotation (n,) of the wires and SI values (ids, n) from sample `first_sample` on."""
         if not self._log.end:
             self._first = first_sample
-        self._log.append(np.vstack((rotation_rad[None], values)))
+        self._log.append(rotation_rad[None], values)
 
     def look(
         self, wires: MotionTrack, tilt_rad: float, eav: RestitutionEstimate, crt: RestitutionEstimate
@@ -103,7 +106,7 @@ class LiveFamilies:
         impacts = len(wires.crossings_s)
         if impacts == 1 and not wires.fell_freely:
             self._release = (words.slow_release(wires.misfit_of_fall).text,)
-        if self._joint is not None and impacts <= _COMPARED_AT[-1]:
+        if self._joint is not None and impacts in _FOLLOWED_AT:
             self._follow(wires, tilt_rad, self._joint)
         if impacts in _TIMED_AT:
             self._timing = self._between_families(wires)
@@ -115,22 +118,23 @@ class LiveFamilies:
             self._values = self._restitution(wires, eav, crt)
 
     def _follow(self, wires: MotionTrack, tilt_rad: float, joint: BaseJoint) -> None:
-        """The half-cycle that ended, as the LVDTs show it; at the first, the level of the hold as well."""
-        known = len(wires.crossings_s) - 1
+        """The half-cycles that ended, as the LVDTs show them; at the first, the level of the hold as well."""
+        known = 0 if self._track is None else len(self._track.arcs)
         start_s = wires.crossings_s[known - 1] if known else wires.release.time_s - _HOLD_S
-        time, kept = self._between(start_s, wires.crossings_s[known])
+        time, kept = self._between(start_s, wires.crossings_s[-1])
         if time.size < 2:
             return
         rotation = joint.motion(kept[self._lvdts]).rotation_rad
-        if not known:
+        if self._track is None:
+            if len(wires.crossings_s) > 1:
+                return  # the release could not be looked at
             self._track = MotionTrack.begin(
                 wires.settings, time, rotation, wires.release.time_s, wires.theta0_rad
             )
             levels = {"wires": wires.theta0_rad, "LVDTs": self._track.theta0_rad, "tiltmeters": tilt_rad}
             finding = level_outlier({name: level for name, level in levels.items() if math.isfinite(level)})
             self._level = () if finding is None else (finding.text,)
-        if self._track is not None and len(self._track.arcs) == known:
-            self._track.add_impact(wires.crossings_s[known], time, rotation)
+        self._track.add_impacts(wires.crossings_s[known:], time, rotation)
 
     def _restitution(
         self, wires: MotionTrack, eav: RestitutionEstimate, crt: RestitutionEstimate
