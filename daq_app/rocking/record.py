@@ -113,7 +113,10 @@ class TestRecord:
         tared: bool = True,
         label: str = "",
     ) -> TestRecord:
-        """A record in memory: `si` (n_channels, n) in the order of `channel_ids` (the rig's if not given)."""
+        """A record in memory: `si` (n_channels, n) in the order of `channel_ids` (the rig's if not given).
+
+        Neighbours are loaded as views, which cannot be written to.
+        """
         known = tuple(channel_ids) if channel_ids is not None else rig.channel_ids
         if si.ndim != 2 or si.shape[0] != len(known):
             raise ValueError(
@@ -122,7 +125,7 @@ class TestRecord:
         row = {channel_id: index for index, channel_id in enumerate(known)}
 
         def load(ids: tuple[str, ...], start: int = 0, stop: int | None = None) -> Floats:
-            return si[[row[channel_id] for channel_id in ids], start:stop]
+            return rows_of(si, [row[channel_id] for channel_id in ids], start, stop)
 
         return cls(
             rig, rate_hz, si.shape[1], known, load, first_sample, dict(time_offsets_s or {}), tared, label
@@ -166,6 +169,15 @@ class TestRecord:
     def time_s(self, offset_s: float = 0.0) -> Floats:
         """(n,) absolute sample index / rate, plus an offset."""
         return np.asarray((self.first_sample + np.arange(self.n_samples)) / self.rate_hz + offset_s)
+
+
+def rows_of(values: Floats, rows: Sequence[int], start: int = 0, stop: int | None = None) -> Floats:
+    """Columns start … stop of rows; neighbours, which most are, as a view that cannot be written to."""
+    if not rows or list(rows) != list(range(rows[0], rows[0] + len(rows))):
+        return values[list(rows), start:stop]
+    view = values[rows[0] : rows[0] + len(rows), start:stop]
+    view.flags.writeable = False
+    return view
 
 
 def analysed_part(run: RunSpan, rate_hz: float) -> tuple[int, int]:

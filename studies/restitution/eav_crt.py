@@ -12,6 +12,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -178,6 +179,10 @@ class Choice:
     first_six: dict[str, float]
 
 
+def _part(signal: Floats, start: int, stop: int) -> Floats:
+    return signal[start:stop]
+
+
 def filter_choices(analyses: Mapping[str, TestAnalysis]) -> list[Choice]:
     """Peaks of the velocity by every filter and cut-off, and without any filter."""
     found = []
@@ -189,7 +194,7 @@ def filter_choices(analyses: Mapping[str, TestAnalysis]) -> list[Choice]:
                 assert series is not None and crt is not None
                 impacts = [half.start_s for half in analysis.half_cycles[1:]]
                 velocity = differentiate(analysis.rate_hz, cutoff, series.rotation_rad)
-                peaks = filtered_peaks(series.time_s, velocity, impacts)
+                peaks = filtered_peaks(series.time_s, partial(_part, velocity), impacts)
                 every[level] = eav_of(peaks) - crt
                 six[level] = eav_of(peaks, 6) - crt
             found.append(Choice(name, cutoff, every, six))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -49,11 +50,19 @@ def test_streaming_equals_offline(sizes, seed):
     np.testing.assert_allclose(streamed, FILTER.velocity(signal)[: streamed.size], atol=1e-9)
 
 
+def test_the_velocity_of_a_part_is_that_of_the_whole_record():
+    signal = np.random.default_rng(1).normal(size=1000)
+    whole = FILTER.velocity(signal)
+    for start, stop in ((0, 50), (400, 401), (950, 1000)):
+        np.testing.assert_array_equal(FILTER.velocity_of_part(signal, start, stop), whole[start:stop])
+
+
 @pytest.mark.parametrize("r", [0.82, 0.9, 0.95])
 def test_loss_of_the_peak_is_known_and_corrected(r):
     motion = free_rocking(0.35 * ALPHA, r, P, ALPHA, release_s=1.0)
     time = np.arange(round((motion.impacts_s[-1] + 1) * RATE)) / RATE
-    peaks = filtered_peaks(time, FILTER.velocity(motion.at(time)[0]), motion.impacts_s.tolist())
+    velocity = partial(FILTER.velocity_of_part, motion.at(time)[0])
+    peaks = filtered_peaks(time, velocity, motion.impacts_s.tolist())
     large = motion.peaks_rad[:-1] > 0.01 * ALPHA
     true = motion.speeds_before_rad_s[large]
     loss = np.abs(peaks[large]) / true

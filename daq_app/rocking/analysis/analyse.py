@@ -72,7 +72,7 @@ def _analyse(
     tracks = follow_families(signals, times, fuse=not alone)
     track = tracks.lead
     side = 1 if track.theta0_rad > 0 else -1
-    peaks = filtered_peaks(signals.time_s, velocity, track.impacts_s)
+    peaks = filtered_peaks(signals.time_s, lambda start, stop: velocity[start:stop], track.impacts_s)
     series = decay_series(signals, tracks, peaks, velocity_filter)
     estimates = estimates_of(series)
     onsets = _onsets(instruments.record, signals, track)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,7 +120,7 @@ def _simulated(wanted: BiasSettings, exact: _Exact, rng: np.random.Generator) ->
     # The detector finds a crossing from some 80 samples around it.
     jitter = wanted.noise_rad / np.maximum(motion.speeds_before_rad_s, 1e-3) / 6.0
     track.add_impacts((motion.impacts_s + rng.normal(0.0, jitter)).tolist(), time, rotation)
-    velocity = wanted.velocity_filter.velocity(rotation)
+    velocity = partial(wanted.velocity_filter.velocity_of_part, rotation)
     return _Simulated(time, rotation, track, filtered_peaks(time, velocity, track.impacts_s))
 
 

@@ -39,46 +39,65 @@ class Hum:
         return np.asarray((self.amplitude[row] * np.exp(turns)).real)
 
 
-def find_hum(rows: Floats, noises: Sequence[float], rate_hz: float) -> Hum | None:
-    """The mains line of rows (channels, n) with noises (channels,) of one sample; None where it is ordinary.
+def find_hum(families: Sequence[Floats], noises: Sequence[float], rate_hz: float) -> Hum | None:
+    """The mains line of channels in families (channels, n); None where it is ordinary.
 
-    Channels whose line is ordinary have amplitude 0.
+    `noises`: rms of one sample of each channel, in the order of the families. Channels whose line is ordinary
+    have amplitude 0.
     """
     size = max(1, round(rate_hz / _MEAN_HZ))
-    groups = rows.shape[1] // size
+    groups = families[0].shape[1] // size if families else 0
     rate = rate_hz / size
-    if not rows.shape[0] or groups < _SHORTEST_S * rate or rate < 2.5 * _BANDS_HZ[-1][1]:
+    if not groups or groups < _SHORTEST_S * rate or rate < 2.5 * _BANDS_HZ[-1][1]:
         return None
     noise = np.asarray(noises)[:, None]
-    known = rows if np.isfinite(rows).all() else np.nan_to_num(rows)
-    means = known[:, : groups * size].reshape(rows.shape[0], groups, size).mean(axis=2) / noise
+    means = np.concatenate([_means(rows, size) for rows in families]) / noise
     window = np.hanning(groups)
+    windowed = (means - means.mean(axis=1, keepdims=True)) * window
     length = 1 << int(4 * groups - 1).bit_length()
-    spectrum = np.fft.rfft((means - means.mean(axis=1, keepdims=True)) * window, length, axis=1)
+    # The first look, at a quarter of the cost, shows a line at no less than 0.85 of its height.
+    if _clearest(windowed, length // 4, rate)[0] < _CLEAR / 2.0:
+        return None
+    clearness, line_hz = _clearest(windowed, length, rate)
+    if clearness <= _CLEAR:
+        return None
+    # The mean over `size` samples weakens the line and dates it to the middle of the mean.
+    step = line_hz / rate_hz
+    weakened = np.sinc(step * size) / np.sinc(step) * np.exp(2j * np.pi * step * (size - 1) / 2.0)
+    turning = np.exp(-2j * np.pi * line_hz / rate * np.arange(groups))
+    amplitude = 2.0 * (windowed @ turning) / (window.sum() * weakened)
+    amplitude = np.where(np.abs(amplitude) > _NOTABLE_NOISES, amplitude, 0.0) * noise[:, 0]
+    return Hum(line_hz, amplitude) if np.any(amplitude) else None
+
+
+def _means(rows: Floats, size: int) -> Floats:
+    """(channels, n // size) of rows (channels, n), what is unknown taken for zero."""
+    groups = rows[:, : rows.shape[1] // size * size].reshape(rows.shape[0], -1, size)
+    weights = np.full(size, 1.0 / size)
+    means = groups @ weights
+    return means if np.isfinite(means).all() else np.asarray(np.nan_to_num(groups) @ weights)
+
+
+def _clearest(windowed: Floats, length: int, rate_hz: float) -> tuple[float, float]:
+    """Height of the clearest line of rows (channels, n) above its background, and its frequency in Hz.
+
+    `length`: points of the spectrum, rows filled up with zeros.
+    """
     # Only what lies about the lines is looked at.
-    first = int((_BANDS_HZ[0][0] - 2.0 * _AROUND_HZ) * length / rate)
-    last = int((_BANDS_HZ[-1][1] + 2.0 * _AROUND_HZ) * length / rate)
-    frequency = np.arange(first, last) * rate / length
-    power = (np.abs(spectrum[:, first:last]) ** 2).max(axis=0)
-    best: tuple[float, float] | None = None
+    first = int((_BANDS_HZ[0][0] - 2.0 * _AROUND_HZ) * length / rate_hz)
+    last = int((_BANDS_HZ[-1][1] + 2.0 * _AROUND_HZ) * length / rate_hz)
+    spectrum = np.fft.rfft(windowed, length, axis=1)[:, first:last]
+    frequency = np.arange(first, last) * rate_hz / length
+    power = (np.abs(spectrum) ** 2).max(axis=0)
+    lines = []
     for low, high in _BANDS_HZ:
         inside = np.flatnonzero((frequency > low) & (frequency < high))
         around = (frequency > low - _AROUND_HZ) & (frequency < high + _AROUND_HZ)
         around[inside] = False
         top = int(inside[np.argmax(power[inside])])
         clearness = float(np.sqrt(power[top] / max(float(np.median(power[around])), 1e-300)))
-        if clearness > _CLEAR and (best is None or clearness > best[0]):
-            best = (clearness, (first + top + _vertex(power, top)) * rate / length)
-    if best is None:
-        return None
-    line_hz = best[1]
-    # The mean over `size` samples weakens the line and dates it to the middle of the mean.
-    step = line_hz / rate_hz
-    weakened = np.sinc(step * size) / np.sinc(step) * np.exp(2j * np.pi * step * (size - 1) / 2.0)
-    turning = np.exp(-2j * np.pi * line_hz / rate * np.arange(groups)) * window
-    amplitude = 2.0 * ((means - means.mean(axis=1, keepdims=True)) @ turning) / (window.sum() * weakened)
-    amplitude = np.where(np.abs(amplitude) > _NOTABLE_NOISES, amplitude, 0.0) * noise[:, 0]
-    return Hum(line_hz, amplitude) if np.any(amplitude) else None
+        lines.append((clearness, (first + top + _vertex(power, top)) * rate_hz / length))
+    return max(lines)
 
 
 def _vertex(power: Floats, top: int) -> float:

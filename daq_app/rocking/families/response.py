@@ -23,7 +23,8 @@ _RATE_HZ = 500.0
 _FEWEST = 200
 _STEP_S = 2e-4
 _LARGEST_S = 0.08
-_GRID_S = (0.0, 0.002, 0.005, 0.01, 0.02, 0.04, _LARGEST_S)
+_STEPS_S = (0.002, 0.005, 0.01, 0.02, 0.04, _LARGEST_S)
+_GRID_S = (0.0, *(sign * step for step in _STEPS_S for sign in (-1.0, 1.0)))
 """Delays and time constants from which the search begins."""
 
 
@@ -102,10 +103,10 @@ def _passed(response_s: float, step_s: float) -> float:
 
 def _least(cost: Callable[[float], float], low: float) -> float:
     """Where `cost` is least between `low` and the largest delay: the best of a grid, then Brent about it."""
-    grid = np.array([sign * value for value in _GRID_S for sign in (-1.0, 1.0) if sign * value >= low])
-    values = [cost(float(place)) for place in grid]
-    best = float(grid[int(np.argmin(values))])
-    reach = max(abs(best) / 2.0, 2.0 * _GRID_S[1])
+    grid = [place for place in _GRID_S if place >= low]
+    values = [cost(place) for place in grid]
+    best = grid[int(np.argmin(values))]
+    reach = max(abs(best) / 2.0, 2.0 * _STEPS_S[0])
     bounds = (max(best - reach, low), best + reach)
     found = minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": _STEP_S / 4.0})
     return float(found.x) if found.fun <= min(values) else best
@@ -164,7 +165,7 @@ class _Pair:
             start = np.array([filled[0] * (1.0 - b)])
             filled, _ = lfilter([b, 1.0 - a - b], [1.0, -a], filled, zi=start)
         rest, y = self._rest
-        table = np.column_stack([filled[self.both], rest])
+        table = np.column_stack([filled if y.size == filled.size else filled[self.both], rest])
         normal = table.T @ table
         solution = np.linalg.solve(normal, table.T @ y)
         left = y - table @ solution

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.rocking.families.hum import Hum
-from daq_app.rocking.record import TestRecord
+from daq_app.rocking.record import TestRecord, rows_of
 
 Floats = NDArray[np.float64]
 
@@ -42,22 +42,18 @@ class Corrections:
         return replace(record, load=load, time_offsets_s=offsets, channel_ids=kept)
 
 
-def held_in_memory(record: TestRecord, held: tuple[str, ...]) -> TestRecord:
-    """The same record with some channels read once, however often they are asked for.
+def held_in_memory(record: TestRecord, families: Sequence[tuple[str, ...]]) -> TestRecord:
+    """The same record with the channels of some families read once, however often they are asked for.
 
-    Neighbours in `held` come as views, which cannot be written to: they are most of the data.
+    They come as views, which cannot be written to.
     """
-    rows = {channel_id: row for row, channel_id in enumerate(held)}
-    values = record.load(held) if held else np.empty((0, record.n_samples))
-    values.flags.writeable = False
+    held = [(ids, record.load(ids)) for ids in families if ids]
 
     def load(ids: tuple[str, ...], start: int = 0, stop: int | None = None) -> Floats:
-        if any(channel_id not in rows for channel_id in ids):
-            return record.load(ids, start, stop)
-        wanted = [rows[channel_id] for channel_id in ids]
-        if wanted and wanted == list(range(wanted[0], wanted[0] + len(wanted))):
-            return values[wanted[0] : wanted[0] + len(wanted), start:stop]
-        return values[wanted, start:stop]
+        for known, values in held:
+            if set(ids) <= set(known):
+                return rows_of(values, [known.index(channel_id) for channel_id in ids], start, stop)
+        return record.load(ids, start, stop)
 
     return replace(record, load=load)
 

@@ -92,8 +92,11 @@ class BaseJoint:
 
     def motion(self, openings_m: Floats) -> JointMotion:
         """(lvdts, n) openings in m to the joint's motion, from the LVDTs that are in range at each sample."""
-        at_end = at_range_end(openings_m, self.ranges_m[:, :1], self.ranges_m[:, 1:])
-        valid = np.isfinite(openings_m) & ~at_end
+        low, high = self.ranges_m[:, :1], self.ranges_m[:, 1:]
+        margin = _RANGE_MARGIN * (high - low)
+        valid = (openings_m > low + margin) & (openings_m < high - margin)
+        partly = np.flatnonzero(~valid.all(axis=1))
+        at_end = at_range_end(openings_m[partly], low[partly], high[partly])
         step = max(1, openings_m.shape[1] // 2000)
         left_out = self.find_outliers(openings_m[:, ::step], valid[:, ::step], self.noise_m)
         valid[left_out] = False
@@ -109,11 +112,13 @@ class BaseJoint:
             contact_m=self.half_width_m - axis * np.sign(rotation),
             twist_rad_per_m=twist,
             suspects=tuple(ids[left_out].tolist()),
-            clipped=tuple(ids[at_end.any(axis=1)].tolist()),
+            clipped=tuple(ids[partly[at_end.any(axis=1)]].tolist()),
         )
 
     def _plane_of_valid(self, openings_m: Floats, valid: Bools) -> Floats:
         """(u, sin θ, κ), (3, n), each sample from the LVDTs that are valid (lvdts, n) at it."""
+        if valid.all():
+            return self.plane(openings_m)  # the usual case, at a third of the cost
         plane = np.full((3, openings_m.shape[1]), np.nan)
         changes = np.flatnonzero(np.any(valid[:, 1:] != valid[:, :-1], axis=0)) + 1
         starts = np.concatenate(([0], changes))[: plane.shape[1]]

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from daq_app.config.rig import Channel, Rig
 from daq_app.rocking.geometry.wires import WireInverse, lever, wire_shortening
+from daq_app.rocking.means import median_of_few, row_means
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -184,17 +185,17 @@ class RotationGeometry:
         """
         own = self.wires.rotation_of_each(shortening_m)
         usable = (watch or self.watch()).apply(self._agreeing(own))
+        if usable.all():
+            rotation, twist = _combine(self.weights(), own)
+            return WireRotation(rotation, twist, np.zeros(own.shape, dtype=bool))
         used = np.repeat(usable, self.frame_samples, axis=1)[:, : own.shape[1]]
-        if used.all():
-            combined = _combine(self.weights(), own)
-        else:
-            combined = np.full((2, own.shape[1]), np.nan)
-            for pattern in np.unique(used, axis=1).T:
-                columns = np.all(used == pattern[:, None], axis=0)
-                if np.count_nonzero(pattern) >= 2:
-                    weights = self.weights(tuple(bool(flag) for flag in pattern))
-                    good = np.where(pattern[:, None], own[:, columns], 0.0)
-                    combined[:, columns] = _combine(weights, good)
+        combined = np.full((2, own.shape[1]), np.nan)
+        for pattern in np.unique(used, axis=1).T:
+            columns = np.all(used == pattern[:, None], axis=0)
+            if np.count_nonzero(pattern) >= 2:
+                weights = self.weights(tuple(bool(flag) for flag in pattern))
+                good = np.where(pattern[:, None], own[:, columns], 0.0)
+                combined[:, columns] = _combine(weights, good)
         return WireRotation(combined[0], combined[1], ~used)
 
     def _agreeing(self, own: Floats) -> Bools:
@@ -202,10 +203,10 @@ class RotationGeometry:
         frames = -(-own.shape[1] // self.frame_samples)
         missing = frames * self.frame_samples - own.shape[1]
         padded = np.pad(own, ((0, 0), (0, missing)), mode="edge") if missing else own
-        mean = padded.reshape(own.shape[0], frames, self.frame_samples).mean(axis=2)
+        mean = row_means(padded.reshape(own.shape[0], frames, self.frame_samples))
         finite = np.isfinite(mean)
         if finite.all():
-            middle = _median_of_few(mean)
+            middle = median_of_few(mean)
         else:
             middle = np.zeros(frames)
             some = finite.any(axis=0)
@@ -228,19 +229,16 @@ class RotationGeometry:
 
     def tilt_levels(self, tilt_rad: Floats, reference_rad: float | None = None) -> Floats:
         """(k,) mean over the block of each tiltmeter that counts in `tilt`."""
-        means = np.asarray(tilt_rad, dtype=np.float64).mean(axis=1) if tilt_rad.size else np.empty(0)
+        means = row_means(tilt_rad) if tilt_rad.size else np.empty(0)
         means = means[np.isfinite(means)]
         if means.size < 2 or reference_rad is None:
             return means
         spread = 3.0 * _AGREEMENT_RAD + _AGREEMENT_RELATIVE * float(np.abs(means).max())
-        return means if np.ptp(means) <= spread else means[[np.argmin(np.abs(means - reference_rad))]]
-
-
-def _median_of_few(rows: Floats) -> Floats:
-    """Median (n,) over some rows (k, n), at a fifth of what `numpy.median` costs for each short block."""
-    ordered = np.sort(rows, axis=0)
-    half = rows.shape[0] // 2
-    return np.asarray(ordered[half] if rows.shape[0] % 2 else (ordered[half - 1] + ordered[half]) / 2.0)
+        return (
+            means
+            if means.max() - means.min() <= spread
+            else means[[np.argmin(np.abs(means - reference_rad))]]
+        )
 
 
 def _combine(weights: Floats, own: Floats) -> Floats:

@@ -7,7 +7,7 @@ always below |θ̇⁻|, the more so the shorter the half-cycle, so EAV from thes
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,15 +21,21 @@ Floats = NDArray[np.float64]
 _REACH_S = 0.04
 
 
-def filtered_peaks(time_s: Floats, velocity_rad_s: Floats, impacts_s: Sequence[float]) -> Floats:
-    """Signed peak of the filtered velocity (n,) at each impact; NaN where the record has none."""
+def filtered_peaks(
+    time_s: Floats, velocity: Callable[[int, int], Floats], impacts_s: Sequence[float]
+) -> Floats:
+    """Signed peak of the filtered velocity at each impact; NaN where the record has none.
+
+    `velocity(start, stop)` gives that of samples of the record, rad/s: only what lies about the impacts is
+    asked for.
+    """
     impacts = np.asarray(impacts_s, dtype=np.float64)
     gaps = np.diff(impacts, prepend=-np.inf, append=np.inf)
+    reach = np.minimum(_REACH_S, 0.4 * np.minimum(gaps[:-1], gaps[1:]))
+    starts, stops = np.searchsorted(time_s, [impacts - reach, impacts + reach]).tolist()
     peaks = np.full(impacts.size, np.nan)
-    for k, impact in enumerate(impacts):
-        reach = min(_REACH_S, 0.4 * gaps[k], 0.4 * gaps[k + 1])
-        low, high = np.searchsorted(time_s, [impact - reach, impact + reach])
-        part = velocity_rad_s[low:high]
+    for k, (start, stop) in enumerate(zip(starts, stops, strict=True)):
+        part = velocity(start, stop) if stop > start else np.empty(0)
         part = part[np.isfinite(part)]
         if part.size:
             peaks[k] = part[np.argmax(np.abs(part))]

@@ -266,16 +266,15 @@ def _points(
     return t[good], y[good], noise_rad / math.sqrt(size)
 
 
-def _long_run_variance(residuals: Floats, jacobian: Floats) -> float:
+def _long_run_variance(residuals: Floats, points: Floats, answer: Floats) -> float:
     """Variance that counts for slow parameters: Bartlett-weighted autocovariances (Newey and West 1987).
 
-    `jacobian` (rows, parameters): the first rows are those of `residuals` (n,), the others of the priors. A
-    parameter takes up what is as slow as itself, so that residuals hold less of slow noise than there was:
+    `points` (n, parameters): the rows of the Jacobian J of `residuals` (n,), without those of the priors;
+    `answer`, of the same shape: what each point makes of the parameters, those rows of J (JᵀJ)⁻¹. A parameter
+    takes up what is as slow as itself, so that residuals hold less of slow noise than there was:
     each sum is divided by the share of it that the fit leaves of white noise, whose covariance of residuals
     is I − J (JᵀJ)⁻¹ Jᵀ. At least the plain variance: neighbours that alternate make nothing better known.
     """
-    points = jacobian[: residuals.size]
-    answer = np.linalg.solve(jacobian.T @ jacobian, points.T).T
     lags = range(1, min(_CORRELATED_POINTS, residuals.size - 1) + 1)
     weights = [1.0 - k / (_CORRELATED_POINTS + 1.0) for k in lags]
     plain, left = float(residuals @ residuals), residuals.size - float(np.sum(answer * points))
@@ -286,16 +285,16 @@ def _long_run_variance(residuals: Floats, jacobian: Floats) -> float:
     return max(plain / left, total / max(left - taken, _LEAST_LEFT * residuals.size))
 
 
-def _of_walking_zero(jacobian: Floats, points: int, sigma: float) -> Floats:
+def _of_walking_zero(answer: Floats, sigma: float) -> Floats:
     """Covariance that a zero adds which walks from the first fitted point to the last.
 
     It walks by what a zero from rest, seconds old, may be wrong by. The fit takes up a zero that stands
     still; one that walks bends late half-cycles against early ones, which p and α of small motions answer to.
-    The parameters answer to the points by (JᵀJ)⁻¹Jᵀ; each step of the walk moves all points before it. Places
-    of sensors that are a millimetre off make a tenth to a third of that in p and are left out.
+    The parameters answer to the points by `answer` (parameters, points), (JᵀJ)⁻¹Jᵀ; each step of the walk
+    moves all points before it. Places of sensors that are a millimetre off make a tenth to a third of that in
+    p and are left out.
     """
-    answer = np.linalg.solve(jacobian.T @ jacobian, jacobian[:points].T) / sigma
-    steps = np.cumsum(answer, axis=1) * (REST_ZERO_SIGMA_RAD / math.sqrt(points))
+    steps = np.cumsum(answer / sigma, axis=1) * (REST_ZERO_SIGMA_RAD / math.sqrt(answer.shape[1]))
     return np.asarray(steps @ steps.T)
 
 
@@ -305,8 +304,10 @@ def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: floa
     # Data rows are weakened by what the model leaves; priors keep their weight.
     scaled = found.jac.copy()
     try:
-        scaled[: data.size] /= math.sqrt(max(1.0, _long_run_variance(data, found.jac)))
-        covariance = np.linalg.inv(scaled.T @ scaled) + _of_walking_zero(found.jac, data.size, sigma)
+        points = found.jac[: data.size]
+        answer = np.linalg.solve(found.jac.T @ found.jac, points.T)
+        scaled[: data.size] /= math.sqrt(max(1.0, _long_run_variance(data, points, answer.T)))
+        covariance = np.linalg.inv(scaled.T @ scaled) + _of_walking_zero(answer, sigma)
     except np.linalg.LinAlgError:
         return None
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,36 +43,38 @@ def find_onsets(
     two variances, before and after, describe the window best (Akaike's criterion on a split).
     """
     gaps = np.diff(np.asarray(impacts_s, dtype=np.float64), prepend=-math.inf, append=math.inf)
-    windows = []
+    windows: list[_Window] = []
     for k, impact in enumerate(impacts_s):
         reach = min(_REACH_S, 0.45 * gaps[k], 0.45 * gaps[k + 1])
-        places = [
-            (
-                max(round((impact - reach - first_s - offset) * rate_hz), 0),
-                min(round((impact + reach - first_s - offset) * rate_hz), n_samples),
-            )
-            for offset in offsets_s
-        ]
-        windows.append([(low, max(high, low)) for low, high in places])
-    if not offsets_s or not windows:
-        return [None] * len(windows)
-    start = min(low for places in windows for low, _ in places)
-    acceleration = read(start, max(high for places in windows for _, high in places))
-    onsets: list[Onset | None] = []
-    for places in windows:
-        rows_by_length: dict[int, list[int]] = {}
-        for row, (low, high) in enumerate(places):
-            rows_by_length.setdefault(high - low, []).append(row)
-        picks = []
-        for rows in rows_by_length.values():
-            parts = np.array(
-                [acceleration[row, places[row][0] - start : places[row][1] - start] for row in rows]
-            )
-            for row, (sample, strength) in zip(rows, _picks(parts), strict=True):
-                if strength >= _SHOCK_SIGMAS:
-                    picks.append(first_s + (places[row][0] + sample) / rate_hz + offsets_s[row])
-        onsets.append(_agreement(picks))
-    return onsets
+        for channel, offset in enumerate(offsets_s):
+            low = max(round((impact - reach - first_s - offset) * rate_hz), 0)
+            high = min(round((impact + reach - first_s - offset) * rate_hz), n_samples)
+            windows.append(_Window(k, channel, low, max(high, low)))
+    if not windows:
+        return [None] * len(impacts_s)
+    start = min(window.start for window in windows)
+    acceleration = read(start, max(window.stop for window in windows))
+    alike: dict[int, list[_Window]] = {}
+    for window in windows:
+        alike.setdefault(window.stop - window.start, []).append(window)
+    picks_s: list[list[float]] = [[] for _ in impacts_s]
+    for together in alike.values():
+        parts = np.array([acceleration[w.channel, w.start - start : w.stop - start] for w in together])
+        for window, (sample, strength) in zip(together, _picks(parts), strict=True):
+            if strength >= _SHOCK_SIGMAS:
+                time_s = first_s + (window.start + sample) / rate_hz + offsets_s[window.channel]
+                picks_s[window.impact].append(time_s)
+    return [_agreement(picks) for picks in picks_s]
+
+
+@dataclass(frozen=True, slots=True)
+class _Window:
+    """Samples start … stop of one channel about one impact."""
+
+    impact: int
+    channel: int
+    start: int
+    stop: int
 
 
 def _picks(windows: Floats) -> list[tuple[float, float]]:
@@ -103,9 +106,8 @@ def _agreement(picks_s: list[float]) -> Onset | None:
     """The onset that at least half of the picks, one of each channel that shows a shock, agree on."""
     if len(picks_s) < 2:
         return None
-    times = np.array(picks_s)
-    middle = float(np.median(times))
-    near = np.abs(times - middle) <= _AGREE_S
-    if np.count_nonzero(near) < max(2, (times.size + 1) // 2):
+    middle = median(picks_s)
+    near = [time for time in picks_s if abs(time - middle) <= _AGREE_S]
+    if len(near) < max(2, (len(picks_s) + 1) // 2):
         return None
-    return Onset(float(np.median(times[near])), int(np.count_nonzero(near)))
+    return Onset(median(near), len(near))

@@ -84,6 +84,12 @@ class VelocityFilter:
         padded = np.pad(rotation_rad, self.delay_samples, mode="edge")
         return np.convolve(padded, self.coefficients, mode="valid")
 
+    def velocity_of_part(self, rotation_rad: Floats, start: int, stop: int) -> Floats:
+        """θ̇ of samples start … stop of a whole record (n,), as `velocity` has it."""
+        around = np.arange(start - self.delay_samples, stop + self.delay_samples)
+        part = rotation_rad[np.clip(around, 0, rotation_rad.size - 1)]
+        return np.convolve(part, self.coefficients, mode="valid")
+
     def peak_ratio(
         self, peak_before_rad: ArrayLike, restitution: float, p_rad_s: float, alpha_rad: float
     ) -> Floats:

@@ -8,6 +8,7 @@ What was found is said, with what was done about it. The recording itself is not
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,6 +34,7 @@ from daq_app.rocking.families.single_wires import SingleWires, compare_wires
 from daq_app.rocking.families.treated import Corrections, held_in_memory, without_hum
 from daq_app.rocking.geometry.joint import BaseJoint
 from daq_app.rocking.geometry.kinematics import RotationGeometry
+from daq_app.rocking.means import median_of_few
 from daq_app.rocking.motion.bending import Bending, find_bending
 from daq_app.rocking.motion.swings import REST_ZERO_SIGMA_RAD
 from daq_app.rocking.record import TestRecord
@@ -84,8 +86,8 @@ class Instruments:
 
 def prepare(record: TestRecord, *, from_rest: bool) -> Instruments:
     """Read, clean, find the test, put instruments right. `ValueError` where the record lacks the wires."""
-    ids = (*record.family("wire"), *record.family("lvdt"), *record.family("tiltmeter", "x"))
-    held, findings = _without_hum(held_in_memory(record, ids), ids)
+    families = [record.family("wire"), record.family("lvdt"), record.family("tiltmeter", "x")]
+    held, findings = _without_hum(held_in_memory(record, families), [ids for ids in families if ids])
     scaled, corrections = _put_to_scale(held)
     findings += scaled
     corrected = corrections.applied(held)
@@ -125,9 +127,12 @@ def _zeroed_at_rest(
 # -- before the test is found ----------------------------------------------------------------------
 
 
-def _without_hum(record: TestRecord, ids: tuple[str, ...]) -> tuple[TestRecord, list[FamilyFinding]]:
+def _without_hum(
+    record: TestRecord, families: Sequence[tuple[str, ...]]
+) -> tuple[TestRecord, list[FamilyFinding]]:
+    ids = tuple(channel_id for family in families for channel_id in family)
     noises = [record.rig.channel(channel_id).noise_si for channel_id in ids]
-    hum = find_hum(record.load(ids), noises, record.rate_hz)
+    hum = find_hum([record.load(family) for family in families], noises, record.rate_hz)
     if hum is None:
         return record, []
     findings = []
@@ -162,7 +167,9 @@ def _crude_rotations(record: TestRecord, size: int) -> dict[str, Floats]:
     def means(channel_ids: tuple[str, ...]) -> Floats:
         rows = record.load(channel_ids)
         count = rows.shape[1] // size
-        return np.asarray(rows[:, : count * size].reshape(rows.shape[0], count, size).mean(axis=2))
+        return np.asarray(
+            rows[:, : count * size].reshape(rows.shape[0], count, size) @ np.full(size, 1.0 / size)
+        )
 
     rotations: dict[str, Floats] = {}
     ids = record.family("wire")
@@ -172,9 +179,8 @@ def _crude_rotations(record: TestRecord, size: int) -> dict[str, Floats]:
             wire: float(lever) for wire, lever in zip(geometry.wires.ids, geometry.wires.lever_m, strict=True)
         }
         of_each_wire = means(ids) / np.array([[levers[channel_id]] for channel_id in ids])
-        rotations["wires"] = np.median(
-            of_each_wire - np.nanmedian(of_each_wire, axis=1, keepdims=True), axis=0
-        )
+        levels = np.nanmedian(of_each_wire, axis=1, keepdims=True)
+        rotations["wires"] = median_of_few(of_each_wire - levels)
     lvdts = record.family("lvdt")
     try:
         joint = BaseJoint.from_rig(record.rig, lvdts)
@@ -184,7 +190,7 @@ def _crude_rotations(record: TestRecord, size: int) -> dict[str, Floats]:
         openings = means(lvdts)
         left = joint.x_m < 0
         across = float(joint.x_m[~left].mean() - joint.x_m[left].mean())
-        rotations["LVDTs"] = (np.median(openings[left], axis=0) - np.median(openings[~left], axis=0)) / across
+        rotations["LVDTs"] = (median_of_few(openings[left]) - median_of_few(openings[~left])) / across
     tilts = record.family("tiltmeter", "x")
     if tilts:
         rotations["tiltmeters"] = means(tilts).mean(axis=0)

@@ -163,10 +163,6 @@ def _combine(
     leads = lead == "lvdts" and joint is not None
     rotation = joint.rotation_rad if leads and joint is not None else wire_rotation
     noise = lvdt_noise if leads else wire_noise
-    bad = ~np.isfinite(rotation)
-    index = np.maximum.accumulate(np.where(bad, 0, np.arange(rotation.size)))
-    first = float(rotation[~bad][0]) if not bad.all() else 0.0
-    bridged = np.where(np.isfinite(rotation[index]), rotation[index], first)
     return Signals(
         record=record,
         geometry=geometry,
@@ -179,11 +175,11 @@ def _combine(
         rotation_rad=rotation,
         wire_rotation_rad=wire_rotation,
         lead="lvdts" if leads else "wires",
-        bridged_rad=bridged,
+        bridged_rad=_bridged(rotation),
         excluded_share={
-            name: float(share)
-            for name, share in zip(geometry.wires.ids, combined.excluded.mean(axis=1), strict=True)
-            if share > 0
+            name: np.count_nonzero(excluded) / excluded.size
+            for name, excluded in zip(geometry.wires.ids, combined.excluded, strict=True)
+            if excluded.any()
         },
         noise_rad=noise,
         joint=joint,
@@ -191,6 +187,16 @@ def _combine(
         fused=fused,
         zeros=zeros,
     )
+
+
+def _bridged(rotation_rad: Floats) -> Floats:
+    """The same (n,) with gaps filled with the last value before, a first one with the first after it."""
+    bad = ~np.isfinite(rotation_rad)
+    if not bad.any():
+        return rotation_rad
+    index = np.maximum.accumulate(np.where(bad, 0, np.arange(rotation_rad.size)))
+    first = float(rotation_rad[~bad][0]) if not bad.all() else 0.0
+    return np.where(bad[index], first, rotation_rad[index])
 
 
 def find_phases(signals: Signals, *, ask_tiltmeters: bool = True) -> TestTimes:
@@ -251,14 +257,13 @@ def _aligned(rows: Floats, lags: Sequence[float]) -> Floats:
     Skews within a family matter as much as those between families: LVDTs along the wall that are read one
     after the other would show a rocking wall twisting.
     """
-    aligned = np.empty_like(rows)
+    aligned, earlier = np.empty_like(rows), np.empty(rows.shape[1])
     last = rows.shape[1] - 1
     for row, lag in enumerate(lags):
         whole = math.floor(lag)
         share = lag - whole
         _shift(rows[row], min(max(whole, -last), last), aligned[row])
         if share:
-            earlier = np.empty(rows.shape[1])
             _shift(rows[row], min(max(whole + 1, -last), last), earlier)
             earlier -= aligned[row]
             earlier *= share
