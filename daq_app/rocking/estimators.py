@@ -112,11 +112,12 @@ def eav_series(
     speeds, sigmas = np.abs(np.asarray(speeds_rad_s)), np.asarray(sigmas_rad_s)
     usable = _usable(speeds, sigmas)
     log, relative = np.log(np.where(usable, speeds, 1.0)), np.where(usable, sigmas / speeds, 0.0)
-    pairs = [(k, k + 2) for k in range(speeds.size - 2) if usable[k] and usable[k + 2]]
+    logs, shares = log.tolist(), relative.tolist()
     points = []
-    for first, last in pairs:
-        r = math.exp(0.5 * (log[last] - log[first]))
-        sigma = 0.5 * r * math.hypot(relative[first], relative[last])
+    for first in np.flatnonzero(usable[:-2] & usable[2:]).tolist():
+        last = first + 2
+        r = math.exp(0.5 * (logs[last] - logs[first]))
+        sigma = 0.5 * r * math.hypot(shares[first], shares[last])
         points.append(RestitutionPoint(last + 1, first + 1, last + 1, r, sigma))
     side = np.arange(speeds.size) % 2
     levels = np.stack([side == 0, side == 1], axis=1).astype(np.float64)
@@ -157,12 +158,13 @@ def crt_series(
     usable = inside & _usable(energies, slope * sigmas)
     relative = np.where(usable, slope * sigmas / energies, 0.0)
     log = np.log(energies)
+    logs, shares = log.tolist(), relative.tolist()
     points = []
     usable_peaks = np.flatnonzero(usable).tolist()
     for first, n in [(usable_peaks[0], n) for n in usable_peaks[1:]]:
         steps = 2 * (n - first)
-        r = math.exp((log[n] - log[first]) / steps)
-        sigma = r * math.hypot(relative[first], relative[n]) / steps
+        r = math.exp((logs[n] - logs[first]) / steps)
+        sigma = r * math.hypot(shares[first], shares[n]) / steps
         points.append(RestitutionPoint(n, first, n, r, sigma))
     levels = np.ones((peaks.size, 1))
     return DecaySeries(method, tuple(points), log / 2.0, (relative / 2.0) ** 2, usable, levels)
@@ -178,18 +180,13 @@ def _usable(values: Floats, sigmas: Floats) -> NDArray[np.bool_]:
 def estimate_all(wanted: Sequence[DecaySeries]) -> list[RestitutionEstimate]:
     """Weighted mean of each series from values that fall by ln r per impact, and plain mean of its points.
 
-    Series of the same length are worked on together: many cost little more than one.
+    They are worked on together: many cost little more than one.
     """
-    found = [RestitutionEstimate(series.method, ()) for series in wanted]
-    alike: dict[tuple[int, ...], list[int]] = {}
-    for place, series in enumerate(wanted):
-        if series.points:
-            alike.setdefault(series.levels.shape, []).append(place)
-    for places in alike.values():
-        together = [wanted[place] for place in places]
-        for place, series, fallen in zip(places, together, _slopes(together), strict=True):
-            found[place] = _estimate(series, *fallen)
-    return found
+    slopes = iter(_slopes([series for series in wanted if series.points]))
+    return [
+        _estimate(series, *next(slopes)) if series.points else RestitutionEstimate(series.method, ())
+        for series in wanted
+    ]
 
 
 def _estimate(
@@ -214,35 +211,46 @@ def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float, 
     """Generalised least-squares slope of the values against their index, its variance, scatter and its least.
 
     Errors are independent (`variances`) plus a random walk of step s. Every s of a grid is tried at
-    once, and every series (all of one length), by a Kalman filter that whitens values and regressors
+    once, and every series, by a Kalman filter that whitens values and regressors
     (Harvey's GLS by prediction errors). Slope and variance are those of the mixture over s, weighted by
     the restricted likelihood; the scatter is the likeliest s, its least the quantile of `_SURELY`.
     """
-    usable = np.array([series.usable for series in together])
-    variances = np.array([series.variances for series in together])
-    index = np.arange(usable.shape[1], dtype=np.float64)
-    rows = np.stack([np.column_stack([s.values, s.levels, index]) for s in together])[:, None]
+    if not together:
+        return []
+    length, levels = np.max([series.levels.shape for series in together], axis=0).tolist()
+    # Shorter series end with values that are not used, and have levels from which none counts.
+    usable = np.zeros((length, len(together)), dtype=bool)
+    # A value that is not used is infinitely uncertain: the filter passes it by.
+    variances = np.full((length, len(together), 1), np.inf)
+    rows = np.zeros((length, len(together), 1 + levels + 1, 1))
+    rows[:, :, -1, 0] = np.arange(length)[:, None]
+    for k, series in enumerate(together):
+        n, of_series = series.levels.shape
+        usable[:n, k] = series.usable
+        variances[:n, k, 0][series.usable] = series.variances[series.usable]
+        rows[:n, k, 0, 0], rows[:n, k, 1 : 1 + of_series, 0] = series.values, series.levels
     walk = np.broadcast_to(_SCATTERS**2, (len(together), _SCATTERS.size))
-    state, spread = np.zeros((*walk.shape, rows.shape[-1])), np.zeros(walk.shape)
-    errors = np.zeros((*walk.shape, usable.shape[1], rows.shape[-1]))
-    totals = np.ones((usable.shape[1], *walk.shape))
-    for k in range(usable.shape[1]):
-        spread = spread + walk if k else spread
-        there = usable[:, k, None]
+    state, spread = np.zeros((len(together), rows.shape[2], _SCATTERS.size)), np.zeros(walk.shape)
+    errors, totals = np.empty((length, *state.shape)), np.empty((length, *walk.shape))
+    for error, total, row, variance in zip(errors, totals, rows, variances, strict=True):
+        np.add(spread, variance, out=total)
         # Rounding and model error of a perfect recording keep the filter well conditioned.
-        total = np.where(there, spread + variances[:, k, None] + 1e-12, 1.0)
-        error = np.where(there[..., None], rows[:, :, k] - state, 0.0)
-        gain = np.where(there, spread / total, 0.0)
-        state = state + gain[..., None] * error
-        spread = spread * (1.0 - gain)
-        errors[:, :, k], totals[k] = error, total
-    whitened = errors / np.moveaxis(np.sqrt(totals), 0, 2)[..., None]
+        total += 1e-12
+        np.subtract(row, state, out=error)
+        gain = spread / total
+        state += gain[:, None] * error
+        spread *= 1.0 - gain
+        spread += walk
+    errors[~usable], totals[~usable] = 0.0, 1.0
+    errors /= np.sqrt(totals)[:, :, None]
+    whitened = np.ascontiguousarray(errors.transpose(1, 3, 0, 2))
     log_spread = np.log(totals).sum(axis=0)
     target, design = whitened[..., :1], whitened[..., 1:]
     normal = np.swapaxes(design, 2, 3) @ design
     # A level that no usable value counts from has no column: a one in its place changes nothing.
-    empty = ~np.array([series.levels[series.usable].any(axis=0) for series in together])
-    for level in range(empty.shape[1]):
+    counts = (rows[:, :, 1:-1, 0] != 0.0) & usable[..., None]
+    empty = ~np.asarray(counts.any(axis=0))
+    for level in range(levels):
         normal[empty[:, level], :, level, level] = 1.0
     inverse = np.linalg.inv(normal)
     solution = inverse @ (np.swapaxes(design, 2, 3) @ target)

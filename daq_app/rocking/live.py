@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from daq_app.config.rig import Rig
 from daq_app.config.scaling import Scaling
-from daq_app.rocking.estimators import RestitutionEstimate
+from daq_app.rocking.estimators import RestitutionEstimate, estimate_all
 from daq_app.rocking.families.noise import slow_noise
 from daq_app.rocking.geometry.kinematics import RotationGeometry
 from daq_app.rocking.live_families import LiveFamilies
@@ -162,13 +162,14 @@ class LiveAnalyser:
         if missing < 0:
             raise ValueError(f"sample {first_sample} was already analysed: the next is {self._next}")
         self._next = first_sample + readings.shape[1]
-        si = self._scaling.to_si(readings[self._rows])
+        si = readings[self._rows]
+        si = self._scaling.to_si(si, out=si)
         tilt = self.geometry.tilt(si[self._tilts], self._last_rotation)
-        gap = np.full((si.shape[0], missing), np.nan)
-        joined = np.concatenate((self._pending, gap, si), axis=1)
-        whole = joined.shape[1] // self._frame * self._frame
-        self._pending = joined[:, whole:]
-        return self._analyse(joined[:, :whole], tilt)
+        if missing or self._pending.shape[1]:
+            si = np.concatenate((self._pending, np.full((si.shape[0], missing), np.nan), si), axis=1)
+        whole = si.shape[1] // self._frame * self._frame
+        self._pending = si[:, whole:]
+        return self._analyse(si[:, :whole], tilt)
 
     def _analyse(self, si: Floats, tilt_rad: float) -> LiveResult:
         """Whole frames of SI values of all channels that are used."""
@@ -182,9 +183,10 @@ class LiveAnalyser:
         for start in range(0, si.shape[1], _PIECE_FRAMES * self._frame):
             piece = si[:, start : start + _PIECE_FRAMES * self._frame]
             wires = self.geometry.rotation(piece[: self._n_wires], self._watch)
-            # In a gap no wire has a value: none disagrees with the others.
-            excluded |= (wires.excluded & ~wires.excluded.all(axis=0)).any(axis=1)
-            self._log.append(np.vstack((wires.rotation_rad[None], piece[self._tilts])))
+            if wires.excluded.any():
+                # In a gap no wire has a value: none disagrees with the others.
+                excluded |= (wires.excluded & ~wires.excluded.all(axis=0)).any(axis=1)
+            self._log.append(wires.rotation_rad[None], piece[self._tilts])
             self._families.append(self._first, wires.rotation_rad, piece[self._tilts.stop :])
             bridged = _bridge(wires.rotation_rad, self._last_rotation)
             self._last_rotation = float(bridged[-1])
@@ -205,7 +207,9 @@ class LiveAnalyser:
             phase=self._detector.phase,
             events=tuple(events),
             estimate=estimate,
-            excluded_wires=tuple(np.array(self.geometry.wires.ids)[excluded].tolist()),
+            excluded_wires=tuple(np.array(self.geometry.wires.ids)[excluded].tolist())
+            if excluded.any()
+            else (),
         )
 
     # -- the motion ------------------------------------------------------------------------------
@@ -271,14 +275,17 @@ class LiveAnalyser:
         theta0 = self._theta0_tilt if math.isfinite(self._theta0_tilt) else level
         release = self._release.sample if track is None else track.release.time_s * self._rate
         alpha = self._motion_settings.alpha_rad
+        eav, crt = RestitutionEstimate("EAV", ()), RestitutionEstimate("CRT", ())
+        if track is not None:
+            eav, crt = estimate_all([track.eav_series(), track.crt_series()])
         return Estimate(
             theta0_rad=theta0,
             release_sample=round(release),
             impact_samples=[] if track is None else [t * self._rate for t in track.impacts_s],
             peaks_rad=[level] if track is None else track.peaks_rad,
             impact_velocities_rad_s=[] if track is None else track.speeds_before_rad_s,
-            eav=RestitutionEstimate("EAV", ()) if track is None else track.eav(),
-            crt=RestitutionEstimate("CRT", ()) if track is None else track.crt(),
+            eav=eav,
+            crt=crt,
             r_max=float(theory.r_max_rectangular(alpha)),
             doubts=self._families.doubts,
         )

@@ -20,6 +20,9 @@ STIFF: Final = 3
 ALL_POWERS: Final = (3, 4, 5, 6)
 POWERS: Final[tuple[tuple[int, ...], ...]] = ((), (4,), (3,), (3, 4), ALL_POWERS)
 """Candidate additions to the basis, from stiff to free."""
+_N: Final = np.array(ALL_POWERS)
+_N_SQUARED_LESS_N: Final = _N * (_N - 1)
+_ONES: Final = np.ones(_N.size)
 _COLUMNS: Final = STIFF + len(ALL_POWERS)
 _NESTED: Final = (0, 2, 3, 4)
 """Candidates that are the first columns of the freest: one decomposition serves all of them."""
@@ -54,16 +57,15 @@ class ArcFits:
         k = self.kappa
         c, s = np.cosh(k * x), np.sinh(k * x)
         even, odd = np.cosh(k) - 1.0, np.sinh(k)
-        value, slope, curve = (np.zeros((*x.shape, _COLUMNS)) for _ in range(3))
-        value[..., 0] = 1.0
+        value, slope, curve = np.empty((3, *x.shape, _COLUMNS))
+        value[..., 0], slope[..., 0], curve[..., 0] = 1.0, 0.0, 0.0
         value[..., 1], slope[..., 1], curve[..., 1] = (c - 1.0) / even, k * s / even, k * k * c / even
         value[..., 2], slope[..., 2], curve[..., 2] = s / odd, k * c / odd, k * k * s / odd
-        power = x.copy()  # x to the (n − 2)
-        for column, n in enumerate(ALL_POWERS, start=STIFF):
-            curve[..., column] = n * (n - 1) * power
-            slope[..., column] = n * power * x
-            value[..., column] = power * x * x
-            power = power * x
+        x = x[..., None]
+        power = np.multiply.accumulate(x * _ONES, axis=-1)  # x to the (n − 2)
+        np.multiply(_N_SQUARED_LESS_N, power, out=curve[..., STIFF:])
+        np.multiply(_N * power, x, out=slope[..., STIFF:])
+        np.multiply(power * x, x, out=value[..., STIFF:])
         return value, slope, curve
 
 
@@ -72,15 +74,14 @@ def design(x: Floats, kappa: Floats) -> Floats:
     k = kappa[:, None]
     grow = np.exp(k * x)
     shrink = 1.0 / grow
-    table = np.empty((*x.shape, _COLUMNS))
-    table[..., 0] = 1.0
-    table[..., 1] = (0.5 * (grow + shrink) - 1.0) / (np.cosh(k) - 1.0)
-    table[..., 2] = 0.5 * (grow - shrink) / np.sinh(k)
-    cube = x * x * x
-    for column in range(STIFF, _COLUMNS):
-        table[..., column] = cube
-        cube = cube * x
-    return table
+    columns = np.empty((_COLUMNS, *x.shape))
+    columns[0] = 1.0
+    columns[1] = (0.5 * (grow + shrink) - 1.0) / (np.cosh(k) - 1.0)
+    columns[2] = 0.5 * (grow - shrink) / np.sinh(k)
+    columns[STIFF] = x * x * x
+    for column in range(STIFF + 1, _COLUMNS):
+        np.multiply(columns[column - 1], x, out=columns[column])
+    return np.moveaxis(columns, 0, -1)
 
 
 def fit_stack(x: Floats, y: Floats, present: Bools, kappa: Floats, noise_rad: Floats) -> ArcFits:
@@ -239,7 +240,7 @@ def extrema(fits: ArcFits) -> Floats:
         for _ in range(12):
             _, slope, curve = fits.rows(x)
             step = _dot(slope, fits.coefficients) / _dot(curve, fits.coefficients)
-            x = np.where(moving, x - np.clip(step, -0.3, 0.3), x)
+            x = np.where(moving, x - np.minimum(np.maximum(step, -0.3), 0.3), x)
             moving &= np.abs(step) >= 1e-9
             if not moving.any():
                 break

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from daq_app.config.rig import Rig
 from daq_app.config.wording import true_minus
+from daq_app.rocking.means import mean_of, row_means
 from daq_app.rocking.motion.release import locate_release
 from daq_app.rocking.motion.rolling import RollingArray
 from daq_app.rocking.theory.housner import exact_amplitude
@@ -125,7 +126,7 @@ class PhaseDetector:
         size = self.settings.frame_samples
         count = joined.shape[1] // size
         whole = joined[:, : count * size].reshape(joined.shape[0], count, size)
-        means = whole.mean(axis=2)
+        means = row_means(whole)
         self._pending = joined[:, count * size :]
         if self._tilts is None:
             self._tilts = RollingArray(2 * self._window, max(joined.shape[0] - 1, 1))
@@ -134,7 +135,7 @@ class PhaseDetector:
         while index < count:
             # A stretch in which nothing can happen goes in as one piece, with the frame behind it.
             stop = min(index + self._uneventful(means[0, index:]) + 1, count)
-            self._raw.append(whole[0, index:stop].reshape(-1))
+            self._raw.append(whole[0, index:stop].reshape(1, -1))
             self._frames.append(means[:1, index:stop])
             if joined.shape[0] > 1:
                 self._tilts.append(means[1:, index:stop])
@@ -211,11 +212,11 @@ class PhaseDetector:
     def _steady_level(self) -> float | None:
         """Mean of the last window where the wall is held steady through it; None where it is not."""
         frames = self._frames.last(self._window)[0]
-        level = float(frames.mean())
+        level = mean_of(frames)
         if not abs(level) >= self.settings.smallest_hold * self.settings.alpha_rad:
             return None
-        ticks = frames.reshape(-1, _TICK).mean(axis=1)
-        if not np.ptp(ticks) < self.settings.steady_rad or not self._tilts_agree(level):
+        ticks = row_means(frames.reshape(-1, _TICK))
+        if not ticks.max() - ticks.min() < self.settings.steady_rad or not self._tilts_agree(level):
             return None
         return level
 
@@ -225,7 +226,7 @@ class PhaseDetector:
         tilts = self._tilts.last(self._window)
         if not tilts.size or not np.isfinite(tilts).all(axis=1).any():
             return True
-        first, last = tilts[:, : 2 * _TICK].mean(axis=1), tilts[:, -2 * _TICK :].mean(axis=1)
+        first, last = row_means(tilts[:, : 2 * _TICK]), row_means(tilts[:, -2 * _TICK :])
         near = np.abs(last - level) < max(self.settings.level_rad, 0.08 * abs(level))
         still = np.abs(last - first) < self.settings.steady_rad
         return bool(np.any(near & still))
@@ -233,7 +234,9 @@ class PhaseDetector:
     def _remember_hold(self, level: float) -> None:
         self._hold_rad = level
         differences = np.diff(self._frames.last(self._window)[0])
-        self._noise = max(self.settings.frame_noise_rad, float(differences.std()) / math.sqrt(2.0))
+        scattered = differences - mean_of(differences)
+        noise = math.sqrt(mean_of(scattered * scattered) / 2.0)
+        self._noise = max(self.settings.frame_noise_rad, noise)
 
     def _enter_hold(self, level: float) -> None:
         self._remember_hold(level)
@@ -248,7 +251,7 @@ class PhaseDetector:
             self._remember_hold(level)
             self._lost_ticks = 0
             return
-        recent = float(self._frames.last(_TICK)[0].mean())
+        recent = mean_of(self._frames.last(_TICK)[0])
         away = abs(recent - self._hold_rad) > max(4 * self.settings.steady_rad, 0.15 * abs(self._hold_rad))
         self._lost_ticks = self._lost_ticks + 1 if away else 0
         if self._lost_ticks * _TICK >= 2 * self._window:
@@ -262,7 +265,7 @@ class PhaseDetector:
         frames = self._frames.last(_SLOPE)[0]
         steps = np.arange(frames.size) - (frames.size - 1) / 2.0
         slope = float(steps @ frames) / float(steps @ steps)
-        return float(frames.mean()), slope / self.settings.frame_s
+        return mean_of(frames), slope / self.settings.frame_s
 
     def _free_speed_square(self, from_rad: float, at_rad: float) -> float:
         alpha, p = self.settings.alpha_rad, self.settings.p_rad_s
@@ -305,9 +308,8 @@ class PhaseDetector:
 
     def _caught(self) -> bool:
         frames = self._frames.last(max(self._window // 3, 2 * _TICK))[0]
-        return bool(np.ptp(frames) < self.settings.steady_rad) and abs(frames.mean()) > 0.1 * abs(
-            self._hold_rad
-        )
+        still = frames.max() - frames.min() < self.settings.steady_rad
+        return bool(still) and abs(mean_of(frames)) > 0.1 * abs(self._hold_rad)
 
     # -- impacts ---------------------------------------------------------------------------------
 
@@ -367,9 +369,9 @@ class PhaseDetector:
         band = max(self.settings.quiet_rad, 12.0 * self._noise)
         step = max(1, round(0.02 / self.settings.frame_s))
         fastest = float(np.abs(frames[step:] - frames[:-step]).max()) / (step * self.settings.frame_s)
-        if not (np.ptp(frames) < band and fastest < self.settings.quiet_rad_s):
+        if not (frames.max() - frames.min() < band and fastest < self.settings.quiet_rad_s):
             return
-        level = float(frames.mean())
+        level = mean_of(frames)
         history = self._frames.last(10 * self._window)[0]
         loud = np.flatnonzero(np.abs(history - level) > band / 2.0)
         quiet = self._frames.end - history.size + (int(loud[-1]) + 1 if loud.size else 0)

@@ -34,18 +34,20 @@ class RollingArray:
             data[:, : self._used] = self._data[:, : self._used]
             self._data, self._capacity = data, capacity
 
-    def append(self, values: Floats) -> None:
-        """Append (n,) or (rows, n) values."""
-        block = values if values.ndim == 2 else values[None]
-        n = block.shape[1]
+    def append(self, *blocks: Floats) -> None:
+        """Append (rows, n) values, or several blocks of rows (k, n) that lie one below the other."""
+        n = blocks[0].shape[1]
         if n > self._capacity:
             self._end += n - self._capacity
-            block, n, self._used = block[:, -self._capacity :], self._capacity, 0
+            blocks, n, self._used = tuple(b[:, -self._capacity :] for b in blocks), self._capacity, 0
         if self._used + n > self._data.shape[1]:
             keep = self._capacity - n
             self._data[:, :keep] = self._data[:, self._used - keep : self._used].copy()
             self._used = keep
-        self._data[:, self._used : self._used + n] = block
+        columns, row = slice(self._used, self._used + n), 0
+        for block in blocks:
+            self._data[row : row + block.shape[0], columns] = block
+            row += block.shape[0]
         self._used += n
         self._end += n
 
@@ -57,4 +59,4 @@ class RollingArray:
 
     def last(self, n: int) -> Floats:
         """(rows, up to n) view of the newest values."""
-        return self.slice(self._end - n, self._end)
+        return self._data[:, self._used - min(n, self._used) : self._used]

@@ -144,10 +144,9 @@ class MotionTrack:
     def _impact(self, index: int) -> ImpactTime:
         before = self.arcs[index]
         after = self.arcs[index + 1] if index + 1 < len(self.arcs) else None
-        known = [(arc.end_s, arc.sigma_end_s, arc.speed_end_rad_s) for arc in (before,) if arc is not None]
-        known += [
-            (arc.start_s, arc.sigma_start_s, arc.speed_start_rad_s) for arc in (after,) if arc is not None
-        ]
+        known = [] if before is None else [(before.end_s, before.sigma_end_s, before.speed_end_rad_s)]
+        if after is not None:
+            known.append((after.start_s, after.sigma_start_s, after.speed_start_rad_s))
         if not known:
             return ImpactTime(self.crossings_s[index], math.nan, math.nan)
         weights = [1.0 / max(sigma, 1e-9) ** 2 for _, sigma, _ in known]

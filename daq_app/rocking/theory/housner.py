@@ -63,11 +63,10 @@ def half_cycle_rotation(
     time_from_peak_s: ArrayLike, peak_rad: ArrayLike, p_rad_s: float, alpha_rad: float
 ) -> tuple[Floats, Floats]:
     """|θ| and d|θ|/dt at times from the peak (negative before it); inputs broadcast together."""
-    time, peak = np.broadcast_arrays(
-        np.asarray(time_from_peak_s, dtype=np.float64), np.abs(np.asarray(peak_rad, dtype=np.float64))
-    )
+    time = np.asarray(time_from_peak_s, dtype=np.float64)
+    peak = np.abs(np.asarray(peak_rad, dtype=np.float64))
     sin_peak = np.sin((alpha_rad - peak) / 2.0)
-    m = 1.0 - sin_peak**2
+    m = 1.0 - sin_peak * sin_peak
     sn, _, dn, _ = scipy.special.ellipj(p_rad_s * time, m)
     half = np.arcsin(np.minimum(sin_peak / dn, 1.0))
     # cos(u/2) = k·cn/dn from the same identity; its derivative gives the speed without a difference.
