@@ -40,6 +40,8 @@ class Auxiliary:
     """Whether a zero is taken with the wall upright: of forces, strains and displacements."""
     travels: bool = False
     """Whether the ends of `range_si` are mechanical or optical stops."""
+    diagnosed: bool = False
+    """Whether the diagnosis has a sensor family for it: it then is auxiliary no more."""
 
 
 AUXILIARY: Final[Mapping[str, Auxiliary]] = {
@@ -53,9 +55,10 @@ AUXILIARY: Final[Mapping[str, Auxiliary]] = {
     "voltage": Auxiliary("a voltage", "voltages (trigger, synchronisation, command)", "voltage", "V"),
     "other": Auxiliary("another sensor", "other sensors", "quantity", ""),
 }
-"""Auxiliary families by name; their order is that of lists and plots."""
+"""Auxiliary families, and those among the diagnosed that began so, by name; their order is that of lists and
+plots."""
 
 
 def is_auxiliary(family: str) -> bool:
-    """Whether the rocking analysis leaves a family out."""
-    return family in AUXILIARY
+    """Whether rocking analysis and diagnosis leave a family out."""
+    return family in AUXILIARY and not AUXILIARY[family].diagnosed

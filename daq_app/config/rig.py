@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
-from daq_app.config.families import AUXILIARY, Family
+from daq_app.config.families import AUXILIARY, Family, is_auxiliary
 from daq_app.config.units import (
     FAMILY_SI_UNIT,
     G_M_S2,
@@ -253,7 +253,7 @@ class Channel(Table):
     @property
     def auxiliary(self) -> bool:
         """Whether rocking analysis and diagnosis leave the channel out."""
-        return self.family in AUXILIARY
+        return is_auxiliary(self.family)
 
     @property
     def zeroed(self) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from typer.testing import CliRunner
 
 from daq_app.cli.app import build_app
 from daq_app.config import ConfigError, parse_rig, plan_tasks
+from daq_app.config.families import AUXILIARY, is_auxiliary
 from daq_app.gap.rocking_model.records import load_run
 from daq_app.runfile import open_run
 from daq_app.runfile.exporters import export_run
@@ -118,3 +120,9 @@ def test_they_are_recorded_beside_a_test_and_leave_r_alone(tables: dict[str, Any
     )
     with open_run(report.run) as back:
         np.testing.assert_allclose(back.si(["JACK"])[0], si["JACK"], rtol=1e-5, atol=1e-3)
+
+
+def test_a_family_that_the_diagnosis_has_is_auxiliary_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert is_auxiliary("temperature")
+    monkeypatch.setitem(AUXILIARY, "temperature", replace(AUXILIARY["temperature"], diagnosed=True))
+    assert not is_auxiliary("temperature")

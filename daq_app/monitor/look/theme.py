@@ -11,7 +11,7 @@ from typing import Final, Literal
 from PySide6.QtGui import QColor, QFont, QPalette
 from PySide6.QtWidgets import QApplication, QWidget
 
-from daq_app.config.families import is_auxiliary
+from daq_app.config.families import AUXILIARY
 
 AUXILIARY_GROUP: Final = "auxiliary"
 """All families that the rocking analysis leaves out, where they stand together."""
@@ -77,7 +77,7 @@ class Colours:
 
     def family(self, family: str) -> str:
         """Colour of a sensor family; auxiliary families share one."""
-        return str(getattr(self, AUXILIARY_GROUP if is_auxiliary(family) else family))
+        return str(getattr(self, AUXILIARY_GROUP if family in AUXILIARY else family))
 
 
 DARK: Final = Colours(
