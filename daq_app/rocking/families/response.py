@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
+from daq_app.rocking.means import mean_of
+
 Floats = NDArray[np.float64]
 
 LATE_S = 1.5e-3
@@ -165,9 +167,10 @@ class _Pair:
             start = np.array([filled[0] * (1.0 - b)])
             filled, _ = lfilter([b, 1.0 - a - b], [1.0, -a], filled, zi=start)
         rest, y = self._rest
-        table = np.column_stack([filled if y.size == filled.size else filled[self.both], rest])
+        table = np.empty((y.size, 3))
+        table[:, 0], table[:, 1:] = filled if y.size == filled.size else filled[self.both], rest
         normal = table.T @ table
         solution = np.linalg.solve(normal, table.T @ y)
         left = y - table @ solution
-        gain, _, drift = (float(value) for value in solution)
-        return _Solved(gain, drift, float(np.sqrt(np.mean(left**2))))
+        gain, _, drift = solution.tolist()
+        return _Solved(gain, drift, math.sqrt(mean_of(left * left)))

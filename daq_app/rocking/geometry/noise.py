@@ -16,11 +16,13 @@ _MEAN_S = 0.015
 def white_noise(values: Floats) -> float:
     """rms of the white noise of a record (n,), by second differences, robust to impacts; NaN for too few."""
     second = np.diff(values, 2)
-    second = second[np.isfinite(second)]
+    known = np.isfinite(second)
+    second = second if known.all() else second[known]
     if second.size < 100:
         return math.nan
     # Median absolute deviation to standard deviation; a second difference has six times the variance.
-    return float(np.median(np.abs(second - np.median(second)))) * 1.4826 / math.sqrt(6.0)
+    second -= np.median(second)
+    return float(np.median(np.abs(second, out=second), overwrite_input=True)) * 1.4826 / math.sqrt(6.0)
 
 
 def timing_noise(rest: Floats, rate_hz: float) -> float:

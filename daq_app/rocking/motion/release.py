@@ -76,7 +76,7 @@ class _Fall:
     def _elapsed(self, x: Floats) -> tuple[Floats, Floats]:
         """Time in the fall, and whether it lies within what the model knows."""
         free = (self.time_s - x[0] * self.quarter_s) / x[2]
-        elapsed = np.clip(free, 0.0, 1.3 * self.quarter_s)
+        elapsed = np.minimum(np.maximum(free, 0.0), 1.3 * self.quarter_s)
         return elapsed, free == elapsed
 
     def _peak(self, x: Floats) -> float:
@@ -84,8 +84,11 @@ class _Fall:
 
     def _residual(self, x: Floats) -> Floats:
         model = half_cycle_rotation(self._elapsed(x)[0], self._peak(x), self.p_rad_s, self.alpha_rad)[0]
-        # The time scale is known to a few per cent: without this, a short fall trades it for t_r.
-        return np.append((model - self.rotation_rad) / (_SHARE * self.level_rad), (x[2] - 1.0) / _SCALE_SIGMA)
+        # The time scale is known to a few per cent: without the last one, a short fall trades it for t_r.
+        residuals = np.empty(model.size + 1)
+        np.divide(model - self.rotation_rad, _SHARE * self.level_rad, out=residuals[:-1])
+        residuals[-1] = (x[2] - 1.0) / _SCALE_SIGMA
+        return residuals
 
     def _jacobian(self, x: Floats) -> Floats:
         elapsed, inside = self._elapsed(x)
