@@ -1,4 +1,4 @@
-"""The stated error of the fitted p is as large as what makes it: a zero that walks, places that are off."""
+"""The stated error of the fitted p is as large as what makes it: slow noise, a zero that walks, places."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from daq_app.config import load_rig
 from daq_app.rocking.geometry.kinematics import RotationGeometry
+from daq_app.rocking.motion import motion_fit
 from daq_app.rocking.motion.motion_fit import fit_motion
 from daq_app.rocking.motion.swings import REST_ZERO_SIGMA_RAD
 from daq_app.rocking.theory.housner import free_rocking
@@ -89,3 +91,14 @@ def test_wires_a_millimetre_off_move_p_by_less_than_its_stated_error(rig):
         off.append(fitted(rig, time, seen, motion).p_rad_s - exact.p_rad_s)
 
     assert np.sqrt(np.mean(np.square(off))) < exact.sigma_p_rad_s / 2.0
+
+
+def test_noise_that_stays_correlated_counts_with_all_of_its_variance_for_slow_parameters():
+    """Of points with a correlation ρ from one to the next, means of many vary by (1 + ρ)/(1 − ρ) more."""
+    rng, correlation, points = np.random.default_rng(7), 0.45, 200_000
+    noise = lfilter([1.0], [1.0, -correlation], rng.standard_normal(points)) * np.sqrt(1.0 - correlation**2)
+    no_parameter = np.zeros((points, 1))
+
+    variance = motion_fit._long_run_variance(noise, no_parameter, no_parameter)
+
+    assert variance == pytest.approx((1.0 + correlation) / (1.0 - correlation), rel=0.03)

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-CALIBRATION_SHARE = 0.002
-"""Prior standard uncertainty of one sensor's gain, place of its ends included; laboratories: 0.1 to 0.3 %."""
+CALIBRATION_SHARE = 0.0021
+"""Prior standard uncertainty of one sensor's gain, place of its ends included: root mean square of the 0.1 to
+0.3 % of laboratories."""
 PRIOR_WEIGHT = 7.0
 """Degrees of freedom that the prior counts for: 2 E(v)² / Var(v) of the variances v of laboratories whose
 standard deviations lie anywhere between 0.1 and 0.3 %."""
@@ -21,10 +22,12 @@ def single_gain_share(
 ) -> tuple[float, float]:
     """Scale of one sensor's gain error and its degrees of freedom, the prior's included.
 
-    `deviations` (sensors,): relative, from what all say together; `freedom`: how many of them are free.
+    `deviations` (sensors,): relative, from what all say together; `freedom`: how many of them are free. The
+    prior is a standard deviation: the scale of a Student's distribution of ν degrees of freedom is
+    √((ν − 2)/ν) of that.
     """
     total = PRIOR_WEIGHT + freedom
-    squares = PRIOR_WEIGHT * prior**2 + float(deviations @ deviations)
+    squares = (PRIOR_WEIGHT - 2.0) * prior**2 + float(deviations @ deviations)
     return math.sqrt(squares / total), total
 
 

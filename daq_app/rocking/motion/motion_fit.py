@@ -267,8 +267,10 @@ def _points(
 
 
 def _long_run_variance(residuals: Floats, points: Floats, answer: Floats) -> float:
-    """Variance that counts for slow parameters: Bartlett-weighted autocovariances (Newey and West 1987).
+    """Variance that counts for slow parameters: autocovariances under a flat top (Politis and Romano 1995).
 
+    Up to half the lags count whole. Weights that fall from the first lag on (Bartlett's) leave out 7 % of the
+    variance of noise that stays correlated for 10 ms.
     `points` (n, parameters): the rows of the Jacobian J of `residuals` (n,), without those of the priors;
     `answer`, of the same shape: what each point makes of the parameters, those rows of J (JᵀJ)⁻¹. A parameter
     takes up what is as slow as itself, so that residuals hold less of slow noise than there was:
@@ -276,7 +278,7 @@ def _long_run_variance(residuals: Floats, points: Floats, answer: Floats) -> flo
     is I − J (JᵀJ)⁻¹ Jᵀ. At least the plain variance: neighbours that alternate make nothing better known.
     """
     lags = range(1, min(_CORRELATED_POINTS, residuals.size - 1) + 1)
-    weights = [1.0 - k / (_CORRELATED_POINTS + 1.0) for k in lags]
+    weights = [min(1.0, 2.0 * (1.0 - k / (_CORRELATED_POINTS + 1.0))) for k in lags]
     plain, left = float(residuals @ residuals), residuals.size - float(np.sum(answer * points))
     total = plain + 2.0 * sum(
         w * float(residuals[k:] @ residuals[:-k]) for k, w in zip(lags, weights, strict=True)
