@@ -112,7 +112,7 @@ class _Exact:
 
 def _simulated(wanted: BiasSettings, exact: _Exact, rng: np.random.Generator) -> _Simulated:
     motion, time = exact.motion, exact.time_s
-    rotation = exact.rotation_rad + rng.normal(0.0, wanted.noise_rad, time.size)
+    rotation = exact.rotation_rad + wanted.noise_rad * rng.standard_normal(time.size)
     first = int(np.searchsorted(time, motion.impacts_s[0] + 1e-3))
     track = MotionTrack.begin(
         wanted.settings, time[:first], rotation[:first], motion.release_s, exact.theta0_rad

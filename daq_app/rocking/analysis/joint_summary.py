@@ -71,6 +71,8 @@ def _first_peak(signals: Signals, track: MotionTrack) -> slice:
 
 def _median(rows: Floats) -> Floats:
     """Median along each row, NaN where a row has no finite value."""
+    if rows.size and np.isfinite(rows).all():
+        return np.asarray(np.median(rows, axis=1))
     result = np.full(rows.shape[0], np.nan)
     for index, row in enumerate(rows):
         good = row[np.isfinite(row)]

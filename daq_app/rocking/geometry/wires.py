@@ -74,6 +74,9 @@ class WireInverse:
             for values in (self._squares, self._products, self._gammas)
         )
         length = self._length_m - shortening_m
+        # In place: new arrays of a whole record would cost as much as the arithmetic.
+        opening = np.subtract(squares, np.multiply(length, length, out=length), out=squares)
+        opening /= products
         with np.errstate(invalid="ignore"):
-            opening = np.arccos((squares - length * length) / products)
-        return np.asarray(gamma - np.copysign(opening, gamma))
+            np.arccos(opening, out=opening)
+        return np.asarray(np.subtract(gamma, np.copysign(opening, gamma, out=opening), out=gamma))
