@@ -21,8 +21,9 @@ _LIBRARY: Final = (
 )
 _OUTSIDE: Final = (
     Entry("one_round_edge", "interface", "rho_m", 0.008, 0.06, kind="near"),
+    # Low: a wall that never tips over its step turns on the inner edge, and that is a shifted pivot.
     Entry(
-        "stepped_edge", "interface", "height_m", 4e-4, 4e-3, others=uniform(width_m=(0.02, 0.08)), kind="near"
+        "stepped_edge", "interface", "height_m", 3e-4, 6e-4, others=uniform(width_m=(0.02, 0.08)), kind="near"
     ),
     Entry("damped_bed", "interface", "theta_c_rad", 1e-4, 9e-4, kind="near"),
     Entry("slippery_base", "contact", "friction_share", 0.99, 0.9, kind="near"),
