@@ -15,9 +15,8 @@ from matplotlib.figure import Figure
 from daq_app.campaign.pages import page_environment
 from daq_app.campaign.report.captioned import CaptionedFigure
 from daq_app.gap import report_figures as draw
-from daq_app.gap.core import CannotDiagnose, Diagnosis
+from daq_app.gap.core import Diagnosis
 from daq_app.gap.report_figures import ProbeMap
-from daq_app.gap.rocking_model.features.run_features import extract
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.traces import Trace, noted, traces
@@ -33,12 +32,11 @@ def write_report(result: Diagnosis, path: Path, runs: Sequence[GapRun] = ()) -> 
     """Write `path` (HTML) and the same page as PDF beside it; returns both. Raises `OSError`.
 
     `runs` are the recordings that were diagnosed: with them the page has measured against
-    simulated rotations, which the result's notes hold from then on, and the sensor map has the names of its
-    coefficients.
+    simulated rotations, which the result's notes hold from then on.
     """
     shown = traces(result, runs)
     result.notes["traces"] = noted(shown)
-    maps = draw.probe_maps(result, _meanings(runs))
+    maps = draw.probe_maps(result, _meanings())
     html = (
         page_environment("daq_app.gap")
         .get_template("gap.html")
@@ -64,23 +62,13 @@ def _causes(result: Diagnosis) -> tuple[str, ...]:
     return causes_in_words(asdict(cause) for cause in result.causes)
 
 
-def _meanings(runs: Sequence[GapRun]) -> dict[str, str]:
-    """What each parameter of a probe means; coefficients have the names of the first run's."""
-    meanings = {
+def _meanings() -> dict[str, str]:
+    """What each parameter of a probe means."""
+    return {
         probe.key(parameter): parameter.meaning
         for probe in rocking_library().probes
         for parameter in probe.parameters
     }
-    for run in runs:
-        try:
-            blocks = extract(run).blocks
-        except CannotDiagnose:
-            continue
-        for block in blocks:
-            for i, name in enumerate(block.names):
-                meanings[f"free_{block.family}.c{i}"] = f"{block.family}: {name}"
-        break
-    return meanings
 
 
 def _pictures(result: Diagnosis, shown: Sequence[Trace], maps: Sequence[ProbeMap]) -> Mapping[str, str]:

@@ -17,7 +17,7 @@ from daq_app.gap.traces import Trace
 BEFORE, AFTER, MEASURED = "#8fa6bf", "#c8442e", "#1c232b"
 _PHASES: Final = ("held", "release", "swing", "peak", "impact", "tail", "run", "rest")
 _KNOT: Final = re.compile(r"^(.*?) at ([\d.]+) (.+)$")
-_MOST_SENSOR_ROWS: Final = 7
+_MOST_BARS: Final = 7
 
 Shape = Mapping[str, tuple[float, float, float]]
 
@@ -173,7 +173,7 @@ class ProbeMap:
 
     def _draw_bars(self, axes: Axes) -> None:
         rows = sorted(self.bars, key=lambda bar: abs(bar[1]) / max(bar[3] - bar[2], 1e-12))
-        rows = rows[-_MOST_SENSOR_ROWS:]
+        rows = rows[-_MOST_BARS:]
         values = np.array([row[1] for row in rows])
         errors = np.abs([[row[1] - row[2] for row in rows], [row[3] - row[1] for row in rows]])
         axes.barh(range(len(rows)), values, color=BEFORE, xerr=errors, error_kw={"lw": 0.7, "capsize": 1.5})
@@ -185,6 +185,7 @@ class ProbeMap:
 _MAPS: Final[dict[str, tuple[str, str, float]]] = {
     "free_restitution": ("loss–velocity", "change of r", 1.0),
     "free_restoring": ("moment–rotation: time gained", "ms", 1e3),
+    "free_geometry": ("moment–rotation, side against side: time gained", "ms", 1e3),
     "free_dissipation": ("loss in swings: fall later by", "ms", 1e3),
 }
 
@@ -192,13 +193,12 @@ _MAPS: Final[dict[str, tuple[str, str, float]]] = {
 def probe_maps(
     result: Diagnosis, meanings: Mapping[str, str], units: Mapping[str, str] | None = None
 ) -> list[ProbeMap]:
-    """The maps of the free forms: r(v), restoring moment, loss, and one map over all sensor coefficients.
+    """The maps of the free forms: r(v), restoring moment, loss, and those of other models.
 
     `meanings`: probe parameter → its meaning; ``X at 0.15 α`` makes a curve. `units` go over the
     units of probes that are not known here.
     """
     maps: list[ProbeMap] = []
-    sensors: dict[str, tuple[float, float, float]] = {}
     for name, shape in result.probe_shapes.items():
         if not shape:
             continue
@@ -206,14 +206,10 @@ def probe_maps(
             title, unit, factor = _MAPS[name]
             scaled = {key: (factor * a, factor * b, factor * c) for key, (a, b, c) in shape.items()}
             maps.append(ProbeMap(title, scaled, meanings, unit))
-        elif any(_KNOT.match(meanings.get(key, "")) for key in shape):
-            maps.append(ProbeMap(name, shape, meanings, (units or {}).get(name, "")))
         else:
-            sensors.update(shape)
+            maps.append(ProbeMap(name, shape, meanings, (units or {}).get(name, "")))
     order = list(_MAPS)
     maps.sort(key=lambda m: next((i for i, k in enumerate(order) if _MAPS[k][0] == m.title), len(order)))
-    if sensors:
-        maps.append(ProbeMap("sensor map: free coefficients", sensors, meanings, "3 × repeatability"))
     return maps
 
 

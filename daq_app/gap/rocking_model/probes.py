@@ -7,17 +7,17 @@ from dataclasses import replace
 
 from daq_app.gap.core import Confusion, Effect, Parameter
 from daq_app.gap.core.parameters import signed
-from daq_app.gap.rocking_model.features.families import sensor_families
 from daq_app.gap.rocking_model.prediction.vector import PROBE_SPEEDS
 
 _LAWS = ("restitution_slope",)
+_SIDES = ("alpha_asymmetry", "base_tilt", "eccentric_mass")
 _LOSSES = ("viscous", "coulomb")
 _MORE_SPEEDS = "release from lower and from higher levels: how r goes with the speed shows there"
 _MORE_ROTATIONS = "release from lower and from higher levels: how the loss grows with θ shows there"
 
 
 def probes() -> Iterable[Effect]:
-    """One free form or more for each family that has one."""
+    """The free form of each family that has one."""
     knots = tuple(signed(f"k{i}", 0.04, "1", f"change of r at {v} rad/s") for i, v in enumerate(PROBE_SPEEDS))
     more = (signed("side", 0.02, "1", "left against right"), signed("order", 0.02, "1", "per ten impacts"))
     form = "r = r₀ + f(v) + s·side + c·n, f piecewise linear"
@@ -29,13 +29,10 @@ def probes() -> Iterable[Effect]:
     yield _probe(
         "free_restoring", "interface", up_and_down, "half-cycle times + f(peak), the same up and down"
     )
+    yield _probe("free_geometry", "geometry", up_and_down, "half-cycle times ± f(peak) by side")
     lost = tuple(signed(f"t{i}", 0.005, "s", text, linear=True) for i, text in enumerate(places[:6]))
     form = "times of the fall + f(peak), of the rise − f(peak)"
     yield _probe("free_dissipation", "dissipation", lost, form, _LOSSES, _MORE_ROTATIONS)
-    free = {block: form for family in sensor_families() for block, form in family.probes.items()}
-    for family, (kind, count) in free.items():
-        shape = tuple(signed(f"c{i}", 40.0, "1", f"coefficient {i}", linear=True) for i in range(count))
-        yield _probe(f"free_{family}", kind, shape, f"every coefficient of the {family} family is free")
 
 
 def _probe(
@@ -67,6 +64,9 @@ def departures() -> Iterable[Effect]:
     yield _departure("loss_power", "dissipation", ("viscous",), steeper, 0.6, words)
     growth, side = signed("zeta", 0.02, "1"), signed("zeta", 0.02, "1")
     yield _departure("loss_growth", "dissipation", _LOSSES, growth, 0.6, "loss + damping that grows as ln φ")
+    radius = signed("rho", 0.05, "m")
+    words = "edges round to different radii: α of either side changes with its rotation"
+    yield _departure("uneven_edges", "geometry", _SIDES, radius, 1.0, words)
     words = "loss + damping of either side's own, ± ζ"
     yield _departure("loss_side", "dissipation", _LOSSES, side, 1.2, words)
 

@@ -6,6 +6,7 @@ import dataclasses
 import json
 import sys
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ from daq_app.gap.blind.world.effects.contact_catalogue import (
 from daq_app.gap.blind.world.events.mechanics import Effects, Release, build
 from daq_app.gap.blind.world.events.motion import Motion, integrate
 from daq_app.gap.blind.world.events.scene import stage
+from daq_app.gap.blind.world.laboratories.numerics import Numerics
 from daq_app.gap.blind.world.sensors.chain import Place, quiet_signals
 from daq_app.gap.blind.world.wall import Wall
 
@@ -106,9 +108,13 @@ def test_the_first_fall_on_another_edge_is_that_of_its_lever_arm(wall: Wall, eff
     assert -contact.impacts[0].before == pytest.approx(-events.impacts[0].before, rel=2e-3)
 
 
-def test_a_bed_sinks_under_the_weight_and_stands_again(wall: Wall) -> None:
+@pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
+def test_a_bed_sinks_under_the_weight_and_stands_again(
+    wall: Wall, cone: Literal["elliptic", "pyramidal"]
+) -> None:
     softness = 5e-4
-    contact = rock(wall, {"damped_bed": {"theta_c_rad": softness}}, Release(THETA0, 0.0, 2.0, 5))
+    bed = {"damped_bed": {"theta_c_rad": softness}}
+    contact = rock(wall, bed, Release(THETA0, 0.0, 2.0, 5), Numerics(cone=cone))
     assert contact.upright[1] == pytest.approx(-softness * wall.half_width, rel=1e-3)  # m g / k
     assert contact.states[:3, -1] == pytest.approx(contact.upright, abs=1e-4)
 
@@ -184,6 +190,16 @@ def _case(rig: Rig, rig_text: str, folder: Path, effects: tuple[Drawn, ...]) -> 
     world: World = draw_world(rig, effects, 4, np.random.default_rng(6), "contact")
     write_case(folder, "case", world, rig_text, 0)
     return folder
+
+
+@pytest.mark.heavy
+def test_one_round_edge_is_no_pair_of_unequal_edges(rig: Rig, configs: Path, tmp_path: Path) -> None:
+    rig_text = (configs / "fr1.toml").read_text(encoding="utf-8")
+    worn = Drawn("one_round_edge", "interface", "near", {"rho_m": 0.03}, (), 0.5)
+    result = product(_case(rig, rig_text, tmp_path, (worn,)))
+    assert result["which"][0]["effects"] != ["alpha_asymmetry"]
+    assert result["decision"] == "none_of_these"
+    assert result["decision_detail"]["family"] == "geometry"
 
 
 @pytest.mark.heavy

@@ -53,6 +53,19 @@ def test_a_coefficient_that_may_only_be_negative_gains_nothing_where_it_would_be
     assert gains[1] > 5.0
 
 
+def test_an_effect_is_screened_beside_a_cause_from_where_it_led_on_nothing() -> None:
+    runs = make_runs(1, slope_k=0.05)
+    found = fit(DecayModel(), runs)
+    base = Base(Experiment.of(DecayModel(), runs), (), found, found.columns)
+    free = base.screened(LIBRARY["slope"])
+    begun = base.screened(LIBRARY["slope"], free.starts)
+    assert 1 <= len(free.starts) <= 2
+    assert begun.robust.gain == pytest.approx(free.robust.gain, rel=1e-12)
+    assert begun.strict.gain == pytest.approx(free.strict.gain, rel=1e-12)
+    elsewhere = base.screened(LIBRARY["slope"], [free.starts[0] + 1.0])
+    assert elsewhere.starts[0] == pytest.approx(free.starts[0] + 1.0)
+
+
 def test_what_chance_gives_is_no_gain() -> None:
     form = FreeForm.of(BEND, Score(4.0, 1.0))
     assert form.p_value == pytest.approx(0.004678, rel=1e-3), "χ² of 8 with one degree of freedom"

@@ -12,7 +12,7 @@ from daq_app.gap.core.judging.hypotheses import Hypotheses
 from daq_app.gap.core.judging.other_forms import FreeForm
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.library import rocking_library
-from daq_app.gap.rocking_model.prediction.free_forms import with_uneven_loss
+from daq_app.gap.rocking_model.prediction.free_forms import with_uneven_edges, with_uneven_loss
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.prediction.vector import half_cycle_table, kernel_vector, restitution_of
 from daq_app.gap.rocking_model.study import prepare
@@ -71,6 +71,59 @@ def test_a_loss_of_either_side_is_damping_on_one_and_a_push_on_the_other(run: Ro
     grown = with_uneven_loss(run, {"loss_growth.zeta": 1e-3}, vector, true, levels, plain) - plain
     share = np.log(np.abs(true) / (0.1 * run.survey.alpha_rad))
     np.testing.assert_allclose(grown, share[:, None] * known, rtol=0.03, atol=1e-8)
+
+
+def test_no_hypothesis_makes_the_scatter_of_r_look_smaller(run: RockingRun) -> None:
+    """A peak tells r by the survey's slope: one that grew with α would pull α and the pivots along."""
+    model = RockingModel(run.survey)
+    values = {p.name: p.mean for p in (*model.nuisance, *model.local_nuisance(run))}
+    further_in = {**values, "half_base": values["half_base"] + 0.01, "pivot_shift.a": 0.01}
+    further_in["alpha"] += 0.01 / values["half_base"] * values["alpha"]
+    one, other = (model.predict(run, v).loadings["scatter of r"] for v in (values, further_in))
+    assert np.count_nonzero(one) == run.peaks.size
+    np.testing.assert_array_equal(one, other)
+    # ω²/2p² = cos(α − φ) − cos α, by differences.
+    peaks, alpha = np.abs(run.swings.peak_rad[run.peaks]), run.survey.alpha_rad
+    height = [np.cos(alpha - share * peaks) - np.cos(alpha) for share in (0.999, 1.001)]
+    slopes = 0.5 * np.log(height[1] / height[0]) / np.log(1.001 / 0.999)
+    np.testing.assert_allclose(1.0 / one[one != 0.0], slopes, rtol=1e-4)
+
+
+def test_uneven_edges_roll_on_one_side_and_bite_on_the_other(run: RockingRun) -> None:
+    values = {
+        p.name: p.mean
+        for p in (*RockingModel(run.survey).nuisance, *RockingModel(run.survey).local_nuisance(run))
+    }
+    vector = kernel_vector(run, values)
+    true, levels = run.swings.peak_rad, run.swings.levels
+    plain = half_cycle_table(run, vector, true, levels)
+    rolling = vector.copy()
+    rolling[par.EDGE_RADIUS] = 5e-4
+    known = half_cycle_table(run, rolling, true, levels) - plain
+    found = with_uneven_edges(run, {"uneven_edges.rho": 5e-4}, vector, true, levels, plain) - plain
+    np.testing.assert_allclose(found[true > 0], known[true > 0], rtol=0.03, atol=1e-8)
+    np.testing.assert_allclose(found[true < 0], -known[true < 0], rtol=0.03, atol=1e-8)
+    place = next(k for k, block in enumerate(run.blocks) if block.family == "joint")
+    names = run.blocks[place].names
+    model, own = RockingModel(run.survey), {}
+    for radius in (0.0, 0.01):
+        features = model.predict(run, {**values, "uneven_edges.rho": radius}).features
+        own[radius] = features[-sum(len(block.names) for block in run.blocks) :]
+    first = sum(len(block.names) for block in run.blocks[:place])
+    moved = (own[0.01] - own[0.0])[first : first + len(names)]
+    told = dict(zip(names, moved, strict=True))
+    assert told["pivot left against right"] == pytest.approx(-0.01, rel=0.01)
+    assert told["pivot with rotation, left against right"] == pytest.approx(0.005, rel=0.01)
+    assert abs(told["pivot"]) < 1e-4
+
+
+def test_unequal_edges_do_not_depart_from_themselves() -> None:
+    forms = {
+        form.name: form for form in forms_on_top({"alpha_asymmetry": {"delta": 0.004}}, "alpha_asymmetry")
+    }
+    assert forms["uneven_edges"].excess < 2.0
+    assert forms["uneven_edges"].log_bayes < 1.0
+    assert forms["free_geometry"].excess < 2.0
 
 
 def test_a_curvature_of_r_is_neither_a_level_nor_a_slope_of_it(run: RockingRun) -> None:

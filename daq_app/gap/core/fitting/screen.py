@@ -50,6 +50,8 @@ class Screened:
     """With next to no discrepancy: a fault that a group's discrepancy has swallowed shows here."""
     sd: tuple[float, ...]
     """Posterior sd of the effect's shared parameters in unit coordinates, with the fit's discrepancy."""
+    starts: tuple[FloatArray, ...]
+    """Unit coordinates of the effect's unknowns from which these steps begin."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,14 +85,14 @@ class Base:
         nominal = Sizes.nominal(experiment).discrepancy
         self.strict = self.robust.under(Sizes(found.sizes.log_scatter, nominal))
 
-    def screened(self, effect: Effect) -> Screened:
-        """The best step from any start of the effect."""
+    def screened(self, effect: Effect, begin: Sequence[FloatArray] = ()) -> Screened:
+        """The best step from any start of the effect, or from those of its unknowns at `begin`."""
         problem = Problem(self.experiment, (*self.effects, effect))
         base = problem.start(dict(zip(_keys(self.problem), self.u.tolist(), strict=True)))
         known = set(_keys(self.problem))
         robust: list[tuple[Step, _Attached]] = []
         strict: list[tuple[Step, _Attached]] = []
-        for u in starts(problem, base, dict.fromkeys(known, 0.0)):
+        for u in _begun(problem, base, effect, begin) or starts(problem, base, dict.fromkeys(known, 0.0)):
             lines = [problem.linearise(i, u, None, self.columns, False) for i in range(len(problem.runs))]
             if not all(np.all(np.isfinite(line.residual)) for line in lines):
                 continue  # the model diverges there
@@ -101,7 +103,9 @@ class Base:
         shared = [k for k, q in enumerate(first[1].unknowns) if problem.unknowns[q].run is None]
         spread = np.sqrt(np.diag(np.linalg.inv(first[1].own)))[shared]
         second = max(strict, key=lambda entry: entry[0].gain)
-        return Screened(effect.name, first[0], second[0], tuple(float(v) for v in spread))
+        begun = (first[1].start, second[1].start)
+        apart = begun if np.any(begun[0] != begun[1]) else begun[:1]
+        return Screened(effect.name, first[0], second[0], tuple(float(v) for v in spread), apart)
 
     def score(self, form: Effect) -> Score:
         """Score test of a form, with the fit's discrepancy.
@@ -127,6 +131,17 @@ class Base:
         information = max(float(own[0, 0]) - 1.0, 1e-12)  # the prior has a weight of one
         unit = problem.unknowns[attached.unknowns[0]].parameter.sd
         return Score(gain, determined, -unit * float(slope[0]) / information, unit / math.sqrt(information))
+
+
+def _begun(
+    problem: Problem, base: FloatArray, effect: Effect, begin: Sequence[FloatArray]
+) -> list[FloatArray]:
+    """Vectors of unknowns with those of an effect at each of some coordinates."""
+    own = [k for k, q in enumerate(problem.unknowns) if q.effect == effect.name]
+    vectors = [base.copy() for _ in begin]
+    for u, coordinates in zip(vectors, begin, strict=True):
+        u[own] = coordinates
+    return vectors
 
 
 def _keys(problem: Problem) -> list[tuple[str, int | None]]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from daq_app.gap.core.effects import Effect
+from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.fitting.experiment import Experiment
 from daq_app.gap.core.fitting.fit import Fit, fitted
 from daq_app.gap.core.fitting.held_out import HeldOutRun, score
@@ -45,10 +46,12 @@ class ScreenTask:
     base: tuple[Effect, ...]
     found: Fit
     effects: tuple[Effect, ...]
+    begin: tuple[tuple[FloatArray, ...], ...]
+    """Coordinates from which each effect's steps begin; from all its starts where there are none."""
 
     def run(self, experiment: Experiment, frozen: Columns) -> list[Screened]:
         base = Base(experiment, self.base, self.found, {**frozen, **self.found.columns})
-        return [base.screened(effect) for effect in self.effects]
+        return [base.screened(*job) for job in zip(self.effects, self.begin, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)

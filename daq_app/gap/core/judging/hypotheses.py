@@ -132,11 +132,13 @@ class Hypotheses:
             self._keep(result)
 
     def _screened(self, base: Hypothesis, effects: Sequence[Effect], text: str) -> dict[str, Screened]:
+        """What effects promise on top of a hypothesis; beside causes, from the starts that led on nothing."""
         share = max(1, -(-len(effects) // (3 * self.options.workers)))
         named = effects_of(base, self.library)
+        begin = [self.alone[e.name].starts if e.name in self.alone else () for e in effects]
         tasks = [
-            ScreenTask(named, self.fits[base], part)
-            for part in (tuple(effects[k : k + share]) for k in range(0, len(effects), share))
+            ScreenTask(named, self.fits[base], tuple(effects[k : k + share]), tuple(begin[k : k + share]))
+            for k in range(0, len(effects), share)
         ]
         return {screened.effect: screened for part in self.workers.run(tasks, text) for screened in part}
 

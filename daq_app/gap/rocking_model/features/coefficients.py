@@ -53,8 +53,8 @@ def sizes() -> Mapping[tuple[str, str], Size]:
 def block_coefficients(run: RockingRun, values: Mapping[str, float]) -> FloatArray:
     """Predicted coefficients of all blocks of a run, (k,)."""
     predicted = [
-        run.cache.part(place, values, partial(_coefficients, run, block, unit))
-        for place, (block, unit) in enumerate(zip(run.blocks, units(run), strict=True))
+        run.cache.part(place, values, partial(_coefficients, run, block))
+        for place, block in enumerate(run.blocks)
     ]
     return np.concatenate(predicted) if predicted else np.zeros(0)
 
@@ -69,15 +69,12 @@ def units(run: RockingRun) -> list[FloatArray]:
     )
 
 
-def _coefficients(run: RockingRun, block: Block, unit: FloatArray, values: Mapping[str, float]) -> FloatArray:
+def _coefficients(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     coefficients = _rules()[block.rule](run, block, values)
     for i, name in _bias_names(block.family, block.names):
         coefficients[i] += values.get(name, 0.0)
     for name, loading in block.systematic.items():
         coefficients = coefficients + values.get(name, 0.0) * loading
-    if f"free_{block.family}.c0" in values:
-        free = [values.get(f"free_{block.family}.c{i}", 0.0) for i in range(unit.size)]
-        coefficients = coefficients + 3.0 * unit * np.array(free)
     return coefficients
 
 

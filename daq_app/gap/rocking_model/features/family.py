@@ -94,12 +94,10 @@ class SensorFamily:
     """One sensor family in the diagnosis.
 
     `observe`: blocks of a run. `predict`: by the block's rule (`Block.rule`). `sizes`: by (block,
-    coefficient). `priors`: parameters of the sensors that all runs share. `probes`: by block, the effect
-    family of its free form and how many of its coefficients are free.
+    coefficient). `priors`: parameters of the sensors that all runs share.
     """
 
     observe: Callable[[Scene], Iterable[Block | None]]
     predict: Mapping[str, Predict]
     sizes: Mapping[tuple[str, str], Size] = field(default_factory=dict)
     priors: Callable[[Survey], tuple[Parameter, ...]] = lambda survey: ()
-    probes: Mapping[str, tuple[str, int]] = field(default_factory=dict)

@@ -45,22 +45,25 @@ def slip_shape(grid: Grid) -> FloatArray:
     return shape
 
 
-def with_play(values: FloatArray, play: float) -> FloatArray:
-    """What is read of values (m,) through a play in their unit, from the middle of it on.
+def with_play(values: FloatArray, plays: FloatArray) -> FloatArray:
+    """What is read of values (m,) through each of some plays (k,) in their unit, (k, m).
 
-    The reading stays where they turn back until the play is taken up, and follows half of it behind.
+    From the middle of a play on: the reading stays where the values turn back until the play is taken up,
+    and follows half of it behind.
     """
-    half, held = 0.5 * play, float(values[0])
-    shown = np.empty_like(values)
-    for k, value in enumerate(values.tolist()):
-        held = min(max(held, value - half), value + half)
-        shown[k] = held
-    return shown
+    low, high = values[:, None] - 0.5 * plays, values[:, None] + 0.5 * plays
+    shown, held = np.empty_like(low), np.full(plays.size, values[0])
+    for row, lowest, highest in zip(shown, low, high, strict=True):
+        np.maximum(held, lowest, out=row)
+        np.minimum(row, highest, out=row)
+        held = row
+    return shown.T
 
 
 def play_shape(theta: FloatArray) -> FloatArray:
     """What a small play adds to a reading of the rotation, (m,), over that play: −½ … ½."""
-    return (with_play(theta, PLAY_RAD) - theta) / PLAY_RAD
+    shape: FloatArray = (with_play(theta, np.array([PLAY_RAD]))[0] - theta) / PLAY_RAD
+    return shape
 
 
 def turned_shape(grid: Grid, *, alternating: bool) -> FloatArray:

@@ -66,8 +66,8 @@ def _play(data: ChannelFamily, name: str, without: tuple[str, ...]) -> _Play:
     left = beyond(other.measured - e)
     power = max(float(left @ left), 1e-300)
     best = _Play(0.0, PLAY_M, 0.0)
-    for size in _PLAYS_M.tolist():
-        shape = beyond(with_play(e, size) - e)
+    for size, shown in zip(_PLAYS_M.tolist(), with_play(e, _PLAYS_M), strict=True):
+        shape = beyond(shown - e)
         square = max(float(shape @ shape), 1e-300)
         share = float(shape @ left) / square
         explained = share**2 * square / power if share > 0.0 else 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,39 +16,57 @@ from sim_hardware.dynamics import parameters as par
 _MIDDLE = 0.1
 """Peak, as a share of α, whose damping a growth with the amplitude leaves as it is."""
 _ZETA_STEP = 1e-4
+_RADIUS_STEP_M = 1e-3
+_FREE_TIMES = {"free_restoring": "alike", "free_dissipation": "way", "free_geometry": "side"}
+"""How the times of a free form go with the half-cycle, by its name."""
 
 
 def free_times(run: RockingRun, values: Mapping[str, float]) -> FloatArray | float:
     """Free forms of the probes: time features as piecewise linear functions of the peak."""
-    restoring, loss = "free_restoring.t0" in values, "free_dissipation.t0" in values
-    if not (restoring or loss):
+    forms = [form for form in _FREE_TIMES if f"{form}.t0" in values]
+    if not forms:
         return 0.0
     total = np.zeros(len(run.places))
-    kind, low, share, direction = run.cache.constant("free basis", lambda: _free_basis(run))
-    if restoring:
-        knots = np.array([values[f"free_restoring.t{i}"] for i in range(9)])
-        first = knots[3 * kind + low]
-        total += first + (knots[3 * kind + low + 1] - first) * share
-    if loss:
-        knots = np.array([values[f"free_dissipation.t{i}"] for i in range(6)] + [0.0] * 3)
-        first = knots[3 * kind + low]
-        total += direction * (first + (knots[3 * kind + low + 1] - first) * share)
+    basis = run.cache.constant("free basis", lambda: _free_basis(run))
+    for form in forms:
+        knots = np.array([values.get(f"{form}.t{i}", 0.0) for i in range(9)])
+        first = knots[3 * basis.kind + basis.low]
+        at_peak = first + (knots[3 * basis.kind + basis.low + 1] - first) * basis.share
+        total += at_peak * getattr(basis, _FREE_TIMES[form])
     return total
 
 
-def _free_basis(run: RockingRun) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray, FloatArray]:
-    """Per time feature: part of the half-cycle (upper, lower, turning), knot, share, fall or rise."""
+@dataclass(frozen=True, slots=True)
+class _FreeBasis:
+    """Where on a free form each time feature is, (T,) each."""
+
+    kind: NDArray[np.intp]
+    """Part of the half-cycle: upper, lower, turning."""
+    low: NDArray[np.intp]
+    """Knot below the peak."""
+    share: FloatArray
+    """Of the way to the next knot."""
+    alike: FloatArray
+    """1: the same up and down."""
+    way: FloatArray
+    """1 in a fall, −1 in a rise, 0 over the top and across an impact."""
+    side: FloatArray
+    """1 at x > 0, −1 at x < 0, 0 across an impact."""
+
+
+def _free_basis(run: RockingRun) -> _FreeBasis:
     count = run.swings.levels.shape[1]
     ka, a, kb, b = run.places.T
     falls = (a < count) & (b < count)
     turning = (ka != kb) | ((a >= count) & (b < count))
     nearer = np.where(falls, b, a - count)
     kind = np.where(turning, 2, np.clip(nearer, 1, 2) - 1)
-    size = np.abs(run.swings.peak_rad[ka]) / run.survey.alpha_rad
-    place = np.interp(size, (0.0, 0.15, 0.4), (0.0, 1.0, 2.0))
+    peaks = run.swings.peak_rad[ka]
+    place = np.interp(np.abs(peaks) / run.survey.alpha_rad, (0.0, 0.15, 0.4), (0.0, 1.0, 2.0))
     low = np.minimum(place.astype(int), 1)
-    direction = np.where(turning, 0.0, np.where(falls, 1.0, -1.0))
-    return kind, low, place - low, direction
+    way = np.where(turning, 0.0, np.where(falls, 1.0, -1.0))
+    side = np.where(ka == kb, np.sign(peaks), 0.0)
+    return _FreeBasis(kind, low, place - low, np.ones(way.size), way, side)
 
 
 def with_uneven_loss(
@@ -72,4 +91,26 @@ def with_uneven_loss(
     behind[par.ZETA] -= _ZETA_STEP
     damped_more, damped_less = (half_cycle_table(run, v, true, levels) for v in (ahead, behind))
     moved: FloatArray = table + zeta[:, None] * (damped_more - damped_less) / (2.0 * _ZETA_STEP)
+    return moved
+
+
+def with_uneven_edges(
+    run: RockingRun,
+    values: Mapping[str, float],
+    vector: FloatArray,
+    true: FloatArray,
+    levels: FloatArray,
+    table: FloatArray,
+) -> FloatArray:
+    """The table of half-cycles, (n, 5 + 2F), with edges that are not equally sharp.
+
+    To first order: the edge at x > 0 is round to a radius and the other is as much sharper.
+    """
+    radius = values.get("uneven_edges.rho", 0.0)
+    if radius == 0.0:
+        return table
+    rounder = vector.copy()
+    rounder[par.EDGE_RADIUS] += _RADIUS_STEP_M
+    rolling = half_cycle_table(run, rounder, true, levels)
+    moved: FloatArray = table + np.sign(true)[:, None] * (rolling - table) * (radius / _RADIUS_STEP_M)
     return moved

@@ -14,7 +14,11 @@ from daq_app.gap.rocking_model.features.coefficients import block_coefficients, 
 from daq_app.gap.rocking_model.features.families.lvdts import FACE_SKEW
 from daq_app.gap.rocking_model.features.oscillations.floor_response import with_measured_inputs
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.prediction.free_forms import free_times, with_uneven_loss
+from daq_app.gap.rocking_model.prediction.free_forms import (
+    free_times,
+    with_uneven_edges,
+    with_uneven_loss,
+)
 from daq_app.gap.rocking_model.prediction.true_motion import pause_at_impact, true_rotations
 from daq_app.gap.rocking_model.prediction.vector import half_cycle_table, kernel_vector, restitution_of
 from daq_app.gap.rocking_model.prediction.wires_alone import times_carry
@@ -127,6 +131,7 @@ class RockingModel:
         # r and what else acts at impacts only moves none of the half-cycles.
         vector, true, levels, table = run.cache.part("half-cycles", values, partial(_half_cycles, run))
         table = with_uneven_loss(run, values, vector, true, levels, table)
+        table = with_uneven_edges(run, values, vector, true, levels, table)
         count = levels.shape[1]
         first = shooting.FIRST_CROSSING
         speeds_out, speeds_in = table[:, shooting.SPEED_OUT], table[:, shooting.SPEED_IN]
@@ -151,9 +156,7 @@ class RockingModel:
             - np.log(np.maximum(speeds_out[before], 1e-12))
             - np.log(r)
         )
-        size = np.abs(true[k])
-        stiffness = vector[1] ** 2 * np.sin(np.maximum(vector[0] - size, 0.01))
-        slopes = size * stiffness / np.maximum(speeds_in[k], 1e-9) ** 2
+        slopes = run.cache.constant("slopes", partial(_slopes, run))
         measured = np.log(np.abs(run.swings.peak_rad[k]))
         return times, measured - excess / slopes, slopes
 
@@ -164,6 +167,18 @@ def _crossings_of(run: RockingRun) -> tuple[NDArray[np.intp], NDArray[np.intp], 
     first, a, second, b = run.places.T
     width = 2 * run.swings.levels.shape[1]
     return first * width + a, second * width + b, first[run.across]
+
+
+def _slopes(run: RockingRun) -> FloatArray:
+    """d ln speed / d ln peak of the peaks after impacts, (P,), of the block of the survey.
+
+    The same under every hypothesis: a slope that grew with α would make what r scatters by look smaller, and
+    pull α and the pivots with it.
+    """
+    alpha, size = run.survey.alpha_rad, np.abs(run.swings.peak_rad[run.peaks])
+    fallen = np.cos(np.maximum(alpha - size, 0.0)) - np.cos(alpha)
+    slopes: FloatArray = 0.5 * size * np.sin(np.maximum(alpha - size, 0.01)) / fallen
+    return slopes
 
 
 def _half_cycles(

@@ -131,5 +131,4 @@ FAMILY = SensorFamily(
         ("swing timing", "delay"): Size(1e-4, 2e-4, "s"),
     },
     _priors,
-    probes={"accelerometer": ("sensor", 2)},
 )

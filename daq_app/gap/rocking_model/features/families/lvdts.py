@@ -36,6 +36,7 @@ def _lift_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_
         "pivot": (size, "m"),
         "pivot left against right": (grid.theta, "m"),
         "pivot with rotation": (size**2, "m/rad"),
+        "pivot with rotation, left against right": (size * grid.theta, "m/rad"),
         "contact length": (np.sqrt(size), "m"),
         "drift": (grid.time_s, "m/s"),
     }
@@ -66,6 +67,7 @@ def _predict_joint(run: RockingRun, block: Block, values: Mapping[str, float]) -
         (inwards, "size", lambda: size),
         (apart, "theta", lambda: theta),
         (curved, "square", lambda: size**2),
+        (0.5 * values.get("uneven_edges.rho", 0.0), "lopsided square", lambda: size * theta),
         # The opening is told against |θ|, whose zero is where the wall came to rest: a wall that rests a
         # hundredth of a milliradian off upright makes a step from side to side of it.
         (-values["half_base"] * values["zero"], "sides", lambda: np.sign(theta)),
@@ -141,10 +143,10 @@ FAMILY = SensorFamily(
         ("joint", "pivot"): Size(3e-4),
         ("joint", "pivot left against right"): Size(5e-5, 3e-4, "m"),
         ("joint", "pivot with rotation"): Size(5e-3),
+        ("joint", "pivot with rotation, left against right"): Size(1e-3, 2e-3, "m/rad"),
         ("joint", "contact length"): Size(5e-5, 3e-5, "m"),
         ("joint", "drift"): Size(1e-6, 2e-6, "m/s"),
         ("twist", "follows rotation"): Size(1.5e-4),
     },
     _priors,
-    {"joint": ("interface", 5)},
 )

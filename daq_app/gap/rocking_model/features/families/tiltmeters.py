@@ -151,5 +151,4 @@ FAMILY = SensorFamily(
         ("tiltmeter", "drift"): Size(2e-6, 6e-6, "rad/s"),
     },
     _priors,
-    probes={"tiltmeter": ("sensor", 3)},
 )

@@ -247,5 +247,4 @@ FAMILY = SensorFamily(
         **{("turn", f"impact {k + 1}"): Size(_TURN_SCATTER_S) for k in range(_TURNS)},
     },
     _priors,
-    {"wire": ("sensor", 5), "base": ("contact", 2), "turn": ("structure", _TURNS)},
 )
