@@ -102,8 +102,8 @@ class Policy:
     that is as likely another form as not ..."""
     form_share: float = 0.02
     """... or this share of what is explained, whichever is more; no effect's model is better. In development
-    laboratories right answers gain 3.8 at most, other forms 6 or more; the friction of a real drive leaves
-    its right answer between 0.01 and 0.02 of what it explains. Raising either names a law that is only near."""
+    laboratories right answers gain 3.8 at most, other forms 6 or more; the right answer for a real drive is
+    left 0.01 to 0.02 of what it explains. Raising either names a law that is only near."""
     own_form: float = 0.05
     """Departure from its own form, as a share of another form's, that our model of an effect may have."""
     listed: float = 0.05
