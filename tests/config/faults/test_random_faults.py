@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from daq_app.config import ConfigError, parse_rig, plan_tasks
 
-_CONFIGS = Path(__file__).parents[2] / "configs"
+_CONFIGS = Path(__file__).parents[3] / "configs"
 _NAMES = ("fr1", "fr1-iepe", "fr1-pxie")
 _VALUES = st.one_of(
     st.none(),

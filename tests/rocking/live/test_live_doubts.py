@@ -16,7 +16,7 @@ from studies.restitution.laboratory import LaboratoryTest, draw_test
 from studies.restitution.live import live_estimates, round_edges, slowly_released
 from studies.restitution.walls import Wall, ringing_test
 
-RIG = load_rig(Path(__file__).parents[2] / "configs" / "fr1.toml")
+RIG = load_rig(Path(__file__).parents[3] / "configs" / "fr1.toml")
 RINGING_SEED = 91001
 """Wires ring at 7 Hz; by their half-cycles alone impacts would seem to take time."""
 
