@@ -137,6 +137,17 @@ def test_soft_joints_tend_to_the_rigid_one(wall: Wall, make: object) -> None:
     assert joint.arm(0.03, 1) == pytest.approx(rigid(wall).arm(0.03, 1), rel=1e-4)
 
 
+def test_a_solver_may_try_any_step_on_a_joint_with_a_loop(wall: Wall) -> None:
+    """An implicit one tries steps beyond upright, by thousands of the rotation in which the loop fades."""
+    loop = {"hysteretic_joint": {"theta_h_rad": 1e-4, "share": 0.05}}
+    mechanics = build(wall, loop, Release(THETA0, 0.0, 2.0, 5))
+    assert math.isfinite(mechanics.acceleration(0.1, -0.2, 0.0, 1))
+    plain = build(wall, {}, Release(THETA0, 0.0, 2.0, 5))
+    gained = [m.acceleration(0.1, 1e-4, 0.0, 1) for m in (mechanics, plain)]
+    level = 0.05 * wall.p**2 * wall.alpha
+    assert gained[0] - gained[1] == pytest.approx(-level * mechanics.heading * math.exp(-1.0))
+
+
 def test_wear_adds_up_over_impacts_and_runs(wall: Wall) -> None:
     release = Release(THETA0, 0.0, 2.0, 5, 1, impacts_before=50)
     worn = build(wall, {"crushing": {"loss_per_100": 0.02}}, release)

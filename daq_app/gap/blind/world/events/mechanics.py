@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from daq_app.gap.blind.world.wall import GRAVITY_M_S2, Wall
 Effects = Mapping[str, Parameters]
 Term = Callable[[float, float, float, int], float]
 """(time after release, θ, ω, side) → angular acceleration, rad/s²."""
+_FAR: Final = 50.0
+"""Logarithm of a moment that no wall has."""
 ImpactTerm = Callable[["Impact"], float]
 """Change of the restitution at an impact."""
 
@@ -145,7 +148,8 @@ def _hysteretic_joint(m: Mechanics, q: Parameters, release: Release) -> None:
     level = q["share"] * m.wall.p**2 * m.wall.alpha
 
     def loop(t: float, theta: float, omega: float, side: int) -> float:
-        return -level * m.heading * math.exp(-side * theta / width)
+        # An implicit solver tries steps far beyond upright, where nothing is ever used.
+        return -level * m.heading * math.exp(min(-side * theta / width, _FAR))
 
     m.terms.append(loop)
 
