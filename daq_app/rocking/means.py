@@ -1,4 +1,4 @@
-"""Means and medians of short rows: what NumPy gives, to the last digit, at a part of its cost."""
+"""Means and medians of short rows at a part of what NumPy's cost."""
 
 from __future__ import annotations
 
@@ -9,8 +9,18 @@ Floats = NDArray[np.float64]
 
 
 def row_means(values: Floats) -> Floats:
-    """(…) means over the last axis of (…, n); `ndarray.mean` costs three times as much where n is small."""
+    """(…) means over the last axis of (…, n), to the last digit as `ndarray.mean` gives them.
+
+    That costs three times as much where n is small.
+    """
     return np.asarray(np.add.reduce(values, axis=-1) / values.shape[-1])
+
+
+def block_means(rows: Floats, size: int) -> Floats:
+    """(k, n // size) means over blocks of `size` samples of rows (k, n), what is left over left out."""
+    count = rows.shape[1] // size
+    blocks = rows[:, : count * size].reshape(rows.shape[0], count, size)
+    return np.asarray(blocks @ np.full(size, 1.0 / size))
 
 
 def mean_of(values: Floats) -> float:

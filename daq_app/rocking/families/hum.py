@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.rocking.means import block_means
+
 Floats = NDArray[np.float64]
 
 _BANDS_HZ = ((49.0, 51.0), (59.0, 61.0))
@@ -72,10 +74,8 @@ def find_hum(families: Sequence[Floats], noises: Sequence[float], rate_hz: float
 
 def _means(rows: Floats, size: int) -> Floats:
     """(channels, n // size) of rows (channels, n), what is unknown taken for zero."""
-    groups = rows[:, : rows.shape[1] // size * size].reshape(rows.shape[0], -1, size)
-    weights = np.full(size, 1.0 / size)
-    means = groups @ weights
-    return means if np.isfinite(means).all() else np.asarray(np.nan_to_num(groups) @ weights)
+    means = block_means(rows, size)
+    return means if np.isfinite(means).all() else block_means(np.nan_to_num(rows), size)
 
 
 def _clearest(windowed: Floats, length: int, rate_hz: float) -> tuple[float, float]:

@@ -34,7 +34,7 @@ from daq_app.rocking.families.single_wires import SingleWires, compare_wires
 from daq_app.rocking.families.treated import Corrections, held_in_memory, without_hum
 from daq_app.rocking.geometry.joint import BaseJoint
 from daq_app.rocking.geometry.kinematics import RotationGeometry
-from daq_app.rocking.means import median_of_few
+from daq_app.rocking.means import block_means, median_of_few
 from daq_app.rocking.motion.bending import Bending, find_bending
 from daq_app.rocking.motion.swings import REST_ZERO_SIGMA_RAD
 from daq_app.rocking.record import TestRecord
@@ -165,11 +165,7 @@ def _crude_rotations(record: TestRecord, size: int) -> dict[str, Floats]:
     """Rotation by family from means of `size` samples, linear, so that a wrong unit stays a factor."""
 
     def means(channel_ids: tuple[str, ...]) -> Floats:
-        rows = record.load(channel_ids)
-        count = rows.shape[1] // size
-        return np.asarray(
-            rows[:, : count * size].reshape(rows.shape[0], count, size) @ np.full(size, 1.0 / size)
-        )
+        return block_means(record.load(channel_ids), size)
 
     rotations: dict[str, Floats] = {}
     ids = record.family("wire")
