@@ -102,8 +102,9 @@ class Policy:
     that is as likely another form as not ..."""
     form_share: float = 0.02
     """... or this share of what is explained, whichever is more; no effect's model is better. In development
-    laboratories right answers gain 3.8 at most, other forms 6 or more; the right answer for a real drive is
-    left 0.01 to 0.02 of what it explains. Raising either names a law that is only near."""
+    laboratories a form gains 3.8 at most on right answers, and 6 or more where it shows another law; on the
+    right answer for a real drive it gains 0.01 to 0.02 of what that explains. Raising either names a law that
+    is only near."""
     own_form: float = 0.05
     """Departure from its own form, as a share of another form's, that our model of an effect may have."""
     listed: float = 0.05

@@ -145,9 +145,7 @@ class GapRun:
         """The run with all channels at the instants of the sample clock."""
         if not self.time_offset_s.size or not np.any(self.time_offset_s):
             return self
-        channels = np.empty_like(self.channels)
-        for i, row in enumerate(channels):
-            row[:] = self.aligned(i)
+        channels = np.array([self.aligned(i) for i in range(len(self.sensors))])
         return replace(self, channels=channels, time_offset_s=np.zeros(0))
 
     def including(self, ids: Sequence[str]) -> GapRun:
