@@ -51,8 +51,9 @@ def departures() -> Iterable[Effect]:
     """First steps away from the form of an effect, one coefficient each.
 
     A law with a power of the speed, v^n, differs from one that is linear in it by (n − 1) v ln v at first, a
-    curved one by the square; a damping that is not one number is asked as decrements show it, by amplitude
-    and by side. Priors are wide: on top of an effect only the direction counts.
+    curved one by the square. A damping that is not one number is asked as decrements show it, by amplitude
+    and by side; edges that are not alike by α of either side, which changes with the rotation. Priors are
+    wide: on top of an effect only the direction counts.
     """
     power = signed("c", 0.6, "1")
     yield _departure("slope_power", "restitution", _LAWS, power, 2.4, "r = r₀ + k v + c v ln v")
@@ -64,11 +65,12 @@ def departures() -> Iterable[Effect]:
     yield _departure("loss_power", "dissipation", ("viscous",), steeper, 0.6, words)
     growth, side = signed("zeta", 0.02, "1"), signed("zeta", 0.02, "1")
     yield _departure("loss_growth", "dissipation", _LOSSES, growth, 0.6, "loss + damping that grows as ln φ")
+    words = "loss + damping of either side's own, ± ζ"
+    yield _departure("loss_side", "dissipation", _LOSSES, side, 1.2, words)
+    # α differs by half the radius of one round edge over the height of the centroid, a metre or more.
     radius = signed("rho", 0.05, "m")
     words = "edges round to different radii: α of either side changes with its rotation"
     yield _departure("uneven_edges", "geometry", _SIDES, radius, 1.0, words)
-    words = "loss + damping of either side's own, ± ζ"
-    yield _departure("loss_side", "dissipation", _LOSSES, side, 1.2, words)
 
 
 def _departure(

@@ -12,9 +12,14 @@ from daq_app.gap.core.judging.hypotheses import Hypotheses
 from daq_app.gap.core.judging.other_forms import FreeForm
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.library import rocking_library
-from daq_app.gap.rocking_model.prediction.free_forms import with_uneven_edges, with_uneven_loss
+from daq_app.gap.rocking_model.prediction.free_forms import departed
 from daq_app.gap.rocking_model.prediction.model import RockingModel
-from daq_app.gap.rocking_model.prediction.vector import half_cycle_table, kernel_vector, restitution_of
+from daq_app.gap.rocking_model.prediction.vector import (
+    HalfCycles,
+    half_cycle_table,
+    kernel_vector,
+    restitution_of,
+)
 from daq_app.gap.rocking_model.study import prepare
 from sim_hardware.dynamics import parameters as par
 from tests.support.simulated_wall import simulate
@@ -54,29 +59,44 @@ def run() -> RockingRun:
     return prepare(simulate({}, LEVELS[1:2]))[0][0]
 
 
-def test_a_loss_of_either_side_is_damping_on_one_and_a_push_on_the_other(run: RockingRun) -> None:
-    values = {
-        p.name: p.mean
-        for p in (*RockingModel(run.survey).nuisance, *RockingModel(run.survey).local_nuisance(run))
-    }
-    vector = kernel_vector(run, values)
+def at_priors(run: RockingRun) -> dict[str, float]:
+    """Every parameter of a run at the centre of its prior."""
+    model = RockingModel(run.survey)
+    return {p.name: p.mean for p in (*model.nuisance, *model.local_nuisance(run))}
+
+
+def half_cycles(run: RockingRun, index: int, value: float) -> HalfCycles:
+    """Those of a wall with one of the simulator's parameters."""
+    vector = kernel_vector(run, at_priors(run))
+    vector[index] = value
     true, levels = run.swings.peak_rad, run.swings.levels
-    plain = half_cycle_table(run, vector, true, levels)
-    damped = vector.copy()
-    damped[par.ZETA] = 1e-3
-    known = half_cycle_table(run, damped, true, levels) - plain
-    found = with_uneven_loss(run, {"loss_side.zeta": 1e-3}, vector, true, levels, plain) - plain
-    np.testing.assert_allclose(found[true > 0], known[true > 0], rtol=0.03, atol=1e-8)
-    np.testing.assert_allclose(found[true < 0], -known[true < 0], rtol=0.03, atol=1e-8)
-    grown = with_uneven_loss(run, {"loss_growth.zeta": 1e-3}, vector, true, levels, plain) - plain
-    share = np.log(np.abs(true) / (0.1 * run.survey.alpha_rad))
+    return HalfCycles(vector, true, levels, half_cycle_table(run, vector, true, levels))
+
+
+def assert_opposite(run: RockingRun, departure: str, index: int, value: float) -> None:
+    """A departure does on one side what the simulator's parameter does, and on the other its opposite."""
+    plain = half_cycles(run, index, 0.0)
+    known = half_cycles(run, index, value).table - plain.table
+    found, side = departed(run, {departure: value}, plain) - plain.table, np.sign(plain.true)
+    assert set(side.tolist()) == {-1.0, 1.0}
+    np.testing.assert_allclose(found, side[:, None] * known, rtol=0.03, atol=1e-8)
+
+
+def test_a_loss_of_either_side_is_damping_on_one_and_a_push_on_the_other(run: RockingRun) -> None:
+    assert_opposite(run, "loss_side.zeta", par.ZETA, 1e-3)
+
+
+def test_a_loss_that_grows_is_a_damping_that_goes_with_the_logarithm_of_the_peak(run: RockingRun) -> None:
+    plain = half_cycles(run, par.ZETA, 0.0)
+    known = half_cycles(run, par.ZETA, 1e-3).table - plain.table
+    grown = departed(run, {"loss_growth.zeta": 1e-3}, plain) - plain.table
+    share = np.log(np.abs(plain.true) / (0.1 * run.survey.alpha_rad))
     np.testing.assert_allclose(grown, share[:, None] * known, rtol=0.03, atol=1e-8)
 
 
 def test_no_hypothesis_makes_the_scatter_of_r_look_smaller(run: RockingRun) -> None:
     """A peak tells r by the survey's slope: one that grew with α would pull α and the pivots along."""
-    model = RockingModel(run.survey)
-    values = {p.name: p.mean for p in (*model.nuisance, *model.local_nuisance(run))}
+    model, values = RockingModel(run.survey), at_priors(run)
     further_in = {**values, "half_base": values["half_base"] + 0.01, "pivot_shift.a": 0.01}
     further_in["alpha"] += 0.01 / values["half_base"] * values["alpha"]
     one, other = (model.predict(run, v).loadings["scatter of r"] for v in (values, further_in))
@@ -90,19 +110,11 @@ def test_no_hypothesis_makes_the_scatter_of_r_look_smaller(run: RockingRun) -> N
 
 
 def test_uneven_edges_roll_on_one_side_and_bite_on_the_other(run: RockingRun) -> None:
-    values = {
-        p.name: p.mean
-        for p in (*RockingModel(run.survey).nuisance, *RockingModel(run.survey).local_nuisance(run))
-    }
-    vector = kernel_vector(run, values)
-    true, levels = run.swings.peak_rad, run.swings.levels
-    plain = half_cycle_table(run, vector, true, levels)
-    rolling = vector.copy()
-    rolling[par.EDGE_RADIUS] = 5e-4
-    known = half_cycle_table(run, rolling, true, levels) - plain
-    found = with_uneven_edges(run, {"uneven_edges.rho": 5e-4}, vector, true, levels, plain) - plain
-    np.testing.assert_allclose(found[true > 0], known[true > 0], rtol=0.03, atol=1e-8)
-    np.testing.assert_allclose(found[true < 0], -known[true < 0], rtol=0.03, atol=1e-8)
+    assert_opposite(run, "uneven_edges.rho", par.EDGE_RADIUS, 5e-4)
+
+
+def test_the_joint_shows_where_uneven_edges_turn(run: RockingRun) -> None:
+    values = at_priors(run)
     place = next(k for k, block in enumerate(run.blocks) if block.family == "joint")
     names = run.blocks[place].names
     model, own = RockingModel(run.survey), {}

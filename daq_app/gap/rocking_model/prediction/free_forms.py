@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.prediction.vector import half_cycle_table
+from daq_app.gap.rocking_model.prediction.vector import HalfCycles, half_cycle_table
 from sim_hardware.dynamics import parameters as par
 
 _MIDDLE = 0.1
@@ -45,9 +45,9 @@ class _FreeBasis:
     low: NDArray[np.intp]
     """Knot below the peak."""
     share: FloatArray
-    """Of the way to the next knot."""
+    """Share of the way from that knot to the next."""
     alike: FloatArray
-    """1: the same up and down."""
+    """1 in all: the same up and down."""
     way: FloatArray
     """1 in a fall, −1 in a rise, 0 over the top and across an impact."""
     side: FloatArray
@@ -69,48 +69,41 @@ def _free_basis(run: RockingRun) -> _FreeBasis:
     return _FreeBasis(kind, low, place - low, np.ones(way.size), way, side)
 
 
-def with_uneven_loss(
-    run: RockingRun,
-    values: Mapping[str, float],
-    vector: FloatArray,
-    true: FloatArray,
-    levels: FloatArray,
-    table: FloatArray,
-) -> FloatArray:
-    """The table of half-cycles, (n, 5 + 2F), with an equivalent damping of each half-cycle's own.
+def departed(run: RockingRun, values: Mapping[str, float], cycles: HalfCycles) -> FloatArray:
+    """The table of half-cycles, (n, 5 + 2F), with first steps away from the forms of loss and edges.
 
-    To first order, which is all that a score test asks. What such a loss takes from a half-cycle shows in its
-    times and in the speeds at its ends, so in r as well.
+    To first order, which is all that a score test asks.
+    """
+    return cycles.table + _uneven_loss(run, values, cycles) + _uneven_edges(run, values, cycles)
+
+
+def _uneven_loss(run: RockingRun, values: Mapping[str, float], cycles: HalfCycles) -> FloatArray | float:
+    """What an equivalent damping of each half-cycle's own adds, (n, 5 + 2F).
+
+    What it takes from a half-cycle shows in its times and in the speeds at its ends, so in r as well.
     """
     growth, side = values.get("loss_growth.zeta", 0.0), values.get("loss_side.zeta", 0.0)
     if growth == 0.0 and side == 0.0:
-        return table
+        return 0.0
+    true = cycles.true
     zeta = growth * np.log(np.abs(true) / (_MIDDLE * run.survey.alpha_rad)) + side * np.sign(true)
-    ahead, behind = vector.copy(), vector.copy()
-    ahead[par.ZETA] += _ZETA_STEP
-    behind[par.ZETA] -= _ZETA_STEP
-    damped_more, damped_less = (half_cycle_table(run, v, true, levels) for v in (ahead, behind))
-    moved: FloatArray = table + zeta[:, None] * (damped_more - damped_less) / (2.0 * _ZETA_STEP)
-    return moved
+    damped_more, damped_less = (_moved(run, cycles, par.ZETA, step) for step in (_ZETA_STEP, -_ZETA_STEP))
+    added: FloatArray = zeta[:, None] * (damped_more - damped_less) / (2.0 * _ZETA_STEP)
+    return added
 
 
-def with_uneven_edges(
-    run: RockingRun,
-    values: Mapping[str, float],
-    vector: FloatArray,
-    true: FloatArray,
-    levels: FloatArray,
-    table: FloatArray,
-) -> FloatArray:
-    """The table of half-cycles, (n, 5 + 2F), with edges that are not equally sharp.
-
-    To first order: the edge at x > 0 is round to a radius and the other is as much sharper.
-    """
+def _uneven_edges(run: RockingRun, values: Mapping[str, float], cycles: HalfCycles) -> FloatArray | float:
+    """What an edge at x > 0 adds that is round, where the other is as much sharper, (n, 5 + 2F)."""
     radius = values.get("uneven_edges.rho", 0.0)
     if radius == 0.0:
-        return table
-    rounder = vector.copy()
-    rounder[par.EDGE_RADIUS] += _RADIUS_STEP_M
-    rolling = half_cycle_table(run, rounder, true, levels)
-    moved: FloatArray = table + np.sign(true)[:, None] * (rolling - table) * (radius / _RADIUS_STEP_M)
-    return moved
+        return 0.0
+    rolling = _moved(run, cycles, par.EDGE_RADIUS, _RADIUS_STEP_M) - cycles.table
+    added: FloatArray = np.sign(cycles.true)[:, None] * rolling * (radius / _RADIUS_STEP_M)
+    return added
+
+
+def _moved(run: RockingRun, cycles: HalfCycles, index: int, step: float) -> FloatArray:
+    """The table with one of the simulator's parameters moved by a step."""
+    vector = cycles.vector.copy()
+    vector[index] += step
+    return half_cycle_table(run, vector, cycles.true, cycles.levels)

@@ -14,13 +14,14 @@ from daq_app.gap.rocking_model.features.coefficients import block_coefficients, 
 from daq_app.gap.rocking_model.features.families.lvdts import FACE_SKEW
 from daq_app.gap.rocking_model.features.oscillations.floor_response import with_measured_inputs
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.prediction.free_forms import (
-    free_times,
-    with_uneven_edges,
-    with_uneven_loss,
-)
+from daq_app.gap.rocking_model.prediction.free_forms import departed, free_times
 from daq_app.gap.rocking_model.prediction.true_motion import pause_at_impact, true_rotations
-from daq_app.gap.rocking_model.prediction.vector import half_cycle_table, kernel_vector, restitution_of
+from daq_app.gap.rocking_model.prediction.vector import (
+    HalfCycles,
+    half_cycle_table,
+    kernel_vector,
+    restitution_of,
+)
 from daq_app.gap.rocking_model.prediction.wires_alone import times_carry
 from daq_app.gap.rocking_model.records import Survey
 from daq_app.gap.rocking_model.tolerances.walls import PUSH_RAD_S
@@ -129,10 +130,9 @@ class RockingModel:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Times (T,), log peaks (P,) and d ln speed / d ln peak (P,)."""
         # r and what else acts at impacts only moves none of the half-cycles.
-        vector, true, levels, table = run.cache.part("half-cycles", values, partial(_half_cycles, run))
-        table = with_uneven_loss(run, values, vector, true, levels, table)
-        table = with_uneven_edges(run, values, vector, true, levels, table)
-        count = levels.shape[1]
+        cycles = run.cache.part("half-cycles", values, partial(_half_cycles, run))
+        table, true = departed(run, values, cycles), cycles.true
+        count = cycles.levels.shape[1]
         first = shooting.FIRST_CROSSING
         speeds_out, speeds_in = table[:, shooting.SPEED_OUT], table[:, shooting.SPEED_IN]
         pause = pause_at_impact(values, speeds_out)
@@ -181,10 +181,7 @@ def _slopes(run: RockingRun) -> FloatArray:
     return slopes
 
 
-def _half_cycles(
-    run: RockingRun, values: Mapping[str, float]
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """(kernel vector, true peaks (n,), their levels (n, F), the simulator's half-cycles (n, 5 + 2F))."""
+def _half_cycles(run: RockingRun, values: Mapping[str, float]) -> HalfCycles:
     vector = kernel_vector(run, values)
     true, levels = true_rotations(run, values)
-    return vector, true, levels, half_cycle_table(run, vector, true, levels)
+    return HalfCycles(vector, true, levels, half_cycle_table(run, vector, true, levels))

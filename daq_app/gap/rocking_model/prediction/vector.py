@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,20 @@ def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> FloatArray:
     vector[par.OMEGA0] += values["omega0"]
     vector[par.COULOMB] += values.get("loss_power.mu", 0.0)
     return vector
+
+
+@dataclass(frozen=True, slots=True)
+class HalfCycles:
+    """The simulator's half-cycles from the peaks of a run."""
+
+    vector: FloatArray
+    """Parameter vector of the simulator."""
+    true: FloatArray
+    """(n,) peaks, rad."""
+    levels: FloatArray
+    """(n, F) rotations at which they are timed, rad."""
+    table: FloatArray
+    """(n, 5 + 2F)."""
 
 
 def half_cycle_table(run: RockingRun, vector: FloatArray, true: FloatArray, levels: FloatArray) -> FloatArray:
