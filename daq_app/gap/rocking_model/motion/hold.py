@@ -22,15 +22,19 @@ def from_hold(run: GapRun) -> tuple[GapRun, Rotation]:
     """
     joint = joint_rotation(run)
     step = max(round(run.rate_hz / GRID_HZ), 1)
-    theta = np.abs(coarse(joint.theta, run.rate_hz))
-    largest = float(theta.max())
-    if largest == 0.0:
+    turned = coarse(joint.theta, run.rate_hz)
+    theta = np.abs(turned)
+    if not theta.any():
         raise CannotDiagnose(
             f"Run {run.name}: the LVDTs read nothing but their zero.",
             "Check their wiring and supply; the rotation of the joint is read from them.",
         )
+    # Until the wall first passes upright: on unequal edges it may rise further on the other side.
+    begun = int(np.argmax(theta > 0.5 * theta.max()))
+    passed = np.flatnonzero(turned[begun:] * turned[begun] < 0.0)
+    largest = float(theta[: begun + int(passed[0]) if passed.size else theta.size].max())
     below = np.flatnonzero(theta < 0.5 * largest)
-    # The release ends the first stay near the largest rotation; a later peak never comes that high.
+    # The release ends the first stay near the largest rotation.
     after = below[below > np.flatnonzero(theta > AT_ROTATION * largest)[0]]
     fall = int(after[0]) if after.size else theta.size
     # A wall that is pulled quickly overshoots and sways about the rotation at which it is then held.

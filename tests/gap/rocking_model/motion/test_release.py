@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from daq_app.gap.core import fit
@@ -48,6 +49,15 @@ def test_impacts_too_small_to_be_timed_are_counted_for_what_wears() -> None:
     assert [run.impacts_before for run in prepared] == pytest.approx(true, rel=0.06)
     result = fit(RockingModel(prepared[0].survey), prepared, (rocking_library()["crushing"],))
     assert result.values["crushing.loss"][0] == pytest.approx(0.02, rel=0.06)
+
+
+def test_a_wall_that_rises_further_on_its_other_side_is_let_go_where_it_was_held() -> None:
+    """The side with the larger α holds more energy: let go there, the wall comes higher on the other."""
+    (run,), _ = prepare(simulate({"alpha_asymmetry": {"delta": 0.03}}, 11, levels=(0.4,)))
+    held, opposite = np.abs(run.swings.peak_rad[:2])
+    assert opposite > 1.03 * held
+    assert held == pytest.approx(0.4 * run.survey.alpha_rad, rel=0.02)
+    assert run.swings.release_s > 1.0
 
 
 def test_a_clean_or_a_slow_release_claims_no_speed() -> None:
