@@ -20,7 +20,7 @@ from daq_app.gap.report_figures import ProbeMap
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.traces import Trace, noted, traces
-from daq_app.gap.words import causes_in_words
+from daq_app.gap.words import causes_in_words, closed_share, gap_goes
 from daq_app.runfile.durable import write_whole
 
 _A4_IN: Final = (8.27, 11.69)
@@ -44,6 +44,8 @@ def write_report(result: Diagnosis, path: Path, runs: Sequence[GapRun] = ()) -> 
             d=result,
             verdict=_verdict(result),
             causes=_causes(result),
+            goes=gap_goes,
+            closed=closed_share,
             estimates=(*result.effect_parameters, *result.parameters),
             pictures=_pictures(result, shown, maps),
         )
@@ -153,10 +155,10 @@ def _write_head(part: Any, result: Diagnosis) -> None:
     if causes := _causes(result):
         lines += _wrapped(f"In words: {'; '.join(causes)}.")
     lines += _wrapped(f"Where: {result.where.sentence}")
-    if result.gap is not None:
+    if (gap := result.gap) is not None:
         lines += _wrapped(
-            f"How far: the held-out gap falls from {result.gap.before:.2f} to {result.gap.after:.2f} times "
-            f"noise and scatter (floor {result.gap.floor:.1f}); closure {100 * result.gap.closure:.0f} %."
+            f"How far: the held-out gap {gap_goes(gap.before, gap.after)} times noise and scatter (floor "
+            f"{gap.floor:.1f}); {closed_share(gap.closure)} of what could be gained was gained."
         )
     lines += _wrapped(f"Measure next: {result.next_measurement}")
     for limit in result.limits:

@@ -74,7 +74,7 @@ def draw_evidence(axes: Axes, result: Diagnosis, most: int = 9) -> None:
     for row, entry in enumerate(ranked):
         if entry.probability >= 0.005:
             axes.text(1.0, row, f"{entry.probability:.2f}", va="center", fontsize=7)
-    axes.set_xlabel("log evidence less that of the best (cut at −60); figures: probability", fontsize=7)
+    axes.set_xlabel("log evidence less that of the best (cut at −60)\nfigures: probability", fontsize=7)
     axes.tick_params(labelsize=7)
 
 

@@ -111,6 +111,16 @@ def causes_in_words(causes: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
     return tuple(sentences)
 
 
+def gap_goes(before: float, after: float) -> str:
+    """What becomes of the gap on held-out runs, in noise and scatter: ``falls from 9.10 to 0.97``."""
+    return f"{'rises' if after > before else 'falls'} from {before:.2f} to {after:.2f}"
+
+
+def closed_share(closure: float) -> str:
+    """How much of what could be gained was gained, or closed of a gap: ``97 %``; ``nothing`` of a loss."""
+    return f"{100.0 * closure:.0f} %" if closure > 0.0 else "nothing"
+
+
 def with_interval(value: float, low: float, high: float, unit: str) -> str:
     """A value with half of its 95 % interval, rounded to two digits of it: ``9.8 ± 0.6 mm``."""
     factor = _UNITS[unit]

@@ -107,6 +107,16 @@ def test_a_report_without_the_recordings_has_no_traces_and_one_without_held_out_
     assert "Measured and simulated" not in page and "How far" not in page
 
 
+def test_a_gap_that_rises_is_said_to_rise_and_nothing_to_be_gained(tmp_path):
+    worse = diagnosis({}, ("0",))
+    assert worse.gap is not None
+    worse = replace(worse, gap=replace(worse.gap, before=9.1, after=30.0, closure=-2.0))
+    html, _ = write_report(worse, tmp_path / "gap.html")
+    page = html.read_text(encoding="utf-8")
+    assert "the gap rises from 9.10 to 30.00 times" in page
+    assert "Nothing of what could be gained was gained." in page
+
+
 def test_the_map_has_the_largest_gap_of_each_channel_and_phase():
     channels, phases, table = map_table(diagnosis({}, ()).where)
     assert (channels, phases) == (["lvdt", "wire"], ["swing", "peak", "run"])

@@ -24,7 +24,7 @@ from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.config import ConfigError
 from daq_app.config.shown_text import shortened
 from daq_app.gap.files import newest_result
-from daq_app.gap.words import causes_in_words
+from daq_app.gap.words import causes_in_words, closed_share
 from daq_app.monitor.data.background import Background
 from daq_app.monitor.data.gap_runner import GapRunner
 from daq_app.monitor.look.labels import number, role_label, set_role, tip_text
@@ -319,7 +319,7 @@ def gap_in_words(gap: dict[str, Any]) -> str:
     figures = f"Gap on held-out runs {change} (1 is noise and scatter)"
     if gap["before"] <= 1.0:
         return f"{figures}: there was none to close."
-    return f"{figures}, {number(100 * gap['closure'], 0)} % of it closed."
+    return f"{figures}, {closed_share(gap['closure'])} of it closed."
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -160,3 +160,4 @@ def test_the_page_shows_measured_beside_simulated_rotation(page):
 def test_a_gap_that_was_none_is_not_called_closed() -> None:
     assert "closed" not in gap_in_words({"before": 0.93, "after": 0.93, "closure": 1.0})
     assert "90 % of it closed" in gap_in_words({"before": 11.0, "after": 2.0, "closure": 0.9})
+    assert "nothing of it closed" in gap_in_words({"before": 11.0, "after": 20.0, "closure": -0.9})
