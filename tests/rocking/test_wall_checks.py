@@ -302,6 +302,18 @@ def test_r_and_theta0_of_a_wall_that_still_rings_where_the_recording_ends_are_th
         assert abs(value.value - test.truth["theta0_rad"]) < 3.0 * value.sigma
 
 
+@pytest.mark.parametrize("factor", [0.05, 0.5])
+def test_r_of_a_wall_that_bends_is_doubted_where_its_lvdts_cannot_take_the_place_of_its_wires(factor: float):
+    ringing = Wall("flexible_wall", {"gain": 0.2, "frequency": 4.6, "zeta": 0.005}, ends_s=0.7)
+    record = Fault("lvdt", "unit", factor).record(ringing.test(RIG, SEED))
+    analysis = analyse_record(record, AnalysisOptions(fit=False, bias_runs=0, keep_series=False))
+    (bending,) = [finding for finding in analysis.findings if finding.kind == "bending"]
+
+    assert analysis.verdict.trust == "doubtful"
+    assert bending.treatment == ("none" if analysis.verdict.used == ("wires",) else "left out")
+    assert ("it was not done" in bending.text) == (analysis.verdict.used == ("wires",))
+
+
 def test_a_survey_whose_alpha_is_not_the_walls_is_named_where_crt_is_off_by_it():
     _, analysis = drawn({"rounded_edge": {"rho": 0.1}}, 72400)
     (named,) = [finding for finding in analysis.findings if finding.kind == "alpha"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final, Literal
 
 from daq_app.config.rig import Family
@@ -102,6 +103,12 @@ def bending(frequency_hz: float, rms_rad: float, *, left_out: bool) -> FamilyFin
     return FamilyFinding(
         "wires", (), "bending", rms_rad, "rad", "left out" if left_out else "none", "warning", text
     )
+
+
+def not_done(finding: FamilyFinding) -> FamilyFinding:
+    """The finding where nothing could be done about it: in what was left, no test is found."""
+    text = f"{finding.text}. That way no test is found in the recording: it was not done"
+    return replace(finding, treatment="none", text=text)
 
 
 def late(family: str, by_s: float, others: str) -> FamilyFinding:

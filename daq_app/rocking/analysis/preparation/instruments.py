@@ -226,20 +226,31 @@ def _in_step(
         findings += timing
         changed = replace(changed, earlier_s=earlier)
     if changed.left_out or changed.earlier_s or lead != "wires":
-        record = changed.applied(record)
+        corrected = changed.applied(record)
         # Tiltmeters on a wall that bends took a zero that may be off, and confirm no hold by it.
-        again, times_again = read(record, lead, ask_tiltmeters=bending is None)
+        again, times_again = read(corrected, lead, ask_tiltmeters=bending is None)
         if times_again.impacts_s:
-            signals, times = again, times_again
+            record, signals, times = corrected, again, times_again
             wires = _single_wires(signals, times)
             response = _follow(signals, times)
             shocks = _shocks(record, signals, times)
+        else:
+            findings = [
+                words.not_done(finding) if _needs_reading(finding) else finding for finding in findings
+            ]
     if response is not None and bending is None:
         findings += _levels(signals, times, response)
     return Instruments(
         record, _with_errors(signals, times), times, tuple(findings), response, shocks,
         gains_of(signals, times, wires), bending,
     )  # fmt: skip
+
+
+def _needs_reading(finding: FamilyFinding) -> bool:
+    """Whether the test is read again for what is done about it: LVDTs are left out by not being asked."""
+    if finding.treatment == "left out":
+        return finding.family == "wires"
+    return finding.treatment == "put in step"
 
 
 def _motion(signals: Signals, times: TestTimes) -> slice:
