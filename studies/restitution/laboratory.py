@@ -45,10 +45,10 @@ class LaboratoryTest:
     truth: dict[str, Any]
     """`SynthesisedTest.truth`, times since power-on."""
 
-    def record(self) -> TestRecord:
+    def record(self, label: str = "study") -> TestRecord:
         """The recording without a tare, as an imported run has it."""
         return TestRecord.from_array(
-            self.rig, self.rate_hz, self.si, time_offsets_s=self.offsets_s, tared=False, label="study"
+            self.rig, self.rate_hz, self.si, time_offsets_s=self.offsets_s, tared=False, label=label
         )
 
     def rows(self, family: str) -> list[int]:
@@ -66,27 +66,32 @@ def draw_test(
     *,
     ordinary: bool = True,
     effects: Mapping[str, Mapping[str, float]] = _NO_EFFECTS,
+    laboratory: int | None = None,
 ) -> LaboratoryTest:
     """A test of a laboratory drawn by `seed`; without `ordinary` its sensors are perfect but for noise.
 
-    `effects`: what its wall does that Housner's block does not, by name with parameters.
+    `effects`: what its wall does that Housner's block does not, by name with parameters. `laboratory`: the
+    seed of all that one laboratory and its wall keep from test to test (calibration, places, levels of noise,
+    clock, body, r and its scatter from impact to impact), so that several `seed` make a campaign.
     """
-    rng, of_all = np.random.default_rng(seed), np.random.default_rng([seed, 2])
-    rig = _drawn_rig(nominal, rng, _DATUM_SIGMA_M * of_all.standard_normal()) if ordinary else nominal
+    rng = np.random.default_rng(seed)
+    kept = rng if laboratory is None else np.random.default_rng([laboratory, 3])
+    of_all = np.random.default_rng([seed if laboratory is None else laboratory, 2])
+    rig = _drawn_rig(nominal, kept, _DATUM_SIGMA_M * of_all.standard_normal()) if ordinary else nominal
     timing = {"upright_s": 1.0, "pull_s": 1.0, "hold_s": float(rng.uniform(4.0, 6.0))}
-    scatter = float(rng.uniform(0.001, 0.006)) if ordinary else 0.0
+    scatter = float(kept.uniform(0.001, 0.006)) if ordinary else 0.0
     rig = rig.model_copy(
         update={"simulation": rig.simulation.model_copy(update=timing | {"restitution_scatter": scatter})}
     )
     plan = plan_tasks(rig)
     level = float(rng.uniform(0.15, 0.4)) * float(rng.choice([-1.0, 1.0]))
-    r = float(rng.uniform(0.82, 0.94))
+    r = float(kept.uniform(0.82, 0.94))
     test = synthesise_test(rig, plan, level, seed, restitution=r, effects=effects)
     upright = test.readings[:, : test.upright_samples].mean(axis=1)
     zeros = {c.id: float(mean - c.offset) for c, mean in zip(rig.channels, upright, strict=True)}
     si = Scaling.of(rig.channels, zeros).to_si(test.readings)
     if ordinary:
-        _spoil(si, rig, test.rate_hz, rng)
+        _spoil(si, rig, test.rate_hz, rng, kept)
     families = dict.fromkeys(channel.family for channel in rig.channels)
     off_s = {name: _TIME_BASE_SIGMA_S * of_all.standard_normal() if ordinary else 0.0 for name in families}
     planned = [channel for task in plan.tasks for channel in task.channels]
@@ -126,16 +131,16 @@ def _drawn_channel(channel: Channel, noise: float, higher_m: float, rng: np.rand
     return channel.model_copy(update=changes)
 
 
-def _spoil(si: Floats, rig: Rig, rate_hz: float, rng: np.random.Generator) -> None:
-    """Calibration, slow noise, weak hum and a walking zero, in place."""
+def _spoil(si: Floats, rig: Rig, rate_hz: float, rng: np.random.Generator, kept: np.random.Generator) -> None:
+    """Calibration, slow noise, weak hum and a walking zero, in place; `kept` draws the calibration."""
     n = si.shape[1]
     time = np.arange(n) / rate_hz
-    calibration = float(rng.uniform(0.001, 0.003))
+    calibration = float(kept.uniform(0.001, 0.003))
     mains_hz = 50.0 + float(rng.normal(0.0, 0.03))
     keep = math.exp(-1.0 / _SLOW_SAMPLES)
     for row, channel in enumerate(rig.channels):
         noise = channel.noise_si
-        si[row] *= 1.0 + rng.normal(0.0, calibration)
+        si[row] *= 1.0 + kept.normal(0.0, calibration)
         slow = lfilter([math.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(n))
         si[row] += 0.3 * noise * slow
         hum = noise * float(rng.uniform(0.05, 0.5))
