@@ -85,7 +85,8 @@ def row_of(what: str, answers: Sequence[Answer], sound: Sequence[Answer]) -> str
 
     Counted as quiet are tests that are called good although what was put in moves r: by any method by more
     than `_OFF_R`, or the verdict by more than `_OFF_SIGMAS` of the sound test's standard errors. Counted
-    as missed are those of them whose own interval of r does not hold the truth either.
+    as missed are those of them whose own interval of r does not hold the truth either. Behind the largest
+    error by each method stands that of the verdict in tests that are not called doubtful.
     """
     quiet = missed = 0
     for answer, before in zip(answers, sound, strict=True):
@@ -96,6 +97,8 @@ def row_of(what: str, answers: Sequence[Answer], sound: Sequence[Answer]) -> str
         missed += said_nothing and not answer.all_hold
     table = np.array([answer.errors for answer in answers])
     numbers = " ".join(f"{value:8.4f}" for value in np.nanmax(np.abs(table), axis=0, initial=0.0))
+    trusted = [abs(a.errors[_METHODS.index("verdict")]) for a in answers if a.trust in ("good", "remarks")]
+    numbers += f" {max(trusted, default=math.nan):8.4f}"
     trusts = Counter(answer.trust for answer in answers)
     said = Counter(what for answer in answers for what in answer.said)
     return f"{what:28s} {numbers} {quiet:6d} {missed:6d}  {dict(trusts)}  {dict(said)}"
@@ -210,7 +213,7 @@ def main() -> None:
         print("\n".join(coverage(tests)))
         return
     methods = " ".join(f"{name:>8s}" for name in _METHODS)
-    head = f"largest |error| of r:       {methods}  quiet missed  trust, said"
+    head = f"largest |error| of r:       {methods}  trusted  quiet missed  trust, said"
     if options.table == "walls":
         seeds = range(options.first_seed, options.first_seed + options.tests)
         rigid = {
