@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.motion_grid import SETTLING_S, Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 from daq_app.gap.rocking_model.tolerances.sensors import PLAY_RAD
 
@@ -77,6 +77,17 @@ def turn_shape(grid: Grid, impact: int) -> FloatArray:
     """The approach speed of one impact, rad/s, without sign, from that impact on, (m,); 0 before."""
     shape: FloatArray = _after(grid)[:, impact] * abs(float(grid.approach[impact]))
     return shape
+
+
+def turning_shape(grid: Grid, *, alternating: bool) -> FloatArray:
+    """What `turned_shape` is ahead of a wall that takes a while to turn at each impact, (m,), rad/s.
+
+    It slides about its corner for some hundredths of a second: with a time constant of `SETTLING_S` here.
+    """
+    speeds = grid.approach if alternating else np.abs(grid.approach)
+    since_s = grid.time_s[:, None] - grid.impact_s[None, :]
+    lacking: FloatArray = np.where(since_s > 0.0, np.exp(-np.maximum(since_s, 0.0) / SETTLING_S), 0.0)
+    return lacking @ speeds
 
 
 def _after(grid: Grid) -> FloatArray:

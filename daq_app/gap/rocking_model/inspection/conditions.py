@@ -21,10 +21,14 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.inspection.spikes import (
     AROUND_S,
+    NO_LONE_SAMPLES,
+    LoneSamples,
     Mask,
-    lone_samples_per_s,
+    lone_samples,
+    often_alone,
     reading_noise,
     shaken_samples,
+    still_samples,
 )
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.tolerances.inspection import (
@@ -42,11 +46,11 @@ from daq_app.gap.rocking_model.tolerances.inspection import (
     RANGE_MARGIN,
     SMALLEST_STEP,
     SPIKES_SD_PER_S,
-    SPIKY_PER_S,
     STANDS_OUT,
     STEP_SD,
     USUAL_HUM,
 )
+from daq_app.rocking.geometry.noise import white_noise
 
 MAINS_HZ = 50.0
 _SLOW_S = 0.1
@@ -64,15 +68,16 @@ class Condition:
     """The hum itself, shape (n,), where there is any."""
     step_si: float = 0.0
     frozen_share: float = 0.0
-    spikes_per_s: float = 0.0
+    lone: LoneSamples = NO_LONE_SAMPLES
     noise_si: float = 0.0
     """Rms noise of one reading: that of this record or the declared one, whichever is larger."""
 
 
-def inspect_channel(run: GapRun, index: int, shaken: Mask | None = None) -> Condition:
+def inspect_channel(run: GapRun, index: int, still: Mask, shaken: Mask | None = None) -> Condition:
     """Examine one channel of one run; NaN anywhere means that nothing is examined.
 
-    `shaken`: samples, (n,), around impacts, where an accelerometer is not looked at for lone samples.
+    `still`: samples, (n,), at which the wall stands still. `shaken`: those around impacts, where an
+    accelerometer is not looked at for lone samples.
     """
     values = run.channels[index]
     if not run.reads(index):
@@ -82,13 +87,13 @@ def inspect_channel(run: GapRun, index: int, shaken: Mask | None = None) -> Cond
     usual = reading_noise(run, index)
     clean = values if wave is None else values - wave
     if accelerometer:
-        spikes = 0.0 if shaken is None else lone_samples_per_s(clean, usual, rate, ~shaken)
-        return Condition(hum, hum_sd, wave, spikes_per_s=spikes, noise_si=usual)
+        lone = NO_LONE_SAMPLES if shaken is None else lone_samples(clean, usual, rate, still, ~shaken)
+        return Condition(hum, hum_sd, wave, lone=lone, noise_si=usual)
     step = _quantisation_step(values, run.sensors[index].noise_si)
     frozen = _frozen(values, rate, step, run.sensors[index].range_si)
     # A channel that rests at the end of its range shows no noise there.
-    spikes = lone_samples_per_s(clean, usual, rate) if step == 0.0 and frozen == 0.0 else 0.0
-    return Condition(hum, hum_sd, wave, step, frozen, spikes, usual)
+    lone = lone_samples(clean, usual, rate, still) if step == 0.0 and frozen == 0.0 else NO_LONE_SAMPLES
+    return Condition(hum, hum_sd, wave, step, frozen, lone, usual)
 
 
 def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray | None]:
@@ -194,10 +199,12 @@ def _frozen(values: FloatArray, rate_hz: float, step: float, limits: tuple[float
     long = stops - starts > FROZEN_S * rate_hz
     if not long.any():
         return 0.0
-    # Between two steps of its converter, or of a coarser quantisation, a sound reading stands still too, but
-    # then it goes on by one of them.
-    after = np.minimum(stops + 1, values.size - 1)
-    long &= np.abs(values[after] - values[starts]) > GOES_ON_STEPS * max(step, _resolution(values))
+    coarsest = max(step, _resolution(values))
+    if white_noise(values) < coarsest:
+        # Between two steps of its converter, or of a coarser quantisation, a sound reading stands still too,
+        # but then it goes on by one of them. Noise of more than a step keeps it moving on a wall at rest.
+        after = np.minimum(stops + 1, values.size - 1)
+        long &= np.abs(values[after] - values[starts]) > GOES_ON_STEPS * coarsest
     return float((stops - starts)[long].sum()) / values.size
 
 
@@ -212,10 +219,10 @@ def conditions_of(runs: Sequence[GapRun]) -> list[dict[str, Condition]]:
     """Conditions of every LVDT, wire and accelerometer, by id, run by run."""
     found = []
     for run in runs:
-        shaken = shaken_samples(run)
+        still, shaken = still_samples(run), shaken_samples(run)
         found.append(
             {
-                sensor.id: inspect_channel(run, i, shaken)
+                sensor.id: inspect_channel(run, i, still, shaken)
                 for i, sensor in enumerate(run.sensors)
                 if sensor.family in _FAMILIES and sensor.id not in run.excluded
             }
@@ -247,7 +254,7 @@ def findings_per_run(
             continue
         noise = float(np.median([[c.noise_si for c in row] for row in rows]))
         # Every channel has a lone sample now and then: what counts is how many it has in all runs.
-        spiky = np.mean([[c.spikes_per_s for c in row] for row in rows], axis=0) > SPIKY_PER_S
+        spiky = [often_alone([c.lone for c in of_channel]) for of_channel in zip(*rows, strict=True)]
         seen = [[_seen(c, often) for c, often in zip(row, spiky, strict=True)] for row in rows]
         for name, words in _WORDS.items():
             if family == "accelerometer" and name not in ("hum", "spikes"):
@@ -281,7 +288,7 @@ def _seen(condition: Condition, often: bool) -> dict[str, _Seen]:
         "hum": (c.hum_si, c.hum_sd, c.hum_si > 0.0),
         "quantisation": (c.step_si, STEP_SD * c.step_si, c.step_si > 0.0),
         "dropout": (c.frozen_share, FROZEN_SD, c.frozen_share > FROZEN_SD),
-        "spikes": (c.spikes_per_s, SPIKES_SD_PER_S, often),
+        "spikes": (c.lone.per_s, SPIKES_SD_PER_S, often),
     }
 
 

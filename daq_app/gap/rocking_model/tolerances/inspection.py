@@ -216,6 +216,12 @@ Raising it overlooks a contact that is seldom loose.
 SPIKES_SD_PER_S = 0.05
 """Sd, 1/s, of the rate of lone samples in one run (assumed). Raising it hides contacts seldom loose."""
 
+STILL = 0.01
+"""Share, 1, of what it moves by in a record that a channel of a wall at rest moves by within 0.1 s (assumed).
+
+Raising it takes small half-cycles for rest, so that what impacts do to a channel is taken for a fault.
+"""
+
 LOUD_NOISE = 4.0
 """Distance of a sample from its neighbours over the noise, 1, from which an accelerometer is loud.
 

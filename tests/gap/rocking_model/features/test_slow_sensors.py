@@ -12,6 +12,7 @@ from daq_app.gap.rocking_model.features.response import first_order, transfer
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import extract
 from daq_app.gap.rocking_model.inspection.conditions import inspect_channel
+from daq_app.gap.rocking_model.inspection.spikes import still_samples
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.study import prepare
 from tests.support.simulated_wall import simulate
@@ -99,7 +100,7 @@ def test_hum_is_told_from_what_impacts_have_of_its_frequency() -> None:
         run.channels[index, k : k + 200] += 60.0 * np.exp(-np.arange(200) / 24.0)
     hum = 0.4 * np.sin(2.0 * np.pi * 50.0 * time_s + 1.0)
     run.channels[index] += hum
-    wave = inspect_channel(run, index).hum_wave
+    wave = inspect_channel(run, index, still_samples(run)).hum_wave
     assert wave is not None
     assert np.abs(wave - hum).max() < 0.04
 

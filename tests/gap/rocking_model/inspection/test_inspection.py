@@ -101,6 +101,17 @@ def test_a_wall_that_dwells_upright_under_a_coarse_converter_is_no_wire_that_fre
     assert not any("dropout" in finding for finding in conditions_found(prepare(runs)[0]))
 
 
+def test_a_channel_that_freezes_while_the_wall_is_at_rest_is_found() -> None:
+    """It goes on by its noise then; a sound reading stays only where its noise is less than a step."""
+    runs = simulate({}, LEVELS)
+    for run in runs:
+        place, samples = run.place("LV-B08"), round(0.24 * run.rate_hz)
+        step = 0.8 * run.sensors[place].noise_si
+        run.channels[place] = np.round(run.channels[place] / step) * step
+        run.channels[place, -2 * samples : -samples] = run.channels[place, -samples]
+    assert conditions_found(prepare(runs)[0]) == {"dropout@LV-B08"}
+
+
 def test_a_channel_with_far_more_pick_up_than_its_family_stands_for_itself() -> None:
     runs = _prepared({"hum@wire": {"amplitude": 2e-4}, "hum@WP-2": {"amplitude": 8e-4}})
     assert conditions_found(runs) == {"hum@wire", "hum@WP-2"}

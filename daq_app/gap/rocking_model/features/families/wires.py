@@ -36,6 +36,7 @@ from daq_app.gap.rocking_model.features.shapes import (
     side_of,
     slip_shape,
     turn_shape,
+    turning_shape,
 )
 from daq_app.gap.rocking_model.features.turns import turn_share, turn_terms
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
@@ -142,6 +143,8 @@ def _turn_block(scene: Scene) -> Block | None:
         "even": (theta**2, "1/rad"),
         "side": (np.abs(theta), "1"),
         "backlash": (side_of(theta), "rad"),
+        "turning on": (turning_shape(grid, alternating=False), "s"),
+        "turning back": (turning_shape(grid, alternating=True), "s"),
     }
     turns = {f"impact {k + 1}": (turn_shape(grid, k), "s") for k in range(count)}
     pick = scene.rocking & grid.settled & (grid.time_s < grid.impact_s[count])
