@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, coarse
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.tolerances.inspection import (
     LOUD_NOISE,
@@ -91,11 +91,11 @@ def still_samples(run: GapRun) -> Mask:
     if not places:
         return np.zeros(count, dtype=np.bool_)
     apart = round(_MOVES_WITHIN_S * GRID_HZ)
-    shown = np.array([gridded(run, i) for i in places])
+    shown = np.array([coarse(run.channels[i], run.rate_hz) for i in places])
     moved = np.abs(shown[:, apart:] - shown[:, :-apart]) / (np.ptp(shown, axis=1)[:, None] + 1e-15)
     moves = np.pad(np.median(moved, axis=0) > STILL, (apart // 2, apart - apart // 2))
     moves = maximum_filter1d(moves, 2 * round(_AROUND_MOTION_S * GRID_HZ) + 1)
-    at = np.minimum((np.arange(count) * GRID_HZ / run.rate_hz).astype(int), moves.size - 1)
+    at = np.minimum(np.arange(count) // round(run.rate_hz / GRID_HZ), moves.size - 1)
     return np.asarray(~moves[at])
 
 
