@@ -41,8 +41,6 @@ class Fit:
     log_likelihood: float
     log_evidence: float
     residuals: tuple[FloatArray, ...]
-    by_group: FloatArray
-    """Log posterior of each group of features and, last, of the model's own unknowns, shape (group + 1,)."""
     converged: bool = True
     columns: Columns = field(default_factory=dict, repr=False)
     """Jacobian at the end, where it was worked out exactly."""
@@ -53,6 +51,22 @@ class Fit:
     def known(self) -> dict[tuple[str, int | None], float]:
         """Unit coordinates by (key, run), to start another fit from."""
         return dict(zip(self.keys, (float(v) for v in self.u), strict=True))
+
+    def misfit_nats(self, experiment: Experiment, sizes: Sizes) -> FloatArray:
+        """What the fit leaves, as half a sum of squares, shape (group + 1,).
+
+        First the residuals of each group of features over their nominal variance and the discrepancy in
+        `sizes`; last, how far the unknowns that belong to no effect are strained.
+        """
+        groups = experiment.groups
+        square = np.zeros(len(groups))
+        for run, index, variance, residual in zip(
+            experiment.runs, groups.index, groups.variance, self.residuals, strict=True
+        ):
+            weight = run.features.independent_fraction
+            square += weight * np.bincount(index, residual**2 / variance, len(groups))
+        own = np.array(["." not in key for key, _ in self.keys])
+        return 0.5 * np.append(square / (1.0 + sizes.discrepancy), np.sum(self.u[own] ** 2))
 
     def strength(self, effect: str, only: Collection[str] = ()) -> float:
         """How many posterior sd the effect is from none.
@@ -186,7 +200,6 @@ def finish(search: Search, converged: bool, exact: bool) -> Fit:
         log_likelihood=linear.log_likelihood,
         log_evidence=evidence,
         residuals=tuple(line.residual for line in linear.lines),
-        by_group=linear.by_group,
         converged=converged,
         columns=problem.columns_of(linear.lines) if exact else {},
         values=shared,

@@ -83,14 +83,6 @@ class Covariance:
             white[self._rows] = self._inverse @ matrix[self._rows]
         return white
 
-    @property
-    def log_scale(self) -> FloatArray:
-        """½ ln |C| as a sum over the features, (n,): those that C couples are counted given those before."""
-        log_scale = np.log(self._root)
-        if self._rows.size:
-            log_scale[self._rows] = -np.log(np.diag(self._inverse))
-        return np.asarray(log_scale, dtype=np.float64)
-
     def back(self, white: FloatArray) -> FloatArray:
         """Mᵀ X for X of shape (n,) or (n, m), with the M of `whiten`."""
         product: FloatArray = white / (self._root if white.ndim == 1 else self._root[:, None])

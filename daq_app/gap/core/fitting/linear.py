@@ -13,7 +13,6 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.fitting import dense
 from daq_app.gap.core.fitting.likelihood import LOG_2PI, Covariance, Sizes
 from daq_app.gap.core.fitting.problem import Linearised, Problem
-from daq_app.gap.core.policy import POLICY
 
 Mask = NDArray[np.bool_]
 _PASSES = 3
@@ -63,23 +62,6 @@ class Linear:
         self.log_likelihood = log_likelihood
         scatters = problem.model.scatters
         self.objective = 0.5 * float(u @ u) - log_likelihood + sizes.cost(scatters)
-
-    @property
-    def by_group(self) -> FloatArray:
-        """Log posterior by what it is the posterior of, shape (group + 1,).
-
-        The log likelihood of each group of features with the prior of its discrepancy; last, the prior of the
-        unknowns that belong to no effect: survey, calibrations, what each run has of its own.
-        """
-        groups = self.problem.experiment.groups
-        total = -np.log1p(self.sizes.discrepancy / POLICY.usual_discrepancy**2)
-        for run, index, covariance, white in zip(
-            self.problem.runs, groups.index, self.covariances, self.white, strict=True
-        ):
-            each = -0.5 * (white[:, -1] ** 2 + LOG_2PI) - covariance.log_scale
-            total += run.features.independent_fraction * np.bincount(index, each, len(groups))
-        own = np.array([not unknown.effect for unknown in self.problem.unknowns])
-        return np.append(total, -0.5 * np.sum(self.u[own] ** 2))
 
     @cached_property
     def factor(self) -> FloatArray:

@@ -197,11 +197,12 @@ class Hypotheses:
         return rank(kept, self.library, self.policy, measured=self.measured)
 
     def _worth_it(self, hypothesis: Hypothesis) -> bool:
-        """Whether the last of several causes explains enough of what it takes part in.
+        """Whether the last of several causes gains what it costs, and more than the others' form is wrong by.
 
-        Where another cause accounts for a group of features, a further one mends that one's form there; where
-        no other does, it need not rival what they explain elsewhere. That the survey is strained less counts
-        as one more group.
+        In the groups of features that it improves, what it takes away is compared with what the others
+        explain, both in the noise, scatter and discrepancy of the whole: the square root of their ratio is
+        that of two amplitudes. The log evidence cannot say this, since it grows with the logarithm of what
+        the others explain.
         """
         if len(hypothesis) < 2 or hypothesis not in self.fits:
             return True
@@ -210,13 +211,19 @@ class Hypotheses:
             for left in hypothesis
         }
         last = max(without, key=lambda name: without[name])
+        if self.evidence[hypothesis] - without[last] < self.policy.further_nats:
+            return False
         rest = tuple(name for name in hypothesis if name != last)
         if rest not in self.fits:
             return True
-        whole, part, nothing = (self.fits[h].by_group for h in (hypothesis, rest, NULL))
-        improved = whole - part > self.policy.improved_nats
-        explained = float(np.maximum(whole - nothing, 0.0)[improved].sum())
-        return self.evidence[hypothesis] - without[last] >= self.policy.further_share * explained
+        yardstick = self.fits[hypothesis].sizes
+        whole, part, nothing = (
+            self.fits[h].misfit_nats(self.experiment, yardstick) for h in (hypothesis, rest, NULL)
+        )
+        taken = part - whole
+        improved = taken > self.policy.improved_nats
+        explained = float(np.maximum(nothing - part, 0.0)[improved].sum())
+        return float(taken[improved].sum()) >= self.policy.further_share**2 * explained
 
     def free_forms(self, best: Hypothesis) -> list[FreeForm]:
         """What each probe of the families of the best hypothesis, and each departure from the forms of its
