@@ -69,7 +69,7 @@ def _moved_apart(run: RockingRun, block: Block, values: Mapping[str, float]) -> 
     if block.wire is None:
         return None
     sizes = dict(bent_wall(run, values))
-    sizes |= kicks_that_turn(run, values) | turns(values)
+    sizes |= kicks_that_turn(run, values) | turns(run, values)
     parts = []
     for form, size in sizes.items():
         if size == 0.0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 
@@ -32,7 +33,7 @@ def _family_difference(run: RockingRun, family: str, values: Mapping[str, float]
     if family == "wire" and family != run.reference and "sliding.c" in values:
         # A slip is a step to whatever the wires answer with.
         slips = run.cache.constant("slips", lambda: slip_shape(run.grid) / run.wire_height_m)
-        shown = shown + values["sliding.c"] * slips
+        shown = shown + at_impacts(run, values, "sliding.c") * slips
     total = _added(run, family, values, shown)
     if total is None or family != run.reference:
         return total
@@ -81,6 +82,19 @@ def difference_of(run: RockingRun, first: str, second: str, values: Mapping[str,
     if a is None:
         return None if b is None else -b
     return a if b is None else a - b
+
+
+def at_impacts(run: RockingRun, values: Mapping[str, float], key: str) -> float:
+    """What an effect does for each rad/s of an impact's approach speed, in the speeds of the survey's wall.
+
+    The grid has these. A block falls from a small rotation φ with ω² = 2 p² φ sin α, so that another p and α
+    make all impacts faster by nearly the same share.
+    """
+    if not (strength := values.get(key, 0.0)):
+        return 0.0
+    survey = run.survey
+    faster = math.sin(values["alpha"]) / math.sin(survey.alpha_rad)
+    return strength * values["p"] / survey.p_rad_s * math.sqrt(faster)
 
 
 def face_gain(values: Mapping[str, float], face: str) -> float:

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.differences import Term
+from daq_app.gap.rocking_model.features.differences import Term, at_impacts
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import turned_shape
 from daq_app.gap.rocking_model.motion.rotation import shown_by_wires
@@ -18,9 +18,9 @@ _FORMS = {"corner_twist.on": False, "corner_twist.back": True}
 """Form of the turns → whether they change sign with the side."""
 
 
-def turns(values: Mapping[str, float]) -> dict[str, float]:
+def turns(run: RockingRun, values: Mapping[str, float]) -> dict[str, float]:
     """Form → how much of it there is, s; empty for a wall that does not turn."""
-    size, alternation = values.get("corner_twist.c", 0.0), values.get("corner_twist.alternation", 0.0)
+    size, alternation = at_impacts(run, values, "corner_twist.c"), values.get("corner_twist.alternation", 0.0)
     sizes = (size * math.cos(alternation), size * math.sin(alternation))
     return {form: part for form, part in zip(_FORMS, sizes, strict=True) if part != 0.0}
 
@@ -44,5 +44,5 @@ def turn_share(run: RockingRun, *, of_base: bool) -> float:
 
 def turn_terms(run: RockingRun, values: Mapping[str, float], share: float = 1.0) -> Iterator[Term]:
     """A share of the rotation about the vertical, by its forms."""
-    for form, size in turns(values).items():
+    for form, size in turns(run, values).items():
         yield share * size, form, partial(turned, run, form)

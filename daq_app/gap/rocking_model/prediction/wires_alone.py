@@ -14,6 +14,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.differences import at_impacts
 from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE
 from daq_app.gap.rocking_model.features.oscillations.ring_response import bent_form, bent_share, bent_wall
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
@@ -56,9 +57,9 @@ def _forms(run: RockingRun, values: Mapping[str, float]) -> Iterator[tuple[float
         yield play, _carried(run, "play")
     if share := values.get(CROSSTALK_SHARE, 0.0):
         yield share, _carried(run, "crosstalk")
-    if slip := values.get("sliding.c", 0.0):
+    if slip := at_impacts(run, values, "sliding.c"):
         yield slip / run.wire_height_m, _carried(run, "slip")
-    for form, size in turns(values).items():
+    for form, size in turns(run, values).items():
         yield size * turn_share(run, of_base=False), _carried(run, form)
     for form, size in bent_wall(run, values).items():
         yield size * bent_share(run, of_base=False), _carried(run, form)

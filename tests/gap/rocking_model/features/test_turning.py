@@ -65,8 +65,8 @@ def test_a_wall_that_takes_a_while_to_turn_turns_as_far(plain: GapRun, settling_
     seen = extract(plain)
     (block,) = [block for block in seen.blocks if block.family == "turn"]
     at_once, slowly = (_turns(_turning_at_one_edge(plain, constant_s)) for constant_s in (1e-4, settling_s))
-    of_size = of_shapes(seen, block, turn_terms(seen, {"corner_twist.c": TURN_S}))
-    alternating = {"corner_twist.c": TURN_S, "corner_twist.alternation": np.pi / 2.0}
+    of_size = of_shapes(seen, block, turn_terms(seen, _usual(seen) | {"corner_twist.c": TURN_S}))
+    alternating = _usual(seen) | {"corner_twist.c": TURN_S, "corner_twist.alternation": np.pi / 2.0}
     forms = np.column_stack([of_size, of_shapes(seen, block, turn_terms(seen, alternating))])
     strength = np.linalg.lstsq(forms, slowly - at_once, rcond=None)[0]
     assert np.max(np.abs(strength)) < 0.02
@@ -97,9 +97,20 @@ def test_a_simulated_wall_that_turns_about_its_corners_is_predicted(alternation:
     (run,) = simulate({"corner_twist": given}, (0.35,))
     seen = extract(run)
     (block,) = [block for block in seen.blocks if block.family == "turn"]
-    values = {f"corner_twist.{key}": value for key, value in given.items()}
+    values = _usual(seen) | {f"corner_twist.{key}": value for key, value in given.items()}
     told = of_shapes(seen, block, turn_terms(seen, values))
     assert np.max(np.abs(told)) > 0.3 * TURN_S
+    np.testing.assert_allclose(block.values, told, atol=0.03 * TURN_S)
+
+
+def test_impacts_are_as_fast_as_those_of_the_wall_and_not_of_the_survey() -> None:
+    (run,) = simulate({"corner_twist": {"c": TURN_S, "alternation": 0.0}}, (0.35,))
+    true = run.survey
+    believed = replace(true, alpha_rad=0.95 * true.alpha_rad, p_rad_s=0.96 * true.p_rad_s)
+    seen = extract(replace(run, survey=believed))
+    (block,) = [block for block in seen.blocks if block.family == "turn"]
+    wall = {"alpha": true.alpha_rad, "p": true.p_rad_s, "corner_twist.c": TURN_S}
+    told = of_shapes(seen, block, turn_terms(seen, wall))
     np.testing.assert_allclose(block.values, told, atol=0.03 * TURN_S)
 
 
@@ -110,7 +121,7 @@ def test_a_turn_that_wires_of_one_end_take_for_something_else_is_predicted(
     given = {"c": 5.0 * TURN_S, "alternation": np.pi / 4}
     still, turning = (_of_one_end(run) for run in (plain, *simulate({"corner_twist": given}, (0.35,))))
     before, after = (next(b for b in run.blocks if b.family == family) for run in (still, turning))
-    values = {f"corner_twist.{key}": value for key, value in given.items()}
+    values = _usual(turning) | {f"corner_twist.{key}": value for key, value in given.items()}
     told = of_shapes(
         turning, after, turn_terms(turning, values, turn_share(turning, of_base=family == "base"))
     )

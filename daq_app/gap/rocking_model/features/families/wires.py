@@ -15,6 +15,7 @@ from daq_app.gap.core.parameters import known
 from daq_app.gap.rocking_model.features.block import Block, regress
 from daq_app.gap.rocking_model.features.differences import (
     Term,
+    at_impacts,
     base_rotation,
     difference_of,
     face_gain,
@@ -174,7 +175,7 @@ def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) ->
         (-face_gain(values, "face_b"), "negative", lambda: np.minimum(theta, 0.0)),
         (values["wire_even"], "even", lambda: theta**2),
         (values["wire_play"], "play", lambda: play_shape(theta)),
-        (values.get("sliding.c", 0.0) / run.wire_height_m, "slip", partial(slip_shape, run.grid)),
+        (at_impacts(run, values, "sliding.c") / run.wire_height_m, "slip", partial(slip_shape, run.grid)),
         *_moved_apart(run, values, of_base=False),
     )
     coefficients = of_shapes(run, block, shapes)
@@ -195,7 +196,7 @@ def _predict_base(run: RockingRun, block: Block, values: Mapping[str, float]) ->
     theta = run.grid.theta
     shapes: tuple[Term, ...] = (
         (values["base_follow"] * run.base_lever, "theta", lambda: theta),
-        (values.get("sliding.c", 0.0), "slip", partial(slip_shape, run.grid)),
+        (at_impacts(run, values, "sliding.c"), "slip", partial(slip_shape, run.grid)),
         (values.get("wire_cosine@wire.kappa", 0.0) * run.base_bend_m2, "square", lambda: theta**2),
         *_moved_apart(run, values, of_base=True),
     )
