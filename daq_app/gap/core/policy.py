@@ -54,10 +54,11 @@ class Policy:
     what the form of the others leaves, it takes up. In development laboratories four of five that gained 10
     to 14 were false, three of six that gained 15 to 25 true; raising it loses weak causes beside strong
     ones."""
-    further_share: float = 0.05
+    further_share: float = 0.03
     """Amplitude of what a further cause takes away, over that of what the others explain in the same groups
     of features, from which it is more than their form may be wrong by. Of 64 development cases none has a
-    false further cause above it beside right ones but one, and true ones begin at 0.06; raising it loses weak
+    false further cause above it beside right ones but one, and true ones begin at 0.06;
+    0.05 loses a real drive's third cause. Raising it loses weak
     causes beside strong ones."""
     improved_nats: float = 0.5
     """What a cause must take off the misfit of a group of features to improve it: half a nat is what one more
