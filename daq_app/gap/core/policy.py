@@ -56,9 +56,8 @@ class Policy:
     ones."""
     further_share: float = 0.03
     """Amplitude of what a further cause takes away, over that of what the others explain in the same groups
-    of features, from which it is more than their form may be wrong by. Of 64 development cases none has a
-    false further cause above it beside right ones but one, and true ones begin at 0.06;
-    0.05 loses a real drive's third cause. Raising it loses weak
+    of features, from which it is more than their form may be wrong by. True ones begin at 0.06 in development
+    laboratories, and at less for a real drive, whose third cause is lost at 0.05. Raising it loses weak
     causes beside strong ones."""
     improved_nats: float = 0.5
     """What a cause must take off the misfit of a group of features to improve it: half a nat is what one more
