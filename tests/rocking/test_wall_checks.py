@@ -112,13 +112,15 @@ def test_an_r_that_scatters_most_likely_is_remarked_where_it_is_known_worse_than
     assert analysis.verdict.trust == "remarks"
 
 
-def test_a_slow_release_is_remarked_and_r_by_the_peaks_begins_after_it():
+def test_a_slow_release_is_remarked_and_r_by_peaks_and_speeds_begins_after_it():
     _, slow = drawn({"slow_release": {"tau": 0.1}})
     _, sound = drawn({})
 
     assert kinds(slow) >= {"release"}
     assert slow.verdict.trust == "remarks"
     assert {point.first for point in slow.estimates["crt"].points} == {1}
+    assert min(point.first for point in slow.estimates["eav"].points) == 2
+    assert math.isnan(slow.half_cycles[1].sigma_speed_before_rad_s)
     assert slow.estimates["crt"].r == pytest.approx(sound.estimates["crt"].r, abs=0.001)
 
 

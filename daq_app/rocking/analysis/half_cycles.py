@@ -29,7 +29,7 @@ def half_cycles_of(
     sigma_starts = [math.nan, *(math.hypot(one.noise_s, one.zero_s, _TIMING_S) for one in impacts)]
     sigma_durations = [math.nan, *map(_sigma_between, impacts, impacts[1:]), math.nan]
     before, after = [math.nan, *track.speeds_before_rad_s], [math.nan, *track.speeds_after_rad_s]
-    sigma_before = [math.nan, *track.sigma_speeds_before_rad_s]
+    sigma_before = [math.nan, *track.sigma_speeds_in_decay]
     sigma_after = [math.nan, *track.sigma_speeds_after_rad_s]
     filtered = [math.nan, *filtered_peaks_rad_s.tolist()]
     heard = [None, *onsets]

@@ -205,7 +205,7 @@ class MotionTrack:
 
     def eav_series(self, method: str = "EAV") -> DecaySeries:
         """What `eav` is found from: many series are estimated together at the cost of one."""
-        return eav_series(self.speeds_before_rad_s, self.sigma_speeds_before_rad_s, method=method)
+        return eav_series(self.speeds_before_rad_s, self.sigma_speeds_in_decay, method=method)
 
     def crt_series(self, method: str = "CRT") -> DecaySeries:
         """What `crt` is found from."""
@@ -228,6 +228,15 @@ class MotionTrack:
         """rms misfit of hold and free fall as a share of θ0; 1 where no fall was found."""
         share = self.release.residual_rad / abs(self.theta0_rad)
         return share if math.isfinite(share) else 1.0
+
+    @property
+    def sigma_speeds_in_decay(self) -> list[float]:
+        """Those of θ̇⁻; NaN at the first impact of a wall that did not fall freely.
+
+        What still holds it bends its first half-cycle as no block's, and the fit's end of that with it.
+        """
+        sigmas = self.sigma_speeds_before_rad_s
+        return sigmas if self.fell_freely else [math.nan, *sigmas[1:]][: len(sigmas)]
 
     @property
     def _sigmas_in_decay(self) -> list[float]:
