@@ -15,6 +15,7 @@ from daq_app.rocking.analysis.families_table import families_of, verdict_of
 from daq_app.rocking.analysis.half_cycles import half_cycles_of
 from daq_app.rocking.analysis.joint_summary import summarise_joint
 from daq_app.rocking.analysis.options import AnalysisOptions
+from daq_app.rocking.analysis.own_body import impact_speeds, with_own_body
 from daq_app.rocking.analysis.preparation.fusion import Fused
 from daq_app.rocking.analysis.preparation.instruments import Instruments, prepare
 from daq_app.rocking.analysis.preparation.signals import Signals
@@ -71,7 +72,6 @@ def _analyse(
     alone = any(finding.kind in ("slow", "bending") for finding in instruments.findings)
     tracks = follow_families(signals, times, fuse=not alone)
     track = tracks.lead
-    side = 1 if track.theta0_rad > 0 else -1
     peaks = filtered_peaks(signals.time_s, lambda start, stop: velocity[start:stop], track.impacts_s)
     series = decay_series(signals, tracks, peaks, velocity_filter)
     estimates = estimates_of(series)
@@ -82,7 +82,8 @@ def _analyse(
     bends = instruments.bending is not None
     # Wires and tiltmeters share the bending: that they agree speaks for neither.
     further = [] if bends else levels_apart(theta0)
-    pattern = pattern_of(instruments, tracks, further)
+    own = with_own_body(track, signals.time_s, signals.rotation_rad)
+    pattern = pattern_of(instruments, tracks, own, further)
     by_speed = pattern.sigma_r_by_speed
     further += wall_findings(instruments, tracks, joint, further, pattern)
     others = [*instruments.findings, *further]
@@ -91,6 +92,7 @@ def _analyse(
     estimates = _with_what_was_found(estimates, findings, by_speed)
     fit = None if fit is None else _for_this_wall(fit, findings, by_speed)
     headline = theta0[signals.lead] if bends else theta0.get("tiltmeters", theta0["wires"])
+    speeds = impact_speeds(track, own, signals.time_s, signals.rotation_rad)
     bias = _bias(record, signals, track, estimates, velocity_filter, options)
     analysis = TestAnalysis(
         label=record.label,
@@ -99,10 +101,10 @@ def _analyse(
         theta0_rad=headline.value,
         theta0_over_alpha=abs(headline.value) / signals.settings.alpha_rad,
         theta0_by_family=theta0,
-        side=side,
+        side=1 if track.theta0_rad > 0 else -1,
         release_s=track.release.time_s,
         rest_s=math.nan if times.rest_s is None else times.rest_s,
-        half_cycles=half_cycles_of(track, peaks, onsets, instruments.gain_sigma),
+        half_cycles=half_cycles_of(track, speeds, peaks, onsets, instruments.gain_sigma),
         verdict=verdict,
         families=families_of(record, instruments, tracks, estimates, theta0, onsets),
         findings=findings,

@@ -1,4 +1,4 @@
-"""Half-cycles of a test with every stated error: measurement, zero, timing and the gain of the family."""
+"""Half-cycles of a test with every stated error: measurement, zero, timing, p and the gain of the family."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.rocking.analysis.own_body import ImpactSpeeds
 from daq_app.rocking.analysis.results import HalfCycle
 from daq_app.rocking.motion.swings import ImpactTime, MotionTrack
 from daq_app.rocking.motion.transients import Onset
@@ -20,7 +21,11 @@ _TIMING_S = 2e-5
 
 
 def half_cycles_of(
-    track: MotionTrack, filtered_peaks_rad_s: Floats, onsets: Sequence[Onset | None], gain_sigma: float
+    track: MotionTrack,
+    speeds: ImpactSpeeds,
+    filtered_peaks_rad_s: Floats,
+    onsets: Sequence[Onset | None],
+    gain_sigma: float,
 ) -> tuple[HalfCycle, ...]:
     """One for the release and one per impact; `gain_sigma` is the relative error of the family's gain."""
     settings = track.settings
@@ -28,9 +33,9 @@ def half_cycles_of(
     starts = [track.release.time_s, *(impact.time_s for impact in impacts)]
     sigma_starts = [math.nan, *(math.hypot(one.noise_s, one.zero_s, _TIMING_S) for one in impacts)]
     sigma_durations = [math.nan, *map(_sigma_between, impacts, impacts[1:]), math.nan]
-    before, after = [math.nan, *track.speeds_before_rad_s], [math.nan, *track.speeds_after_rad_s]
-    sigma_before = [math.nan, *track.sigma_speeds_in_decay]
-    sigma_after = [math.nan, *track.sigma_speeds_after_rad_s]
+    before, after = [math.nan, *speeds.before_rad_s.tolist()], [math.nan, *speeds.after_rad_s.tolist()]
+    sigma_before = [math.nan, *speeds.sigma_before_rad_s.tolist()]
+    sigma_after = [math.nan, *speeds.sigma_after_rad_s.tolist()]
     filtered = [math.nan, *filtered_peaks_rad_s.tolist()]
     heard = [None, *onsets]
     peak, sigma = [*track.peaks_rad, math.nan], [*track.sigma_peaks_rad, math.nan]

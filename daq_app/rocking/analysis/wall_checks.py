@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from daq_app.rocking.analysis.families_table import LEADS, other_is_blamed
+from daq_app.rocking.analysis.own_body import OwnTrack, with_own_body
 from daq_app.rocking.analysis.preparation.instruments import Instruments
 from daq_app.rocking.analysis.results import JointSummary
 from daq_app.rocking.analysis.tracks import FamilyTracks
@@ -25,44 +23,28 @@ from daq_app.rocking.families.block_checks import (
 from daq_app.rocking.families.body import body_of
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.motion.impact_pattern import ImpactPattern, impact_pattern
-from daq_app.rocking.motion.swings import MotionTrack
 from daq_app.rocking.theory.block import RigidBlock
-
-Floats = NDArray[np.float64]
 
 _MADE_BY_A_DRIFT: Final = ("side", "duration", "pause", "hop")
 """A zero that moves makes leans to one side longer and faster than those to the other."""
-_P_SHARE: Final = 0.1
-_ALPHA_SHARE: Final = 0.2
-"""p and α by the half-cycles that are further from the survey's than this are no property of the wall."""
 
 
 def pattern_of(
-    instruments: Instruments, tracks: FamilyTracks, level_findings: Sequence[FamilyFinding]
+    instruments: Instruments, tracks: FamilyTracks, own: OwnTrack, level_findings: Sequence[FamilyFinding]
 ) -> ImpactPattern:
     """How the impacts of the test differ, by both families together where no instrument is to blame.
+
+    `own`: the family that leads, with the wall's own p and α.
 
     Sides are those of the family that leads: where the families' zeros differ, what is fused of them leans.
     """
     signals = instruments.signals
-    pattern = impact_pattern(_with_own_body(tracks.lead, signals.time_s, signals.rotation_rad))
+    pattern = impact_pattern(own.track)
     blamed = other_is_blamed([*instruments.findings, *level_findings], tracks.other_name)
     if tracks.fused is None or signals.fused is None or blamed:
         return pattern
-    fused = impact_pattern(_with_own_body(tracks.fused, signals.time_s, signals.fused.rotation_rad))
-    return replace(fused, by_side=pattern.by_side)
-
-
-def _with_own_body(track: MotionTrack, time_s: Floats, rotation_rad: Floats) -> MotionTrack:
-    """Half-cycles fitted with the p and α that they show; as they are where those are no wall's."""
-    body, nominal = body_of(track, 0.0), track.settings
-    if (
-        body is not None
-        and abs(body.p_rad_s / nominal.p_rad_s - 1.0) < _P_SHARE
-        and abs(body.alpha_rad / nominal.alpha_rad - 1.0) < _ALPHA_SHARE
-    ):
-        return track.fitted_again(body.p_rad_s, body.alpha_rad, time_s, rotation_rad)
-    return track
+    fused = with_own_body(tracks.fused, signals.time_s, signals.fused.rotation_rad)
+    return replace(impact_pattern(fused.track), by_side=pattern.by_side)
 
 
 def wall_findings(
