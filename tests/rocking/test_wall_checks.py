@@ -180,6 +180,18 @@ def test_a_wall_that_is_let_go_slowly_is_fitted_from_its_first_impact_on():
     assert fit.alpha_rad == pytest.approx(test.truth["alpha_rad"], abs=3 * fit.sigma_alpha_rad)
 
 
+def test_a_slow_release_is_left_out_of_the_fit_even_where_the_rest_is_no_rigid_blocks_motion_either():
+    effects = {"slow_release": {"tau": 0.3}, "base_tilt": {"beta": 0.004}}
+    test = draw_test(RIG, SEED, effects=effects)
+    analysis = analyse_record(test.record(), AnalysisOptions(bias_runs=0, keep_series=False))
+    fit = analysis.fit
+
+    assert not fit.from_release
+    assert not fit.explains_the_motion
+    assert "misfit" in kinds(analysis)
+    assert fit.r == pytest.approx(test.truth["restitution"], abs=0.003)
+
+
 def test_the_fit_of_a_wall_whose_r_scatters_widely_has_the_mean_of_its_impacts():
     test = draw_test(RIG, 52404, effects={"restitution_scatter": {"sigma": 0.02}})
     analysis = analyse_record(test.record(), AnalysisOptions(bias_runs=0, keep_series=False))

@@ -37,6 +37,9 @@ _POOR = 1.5
 _NO_CLEAN_FALL = 4.0
 """Misfit in noises above which the motion is fitted from its first impact on: a wall that is let go slowly,
 or kicked, falls as no free block does, and rocks on as one."""
+_FALL_TO_BLAME = 0.5
+"""Where neither explains the motion, the fit without the fall counts if it leaves less than this share of what
+the fit with it leaves. Raising it leaves the fall out where the rest is no better understood."""
 _HIGHEST = 0.99
 """Share of the energy at which a block falls over that a motion is begun with at most."""
 _CORRELATED_POINTS = 12
@@ -127,9 +130,11 @@ def fit_motion(
     for thorough in (False, True):
         if math.isfinite(begin_s) and (later is None or later.residual_rad > _POOR * later.noise_rad):
             later = record.fit(at_impact, thorough=thorough)
-    if later is not None and later.explains_the_motion:
-        return replace(later, from_release=False)
-    return record.fit(at_release, thorough=True)
+    if later is None or not later.explains_the_motion:
+        whole = record.fit(at_release, thorough=True)
+        if later is None or (whole is not None and later.residual_rad > _FALL_TO_BLAME * whole.residual_rad):
+            return whole
+    return replace(later, from_release=False)
 
 
 @dataclass(frozen=True, slots=True)
