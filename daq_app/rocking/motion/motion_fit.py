@@ -38,8 +38,8 @@ _NO_CLEAN_FALL = 4.0
 """Misfit in noises above which the motion is fitted from its first impact on: a wall that is let go slowly,
 or kicked, falls as no free block does, and rocks on as one."""
 _FALL_TO_BLAME = 0.5
-"""Where neither explains the motion, the fit without the fall counts if it leaves less than this share of what
-the fit with it leaves. Raising it leaves the fall out where the rest is no better understood."""
+"""Where neither explains the motion, the fit without the fall counts if it leaves less than this share of
+what the fit with it leaves. Raising it leaves the fall out where the rest is no better understood."""
 _HIGHEST = 0.99
 """Share of the energy at which a block falls over that a motion is begun with at most."""
 _CORRELATED_POINTS = 12
