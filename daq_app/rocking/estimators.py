@@ -35,7 +35,7 @@ _SCATTER_WEIGHTS = np.gradient(_SCATTERS) / np.maximum(_SCATTERS, _USUAL_SCATTER
 it all ratios alike (the scale-invariant prior of Jeffreys)."""
 _SURELY = 0.05
 """Chance of less scatter than what is stated as its least."""
-_FEWEST = 4
+FEWEST_POINTS = 4
 """Points below which a scatter cannot be told from the values' own errors: none is assumed."""
 
 
@@ -199,7 +199,9 @@ def _estimate(
         points=series.points,
         r=r,
         standard_error=r * math.sqrt(variance),
-        degrees_of_freedom=math.inf if len(series.points) >= _FEWEST else max(len(series.points) - 1, 1),
+        degrees_of_freedom=math.inf
+        if len(series.points) >= FEWEST_POINTS
+        else max(len(series.points) - 1, 1),
         scatter=scatter,
         least_scatter=least_scatter,
         plain_mean=float(single.mean()),
@@ -256,7 +258,7 @@ def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float, 
     solution = inverse @ (np.swapaxes(design, 2, 3) @ target)
     misfit = ((target - design @ solution) ** 2).sum(axis=(2, 3))
     likelihood = -0.5 * (log_spread + np.linalg.slogdet(normal)[1] + misfit)
-    few = np.array([len(series.points) < _FEWEST for series in together])
+    few = np.array([len(series.points) < FEWEST_POINTS for series in together])
     likelihood[few, 1:] = -np.inf
     weights = _SCATTER_WEIGHTS * np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
     weights /= weights.sum(axis=1, keepdims=True)

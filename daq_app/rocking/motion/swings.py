@@ -9,7 +9,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.estimators import DecaySeries, RestitutionEstimate, crt_series, eav_series, estimate_all
+from daq_app.rocking.estimators import (
+    FEWEST_POINTS,
+    DecaySeries,
+    RestitutionEstimate,
+    crt_series,
+    eav_series,
+    estimate_all,
+)
 from daq_app.rocking.motion.arcs import Arc, fit_arcs
 from daq_app.rocking.motion.release import Release, locate_release
 
@@ -231,12 +238,16 @@ class MotionTrack:
 
     @property
     def sigma_speeds_in_decay(self) -> list[float]:
-        """Those of θ̇⁻; NaN at the first impact of a wall that did not fall freely.
+        """Those of θ̇⁻; NaN at the first impact of a wall that did not fall freely, where enough are left.
 
-        What still holds it bends its first half-cycle as no block's, and the fit's end of that with it.
+        What still holds it bends its first half-cycle as no block's, and the fit's end of that with it. Fewer
+        points than show a scatter would state next to no error.
         """
         sigmas = self.sigma_speeds_before_rad_s
-        return sigmas if self.fell_freely else [math.nan, *sigmas[1:]][: len(sigmas)]
+        if self.fell_freely or not sigmas:
+            return sigmas
+        later = [math.nan, *sigmas[1:]]
+        return later if len(eav_series(self.speeds_before_rad_s, later).points) >= FEWEST_POINTS else sigmas
 
     @property
     def _sigmas_in_decay(self) -> list[float]:
