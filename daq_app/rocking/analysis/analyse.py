@@ -174,7 +174,6 @@ def _fit(
         speeds_rad_s=track.speeds_before_rad_s,
         r=_typical_r(estimates),
         scatter=max(estimates["eav"].scatter, estimates["crt"].scatter),
-        scatter_of_speeds=estimates["eav"].scatter,
         noise_rad=max(signals.noise_rad, signals.settings.slow_noise_rad),
         p_rad_s=signals.settings.p_rad_s,
         alpha_rad=signals.settings.alpha_rad,

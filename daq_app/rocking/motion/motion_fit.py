@@ -94,7 +94,6 @@ def fit_motion(
     speeds_rad_s: list[float],
     r: float,
     scatter: float | None,
-    scatter_of_speeds: float | None = None,
     noise_rad: float,
     p_rad_s: float,
     alpha_rad: float,
@@ -104,8 +103,7 @@ def fit_motion(
     `r`, `impacts_s`, `peaks_rad` (release first) and `speeds_rad_s` (at the impacts) start the fit;
     `noise_rad` is the rms of one sample.
     `scatter` is the relative standard deviation of r from impact to impact (at least 0.0003 is
-    allowed for); None says that r is the same at every impact. `scatter_of_speeds`
-    counts in its place where the fall is left out.
+    allowed for); None says that r is the same at every impact.
     """
     count = _span(peaks_rad, len(impacts_s))
     if count < 2 or not 0.0 < r <= 1.0:
@@ -124,8 +122,7 @@ def fit_motion(
     amplitude, begin_s, own = _fall_to_first_impact(
         impacts_s[0], peaks_rad[1], _deviations(speeds_rad_s[1:], count, log_r), log_r, p_rad_s, alpha_rad
     )
-    spread = scatter if scatter_of_speeds is None else scatter_of_speeds
-    at_impact = _Start(impacts_s[0] + POINT_S, begin_s, amplitude, own, spread)
+    at_impact = _Start(impacts_s[0] + POINT_S, begin_s, amplitude, own, scatter)
     later: MotionFit | None = None
     for thorough in (False, True):
         if math.isfinite(begin_s) and (later is None or later.residual_rad > _POOR * later.noise_rad):
