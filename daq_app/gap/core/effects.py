@@ -42,6 +42,8 @@ class Effect:
     typical: float = 0.0
     """Size of a departure's coefficient where the family has another form, per unit of the first
     parameter of the effect that it departs from. Without it the departure says nothing of that."""
+    directed: bool = False
+    """Whether the sign of that coefficient follows from the signs of `typical` and of the parameter."""
     part_of: str = ""
     """Effect of which this is one place: the same law on one channel of a family. They are no two causes."""
     null_value: Mapping[str, float] = field(default_factory=dict)

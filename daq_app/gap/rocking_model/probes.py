@@ -10,7 +10,6 @@ from daq_app.gap.core.parameters import signed
 from daq_app.gap.rocking_model.prediction.vector import PROBE_SPEEDS
 
 _LAWS = ("restitution_slope",)
-_SIDES = ("alpha_asymmetry", "base_tilt", "eccentric_mass")
 _LOSSES = ("viscous", "coulomb")
 _MORE_SPEEDS = "release from lower and from higher levels: how r goes with the speed shows there"
 _MORE_ROTATIONS = "release from lower and from higher levels: how the loss grows with θ shows there"
@@ -67,10 +66,11 @@ def departures() -> Iterable[Effect]:
     yield _departure("loss_growth", "dissipation", _LOSSES, growth, 0.6, "loss + damping that grows as ln φ")
     words = "loss + damping of either side's own, ± ζ"
     yield _departure("loss_side", "dissipation", _LOSSES, side, 1.2, words)
-    # α differs by half the radius of one round edge over the height of the centroid, a metre or more.
+    # The round edge has the smaller α, by its radius over the height of the centroid, a metre and a half.
     radius = signed("rho", 0.05, "m")
     words = "edges round to different radii: α of either side changes with its rotation"
-    yield _departure("uneven_edges", "geometry", _SIDES, radius, 1.0, words)
+    uneven = _departure("uneven_edges", "geometry", ("alpha_asymmetry",), radius, -1.5, words)
+    yield replace(uneven, directed=True)
 
 
 def _departure(

@@ -13,7 +13,7 @@ from daq_app.gap.core.effects import Effect
 from daq_app.gap.core.fitting.screen import Score
 from daq_app.gap.core.judging.evidence import Ranked
 from daq_app.gap.core.judging.other_forms import FreeForm, with_other_forms
-from daq_app.gap.core.policy import POLICY
+from daq_app.gap.core.policy import POLICY, Policy
 from tests.support.gap.toy_wave import BEND, LIBRARY, BendingModel, make_runs
 
 SIZED = replace(BEND, typical=1.5)
@@ -24,14 +24,16 @@ KNOWN = 1.0 - POLICY.unforeseen
 FORMS = Library([*(e for e in LIBRARY.values() if e.name != "free"), PROBE, SIZED])
 
 
-def diagnosed(seed: int, library: Library = FORMS, **hidden: float) -> Diagnosis:
-    return diagnose(BendingModel(), make_runs(seed, scatter=0.004, **hidden), library, Options())
+def diagnosed(seed: int, library: Library = FORMS, policy: Policy = POLICY, **hidden: float) -> Diagnosis:
+    options = Options(policy=policy)
+    return diagnose(BendingModel(), make_runs(seed, scatter=0.004, **hidden), library, options)
 
 
 def test_an_effect_that_is_only_just_there_may_have_another_form() -> None:
     """The same runs: named for certain without the departure, which no r(a) of 6 sd deserves."""
-    weak = diagnosed(3, slope_k=0.015)
+    weak = diagnosed(3, policy=replace(POLICY, prior_other_form=0.5), slope_k=0.015)
     assert diagnosed(3, LIBRARY, slope_k=0.015).decision.confidence > 0.99 * KNOWN
+    assert 0.9 * KNOWN < diagnosed(3, slope_k=0.015).decision.confidence < 0.95 * KNOWN
     shared = {entry.effects: entry.probability for entry in weak.which}
     assert 0.1 < shared[("free",)] < 0.6
     assert weak.p_unknown == pytest.approx(weak.rest.unknown + shared[("free",)])
@@ -76,6 +78,14 @@ def test_evidence_for_another_form_is_that_of_a_coefficient_of_its_size() -> Non
     assert -5.0 < small[-1] < -4.0, "no surer of its form than our model of it is good"
     assert math.isnan(FreeForm.of(BEND, Score(1.0, 1.0, 2.0, 1.0), 1.0).log_bayes), "its size is not known"
     assert math.isnan(FreeForm.of(PROBE, Score(1.0, 3.0), 1.0).log_bayes)
+
+
+def test_a_departure_of_known_direction_is_no_other_form_the_other_way() -> None:
+    directed = replace(SIZED, directed=True)
+    along, against = (FreeForm.of(directed, Score(1.0, 1.0, c, 0.3), 1.0).log_bayes for c in (1.5, -1.5))
+    assert along == pytest.approx(_form(1.5, 0.3).log_bayes + math.log(2.0), abs=0.01)
+    assert against < _form(-1.5, 0.3).log_bayes - 3.0
+    assert FreeForm.of(directed, Score(1.0, 1.0, -1.5, 0.3), -1.0).log_bayes == pytest.approx(along)
 
 
 def test_of_a_pair_the_effect_with_another_form_is_exchanged_and_all_else_gives_way() -> None:

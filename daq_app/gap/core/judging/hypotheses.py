@@ -249,7 +249,7 @@ class Hypotheses:
 
     def _departed_from(self, form: Effect, best: Hypothesis) -> float:
         """The first parameter, in its unit, of the effect of the best hypothesis that a form departs from."""
-        values, largest = self.fits[best].values, 0.0
-        for effect in (self.library[name] for name in best if name in form.of):
-            largest = max(largest, abs(values.get(effect.key(effect.parameters[0]), (0.0,))[0]))
-        return largest
+        values = self.fits[best].values
+        effects = (self.library[name] for name in best if name in form.of)
+        sizes = [values.get(effect.key(effect.parameters[0]), (0.0,))[0] for effect in effects]
+        return max(sizes, key=abs, default=0.0)

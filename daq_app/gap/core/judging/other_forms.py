@@ -59,12 +59,13 @@ class FreeForm:
             score.gain,
             chance,
             score.gain - score.determined,
-            _log_bayes(score, form.typical * abs(strength)),
+            _log_bayes(score, form.typical * strength, form.directed),
         )
 
 
-def _log_bayes(score: Score, typical: float) -> float:
-    """Evidence for a coefficient of ± `typical`, half of it its sd, over one of nearly none.
+def _log_bayes(score: Score, typical: float, directed: bool) -> float:
+    """Evidence for a coefficient of ± `typical`, half of it its sd, over one of nearly none; of `typical`
+    alone where its sign is known (`directed`).
 
     Each is seen with the score's error. Another form is no form that departs by next to nothing.
     """
@@ -72,8 +73,9 @@ def _log_bayes(score: Score, typical: float) -> float:
         return math.nan
     named_form = math.hypot(score.error, POLICY.own_form * typical)
     other_form = math.hypot(score.error, 0.5 * typical)
-    sides = [norm.logpdf(score.coefficient, side * typical, other_form) for side in (-1.0, 1.0)]
-    return float(np.logaddexp(*sides) - math.log(2.0) - norm.logpdf(score.coefficient, 0.0, named_form))
+    sides = (1.0, 1.0) if directed else (-1.0, 1.0)
+    either = [norm.logpdf(score.coefficient, side * typical, other_form) for side in sides]
+    return float(np.logaddexp(*either) - math.log(2.0) - norm.logpdf(score.coefficient, 0.0, named_form))
 
 
 def with_other_forms(

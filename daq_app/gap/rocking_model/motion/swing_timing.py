@@ -21,6 +21,8 @@ from daq_app.gap.rocking_model.tolerances.sensors import (
 from daq_app.gap.rocking_model.tolerances.walls import MIDDLE_OF_IMPACT_S
 
 _ROUNDS = 3
+_WALK = 3
+"""Order of the polynomial that the zero of an accelerometer walks by while a wall rocks."""
 
 
 def swing_delay(run: GapRun, grid: Grid, of_impacts_s: float | None) -> tuple[float, float] | None:
@@ -70,9 +72,9 @@ class _Foot:
     """(k, n) each accelerometer less gravity and its share of ω² about the edge, m/s²."""
     heights_m: FloatArray
     design: FloatArray
-    """(n, 4): zero, gravity, inertia of unequal calibrations, and the rate of gravity: a delay."""
+    """(n, m): a zero that walks, gravity, inertia of unequal calibrations, and the rate of gravity: a delay."""
     inverse: FloatArray
-    """(4, n)"""
+    """(m, n)"""
 
     @classmethod
     def of(cls, run: GapRun, grid: Grid, rows: FloatArray, chosen: list[int]) -> _Foot | None:
@@ -80,9 +82,10 @@ class _Foot:
         pick = free & ~grid.near_impact & grid.valid
         theta, omega = grid.theta[pick], grid.omega[pick]
         gravity = -GRAVITY_M_S2 * np.sin(theta)
-        columns = [np.ones_like(theta), gravity, grid.alpha[pick], GRAVITY_M_S2 * np.cos(theta) * omega]
-        design = np.column_stack(columns)
-        if len(design) < 20 * len(columns):
+        zero = np.polynomial.legendre.legvander(grid.time_s[pick] / grid.impact_s[-1] * 2.0 - 1.0, _WALK)
+        rate = GRAVITY_M_S2 * np.cos(theta) * omega
+        design = np.column_stack([zero, gravity, grid.alpha[pick], rate])
+        if len(design) < 20 * design.shape[1]:
             return None
         places = run.positions(chosen)
         arms = places[:, :1] - np.sign(theta) * run.survey.half_base_m

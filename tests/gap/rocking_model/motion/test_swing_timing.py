@@ -42,6 +42,18 @@ def test_a_delay_is_read_between_impacts(tau: float) -> None:
         assert abs(seen - tau) < 3.0 * sd + 2e-4
 
 
+def test_zeros_that_walk_leave_a_delay_as_well_known() -> None:
+    (still,), (walking,) = (simulate({"lag@accelerometer": {"tau": 3e-3}}, LEVELS[:1]) for _ in range(2))
+    sensors = walking.indices("accelerometer", "x")
+    for place, size in zip(sensors, np.linspace(-0.2, 0.3, len(sensors)), strict=True):
+        time = np.linspace(0.0, 1.0, walking.channels.shape[1])
+        walking.channels[place] += size * (time + 2.0 * time**2 - 2.5 * time**3)
+    sure = _delay(extract(still), "swing timing")[1]
+    seen, sd = _delay(extract(walking), "swing timing")
+    assert sd < 1.2 * sure
+    assert abs(seen - 3e-3) < 3.0 * sd + 2e-4
+
+
 def test_the_form_of_an_impact_is_no_delay_between_impacts() -> None:
     before = [extract(run) for run in simulate({}, LEVELS)]
     after = [extract(run) for run in _with_another_shock(simulate({}, LEVELS), 0.01)]
