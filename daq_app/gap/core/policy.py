@@ -54,8 +54,8 @@ class Policy:
     further_nats: float = 5.0
     """What a further cause, or a first one beside a material finding, costs in log evidence beyond its prior:
     what the form of the others leaves, it takes up. True ones that are larger than their form may be wrong by
-    gain 6 or more in development laboratories, false ones 5 at most beside a right one. Raising it loses weak
-    causes beside strong ones."""
+    gain 6 or more in development laboratories, false ones 7 at most where nothing else is missing. Raising it
+    loses weak causes beside strong ones."""
     further_share: float = 0.03
     """Amplitude of what a further cause takes away, over that of what the others explain in the same groups
     of features, from which it is more than their form may be wrong by. True ones begin at 0.06 in development

@@ -72,7 +72,7 @@ class _Foot:
     """(k, n) each accelerometer less gravity and its share of ω² about the edge, m/s²."""
     heights_m: FloatArray
     design: FloatArray
-    """(n, m): a zero that walks, gravity, inertia of unequal calibrations, and the rate of gravity: a delay."""
+    """(n, m): a zero that walks, gravity, inertia of unequal calibrations, rate of gravity: a delay."""
     inverse: FloatArray
     """(m, n)"""
 
