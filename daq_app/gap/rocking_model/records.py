@@ -145,7 +145,9 @@ class GapRun:
         """The run with all channels at the instants of the sample clock."""
         if not self.time_offset_s.size or not np.any(self.time_offset_s):
             return self
-        channels = np.array([self.aligned(i) for i in range(len(self.sensors))])
+        channels = np.empty(self.channels.shape)
+        for i, row in enumerate(channels):
+            row[:] = self.aligned(i)
         return replace(self, channels=channels, time_offset_s=np.zeros(0))
 
     def including(self, ids: Sequence[str]) -> GapRun:

@@ -51,13 +51,16 @@ def with_play(values: FloatArray, plays: FloatArray) -> FloatArray:
     From the middle of a play on: the reading stays where the values turn back until the play is taken up,
     and follows half of it behind.
     """
-    low, high = values[:, None] - 0.5 * plays, values[:, None] + 0.5 * plays
-    shown, held = np.empty_like(low), np.full(plays.size, values[0])
-    for row, lowest, highest in zip(shown, low, high, strict=True):
-        np.maximum(held, lowest, out=row)
-        np.minimum(row, highest, out=row)
-        held = row
-    return shown.T
+    low, high = values - 0.5 * plays[:, None], values + 0.5 * plays[:, None]
+    # Each sample keeps the reading before it between two ends, and so do several in a row: from the ends of
+    # one sample on, those of twice as many follow each time.
+    span = 1
+    while span < values.size:
+        ends = [np.clip(side[:, :-span], low[:, span:], high[:, span:]) for side in (low, high)]
+        low[:, span:], high[:, span:] = ends
+        span *= 2
+    shown: FloatArray = np.clip(values[0], low, high)
+    return shown
 
 
 def play_shape(theta: FloatArray) -> FloatArray:
