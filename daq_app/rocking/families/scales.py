@@ -1,7 +1,7 @@
 """Signs and units: families that show one wall with factors like −1, 10 or 57.3 between them.
 
-Looked at before anything is known of the test, on means of 50 ms in which nothing moves: a family of the
-wrong sign or unit hides the hold, so that no test would be found.
+Looked at before anything is known of the test, on means over a quarter of a second in which nothing moves: a
+family of the wrong sign or unit hides the hold, so that no test would be found.
 """
 
 from __future__ import annotations
@@ -15,12 +15,16 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-_MEAN_S = 0.05
+_STEP_S = 0.05
+_MEAN_S = 0.25
+"""A period of a wall that rings at 4 Hz: shorter means of it are not still. Raising it loses short holds."""
+_STILL_S = 0.75
 _STILL_RAD = 1.5e-3
-"""Largest change over a second of a mean that counts as still: the steadiness of a hold."""
+"""Largest change of a mean over that time that counts as still: the steadiness of a hold."""
 _LEAST_SPAN_RAD = 5e-3
-_ALIKE = 0.12
-"""Relative difference of two families that show the same; calibration and creep stay far below."""
+_ALIKE = 0.27
+"""Difference of the logarithm of a ratio from a known factor's, of which the nearest two are 0.55 apart.
+What a bent wall or a range that ends makes of a family at rest, a fifth of the rotation, is less."""
 _FACTORS = (1e3, 1e2, 180.0 / math.pi, 25.4, 10.0)
 _FACTOR_WORDS = {
     1e3: "1000: a unit is wrong (m for mm)",
@@ -70,15 +74,17 @@ def factor_words(factor: float) -> str:
 
 
 def _means(rotation: Floats, rate_hz: float) -> Floats:
-    size = max(1, round(_MEAN_S * rate_hz))
+    size = max(1, round(_STEP_S * rate_hz))
     groups = rotation.size // size
-    return np.asarray(rotation[: groups * size].reshape(groups, size).mean(axis=1))
+    steps = rotation[: groups * size].reshape(groups, size).mean(axis=1)
+    count = min(round(_MEAN_S / _STEP_S), max(groups, 1))
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(steps, count).mean(axis=1))
 
 
 def _ratio(one: Floats, other: Floats, rate_hz: float) -> float | None:
     """Slope of `one` against `other` over the still means; None where they do not span enough."""
-    second = round(1.0 / _MEAN_S)
-    if one.size < 2 * second:
+    count = round((_STILL_S - _MEAN_S) / _STEP_S) + 1
+    if one.size < 2 * count:
         return None
     smaller = min(float(np.nanmax(np.abs(row - np.nanmedian(row)), initial=0.0)) for row in (one, other))
     still = np.ones(one.size, dtype=bool)
@@ -86,10 +92,10 @@ def _ratio(one: Floats, other: Floats, rate_hz: float) -> float | None:
         # Where one family is ten times too large, what counts as still is too: judged by its own span.
         span = float(np.nanmax(np.abs(row), initial=0.0))
         limit = _STILL_RAD * max(span / max(smaller, 1e-12), 1.0)
-        windows = np.lib.stride_tricks.sliding_window_view(row, second)
+        windows = np.lib.stride_tricks.sliding_window_view(row, count)
         quiet = np.ptp(windows, axis=1) < limit
-        still[: second - 1] = False
-        still[second - 1 :] &= quiet
+        still[: count - 1] = False
+        still[count - 1 :] &= quiet
     x, y = other[still], one[still]
     good = np.isfinite(x) & np.isfinite(y)
     x, y = x[good] - np.median(x[good]) if good.any() else x[good], y[good]
@@ -105,6 +111,6 @@ def _ratio(one: Floats, other: Floats, rate_hz: float) -> float | None:
 def _factor(ratio: float) -> float | None:
     """The known factor that a ratio is nearest to; None where it is none of them."""
     for size in (1.0, *_FACTORS, *(1.0 / factor for factor in _FACTORS)):
-        if abs(abs(ratio) / size - 1.0) < _ALIKE:
+        if abs(math.log(abs(ratio) / size)) < _ALIKE:
             return math.copysign(size, ratio)
     return None
