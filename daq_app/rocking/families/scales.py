@@ -22,9 +22,10 @@ _STILL_S = 0.75
 _STILL_RAD = 1.5e-3
 """Largest change of a mean over that time that counts as still: the steadiness of a hold."""
 _LEAST_SPAN_RAD = 5e-3
-_ALIKE = 0.27
+_ALIKE = 0.22
 """Difference of the logarithm of a ratio from a known factor's, of which the nearest two are 0.55 apart.
-What a bent wall or a range that ends makes of a family at rest, a fifth of the rotation, is less."""
+What a bent wall or a range that ends makes of a family at rest, a fifth of the rotation, is less; raising it
+takes a twentieth for inches."""
 _FACTORS = (1e3, 1e2, 180.0 / math.pi, 25.4, 10.0)
 _FACTOR_WORDS = {
     1e3: "1000: a unit is wrong (m for mm)",
