@@ -198,7 +198,7 @@ def main() -> None:
     parser.add_argument("--first-seed", type=int, default=5000)
     parser.add_argument("--foreign", type=Path, help="folder of labelled recordings instead")
     parser.add_argument("--cases", nargs="*", default=(), help="cases of that folder; all if none is named")
-    parser.add_argument("--ringing", action="store_true", help="simulated walls bend, their recordings are cut")
+    parser.add_argument("--ringing", action="store_true", help="simulated walls bend, recordings are cut")
     kinds = sorted({fault.kind for fault in FAULTS})
     parser.add_argument("--kinds", nargs="*", choices=kinds, default=kinds, help="kinds of fault to put in")
     options = parser.parse_args()
