@@ -328,6 +328,25 @@ def test_r_of_a_wall_that_bends_is_doubted_where_its_lvdts_cannot_take_the_place
     assert ("it was not done" in bending.text) == (analysis.verdict.used == ("wires",))
 
 
+@pytest.mark.parametrize(
+    ("fault", "kind", "trust"),
+    [
+        (Fault("wire", "slow", 0.02), "slow", "remarks"),
+        (Fault("lvdt", "slow", 0.02), "slow", "doubtful"),
+        (Fault("wire", "late", 0.03), "late", "remarks"),
+    ],
+)
+def test_a_wall_that_bends_is_told_behind_a_family_that_is_slow_or_late(fault: Fault, kind: str, trust: str):
+    ringing = Wall("flexible_wall", {"gain": 0.2, "frequency": 4.6, "zeta": 0.005}, ends_s=0.7)
+    test = ringing.test(RIG, SEED)
+    analysis = analyse_record(fault.record(test), AnalysisOptions(bias_runs=0, keep_series=False))
+    low, high = analysis.verdict.interval95
+
+    assert kinds(analysis) >= {kind, "bending"}
+    assert analysis.verdict.trust == trust
+    assert trust == "doubtful" or low <= test.truth["restitution"] <= high
+
+
 def test_a_survey_whose_alpha_is_not_the_walls_is_named_where_crt_is_off_by_it():
     _, analysis = drawn({"rounded_edge": {"rho": 0.1}}, 72400)
     (named,) = [finding for finding in analysis.findings if finding.kind == "alpha"]

@@ -43,6 +43,13 @@ class Response:
     span_s: float
     """Length of what was compared."""
 
+    def made_alike(self, rate_hz: float, reference: Floats, follower: Floats) -> tuple[Floats, Floats]:
+        """Both rotations, (n,), with the delay and the slowness of either; NaN is filled straight."""
+        x, y = _without_gaps(reference), _without_gaps(follower)
+        if self.response_s < 0.0:
+            return x, _delayed_and_slowed(y, 0.0, -self.response_s * rate_hz)
+        return _delayed_and_slowed(x, self.delay_s * rate_hz, self.response_s * rate_hz), y
+
 
 def compare(time_s: Floats, reference_rad: Floats, follower_rad: Floats) -> Response | None:
     """Response of `follower_rad` (n,) to `reference_rad` (n,) on one time base; None with too few samples."""
@@ -90,6 +97,26 @@ def compare(time_s: Floats, reference_rad: Floats, follower_rad: Floats) -> Resp
         return Response(gain, -solved.drift * gain, 0.0, response, turned_rms, span)
     solved = pair.solved(delay, response)
     return Response(solved.gain, solved.drift, delay, response, solved.rms, span)
+
+
+def _without_gaps(values: Floats) -> Floats:
+    """The same, straight across its gaps."""
+    places, known = np.arange(values.size, dtype=np.float64), np.isfinite(values)
+    return np.interp(places, places[known], values[known])
+
+
+def _delayed_and_slowed(values: Floats, delay: float, time_constant: float) -> Floats:
+    """Values, (n,), later by a delay and behind a first order, both in samples."""
+    if delay:
+        places = np.arange(values.size, dtype=np.float64)
+        values = np.interp(places - delay, places, values)
+    if time_constant > 0.0:
+        # First order, the input straight between samples (exact for a ramp).
+        a = math.exp(-1.0 / time_constant)
+        b = 1.0 - (1.0 - a) * time_constant
+        start = np.array([values[0] * (1.0 - b)])
+        values, _ = lfilter([b, 1.0 - a - b], [1.0, -a], values, zi=start)
+    return values
 
 
 def _noise(values: Floats) -> float:
@@ -145,8 +172,7 @@ class _Pair:
     @cached_property
     def _filled(self) -> Floats:
         """The reference, straight across its gaps."""
-        known = np.isfinite(self.reference)
-        return np.interp(self._places, self._places[known], self.reference[known])
+        return _without_gaps(self.reference)
 
     @cached_property
     def _rest(self) -> tuple[Floats, Floats]:
@@ -157,15 +183,7 @@ class _Pair:
 
     def solved(self, delay_s: float, response_s: float) -> _Solved:
         """Linear part for a delay and a response: residuals where both are known."""
-        n, filled = self._places, self._filled
-        if delay_s:
-            filled = np.interp(n - delay_s / self.step_s, n, filled)
-        if response_s > 0.0:
-            # First order, the input straight between samples (exact for a ramp).
-            a = math.exp(-self.step_s / response_s)
-            b = 1.0 - (1.0 - a) * response_s / self.step_s
-            start = np.array([filled[0] * (1.0 - b)])
-            filled, _ = lfilter([b, 1.0 - a - b], [1.0, -a], filled, zi=start)
+        filled = _delayed_and_slowed(self._filled, delay_s / self.step_s, response_s / self.step_s)
         rest, y = self._rest
         table = np.empty((y.size, 3))
         table[:, 0], table[:, 1:] = filled if y.size == filled.size else filled[self.both], rest

@@ -94,7 +94,7 @@ def bending(frequency_hz: float, rms_rad: float, *, left_out: bool) -> FamilyFin
     done = (
         "r and θ0 are taken from the LVDTs"
         if left_out
-        else "r is off by it: the LVDTs do not reach far enough to take their place"
+        else "r is off by it: the LVDTs cannot take their place"
     )
     text = (
         f"wires ring at {frequency_hz:.1f} Hz about the LVDTs at the base, {rms_rad * 1e3:.2f} mrad rms: the "

@@ -216,7 +216,7 @@ def _in_step(
         changed = replace(changed, left_out=frozenset({name}))
     response = _follow(signals, times)
     shocks = _shocks(record, signals, times)
-    bending = _bending(signals, times)
+    bending = _bending(signals, times, None)
     if bending is not None:
         # Delays and first orders are no answer to what the wall does between the two families.
         lead = "lvdts" if _lvdts_cover(signals, times) else "wires"
@@ -225,6 +225,12 @@ def _in_step(
         timing, lead, earlier = _timing(record, signals, times, response, shocks)
         findings += timing
         changed = replace(changed, earlier_s=earlier)
+        # A slow or late family leaves more between the two than the ringing of a wall that bends.
+        bending = _bending(signals, times, response) if timing else None
+        if bending is not None:
+            blamed = any("LVDTs" in finding.family for finding in timing)
+            lead = "wires" if blamed or not _lvdts_cover(signals, times) else "lvdts"
+            findings.append(words.bending(bending.frequency_hz, bending.rms_rad, left_out=lead == "lvdts"))
     if changed.left_out or changed.earlier_s or lead != "wires":
         corrected = changed.applied(record)
         # Tiltmeters on a wall that bends took a zero that may be off, and confirm no hold by it.
@@ -277,13 +283,15 @@ def _follow(signals: Signals, times: TestTimes) -> Response | None:
     return compare(signals.time_s[part], signals.joint.rotation_rad[part], signals.wire_rotation_rad[part])
 
 
-def _bending(signals: Signals, times: TestTimes) -> Bending | None:
-    """How the wires ring about the LVDTs through the motion."""
+def _bending(signals: Signals, times: TestTimes, response: Response | None) -> Bending | None:
+    """How the wires ring about the LVDTs through the motion, once both are as late and as slow as either."""
     if signals.joint is None:
         return None
     part = _motion(signals, times)
-    rotations = signals.wire_rotation_rad[part], signals.joint.rotation_rad[part]
-    return find_bending(signals.time_s[part], *rotations, times.impacts_s)
+    lvdts, wires = signals.joint.rotation_rad[part], signals.wire_rotation_rad[part]
+    if response is not None:
+        lvdts, wires = response.made_alike(signals.record.rate_hz, lvdts, wires)
+    return find_bending(signals.time_s[part], wires, lvdts, times.impacts_s)
 
 
 def _lvdts_cover(signals: Signals, times: TestTimes) -> bool:
