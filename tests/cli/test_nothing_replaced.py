@@ -78,9 +78,12 @@ def limited(kind: str, size: int) -> Iterator[None]:
     which = getattr(resource, kind)
     soft, hard = resource.getrlimit(which)
     resource.setrlimit(which, (size, hard))
+    # Python keeps byte code that the limit cuts short, and then no program can import that module any more.
+    sys.dont_write_bytecode = True
     try:
         yield
     finally:
+        sys.dont_write_bytecode = False
         resource.setrlimit(which, (soft, hard))
 
 

@@ -22,6 +22,7 @@ from daq_app.runfile import JournalDiskFull, JournalWriter, RunFileError, RunHea
 from daq_app.runfile.exporters import FORMATS, export_run
 from daq_app.runfile.importers import import_file
 
+sys.dont_write_bytecode = True  # a limit would cut it short, and no program could import that module again
 folder, rig_file = Path(sys.argv[1]), Path(sys.argv[2])
 rig, text = load_rig(rig_file), rig_file.read_text(encoding="utf-8")
 answers = {}
