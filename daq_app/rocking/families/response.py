@@ -44,11 +44,14 @@ class Response:
     """Length of what was compared."""
 
     def made_alike(self, rate_hz: float, reference: Floats, follower: Floats) -> tuple[Floats, Floats]:
-        """Both rotations, (n,), with the delay and the slowness of either; NaN is filled straight."""
+        """Both rotations, (n,), with the delay and the slowness of either; NaN where one is not known."""
+        unknown = ~np.isfinite(reference + follower)
         x, y = _without_gaps(reference), _without_gaps(follower)
         if self.response_s < 0.0:
-            return x, _delayed_and_slowed(y, 0.0, -self.response_s * rate_hz)
-        return _delayed_and_slowed(x, self.delay_s * rate_hz, self.response_s * rate_hz), y
+            y = _delayed_and_slowed(y, 0.0, -self.response_s * rate_hz)
+        else:
+            x = _delayed_and_slowed(x, self.delay_s * rate_hz, self.response_s * rate_hz)
+        return np.where(unknown, np.nan, x), np.where(unknown, np.nan, y)
 
 
 def compare(time_s: Floats, reference_rad: Floats, follower_rad: Floats) -> Response | None:
