@@ -73,9 +73,9 @@ def _log_bayes(score: Score, typical: float, directed: bool) -> float:
         return math.nan
     named_form = math.hypot(score.error, POLICY.own_form * typical)
     other_form = math.hypot(score.error, 0.5 * typical)
-    sides = (1.0, 1.0) if directed else (-1.0, 1.0)
-    either = [norm.logpdf(score.coefficient, side * typical, other_form) for side in sides]
-    return float(np.logaddexp(*either) - math.log(2.0) - norm.logpdf(score.coefficient, 0.0, named_form))
+    sides = np.array([1.0] if directed else [-1.0, 1.0])
+    elsewhere = np.logaddexp.reduce(norm.logpdf(score.coefficient, sides * typical, other_form))
+    return float(elsewhere - math.log(sides.size) - norm.logpdf(score.coefficient, 0.0, named_form))
 
 
 def with_other_forms(

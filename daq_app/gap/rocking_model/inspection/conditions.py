@@ -169,14 +169,11 @@ def _quantisation_step(values: FloatArray, noise_si: float) -> float:
     if top <= 0.0 or np.mean(large) < FEWEST_STEPS:
         return 0.0
     rest = float(np.sqrt(np.mean(change[~large] ** 2)))
-    if rest > BESIDE_STEPS * top:  # nor is it less beside their median
+    if rest > BESIDE_STEPS * top:  # their median is smaller still, and takes longer to find
         return 0.0
-    steps = change[large]
-    step = float(np.median(steps))
-    if rest > BESIDE_STEPS * step:
-        return 0.0
-    whole = steps / step
-    if np.mean(np.abs(whole - np.round(whole)) < OFF_STEP) < IN_STEPS:
+    step = float(np.median(change[large]))
+    whole = change[large] / step
+    if rest > BESIDE_STEPS * step or np.mean(np.abs(whole - np.round(whole)) < OFF_STEP) < IN_STEPS:
         return 0.0
     own = step < CONVERTER_STEP * noise_si or step < SMALLEST_STEP * float(np.ptp(values))
     return 0.0 if own else step  # the converter's own step is none

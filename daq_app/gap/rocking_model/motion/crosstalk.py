@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
+from daq_app.gap.rocking_model.motion.rotation import gridded
 from daq_app.gap.rocking_model.records import GapRun, Sensor
 
 
@@ -17,13 +17,15 @@ def crosstalk(run: GapRun, places: Sequence[int]) -> FloatArray:
     Equal volts: by the sensitivities, or where these are not known by the ranges. Zero for the first channel,
     where neither is known, and where the channel before did not read.
     """
-    rows = np.zeros((len(places), run.channels.shape[1] // round(run.rate_hz / GRID_HZ)))
-    for row, place in zip(rows, places, strict=True):
+    rows = []
+    for place in places:
+        row = np.zeros(gridded(run, place).size)
         before = run.before(place)
         scale = _same_volts(run.sensors[place], run.sensors[before])
         if before >= 0 and np.isfinite(scale) and run.reads(before):
-            row[:] = scale * gridded(run, before)
-    return rows
+            row = scale * gridded(run, before)
+        rows.append(row)
+    return np.array(rows)
 
 
 def _same_volts(own: Sensor, before: Sensor) -> float:
