@@ -133,8 +133,8 @@ def _forms() -> list[Case]:
     four, words = "four tests, L1 to L4", "twelve tests more, from a tenth to 0.45 of α"
     lower = "release from lower and from higher levels"
     return [
-        _case("restitution_slope", 0.035, "free_restitution", lower, FOUR, four, MANY, words),
-        _case("viscous", 0.0015, "free_dissipation", lower, FOUR, four, MANY, words),
+        _case("restitution_slope", 0.025, "free_restitution", lower, FOUR, four, MANY, words),
+        _case("viscous", 0.001, "free_dissipation", lower, FOUR, four, MANY, words),
     ]
 
 
