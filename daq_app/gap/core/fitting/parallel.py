@@ -20,12 +20,16 @@ _STATE: dict[str, Any] = {}
 """In a worker process: the experiment, sent once instead of with every task."""
 
 
-def _prepare(experiment: Experiment, frozen: Columns) -> None:
-    _STATE["experiment"], _STATE["frozen"] = experiment, frozen
+def _prepare(experiment: Experiment) -> None:
+    _STATE["experiment"] = experiment
 
 
-def _work(task: Task) -> Any:
-    return task.run(_STATE["experiment"], _STATE["frozen"])
+def _ready() -> None:
+    """Nothing to do: a pool starts a process for it."""
+
+
+def _work(task: Task, frozen: Columns) -> Any:
+    return task.run(_STATE["experiment"], frozen)
 
 
 class Workers:
@@ -47,9 +51,20 @@ class Workers:
         self._cancelled = cancelled or (lambda: False)
         self._pool: ProcessPoolExecutor | None = None
         self.frozen: Columns = {}
-        """Columns of the Jacobian without any effect; set before the first tasks on several cores."""
+        """Columns of the Jacobian without any effect, once they are known."""
 
     def __enter__(self) -> Workers:
+        if self._count > 1:
+            with worker_surroundings():
+                self._pool = ProcessPoolExecutor(
+                    self._count,
+                    mp_context=worker_context(),
+                    initializer=_prepare,
+                    initargs=(self._experiment,),
+                )
+                # The processes start while this one fits the runs without any effect.
+                for _ in range(self._count):
+                    self._pool.submit(_ready)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -59,19 +74,9 @@ class Workers:
     def run(self, tasks: Iterable[Task], text: str) -> list[Any]:
         """Results in the order of the tasks. Raises `Interrupted` soon after `cancelled` says so."""
         listed = list(tasks)
-        if self._count == 1 or len(listed) < 2:
+        if self._pool is None or len(listed) < 2:
             return self._in_process(listed, text)
-        if self._pool is None:
-            with worker_surroundings():
-                self._pool = ProcessPoolExecutor(
-                    self._count,
-                    mp_context=worker_context(),
-                    initializer=_prepare,
-                    initargs=(self._experiment, self.frozen),
-                )
-                futures = [self._pool.submit(_work, task) for task in listed]
-        else:
-            futures = [self._pool.submit(_work, task) for task in listed]
+        futures = [self._pool.submit(_work, task, self.frozen) for task in listed]
         self._await(futures, text)
         return [future.result() for future in futures]
 

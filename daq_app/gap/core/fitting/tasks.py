@@ -19,7 +19,7 @@ class Task(Protocol):
     """A piece of work that can be sent to another process."""
 
     def run(self, experiment: Experiment, frozen: Columns) -> Any:
-        """`frozen`: columns of the Jacobian without any effect, which every process has."""
+        """`frozen`: columns of the Jacobian without any effect."""
         ...
 
 
