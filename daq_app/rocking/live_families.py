@@ -19,7 +19,7 @@ from daq_app.rocking.families import words
 from daq_app.rocking.families.block_checks import pattern_findings, survey_off
 from daq_app.rocking.families.body import body_of
 from daq_app.rocking.families.levels import level_outlier
-from daq_app.rocking.families.response import LATE_S, SLOW_S, compare
+from daq_app.rocking.families.response import LATE_S, SLOW_S, Response, compare
 from daq_app.rocking.families.shocks import LATE_SHOCKS_S, shock_timing
 from daq_app.rocking.families.verdict import compare_series, families_apart, methods_apart
 from daq_app.rocking.geometry.joint import BaseJoint
@@ -69,7 +69,7 @@ class LiveFamilies:
         self._track: MotionTrack | None = None
         self._release: tuple[str, ...] = ()
         self._level: tuple[str, ...] = ()
-        self._bends = False
+        self._bends = self._base_follows_badly = False
         self._timing: tuple[str, ...] = ()
         self._survey: tuple[str, ...] = ()
         self._values: tuple[str, ...] = ()
@@ -156,7 +156,8 @@ class LiveFamilies:
         """The motion that the wall itself is judged by: wires on a wall that bends ring with it."""
         lvdts = self._track
         followed = lvdts is not None and len(lvdts.arcs) == len(wires.arcs)
-        return lvdts if self._bends and followed and lvdts is not None else wires
+        judge = self._bends and not self._base_follows_badly
+        return lvdts if judge and followed and lvdts is not None else wires
 
     def _alpha(self, wall: MotionTrack) -> tuple[str, ...]:
         """A survey whose α is not that of the motion, where CRT is off by much."""
@@ -170,21 +171,19 @@ class LiveFamilies:
         time, kept = self._between(wires.release.time_s - 0.3, wires.crossings_s[-1])
         rotation = self._joint.motion(kept[self._lvdts]).rotation_rad
         inside = [crossing for crossing in wires.crossings_s if crossing >= time[0]]
-        bending = find_bending(time, kept[0], rotation, inside)
-        self._bends = bending is not None
+        bending, found = find_bending(time, kept[0], rotation, inside), None
+        if bending is None:
+            # A family that is slow or late leaves more between the two than ringing wires do.
+            found = compare(time, rotation, kept[0])
+            alike = None if found is None else found.made_alike(self._rate, rotation, kept[0])
+            bending = None if alike is None else find_bending(time, alike[1], alike[0], inside)
+        named = None if found is None else _slow_or_late(found)
+        self._bends, self._base_follows_badly = bending is not None, named is not None and named[0] == "LVDTs"
+        said = [] if named is None else [named[1]]
         if bending is not None:
-            # Delays and first orders are no answer to what the wall does between the two families.
-            return (words.bending_while_live(bending.frequency_hz, bending.rms_rad),)
-        found = compare(time, rotation, kept[0])
-        if found is None:
-            return ()
-        if abs(found.response_s) > SLOW_S:
-            slow = "wires" if found.response_s > 0 else "LVDTs"
-            return (words.slow_while_live(slow, abs(found.response_s)),)
-        if abs(found.delay_s) > LATE_S:
-            later = "wires" if found.delay_s > 0 else "LVDTs"
-            return (words.late_while_live(later, abs(found.delay_s), "the other family"),)
-        return ()
+            follow = not self._base_follows_badly
+            said.insert(0, words.bending_while_live(bending.frequency_hz, bending.rms_rad, lvdts_follow=follow))
+        return tuple(said)
 
     def _lag_of_shocks(self, wires: MotionTrack) -> tuple[str, ...]:
         """Shocks that come elsewhere than the zero crossings of the wires."""
@@ -209,3 +208,14 @@ class LiveFamilies:
         stop = min(math.ceil(stop_s * self._rate) - self._first + 1, self._log.end)
         time = (self._first + np.arange(start, stop)) / self._rate
         return time, self._log.slice(start, stop)
+
+
+def _slow_or_late(found: Response) -> tuple[str, str] | None:
+    """The family that is slow or late against the other, and the sentence for it; None where none is."""
+    if abs(found.response_s) > SLOW_S:
+        slow = "wires" if found.response_s > 0 else "LVDTs"
+        return slow, words.slow_while_live(slow, abs(found.response_s))
+    if abs(found.delay_s) > LATE_S:
+        later = "wires" if found.delay_s > 0 else "LVDTs"
+        return later, words.late_while_live(later, abs(found.delay_s), "the other family")
+    return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -29,13 +29,15 @@ class Fault:
 
     def record(self, test: LaboratoryTest) -> TestRecord:
         """The test's recording with this fault."""
+        return self.test(test).record()
+
+    def test(self, test: LaboratoryTest) -> LaboratoryTest:
+        """The test with this fault."""
         rows = test.rows(self.family)
         rows = rows if self.single is None else [rows[self.single]]
         si = test.si.copy()
         si[rows] = self._changed(si[rows], test.rate_hz)
-        return TestRecord.from_array(
-            test.rig, test.rate_hz, si, time_offsets_s=test.offsets_s, tared=False, label="study"
-        )
+        return replace(test, si=si)
 
     def _changed(self, values: Floats, rate_hz: float) -> Floats:
         time = np.arange(values.shape[1]) / rate_hz

@@ -15,6 +15,7 @@ from typing import Final
 from daq_app.config import Rig, Scaling, load_rig
 from daq_app.rocking import LiveAnalyser
 from daq_app.rocking.live import Estimate
+from studies.restitution.faults import Fault
 from studies.restitution.laboratory import LaboratoryTest, draw_test
 from studies.restitution.walls import Wall, ringing_test
 
@@ -27,6 +28,7 @@ _TOLD: Final = {
     "give CRT": "wires and LVDTs apart",
     "EAV and CRT differ": "EAV and CRT apart",
     "no clean one": "release",
+    "are slow": "slow",
 }
 """What a sentence is counted as, by words in it."""
 
@@ -41,9 +43,21 @@ def slowly_released(rig: Rig, seed: int) -> LaboratoryTest:
     return Wall("slow_release", {"tau": 0.1}).test(rig, seed)
 
 
+def behind_slow_lvdts(rig: Rig, seed: int) -> LaboratoryTest:
+    """The wall of `seed` that bends, whose LVDTs follow like a first order of 20 ms."""
+    return Fault("lvdt", "slow", 0.02).test(ringing_test(rig, seed))
+
+
+def behind_slow_wires(rig: Rig, seed: int) -> LaboratoryTest:
+    """The wall of `seed` that bends, whose wires are slow by less than is named."""
+    return Fault("wire", "slow", 0.0014).test(ringing_test(rig, seed))
+
+
 WALLS: Final[dict[str, Callable[[Rig, int], LaboratoryTest]]] = {
     "sound": draw_test,
     "bends": ringing_test,
+    "bends, LVDTs slow": behind_slow_lvdts,
+    "bends, wires slow": behind_slow_wires,
     "round edges": round_edges,
     "slow release": slowly_released,
 }
@@ -78,7 +92,7 @@ def row_of(name: str, tests: Sequence[LaboratoryTest]) -> str:
         said = [doubt for estimate in estimates for doubt in estimate.doubts]
         told.update({_kind(doubt) for doubt in said})
     errors = " ".join(f"{error:.4f}" for error in largest)
-    return f"{name:12s} {doubted:3d} of {len(tests):<5d} {latest:6d}  {errors}  {dict(told)}"
+    return f"{name:18s} {doubted:3d} of {len(tests):<5d} {latest:6d}  {errors}  {dict(told)}"
 
 
 def _kind(doubt: str) -> str:
@@ -93,7 +107,7 @@ def main() -> None:
     parser.add_argument("--walls", nargs="*", choices=list(WALLS), default=list(WALLS))
     options = parser.parse_args()
     rig = load_rig(RIG)
-    print("wall         in doubt     from impact  largest error of r, EAV and CRT; told in how many tests")
+    print("wall               in doubt     from impact  largest error of r, EAV and CRT; told in how many tests")
     for name in options.walls:
         tests = [WALLS[name](rig, options.first_seed + place) for place in range(options.tests)]
         print(row_of(name, tests), flush=True)

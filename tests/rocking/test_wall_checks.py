@@ -16,7 +16,7 @@ from daq_app.rocking.theory.block import RigidBlock
 from sim_hardware.direct import synthesise_test
 from studies.restitution.faults import Fault
 from studies.restitution.laboratory import LaboratoryTest, draw_test
-from studies.restitution.walls import Wall
+from studies.restitution.walls import Wall, ringing_test
 
 ROOT = Path(__file__).parents[2]
 RIG = load_rig(ROOT / "configs" / "fr1.toml")
@@ -345,6 +345,17 @@ def test_a_wall_that_bends_is_told_behind_a_family_that_is_slow_or_late(fault: F
     assert kinds(analysis) >= {kind, "bending"}
     assert analysis.verdict.trust == trust
     assert trust == "doubtful" or low <= test.truth["restitution"] <= high
+
+
+def test_a_wall_that_bends_is_told_behind_wires_that_are_slow_by_less_than_is_named():
+    """Their half-cycles would give r by EAV 0.02 off, and none of what was said of them was so."""
+    test = ringing_test(RIG, 78602)
+    record = Fault("wire", "slow", 0.0014).record(test)
+    analysis = analyse_record(record, AnalysisOptions(fit=False, bias_runs=0, keep_series=False))
+
+    assert kinds(analysis) >= {"bending"} and not kinds(analysis) & {"slow", "duration", "speed"}
+    assert analysis.verdict.trust == "remarks" and analysis.verdict.left_out == ("wires",)
+    assert analysis.verdict.r == pytest.approx(test.truth["restitution"], abs=0.002)
 
 
 def test_a_survey_whose_alpha_is_not_the_walls_is_named_where_crt_is_off_by_it():

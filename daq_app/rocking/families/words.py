@@ -301,11 +301,12 @@ def late_while_live(family: str, by_s: float, others: str) -> str:
     return f"{late}: impact times are off by as much, r is not"
 
 
-def bending_while_live(frequency_hz: float, rms_rad: float) -> str:
+def bending_while_live(frequency_hz: float, rms_rad: float, *, lvdts_follow: bool) -> str:
     """Wires that ring with a wall that bends, said during the test."""
     return (
         f"wires ring at {frequency_hz:.1f} Hz about the LVDTs at the base, {rms_rad * 1e3:.2f} mrad rms: the "
-        "wall bends; r from the wires is off by it, and the analysis after the test takes r from the LVDTs"
+        "wall bends; r from the wires is off by it"
+        + (", and the analysis after the test takes r from the LVDTs" if lvdts_follow else "")
     )
 
 

@@ -13,7 +13,13 @@ import pytest
 from daq_app.config import load_rig
 from daq_app.rocking.live import Estimate
 from studies.restitution.laboratory import LaboratoryTest, draw_test
-from studies.restitution.live import live_estimates, round_edges, slowly_released
+from studies.restitution.live import (
+    behind_slow_lvdts,
+    behind_slow_wires,
+    live_estimates,
+    round_edges,
+    slowly_released,
+)
 from studies.restitution.walls import Wall, ringing_test
 
 RIG = load_rig(Path(__file__).parents[3] / "configs" / "fr1.toml")
@@ -55,6 +61,21 @@ def test_zero_crossings_that_ringing_moves_are_not_taken_for_a_delay_of_the_wire
 
     assert "the wall bends" in estimates[-1].doubts[0]
     assert not any("late against" in doubt for estimate in estimates for doubt in estimate.doubts)
+
+
+@pytest.mark.parametrize(
+    ("behind", "named", "lvdts_follow"),
+    [(behind_slow_lvdts, "LVDTs are slow", False), (behind_slow_wires, "the wall bends", True)],
+)
+def test_a_wall_that_bends_is_told_live_behind_a_slow_family(behind, named, lvdts_follow):
+    """A first order leaves more between the two families than the ringing, even one too short to be named."""
+    test = behind(RIG, 78602)
+    last = live_estimates(test)[-1]
+    told = " ".join(last.doubts)
+
+    assert abs(last.eav.r - test.truth["restitution"]) > 0.01
+    assert "the wall bends" in last.doubts[0] and named in told
+    assert ("takes r from the LVDTs" in told) == lvdts_follow
 
 
 def test_a_survey_whose_alpha_is_not_the_walls_is_told_with_what_it_makes_of_crt():

@@ -225,8 +225,9 @@ def _in_step(
         timing, lead, earlier = _timing(record, signals, times, response, shocks)
         findings += timing
         changed = replace(changed, earlier_s=earlier)
-        # A slow or late family leaves more between the two than the ringing of a wall that bends.
-        bending = _bending(signals, times, response) if timing else None
+        # A family that is slow or late, even by less than is named, may leave more between the two than
+        # the ringing of a wall that bends.
+        bending = _bending(signals, times, response)
         if bending is not None:
             blamed = any("LVDTs" in finding.family for finding in timing)
             lead = "wires" if blamed or not _lvdts_cover(signals, times) else "lvdts"
