@@ -5,7 +5,7 @@ The plain mean is the paper's. The weighted mean is the generalised least-square
 against n, with two sources of error: what each speed or peak is known to (large for the last, small
 cycles), and the scatter of r from impact to impact, which all later values inherit (a random walk).
 How large the scatter is, few impacts tell: every size counts by its restricted likelihood, so that the
-standard error holds what is not known of it.
+standard error holds what is not known of it. Where even fewer are left, the usual scatter is taken.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ it all ratios alike (the scale-invariant prior of Jeffreys)."""
 _SURELY = 0.05
 """Chance of less scatter than what is stated as its least."""
 FEWEST_POINTS = 4
-"""Points below which a scatter cannot be told from the values' own errors: none is assumed."""
+"""Points below which the scatter of r cannot be told from the values' own errors: the usual one is taken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,9 +63,10 @@ class RestitutionEstimate:
     """Weighted mean; None with fewer points than needed."""
     standard_error: float | None = None
     degrees_of_freedom: float = 0.0
-    """Infinite where the standard error holds what is not known of the scatter."""
+    """Infinite where the standard error holds the scatter of r."""
     scatter: float = 0.0
-    """Relative standard deviation of r from impact to impact that is the likeliest."""
+    """Relative standard deviation of r from impact to impact that is the likeliest; the usual one where
+    points are too few to tell it."""
     least_scatter: float = 0.0
     """What the scatter is below with a chance of 5 %."""
     plain_mean: float | None = None
@@ -73,7 +74,7 @@ class RestitutionEstimate:
     plain_standard_error: float | None = None
 
     def interval95(self) -> tuple[float, float] | None:
-        """95 % interval: Student's, or normal where the error holds what is not known of the scatter."""
+        """95 % interval: Student's, or normal where the error holds the scatter of r."""
         if self.r is None or self.standard_error is None or self.degrees_of_freedom < 1:
             return None
         reach = float(scipy.special.stdtrit(self.degrees_of_freedom, 0.975)) * self.standard_error
@@ -93,6 +94,8 @@ class DecaySeries:
     usable: NDArray[np.bool_]
     levels: Floats
     """(n, levels) 1 where a value counts from this level."""
+    may_scatter: bool = True
+    """Whether the usual scatter is assumed of few points: not of differences, which it does not reach."""
 
 
 def eav(
@@ -200,7 +203,7 @@ def _estimate(
         r=r,
         standard_error=r * math.sqrt(variance),
         degrees_of_freedom=math.inf
-        if len(series.points) >= FEWEST_POINTS
+        if series.may_scatter or len(series.points) >= FEWEST_POINTS
         else max(len(series.points) - 1, 1),
         scatter=scatter,
         least_scatter=least_scatter,
@@ -258,8 +261,10 @@ def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float, 
     solution = inverse @ (np.swapaxes(design, 2, 3) @ target)
     misfit = ((target - design @ solution) ** 2).sum(axis=(2, 3))
     likelihood = -0.5 * (log_spread + np.linalg.slogdet(normal)[1] + misfit)
-    few = np.array([len(series.points) < FEWEST_POINTS for series in together])
-    likelihood[few, 1:] = -np.inf
+    usual = int(np.argmin(np.abs(_SCATTERS - _USUAL_SCATTER)))
+    for series, of_each in zip(together, likelihood, strict=True):
+        if len(series.points) < FEWEST_POINTS:
+            of_each[np.arange(_SCATTERS.size) != (usual if series.may_scatter else 0)] = -np.inf
     weights = _SCATTER_WEIGHTS * np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
     weights /= weights.sum(axis=1, keepdims=True)
     slopes, variances_of_slope = solution[..., -1, 0], inverse[..., -1, -1]

@@ -182,7 +182,8 @@ class LiveFamilies:
         said = [] if named is None else [named[1]]
         if bending is not None:
             follow = not self._base_follows_badly
-            said.insert(0, words.bending_while_live(bending.frequency_hz, bending.rms_rad, lvdts_follow=follow))
+            text = words.bending_while_live(bending.frequency_hz, bending.rms_rad, lvdts_follow=follow)
+            said.insert(0, text)
         return tuple(said)
 
     def _lag_of_shocks(self, wires: MotionTrack) -> tuple[str, ...]:

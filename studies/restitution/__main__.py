@@ -199,6 +199,7 @@ def main() -> None:
     parser.add_argument("--foreign", type=Path, help="folder of labelled recordings instead")
     parser.add_argument("--cases", nargs="*", default=(), help="cases of that folder; all if none is named")
     parser.add_argument("--ringing", action="store_true", help="simulated walls bend, recordings are cut")
+    parser.add_argument("--impacts", type=int, help="after how many impacts simulated recordings end")
     kinds = sorted({fault.kind for fault in FAULTS})
     parser.add_argument("--kinds", nargs="*", choices=kinds, default=kinds, help="kinds of fault to put in")
     options = parser.parse_args()
@@ -207,6 +208,8 @@ def main() -> None:
         rig = load_rig(RIG)
         draw = ringing_test if options.ringing else draw_test
         tests = (draw(rig, options.first_seed + place) for place in range(options.tests))
+        if options.impacts is not None:
+            tests = (test.until_impact(options.impacts) for test in tests)
     else:
         tests = foreign_tests(options.foreign, RIG.parent, tuple(options.cases))
     if options.table == "coverage":

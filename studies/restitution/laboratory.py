@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -50,6 +50,11 @@ class LaboratoryTest:
         return TestRecord.from_array(
             self.rig, self.rate_hz, self.si, time_offsets_s=self.offsets_s, tared=False, label=label
         )
+
+    def until_impact(self, n: int) -> LaboratoryTest:
+        """The test whose recording ends half-way between impact `n` (1 is the first) and the next."""
+        last_s, next_s = self.truth["impact_time_s"][n - 1 : n + 1]
+        return replace(self, si=self.si[:, : round(0.5 * (last_s + next_s) * self.rate_hz)])
 
     def rows(self, family: str) -> list[int]:
         """Rows of the channels of a family that measure the rocking."""

@@ -107,7 +107,7 @@ def main() -> None:
     parser.add_argument("--walls", nargs="*", choices=list(WALLS), default=list(WALLS))
     options = parser.parse_args()
     rig = load_rig(RIG)
-    print("wall               in doubt     from impact  largest error of r, EAV and CRT; told in how many tests")
+    print("wall               in doubt     from impact  largest error of r, EAV and CRT; told, tests")
     for name in options.walls:
         tests = [WALLS[name](rig, options.first_seed + place) for place in range(options.tests)]
         print(row_of(name, tests), flush=True)

@@ -25,7 +25,7 @@ from daq_app.rocking.analysis.residuals import residuals_after
 from daq_app.rocking.analysis.results import Bias, Series, TestAnalysis, Theory
 from daq_app.rocking.analysis.tracks import decay_series, estimates_of, follow_families
 from daq_app.rocking.analysis.wall_checks import pattern_of, wall_findings
-from daq_app.rocking.estimators import RestitutionEstimate
+from daq_app.rocking.estimators import FEWEST_POINTS, RestitutionEstimate
 from daq_app.rocking.families.block_checks import is_rigid_block, misfit_findings, scatter_findings
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.verdict import judge, with_change_by_speed, with_findings
@@ -180,7 +180,12 @@ def _fit(
     )
     if fit is None:
         return None
-    return replace(fit, sigma_alpha_rad=math.hypot(fit.sigma_alpha_rad, gain_sigma * fit.alpha_rad))
+    scatter_assumed = min(len(estimates[method].points) for method in ("eav", "crt")) < FEWEST_POINTS
+    return replace(
+        fit,
+        sigma_alpha_rad=math.hypot(fit.sigma_alpha_rad, gain_sigma * fit.alpha_rad),
+        degrees_of_freedom=math.inf if scatter_assumed else fit.degrees_of_freedom,
+    )
 
 
 def _bias(

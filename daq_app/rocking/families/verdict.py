@@ -81,6 +81,7 @@ def compare_series(wires: DecaySeries, lvdts: DecaySeries) -> tuple[float, float
         values=np.where(usable, wires.values - lvdts.values, 0.0),
         variances=np.where(usable, wires.variances + lvdts.variances, 0.0),
         usable=usable,
+        may_scatter=False,
     )
     ratio, typical = estimate_all([apart, wires])
     if ratio.r is None or ratio.standard_error is None or typical.r is None:

@@ -71,6 +71,9 @@ class MotionFit:
     """rms expected of a perfect model at the fitted points."""
     from_release: bool = True
     """Whether the fall is fitted; else θ0 and release are those of a free fall to the same impact."""
+    degrees_of_freedom: float = math.inf
+    """Of the standard error of r: what r scatters by is known from these impacts only. Infinite where the
+    usual scatter is taken."""
 
     @property
     def explains_the_motion(self) -> bool:
@@ -78,8 +81,8 @@ class MotionFit:
         return self.residual_rad < 2.0 * self.noise_rad
 
     def interval95(self) -> tuple[float, float]:
-        """95 % confidence interval (Student t: what r scatters by is known from these impacts only)."""
-        reach = float(stdtrit(max(self.impacts - 1, 1), 0.975)) * self.standard_error
+        """95 % confidence interval, Student's."""
+        reach = float(stdtrit(self.degrees_of_freedom, 0.975)) * self.standard_error
         return self.r - reach, self.r + reach
 
 
@@ -335,4 +338,5 @@ def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: floa
         impacts=count,
         residual_rad=float(np.sqrt(np.mean(data**2))) * sigma,
         noise_rad=sigma,
+        degrees_of_freedom=max(count - 1, 1),
     )
