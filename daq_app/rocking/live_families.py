@@ -19,7 +19,7 @@ from daq_app.rocking.families import words
 from daq_app.rocking.families.block_checks import pattern_findings, survey_off
 from daq_app.rocking.families.body import body_of
 from daq_app.rocking.families.levels import level_outlier
-from daq_app.rocking.families.response import LATE_S, SLOW_S, Response, compare
+from daq_app.rocking.families.response import DRIFT_RAD, LATE_S, SLOW_S, Response, compare
 from daq_app.rocking.families.shocks import LATE_SHOCKS_S, shock_timing
 from daq_app.rocking.families.verdict import compare_series, families_apart, methods_apart
 from daq_app.rocking.geometry.joint import BaseJoint
@@ -165,7 +165,7 @@ class LiveFamilies:
         return (words.alpha_while_live(off.share, off.shift),) if off is not None and off.is_notable else ()
 
     def _between_families(self, wires: MotionTrack) -> tuple[str, ...]:
-        """Wires that ring about the LVDTs, or wires and LVDTs that are slow or late against each other."""
+        """Wires that ring about the LVDTs; wires and LVDTs that are slow or late, or drift apart."""
         if self._joint is None:
             return ()
         time, kept = self._between(wires.release.time_s - 0.3, wires.crossings_s[-1])
@@ -184,6 +184,8 @@ class LiveFamilies:
             follow = not self._base_follows_badly
             text = words.bending_while_live(bending.frequency_hz, bending.rms_rad, lvdts_follow=follow)
             said.insert(0, text)
+        elif found is not None and abs(found.drift_rad_s * found.span_s) > DRIFT_RAD:
+            said.append(words.drift_while_live(found.drift_rad_s * found.span_s))
         return tuple(said)
 
     def _lag_of_shocks(self, wires: MotionTrack) -> tuple[str, ...]:

@@ -29,6 +29,8 @@ _TOLD: Final = {
     "EAV and CRT differ": "EAV and CRT apart",
     "no clean one": "release",
     "are slow": "slow",
+    "drift apart": "drift",
+    "where a lean to": "side",
 }
 """What a sentence is counted as, by words in it."""
 
@@ -53,11 +55,17 @@ def behind_slow_wires(rig: Rig, seed: int) -> LaboratoryTest:
     return Fault("wire", "slow", 0.0014).test(ringing_test(rig, seed))
 
 
+def drifting_wires(rig: Rig, seed: int) -> LaboratoryTest:
+    """The laboratory of `seed` with wires whose zeros move by 0.1 mm/s, all of them."""
+    return Fault("wire", "drift", 1e-4).test(draw_test(rig, seed))
+
+
 WALLS: Final[dict[str, Callable[[Rig, int], LaboratoryTest]]] = {
     "sound": draw_test,
     "bends": ringing_test,
     "bends, LVDTs slow": behind_slow_lvdts,
     "bends, wires slow": behind_slow_wires,
+    "wires drift": drifting_wires,
     "round edges": round_edges,
     "slow release": slowly_released,
 }

@@ -21,6 +21,9 @@ LATE_S = 1.5e-3
 families."""
 SLOW_S = 1.5e-3
 """Time constant above which a family is named slow; raising it lets EAV be too low and nothing be said."""
+DRIFT_RAD = 1.2e-4
+"""Drift of one family against the other over what is compared that is named; sound ones stay below 6e-5 over
+the motion and below 9e-5 over a part of it. One of 2e-4 moves r by up to 0.003, r of the fit by more."""
 _RATE_HZ = 500.0
 _FEWEST = 200
 _STEP_S = 2e-4

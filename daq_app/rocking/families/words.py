@@ -301,6 +301,14 @@ def late_while_live(family: str, by_s: float, others: str) -> str:
     return f"{late}: impact times are off by as much, r is not"
 
 
+def drift_while_live(by_rad: float) -> str:
+    """Wires and LVDTs that drift apart, said during the test."""
+    return (
+        f"wires and LVDTs drift apart by {by_rad * 1e3:+.2f} mrad: a zero moves; if that of the wires "
+        "does, r is off by it, above all by the last small half-cycles"
+    )
+
+
 def bending_while_live(frequency_hz: float, rms_rad: float, *, lvdts_follow: bool) -> str:
     """Wires that ring with a wall that bends, said during the test."""
     return (

@@ -27,7 +27,7 @@ from daq_app.rocking.families import words
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.hum import find_hum
 from daq_app.rocking.families.noise import slow_noise
-from daq_app.rocking.families.response import LATE_S, SLOW_S, Response, compare
+from daq_app.rocking.families.response import DRIFT_RAD, LATE_S, SLOW_S, Response, compare
 from daq_app.rocking.families.scales import wrong_scales
 from daq_app.rocking.families.shocks import LATE_SHOCKS_S, ShockTiming, shock_timing
 from daq_app.rocking.families.single_wires import SingleWires, compare_wires
@@ -41,9 +41,6 @@ from daq_app.rocking.record import TestRecord
 
 Floats = NDArray[np.float64]
 
-DRIFT_RAD = 1.2e-4
-"""Drift of one family against the other over the motion that is named; sound ones stay below 6e-5. One of
-2e-4 moves r by up to 0.003, that of the whole fit by more."""
 GAIN_SHARE = 0.01
 """Gain of one family against the other that is named: three times what calibration leaves."""
 _COVERED = 0.98
