@@ -70,7 +70,8 @@ def _found(listed: list[_Known], values: Mapping[str, float]) -> _Known | None:
             asked = known.keys
             given = tuple(map(values.get, asked))
         if given == known.given:
-            listed.append(listed.pop(place))
+            if known is not listed[-1]:
+                listed.append(listed.pop(place))
             return known
     return None
 

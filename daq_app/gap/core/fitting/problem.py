@@ -100,16 +100,20 @@ class Problem:
         prediction: Prediction | None = None,
         known: Columns | None = None,
         exact: bool = True,
+        effect: str | None = None,
     ) -> Linearised:
         """Residual and Jacobian of one run.
 
         Differences are central (one-sided at a bound) where `exact`, else forward: half the work, and
         good enough to walk by. `known` are columns taken from elsewhere, shape (n,) by (key, run).
+        With `effect` no columns but those of its unknowns are worked out; the others are zero.
         """
         values = self.values(run, u)
         here = prediction or self.model.predict(self.runs[run], values)
         jacobian = np.zeros((here.features.size, len(self)))
         for k, key, _ in self._asked[run]:
+            if effect is not None and self.unknowns[k].effect != effect:
+                continue
             column = known.get((key, run)) if known else None
             jacobian[:, k] = self._slope(run, u, values, k, here, exact) if column is None else column
         return Linearised(self.runs[run].features.values - here.features, jacobian, here)

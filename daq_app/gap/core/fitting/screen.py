@@ -80,7 +80,6 @@ class Base:
         lines = [
             self.problem.linearise(i, self.u, None, columns, exact=False) for i in range(len(experiment.runs))
         ]
-        self.columns = columns | self.problem.columns_of(lines)
         self.robust = Linear(self.problem, self.u, lines, found.sizes)
         nominal = Sizes.nominal(experiment).discrepancy
         self.strict = self.robust.under(Sizes(found.sizes.log_scatter, nominal))
@@ -93,7 +92,7 @@ class Base:
         robust: list[tuple[Step, _Attached]] = []
         strict: list[tuple[Step, _Attached]] = []
         for u in _begun(problem, base, effect, begin) or starts(problem, base, dict.fromkeys(known, 0.0)):
-            lines = [problem.linearise(i, u, None, self.columns, False) for i in range(len(problem.runs))]
+            lines = _beside(problem, u, effect)
             if not all(np.all(np.isfinite(line.residual)) for line in lines):
                 continue  # the model diverges there
             for kept, linear in ((robust, self.robust), (strict, self.strict)):
@@ -115,7 +114,7 @@ class Base:
         """
         problem = Problem(self.experiment, (*self.effects, form))
         u = problem.start(dict(zip(_keys(self.problem), self.u.tolist(), strict=True)))
-        lines = [problem.linearise(i, u, None, self.columns, False) for i in range(len(problem.runs))]
+        lines = _beside(problem, u, form)
         named = np.array([_FLAT * bool(q.effect) for q in self.problem.unknowns])
         attached = _Attached(self.robust, problem, u, lines, form.name, named)
         free = attached.free(np.zeros(len(attached.unknowns)))
@@ -131,6 +130,11 @@ class Base:
         information = max(float(own[0, 0]) - 1.0, 1e-12)  # the prior has a weight of one
         unit = problem.unknowns[attached.unknowns[0]].parameter.sd
         return Score(gain, determined, -unit * float(slope[0]) / information, unit / math.sqrt(information))
+
+
+def _beside(problem: Problem, u: FloatArray, effect: Effect) -> list[Linearised]:
+    """Residuals at `u`, (p,), and the columns of the effect alone: those of the fit are known."""
+    return [problem.linearise(i, u, exact=False, effect=effect.name) for i in range(len(problem.runs))]
 
 
 def _begun(
@@ -176,8 +180,8 @@ class _Attached:
             weight = problem.runs[i].features.independent_fraction
             white = linear.covariances[i].whiten(np.column_stack([line.jacobian[:, mine], line.residual]))
             theirs, columns = linear.white[i][:, :-1], base.columns(i)
-            across[np.ix_(columns, places)] += weight * (theirs.T @ white[:, :-1])
-            own[np.ix_(places, places)] += weight * (white[:, :-1].T @ white[:, :-1])
+            across[columns[:, None], places] += weight * (theirs.T @ white[:, :-1])
+            own[places[:, None], places] += weight * (white[:, :-1].T @ white[:, :-1])
             slope_base[columns] -= weight * (theirs.T @ white[:, -1])
             slope_own[places] -= weight * (white[:, :-1].T @ white[:, -1])
             square += weight * float(white[:, -1] @ white[:, -1])
