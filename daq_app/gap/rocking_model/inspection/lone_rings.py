@@ -96,8 +96,11 @@ def lone_rings(
     `examined` are the channels that are not used with their family.
     """
     findings: list[list[RunFinding]] = [[] for _ in runs]
+    wall = _Kicks.of([_accelerations(run, grid) for run, grid in zip(runs, grids, strict=True)])
+    if wall is None or not len(wall.shown):
+        return findings  # without accelerometers a bracket is not told from a wall
     for family in _FAMILIES:
-        ring = _lone(runs, grids, family, tuple(examined))
+        ring = _lone(runs, grids, family, tuple(examined), wall)
         if ring is None:
             continue
         index = runs[0].place(ring.name)
@@ -111,7 +114,7 @@ def lone_rings(
 
 
 def _lone(
-    runs: Sequence[GapRun], grids: Sequence[Grid], family: Family, examined: tuple[str, ...]
+    runs: Sequence[GapRun], grids: Sequence[Grid], family: Family, examined: tuple[str, ...], wall: _Kicks
 ) -> _Ring | None:
     data = alike_in_all(runs, grids, family, examined)
     if not data:
@@ -120,9 +123,8 @@ def _lone(
     design = data[0].design
     apart, unturned = (_beyond(columns) for columns in (design, np.hstack([design, beside])))
     kicks = _Kicks.of([(grid, one.pick, apart @ one.signals) for grid, one in zip(grids, data, strict=True)])
-    wall = _Kicks.of([_accelerations(run, grid) for run, grid in zip(runs, grids, strict=True)])
-    if kicks is None or wall is None or not len(wall.shown):
-        return None  # without accelerometers a bracket is not told from a wall
+    if kicks is None:
+        return None
     still = replace(kicks, shown=np.einsum("jk,kif->jif", unturned, kicks.shown))
     best: _Ring | None = None
     for turned in (True, False):

@@ -32,11 +32,15 @@ from daq_app.gap.rocking_model.tolerances.walls import (
 )
 
 ComplexArray = NDArray[np.complex128]
+_Bases = list[tuple[NDArray[np.intp], FloatArray]]
+"""Samples, (n,), and what is removed from a signal there: orthonormal columns, (n, k)."""
 BEND_HZ = np.geomspace(2.0, 42.0, 61)
 TURN_HZ = np.geomspace(1.5, 14.0, 40)
 DAMPING = (0.01, 0.04)
 FINE_DAMPING = (0.007, 0.012, 0.02, 0.032, 0.05, 0.08)
 _DEGREE = 4
+_OTHER_DAMPING = (1.1, 1.0 / 1.1)
+"""Factors of the damping between which the size of a ring-down says how it follows ln ζ."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +104,7 @@ def forced_column(grid: Grid, frequency_hz: float, zeta: float, *, accelerations
     return np.asarray(natural * (grid.alpha - 2.0 * zeta * speed - natural * place))
 
 
-def cleaner(grid: Grid, pick: NDArray[np.bool_], slow: bool) -> list[tuple[NDArray[np.intp], FloatArray]]:
+def cleaner(grid: Grid, pick: NDArray[np.bool_], slow: bool) -> _Bases:
     """Bases to be removed from a signal: smooth curves between impacts, or the rotation for slow turns."""
     places = np.flatnonzero(pick)
     if slow:
@@ -124,7 +128,7 @@ def _smooth_curves(count: int) -> FloatArray:
     return np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, count), _DEGREE + 1))[0]
 
 
-def _clean(values: FloatArray, bases: list[tuple[NDArray[np.intp], FloatArray]]) -> FloatArray:
+def _clean(values: FloatArray, bases: _Bases) -> FloatArray:
     """What the bases leave of the columns of `values` (m, k), at their samples."""
     parts = [values[part] - basis @ (basis.T @ values[part]) for part, basis in bases]
     return np.concatenate(parts) if parts else values[:0]
@@ -133,14 +137,15 @@ def _clean(values: FloatArray, bases: list[tuple[NDArray[np.intp], FloatArray]])
 def scan(grids: Sequence[Grid], signals: Sequence[list[Signal]], *, slow: bool) -> Ring | None:
     """The oscillator that all runs and signals agree on best; None where there is nothing to scan."""
     coarse_hz = TURN_HZ if slow else BEND_HZ
-    score = _score(grids, signals, coarse_hz, DAMPING, slow=slow)
+    seen = [(grid, _cleaned(grid, listed, slow)) for grid, listed in zip(grids, signals, strict=True)]
+    score = _score(seen, coarse_hz, DAMPING)
     if not np.any(score > 0.0):
         return None
     i, _ = np.unravel_index(int(np.argmax(score)), score.shape)
     # A lightly damped ring is sharper than the first scan's steps.
     step = float(coarse_hz[1] / coarse_hz[0])
     fine_hz = coarse_hz[i] * np.geomspace(1.0 / step, step, 25)
-    score = _score(grids, signals, fine_hz, FINE_DAMPING, slow=slow)
+    score = _score(seen, fine_hz, FINE_DAMPING)
     k, j = np.unravel_index(int(np.argmax(score)), score.shape)
     spacing = float(np.log(fine_hz[1] / fine_hz[0]))
     along, bend = _vertex(score[:, j], int(k))
@@ -148,7 +153,7 @@ def scan(grids: Sequence[Grid], signals: Sequence[list[Signal]], *, slow: bool) 
     sd = frequency * spacing / np.sqrt(max(bend, 0.05))
     # A damping between the steps would leave the ring too small: its size follows the damping.
     zetas = FINE_DAMPING[int(j)] * np.geomspace(1.0 / 1.7, 1.7, 13)
-    score = _score(grids, signals, np.array([frequency]), list(zetas), slow=slow)[0]
+    score = _score(seen, np.array([frequency]), list(zetas))[0]
     across, bend = _vertex(score, int(np.argmax(score)))
     spacing = float(np.log(zetas[1] / zetas[0]))
     zeta = float(zetas[0] * np.exp(spacing * np.clip(across, 0.0, zetas.size - 1.0)))
@@ -170,34 +175,37 @@ def _vertex(values: FloatArray, k: int) -> tuple[float, float]:
     return inner + float(np.clip(shift, -1.0, 1.0)), -bend
 
 
+def _cleaned(grid: Grid, signals: Sequence[Signal], slow: bool) -> list[tuple[FloatArray, _Bases]]:
+    """What the bases leave of each signal that is long enough, (n,), and these bases."""
+    seen = []
+    for signal in signals:
+        if signal.pick.sum() < 100:
+            continue
+        bases = cleaner(grid, signal.pick, slow)
+        values = _clean(signal.values[:, None], bases)[:, 0]
+        if values.size >= 60:
+            seen.append((values, bases))
+    return seen
+
+
 def _score(
-    grids: Sequence[Grid],
-    signals: Sequence[list[Signal]],
+    seen: Sequence[tuple[Grid, list[tuple[FloatArray, _Bases]]]],
     frequencies: FloatArray,
     damping: Sequence[float],
-    *,
-    slow: bool,
 ) -> FloatArray:
-    """Gain in log likelihood over all runs and signals, (frequencies, damping)."""
+    """Gain in log likelihood over all runs and their clean signals, (frequencies, damping)."""
     score = np.zeros((frequencies.size, len(damping)))
-    for grid, listed in zip(grids, signals, strict=True):
-        waves = None
-        for signal in listed:
-            if signal.pick.sum() < 100:
-                continue
-            if waves is None:
-                both = np.meshgrid(frequencies, damping, indexing="ij")
-                waves = ring_waves(grid, both[0].ravel(), both[1].ravel())
-            bases = cleaner(grid, signal.pick, slow)
-            values = _clean(signal.values[:, None], bases)[:, 0]
-            if values.size >= 60:
-                score += _gains(values, waves, bases).reshape(score.shape)
+    both = np.meshgrid(frequencies, damping, indexing="ij")
+    for grid, signals in seen:
+        if not signals:
+            continue
+        waves = ring_waves(grid, both[0].ravel(), both[1].ravel())
+        for values, bases in signals:
+            score += _gains(values, waves, bases).reshape(score.shape)
     return score
 
 
-def _gains(
-    values: FloatArray, waves: ComplexArray, bases: list[tuple[NDArray[np.intp], FloatArray]]
-) -> FloatArray:
+def _gains(values: FloatArray, waves: ComplexArray, bases: _Bases) -> FloatArray:
     """Gain in log likelihood of sine and cosine of each wave (m, k); residuals' correlation is allowed for.
 
     `values` (n,) are free of the bases. What these leave of a wave is not worked out: its products are
@@ -229,18 +237,15 @@ def _span(places: NDArray[np.intp]) -> slice | NDArray[np.intp]:
     return slice(first, last) if last - first == places.size else places
 
 
-def _colour(
-    grid: Grid,
-    signal: Signal,
-    bases: list[tuple[NDArray[np.intp], FloatArray]],
-    ring: Ring,
-    values: FloatArray,
-) -> float:
-    """Size of chance at frequencies around the ring's, over that of white noise; at least 1."""
+def _surroundings(grid: Grid, ring: Ring) -> FloatArray:
+    """Sines and cosines of ring-downs at frequencies around the ring's, (m, 2 k)."""
     factors = [f for f in (0.55, 0.62, 0.7, 0.78, 1.28, 1.43, 1.6, 1.8) if ring.frequency_hz * f < 60.0]
-    beside = ring_waves(grid, ring.frequency_hz * np.array(factors), np.full(len(factors), 0.03))
-    waves = _clean(np.hstack([beside.imag, beside.real]), bases)
-    own = _clean(ring_columns(grid, ring.frequency_hz, ring.zeta), bases)
+    waves = ring_waves(grid, ring.frequency_hz * np.array(factors), np.full(len(factors), 0.03))
+    return np.hstack([waves.imag, waves.real])
+
+
+def _colour(waves: FloatArray, own: FloatArray, values: FloatArray) -> float:
+    """Size of chance in waves around the ring's own (n, 2), over that of white noise; at least 1."""
     # The ring itself, if there is one, must not count as its own surroundings.
     left = values - own @ np.linalg.lstsq(own, values, rcond=None)[0]
     size = np.sqrt(np.maximum((waves**2).sum(0), 1e-300))
@@ -254,7 +259,8 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
     rows: list[FloatArray] = []
     shares: list[Shares] = []
     values, variances, fading, unequal = (list[float]() for _ in range(4))
-    waves = ring_columns(grid, ring.frequency_hz, ring.zeta)
+    waves, beside = ring_columns(grid, ring.frequency_hz, ring.zeta), _surroundings(grid, ring)
+    otherwise = [ring_columns(grid, ring.frequency_hz, f * ring.zeta) for f in _OTHER_DAMPING]
     natural = 2.0 * np.pi * ring.frequency_hz
     for signal in signals:
         bases = cleaner(grid, signal.pick, slow)
@@ -269,7 +275,7 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
         variance = float(left @ left) / max(left.size - 2, 1) / fraction * np.diag(inverse @ inverse.T)
         # What is left of the motion is no white noise: neighbouring frequencies say how large chance is.
         # And this frequency was chosen for its gain, which doubles it.
-        variance *= 2.0 * _colour(grid, signal, bases, ring, both[:, 0]) ** 2
+        variance *= 2.0 * _colour(_clean(beside, bases), _clean(waves, bases), both[:, 0]) ** 2
         scale = natural**2 if signal.family == "accelerometer" else 1.0
         full = np.zeros((2, grid.time_s.size))
         full[:, places] = inverse
@@ -281,7 +287,8 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
         variances += (variance / scale**2).tolist()
         rows += list(full / scale)
         shares += [signal.shares] * 2
-        fading += _fading(grid, bases, ring, inverse).tolist()
+        quick, slowly = (np.diag(inverse @ _clean(other, bases)) for other in otherwise)
+        fading += ((quick - slowly) / (2.0 * np.log(_OTHER_DAMPING[0]))).tolist()
         unequal += [0.0, 0.0] if signal.unequal is None else (full / scale @ signal.unequal).tolist()
     if not names:
         return None
@@ -305,18 +312,6 @@ def ring_block(name: str, grid: Grid, signals: Sequence[Signal], ring: Ring, *, 
         systematic={f"{name}_unequal": np.array([*unequal, 0.0, 0.0])},
         undone_s=next((s.undone_s for s in signals if s.family == "accelerometer"), 0.0),
     )
-
-
-def _fading(
-    grid: Grid, bases: list[tuple[NDArray[np.intp], FloatArray]], ring: Ring, inverse: FloatArray
-) -> FloatArray:
-    """d coefficient / d ln ζ of a ring-down of unit size, (2,): what dies sooner looks smaller."""
-    sizes = []
-    for factor in (1.1, 1.0 / 1.1):
-        waves = _clean(ring_columns(grid, ring.frequency_hz, factor * ring.zeta), bases)
-        sizes.append(np.diag(inverse @ waves))
-    slopes: FloatArray = (sizes[0] - sizes[1]) / (2.0 * np.log(1.1))
-    return slopes
 
 
 def with_repeatability(blocks: Sequence[Block]) -> list[Block]:
