@@ -32,7 +32,7 @@ _LOGARITHMIC = {("winkler", "theta_c"), ("slow_release", "tau"), ("residual_cabl
     for name in ("flexible_wall", "yaw", "twist", "ambient", "wire_inertia")
     for parameter in ("frequency", "zeta")
 }
-_PER_RUN = {("initial_velocity", "omega"), ("residual_cable", "slack")}
+_PER_RUN = {("residual_cable", "slack")}
 """A cable is paid out anew for every test: where it grips is each run's own."""
 _SENSORS = {
     "gain": ("lvdt", "wire", "tiltmeter", "accelerometer"),
@@ -62,9 +62,15 @@ _RANGES = {
 """Where walls and releases go beyond the simulator's usual ranges: slender walls on soft beds ring below
 5 Hz, squat ones above 30 Hz (`rings` looks for them there), and a winch or a leaking jack lets go within a
 second."""
-_WIDER = {("yaw", "kick"): 0.4, ("twist", "kick"): 0.4, ("flexible_wall", "gain"): 0.2}
+_WIDER = {
+    ("yaw", "kick"): 0.4,
+    ("twist", "kick"): 0.4,
+    ("flexible_wall", "gain"): 0.2,
+    ("filter_delay", "tau"): 0.05,
+}
 """Reach of strengths that have no usual size: how hard an impact kicks depends on its very form, and how far
-the wall bends goes with one over its frequency."""
+the wall bends goes with one over its frequency. A filter may be as late as any other sensor: with a shorter
+reach it would be the likelier answer for short delays, whose form the runs do not show."""
 _DRIFT_REACH = {"lvdt": 1e-3, "wire": 2e-3, "tiltmeter": 1e-3, "accelerometer": 1e-2}
 
 
@@ -73,6 +79,7 @@ _WEAKEST_SIGNED = {
     "restitution_asymmetry": 2e-3,
     "alpha_asymmetry": 2e-4,
     "base_tilt": 2e-4,
+    "initial_velocity": 3e-3,
     "eccentric_mass": 3e-4,
     "gain": 0.01,
     "wire_anchor": 0.03,
@@ -115,6 +122,18 @@ _FORMS = {
     # On and on, back and forth, or at one edge alone.
     "corner_twist": (
         Parameter("alternation", 0.0, 0.8, "rad", -math.pi / 2, math.pi / 2, meaning="how it turns back"),
+    ),
+    # Who pushes does so in every test, now more and now less.
+    "initial_velocity": (
+        Parameter(
+            "own",
+            0.0,
+            5e-3,
+            "rad/s",
+            meaning="what each test's speed differs by",
+            per_run=True,
+            starts=(0.0,),
+        ),
     ),
     # Nobody knows how a hand or a winch lets go: from a force that dies away to one paid out evenly.
     "slow_release": (Parameter("even", 0.5, 0.4, "1", 0.0, 1.0, meaning="how evenly the force falls"),),

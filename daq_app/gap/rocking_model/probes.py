@@ -71,6 +71,8 @@ def departures() -> Iterable[Effect]:
     words = "edges round to different radii: α of either side changes with its rotation"
     uneven = _departure("uneven_edges", "geometry", ("alpha_asymmetry",), radius, -1.5, words)
     yield replace(uneven, directed=True)
+    words = "loss of α with another power of the number of impacts: c N + c' N ln(N/100)"
+    yield _departure("wear_power", "interface", ("crushing",), signed("loss", 0.03, "1"), 1.0, words)
 
 
 def _departure(

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import pytest
 
 from daq_app.gap.core import Confusion, Effect, Indistinguishable, Library, Options, diagnose
-from daq_app.gap.core.judging.evidence import Ranked, answers, credible_set
+from daq_app.gap.core.judging.evidence import Ranked, answers, credible_set, log_prior
 from daq_app.gap.core.parameters import signed
+from daq_app.gap.core.policy import POLICY
 from daq_app.gap.rocking_model.library import rocking_library
 from tests.support.gap.toy_wave import LIBRARY, DecayModel, make_runs
 
@@ -42,6 +46,17 @@ def test_twins_that_no_sensor_tells_apart_are_an_answer_with_both_names() -> Non
     assert {h.effects for h in result.set95} == {("slope",), ("twin",)}
     detail = result.to_dict()["decision_detail"]
     assert detail["alternatives"] == [list(names) for names in result.decision.alternatives]
+
+
+def test_what_has_two_names_is_no_likelier_than_with_one() -> None:
+    """Twins share the prior probability that one of them would have alone; the other family keeps its own."""
+    twins, alone = Library(EFFECTS, (SAME,)), Library((replace(SLOPE, confusable_with=()), LIBRARY["shift"]))
+
+    def prior(name: str, library: Library) -> float:
+        return math.exp(log_prior((name,), library, POLICY))
+
+    assert prior("slope", twins) == prior("twin", twins) == pytest.approx(0.5 * prior("slope", alone))
+    assert prior("shift", twins) == pytest.approx(prior("shift", alone))
 
 
 def test_a_pair_of_which_one_is_a_twin_is_named_as_a_pair() -> None:

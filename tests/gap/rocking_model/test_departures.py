@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -20,9 +22,11 @@ from daq_app.gap.rocking_model.prediction.vector import (
     kernel_vector,
     restitution_of,
 )
+from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import prepare
 from sim_hardware.dynamics import parameters as par
-from tests.support.simulated_wall import simulate
+from tests.support.gap.simulated_campaign import campaign
+from tests.support.simulated_wall import short_rig, simulate
 
 LEVELS = (0.15, -0.25, 0.35, -0.40)
 LIBRARY: Library = rocking_library()
@@ -30,7 +34,12 @@ LIBRARY: Library = rocking_library()
 
 def forms_on_top(effects: dict[str, dict[str, float]], name: str) -> list[FreeForm]:
     """Free forms on top of an effect that is taken for what is hidden in simulated runs."""
-    runs = tuple(prepare(simulate(effects, LEVELS))[0])
+    return forms_of(simulate(effects, LEVELS), name)
+
+
+def forms_of(recorded: list[GapRun], name: str) -> list[FreeForm]:
+    """The same of any runs."""
+    runs = tuple(prepare(recorded)[0])
     model = RockingModel(runs[0].survey)
     null = fit(model, runs)
     experiment = Experiment.of(model, runs)
@@ -136,6 +145,44 @@ def test_unequal_edges_do_not_depart_from_themselves() -> None:
     assert forms["uneven_edges"].excess < 2.0
     assert forms["uneven_edges"].log_bayes < 1.0
     assert forms["free_geometry"].excess < 2.0
+
+
+def broken_once(loss: float) -> list[GapRun]:
+    """Runs of a wall whose α falls by a share after the first, and stays."""
+    rig = short_rig()
+    whole, *_ = simulate({}, LEVELS)
+    alpha = rig.specimen.alpha0_rad * (1.0 - loss)
+    cracked = rig.model_copy(update={"specimen": rig.specimen.model_copy(update={"alpha0_rad": alpha})})
+    first = prepare([whole])[0][0].swings.impacts
+    runs = campaign(cracked, rig, {}, 1, LEVELS, post_rest_s=1.0)[1:]
+    return [whole, *(replace(run, impacts_before=run.impacts_before + first) for run in runs)]
+
+
+def wear_power(recorded: list[GapRun]) -> FreeForm:
+    return next(form for form in forms_of(recorded, "crushing") if form.name == "wear_power")
+
+
+def test_a_wall_that_breaks_once_is_not_worn_steadily() -> None:
+    form = wear_power(broken_once(0.02))
+    assert form.excess > 6.0
+    assert form.log_bayes > 5.0
+
+
+def test_steady_wear_does_not_depart_from_itself() -> None:
+    form = wear_power(simulate({"crushing": {"loss": 0.01}}, LEVELS))
+    assert form.excess < 2.0
+    assert form.log_bayes < -1.0
+
+
+def test_after_many_impacts_a_faster_wear_is_a_larger_one(run: RockingRun) -> None:
+    """ln(N/100) hardly changes within a test of a wall that has had a thousand impacts."""
+    worn = replace(run, impacts_before=1000.0)
+    model, values = RockingModel(run.survey), at_priors(run)
+    sound = model.predict(worn, values).features
+    faster = model.predict(worn, {**values, "crushing.loss": 0.0, "wear_power.loss": 1e-4}).features - sound
+    larger = model.predict(worn, {**values, "crushing.loss": 1e-4 * np.log(10.0)}).features - sound
+    assert np.linalg.norm(larger) > 0.0
+    assert np.linalg.norm(faster - larger) < 0.03 * np.linalg.norm(larger)
 
 
 def test_a_curvature_of_r_is_neither_a_level_nor_a_slope_of_it(run: RockingRun) -> None:

@@ -19,9 +19,9 @@ NULL: Hypothesis = ()
 def log_prior(effects: Hypothesis, library: Library, policy: Policy) -> float:
     """ln prior probability of a hypothesis.
 
-    What "nothing missing" leaves is shared by how many causes there are, then equally among the families, and
-    within a family among its effects: a family of many forms is not more probable for being written down in
-    more forms.
+    What "nothing missing" leaves is shared by how many causes there are, then equally among the families,
+    within a family among what sensors tell apart, and there among its effects: nothing is more probable for
+    being written down in more forms.
     """
     if not effects:
         return math.log(policy.prior_null)
@@ -36,9 +36,9 @@ def log_prior(effects: Hypothesis, library: Library, policy: Policy) -> float:
 
 def _share(name: str, library: Library) -> float:
     family = library[name].family
-    siblings = sum(1 for e in library.named if e.family == family)
+    siblings = [library.class_of([e.name]) for e in library.named if e.family == family]
     families = len({e.family for e in library.named})
-    return -math.log(families * siblings)
+    return -math.log(families * len(set(siblings)) * siblings.count(library.class_of([name])))
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,6 +51,8 @@ class Block:
     """Which rule predicts it; empty where the family's name says so."""
     expected: FloatArray | None = None
     """A single channel as the others predict it, on the whole grid."""
+    finer: tuple[FloatArray, float] | None = None
+    """The same at a higher rate, Hz, for what the grid is too coarse for: the corners at impacts."""
     design: FloatArray | None = None
     """Shapes of a single channel's regression at the samples of `pick`."""
     noise: float = 1.0

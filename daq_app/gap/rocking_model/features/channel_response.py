@@ -18,7 +18,7 @@ from daq_app.gap.rocking_model.features.oscillations.ring_response import (
 from daq_app.gap.rocking_model.features.response import effects_on, responded
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.turns import turned, turns
-from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, TAIL_S, Wire, straight_line
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, TAIL_S, Wire, coarse, straight_line
 from daq_app.gap.rocking_model.records import Sensor
 
 
@@ -40,6 +40,9 @@ def channel(run: RockingRun, block: Block, values: Mapping[str, float]) -> Float
         if effect == "wire_anchor":
             assert block.wire is not None
             series = block.wire.shortening(_rotation(block), value) - true
+        elif block.finer is not None:
+            finer, rate_hz = block.finer
+            series = coarse(responded(finer, effect, value, block.family, values, rate_hz) - finer, rate_hz)
         else:
             series = responded(true, effect, value, block.family, values) - true
         total = series if total is None else total + series

@@ -22,20 +22,22 @@ from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, CERTIFIED
 _SHAPES = ("gain", "lag", "curvature", "drift")
 _GAIN, _CURVATURE = _SHAPES.index("gain"), _SHAPES.index("curvature")
 SHAPES: dict[Family, tuple[str, ...]] = {
-    "lvdt": _SHAPES,
+    "lvdt": (*_SHAPES, "rounding"),
     "wire": (*_SHAPES, "side"),
     "accelerometer": _SHAPES,
 }
 """Wires have half the difference in gain between the two sides as well: the wall lifts on one side only, and
 a wire whose anchor is not as high as the rig file says slopes and sees it. A joint opens at one face at a
-time: LVDTs have no other side."""
+time: LVDTs have no other side. Where they close or open at an impact their readings have a corner, which
+every response rounds by the variance of its delays over two: a delay by none, a first order by most."""
+FURTHER = {family: shapes[len(_SHAPES) :] for family, shapes in SHAPES.items()}
 _UNITS: dict[Family, tuple[str, ...]] = {
-    "lvdt": ("1", "s", "1/m", "m/s"),
+    "lvdt": ("1", "s", "1/m", "m/s", "s²"),
     "wire": ("1", "s", "1/m", "m/s", "1"),
     "accelerometer": ("1", "s", "s²/m", "m/s³"),
 }
 TOLERANCE: dict[Family, tuple[float, ...]] = {
-    "lvdt": (3.2e-3, 1e-4, 0.06, 4e-6),
+    "lvdt": (3.2e-3, 1e-4, 0.06, 4e-6, 1e-6),
     "wire": (3.2e-3, 1e-4, 0.005, 6e-6, 5e-4),
     "accelerometer": (3.2e-3, 2e-3, 2e-3, 1.5e-3),
 }
@@ -43,7 +45,8 @@ TOLERANCE: dict[Family, tuple[float, ...]] = {
 by the place's own ringing, which a hop of the wall carries beyond the mask. An LVDT's lag is as good as what
 its family may be late by: a twelfth of it is in the time across every impact, to one side up and to the other
 down, and those times repeat to some hundredths of a millisecond. A wire is straight to 0.1 % of its travel of
-± 0.45 m; its side is an anchor known to 5 mm."""
+± 0.45 m; its side is an anchor known to 5 mm. An LVDT rounds as sensors do that respond within a
+millisecond."""
 RINGING: tuple[Family, ...] = ("accelerometer",)
 """Families whose channels differ in how they ring: what remains of one says nothing."""
 
@@ -64,8 +67,10 @@ class Others:
     """Rms of what the steps of these readings make of the difference; 0 where they have none."""
     repeats: int = 1
     """Half-cycles, in each of which the same steps come back."""
-    sided: bool = False
-    """Whether its side is among the shapes."""
+    further: tuple[str, ...] = ()
+    """Shapes of its family beyond those of all."""
+    weights: FloatArray | None = None
+    """By which the channels of the family make up the prediction, (c,)."""
     imperfections: FloatArray | None = None
     """What one sd of each ordinary imperfection adds to what this channel shows beyond the others, (k, m),
     SI: crosstalk from the channels that are scanned before, mounts that are turned."""
@@ -88,13 +93,14 @@ class Deviation:
 def shape_columns(beside: Others) -> FloatArray:
     """The shapes in which a channel may differ at the samples used, (n, k + 1); the last is its zero."""
     e = beside.expected
+    rate = np.gradient(e, 1.0 / GRID_HZ)
     columns: FloatArray = np.column_stack(
         [
             e,
-            -np.gradient(e, 1.0 / GRID_HZ),
+            -rate,
             e**2,
             np.arange(e.size) / GRID_HZ,
-            *([np.abs(e)] if beside.sided else []),
+            *(np.abs(e) if name == "side" else np.gradient(rate, 1.0 / GRID_HZ) for name in beside.further),
             np.ones_like(e),
         ]
     )[beside.pick]
@@ -173,10 +179,12 @@ def block_of(
     beside: Others,
     sound: Sequence[tuple[Others, Deviation]],
     wire: Wire | None = None,
+    finer: tuple[FloatArray, float] | None = None,
 ) -> Block:
     """Block of the coefficients of a channel; `sound` are the others of its family, each beside the others.
 
     Without any, the certificate says what a sound one is off by, and what remains is as it should be.
+    `finer` is its prediction at a higher rate, Hz.
     """
     misfit = deviation(beside)
     usual = usual_remains([other.remains for _, other in sound] or [misfit.remains])
@@ -195,6 +203,7 @@ def block_of(
         beside.pick,
         kind="channel",
         expected=beside.expected,
+        finer=finer,
         design=misfit.design,
         noise=misfit.noise * float(np.exp(usual)),
         wire=wire,

@@ -27,7 +27,8 @@ _RINGS = ("bending", "turning")
 
 def _release(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     """Speed away from upright at the release."""
-    return np.array([values["omega0"] + values.get("initial_velocity.omega", 0.0)])
+    pushed = values.get("initial_velocity.omega", 0.0) + values.get("initial_velocity.own", 0.0)
+    return np.array([values["omega0"] + pushed])
 
 
 @cache

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
@@ -13,12 +14,21 @@ from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import side_of
 from daq_app.gap.rocking_model.motion.rotation import pivots_off
 
+_MIDDLE_OF_WEAR = 100.0
+"""Impacts after which a wear that goes with another power of their number is as large as a steady one."""
+
+
+def wear_growth(impacts: ArrayLike) -> FloatArray:
+    """How a wear c N^q of edges departs at first from a steady one, per (q − 1) and term: ln(N/N₀)."""
+    return np.asarray(np.log(np.maximum(impacts, 1.0) / _MIDDLE_OF_WEAR))
+
 
 def pivots(run: RockingRun, values: Mapping[str, float]) -> tuple[float, float]:
     """(distance of the pivots from the middle beyond the survey's, half its difference right to left), m."""
     half, alpha = values["half_base"], values["alpha"]
     tall = half / np.tan(alpha)
-    wear = values.get("crushing.loss", 0.0) * 0.01 * run.impacts_before
+    faster = wear_growth(run.impacts_before) * values.get("wear_power.loss", 0.0)
+    wear = 0.01 * run.impacts_before * (values.get("crushing.loss", 0.0) + faster)
     worn = half - tall * np.tan(alpha * (1.0 - wear))
     inwards = half - run.survey.half_base_m - values.get("pivot_shift.a", 0.0) - worn
     inwards -= values.get("rounded_edge.rho", 0.0)

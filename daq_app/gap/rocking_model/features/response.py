@@ -84,25 +84,32 @@ def _keys(target: str) -> tuple[tuple[str, str], ...]:
 
 
 def responded(
-    signal: FloatArray, effect: str, value: float, target: str, values: Mapping[str, float]
+    signal: FloatArray,
+    effect: str,
+    value: float,
+    target: str,
+    values: Mapping[str, float],
+    rate_hz: float = GRID_HZ,
 ) -> FloatArray:
-    """A signal, (m,) on the grid, as sensors with an effect on `target` show it; `value` as in `EFFECTS`."""
+    """A signal, (m,), as sensors with an effect on `target` show it; `value` as in `EFFECTS`."""
     match effect:
         case "gain":
             return signal * (1.0 + value)
         case "lag":
             k = np.arange(signal.size, dtype=float)
-            return np.asarray(np.interp(k - value * GRID_HZ, k, signal))
+            return np.asarray(np.interp(k - value * rate_hz, k, signal))
         case "slow_response":
-            return first_order(signal, value)
+            return first_order(signal, value, rate_hz)
         case "filter_delay":
-            return bessel(signal, value)
+            return bessel(signal, value, rate_hz)
         case "wire_inertia":
-            return resonator(signal, 2.0 * np.pi * value, values.get(f"wire_inertia@{target}.zeta", 0.2))
+            return resonator(
+                signal, 2.0 * np.pi * value, values.get(f"wire_inertia@{target}.zeta", 0.2), rate_hz
+            )
         case "wire_cosine":
             return signal + value * signal**2
         case "drift":
-            return signal + value * np.arange(signal.size) / GRID_HZ
+            return signal + value * np.arange(signal.size) / rate_hz
     raise KeyError(effect)
 
 

@@ -11,7 +11,7 @@ from scipy.signal import oaconvolve
 
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.channel_shapes import SHAPES, Others
+from daq_app.gap.rocking_model.features.channel_shapes import FURTHER, Others
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rigid_body import across_axes
@@ -34,7 +34,7 @@ class ChannelFamily:
     pick: NDArray[np.bool_]
     step: float = 0.0
     repeats: int = 1
-    sided: bool = False
+    further: tuple[str, ...] = ()
     leaked: FloatArray | None = None
     """What one sd of crosstalk from the channel that is scanned before adds to each signal; common to all."""
     turned: FloatArray | None = None
@@ -65,7 +65,7 @@ def channel_family(
         pick,
         step,
         repeats=grid.impact_s.size,
-        sided="side" in SHAPES[family],
+        further=FURTHER[family],
         leaked=CROSSTALK * crosstalk(run, chosen),
         turned=MOUNT_RAD * across_axes(run, grid, chosen) if family == "accelerometer" else None,
     )
@@ -108,6 +108,8 @@ def beside(data: ChannelFamily, name: str, without: tuple[str, ...]) -> Others:
     errors = _usual_errors(data)[others]
     weights = data.design[place] @ np.linalg.pinv(data.design[others] / errors[:, None]) / errors
     expected = weights @ data.signals[others]
+    all_weights = np.zeros(len(data.ids))
+    all_weights[others] = weights
     # A channel far from the others is predicted by a difference of them: their errors grow.
     sizes = np.sqrt(np.mean(data.signals[others] ** 2, axis=1))
     expected_rms = float(np.sqrt(np.mean(expected**2))) + 1e-300
@@ -127,7 +129,8 @@ def beside(data: ChannelFamily, name: str, without: tuple[str, ...]) -> Others:
         curved,
         rough,
         data.repeats,
-        data.sided,
+        data.further,
+        all_weights,
         own_and_others,
     )
 

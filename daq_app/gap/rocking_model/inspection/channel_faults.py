@@ -26,7 +26,7 @@ from daq_app.gap.rocking_model.features.channel_shapes import (
 )
 from daq_app.gap.rocking_model.inspection.channel_families import ChannelFamily, beside, channel_family
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
-from daq_app.gap.rocking_model.motion.rotation import Wire
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Wire, finer_step, zeroed
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.tolerances.inspection import AS_SINGLE, OTHERS_AGREE, REMAINS, SUSPECT
 
@@ -176,7 +176,7 @@ def _misfit(data: ChannelFamily, without: str) -> float:
     for i, name in enumerate(data.ids):
         if name == without:
             continue
-        misfit = deviation(Others(data.signals[i], heights[i] * mean, data.pick, 1.0, sided=data.sided))
+        misfit = deviation(Others(data.signals[i], heights[i] * mean, data.pick, 1.0, further=data.further))
         # In units of the errors of this wire, which differ from shape to shape and hang together.
         whiten = np.linalg.inv(np.linalg.cholesky(np.diag(tolerance**2) + misfit.covariance))
         rows.append(
@@ -201,8 +201,7 @@ def _sizes(
         usual = usual_remains([misfit.remains for misfit in table.values()])
         for name, misfit in table.items():
             tolerance = np.array(TOLERANCE[family]) * rows_beside[name].spread
-            sd = np.hypot(tolerance, np.sqrt(np.diag(misfit.covariance)))
-            sizes = np.abs(misfit.values / sd)
+            sizes = _errors(misfit.values, misfit.covariance + np.diag(tolerance**2))
             if shape:
                 rows.setdefault(name, []).append(float(sizes[SHAPES[family].index(shape)]))
                 continue
@@ -211,6 +210,18 @@ def _sizes(
                 usual = misfit.remains
             rows.setdefault(name, []).append(max(size, SUSPECT[family] * (misfit.remains - usual) / REMAINS))
     return {name: float(np.median(values)) for name, values in rows.items()}
+
+
+def _errors(values: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Each coefficient in its own errors, (k,): alone, or beside the others where these say more of it.
+
+    What leaks in from the channel that is scanned before may be of any size and has one shape. It says as
+    little of the gain as of the side alone, and much of the two together.
+    """
+    precision = np.linalg.inv(covariance)
+    alone = values / np.sqrt(np.diag(covariance))
+    beside_others = precision @ values / np.sqrt(np.diag(precision))
+    return np.asarray(np.maximum(np.abs(alone), np.abs(beside_others)))
 
 
 def _straightened(data: ChannelFamily) -> ChannelFamily:
@@ -237,4 +248,18 @@ def channel_block(run: GapRun, grid: Grid, family: Family, name: str, step: floa
     others = beside(data, name, (name,))
     sound = [(row, deviation(row)) for row in (beside(data, n, (name,)) for n in data.ids if n != name)]
     wire = Wire(run.sensors[run.place(name)], run.survey.half_base_m) if family == "wire" else None
-    return block_of(name, family, others, sound, wire)
+    return block_of(name, family, others, sound, wire, _finer(run, data, others))
+
+
+def _finer(run: GapRun, data: ChannelFamily, others: Others) -> tuple[FloatArray, float] | None:
+    """The prediction of a channel at a millisecond's resolution, and its rate in Hz; None where no shape of
+    its family needs it."""
+    if "rounding" not in others.further or others.weights is None:
+        return None
+    step = finer_step(run.rate_hz)
+    places = [run.place(name) for name in data.ids]
+    whole = sum(
+        weight * zeroed(run, i) for weight, i in zip(others.weights, places, strict=True) if weight != 0.0
+    )
+    kept = len(others.expected) * round(run.rate_hz / GRID_HZ)
+    return np.asarray(whole)[:kept].reshape(-1, step).mean(axis=1), run.rate_hz / step

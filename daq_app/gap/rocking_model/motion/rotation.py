@@ -18,6 +18,8 @@ from daq_app.rocking.geometry.noise import timing_noise
 from daq_app.rocking.geometry.wires import wire_rotation, wire_shortening
 
 GRID_HZ = 200.0
+FINER_HZ = 1000.0
+"""Rate at which corners at impacts are told from what sensors make of them."""
 """Regressions run on averages over 5 ms."""
 TAIL_S = 0.3
 """The wall stands at rest at the end of a record; this much of it is the zero of every channel."""
@@ -66,6 +68,12 @@ def coarse(values: FloatArray, rate_hz: float) -> FloatArray:
     m = values.size // step
     means: FloatArray = values[: m * step].reshape(m, step).mean(axis=1)
     return means
+
+
+def finer_step(rate_hz: float) -> int:
+    """Samples in the coarsest part of an interval of the grid that lasts a millisecond at most."""
+    step = round(rate_hz / GRID_HZ)
+    return max(d for d in range(1, step + 1) if step % d == 0 and (d == 1 or rate_hz / d >= FINER_HZ))
 
 
 def gridded(run: GapRun, index: int, early: int = 0) -> FloatArray:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.pivots import wear_growth
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.prediction.vector import HalfCycles, half_cycle_table
 from sim_hardware.dynamics import parameters as par
@@ -17,6 +18,7 @@ _MIDDLE = 0.1
 """Peak, as a share of α, whose damping a growth with the amplitude leaves as it is."""
 _ZETA_STEP = 1e-4
 _RADIUS_STEP_M = 1e-3
+_LOSS_STEP = 1e-4
 _FREE_TIMES = {"free_restoring": "alike", "free_dissipation": "way", "free_geometry": "side"}
 """How the times of a free form go with the half-cycle, by its name."""
 
@@ -70,11 +72,12 @@ def _free_basis(run: RockingRun) -> _FreeBasis:
 
 
 def departed(run: RockingRun, values: Mapping[str, float], cycles: HalfCycles) -> FloatArray:
-    """The table of half-cycles, (n, 5 + 2F), with first steps away from the forms of loss and edges.
+    """The table of half-cycles, (n, 5 + 2F), with first steps away from the forms of loss, edges and wear.
 
     To first order, which is all that a score test asks.
     """
-    return cycles.table + _uneven_loss(run, values, cycles) + _uneven_edges(run, values, cycles)
+    forms = (_uneven_loss, _uneven_edges, _unsteady_wear)
+    return cycles.table + sum(form(run, values, cycles) for form in forms)
 
 
 def _uneven_loss(run: RockingRun, values: Mapping[str, float], cycles: HalfCycles) -> FloatArray | float:
@@ -99,6 +102,20 @@ def _uneven_edges(run: RockingRun, values: Mapping[str, float], cycles: HalfCycl
         return 0.0
     rolling = _moved(run, cycles, par.EDGE_RADIUS, _RADIUS_STEP_M) - cycles.table
     added: FloatArray = np.sign(cycles.true)[:, None] * rolling * (radius / _RADIUS_STEP_M)
+    return added
+
+
+def _unsteady_wear(run: RockingRun, values: Mapping[str, float], cycles: HalfCycles) -> FloatArray | float:
+    """What edges add that wear as a power of the number of impacts, (n, 5 + 2F).
+
+    What the steady wear of CRUSH_ALPHA adds to each half-cycle goes with the number before it already.
+    """
+    loss = values.get("wear_power.loss", 0.0)
+    if loss == 0.0:
+        return 0.0
+    impacts = run.impacts_before + np.arange(len(cycles.true))
+    steady = (_moved(run, cycles, par.CRUSH_ALPHA, _LOSS_STEP) - cycles.table) / _LOSS_STEP
+    added: FloatArray = loss * wear_growth(impacts)[:, None] * steady
     return added
 
 

@@ -58,7 +58,7 @@ def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> FloatArray:
             if vector[other] == 0.0:
                 vector[other] = default
         vector[index] = value
-    vector[par.OMEGA0] += values["omega0"]
+    vector[par.OMEGA0] += values["omega0"] + values.get("initial_velocity.own", 0.0)
     vector[par.COULOMB] += values.get("loss_power.mu", 0.0)
     return vector
 

@@ -34,10 +34,19 @@ def test_a_wall_thrown_up_and_one_pushed_down_are_told_apart() -> None:
         assert found == pytest.approx(true, abs=3 * sd)
         assert sd < 0.3 * SPEED_RAD_S
     result = fit(RockingModel(runs[0].survey), runs, (rocking_library()["initial_velocity"],))
+    common, _, _ = result.values["initial_velocity.omega"]
     for local, true in zip(result.local_values, (SPEED_RAD_S, -SPEED_RAD_S), strict=True):
-        value, low, high = local["initial_velocity.omega"]
-        assert low < true < high
-        assert value == pytest.approx(true, rel=0.15)
+        own, low, high = local["initial_velocity.own"]
+        assert common + low < true < common + high
+        assert common + own == pytest.approx(true, rel=0.15)
+
+
+def test_pushes_of_one_hand_have_one_size() -> None:
+    """Each test has its own push, and what they have in common is the effect's size."""
+    runs, _ = prepare(simulate({"initial_velocity": {"omega": -SPEED_RAD_S}}, 12, levels=(-0.35, 0.25)))
+    result = fit(RockingModel(runs[0].survey), runs, (rocking_library()["initial_velocity"],))
+    _, low, high = result.values["initial_velocity.omega"]
+    assert low < -SPEED_RAD_S < high < 0.0
 
 
 def test_impacts_too_small_to_be_timed_are_counted_for_what_wears() -> None:
