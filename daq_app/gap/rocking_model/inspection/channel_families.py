@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,5 +153,8 @@ def smoothed(run: GapRun, chosen: Sequence[int], late_s: float = 0.0) -> FloatAr
     window = np.hanning(round(_SMOOTH_S * run.rate_hz))
     window /= window.sum()
     early = round(late_s * run.rate_hz)
-    rows = (oaconvolve(sooner(zeroed(run, i), early), window, "same") for i in chosen)
-    return np.array([coarse(row, run.rate_hz) for row in rows])
+
+    def one(index: int) -> FloatArray:
+        return coarse(oaconvolve(sooner(zeroed(run, index), early), window, "same"), run.rate_hz)
+
+    return np.array([run.cache.constant(("smoothed", i, early), partial(one, i)) for i in chosen])

@@ -91,6 +91,8 @@ def gridded(run: GapRun, index: int, early: int = 0) -> FloatArray:
 
 def sooner(values: FloatArray, samples: int) -> FloatArray:
     """A record (n,) as if it came `samples` sooner; its ends are held."""
+    if not samples:
+        return values
     moved: FloatArray = values[np.clip(np.arange(values.size) + samples, 0, values.size - 1)]
     return moved
 
