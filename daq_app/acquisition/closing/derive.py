@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from daq_app.acquisition.closing.verdict import judge_imported, judge_run
 from daq_app.config.rig import Rig
 from daq_app.config.scaling import Scaling
+from daq_app.plain import plain
 from daq_app.rocking.analysis.analyse import analyse_record
 from daq_app.rocking.analysis.options import AnalysisOptions
 from daq_app.rocking.analysis.results import Series
@@ -117,18 +117,7 @@ def _online(contents: JournalContents, rig: Rig) -> dict[str, Any] | None:
     estimate = None
     for first, window in contents.windows(_WINDOW):
         estimate = analyser.process(first, window).estimate or estimate
-    return None if estimate is None else _plain(estimate.as_message())
-
-
-def _plain(value: Any) -> Any:
-    """NaN (a half-cycle that could not be fitted) becomes None: JSON has no NaN."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    return value
+    return None if estimate is None else plain(estimate.as_message())
 
 
 def _signals(series: Series | None) -> dict[str, DerivedSignal]:

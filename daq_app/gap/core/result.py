@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -14,6 +14,7 @@ from daq_app.gap.core.judging.evidence import Ranked
 from daq_app.gap.core.judging.other_forms import FreeForm
 from daq_app.gap.core.judging.remainder import Remainder
 from daq_app.gap.core.judging.where import GapMap
+from daq_app.plain import plain
 
 FORMAT_VERSION: Final = 2
 
@@ -156,32 +157,15 @@ class Diagnosis:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, with the keys of the documented format."""
-        data = asdict(self)
+        data: dict[str, Any] = plain(self)
         data["format"] = FORMAT_VERSION
         data["decision_detail"] = data["decision"]
         data["decision"] = self.decision.verdict
-        data["p_unknown"] = self.p_unknown
-        for key in ("which", "set95", "probes"):
-            for entry in data[key]:
-                entry["effects"] = list(entry["effects"])
-        cleaned: dict[str, Any] = _plain(data)
-        return cleaned
+        data["p_unknown"] = plain(self.p_unknown)
+        return data
 
     def to_json(self, indent: int | None = 1) -> str:
         return json.dumps(self.to_dict(), indent=indent, ensure_ascii=False, allow_nan=False)
 
     def save(self, path: Path) -> None:
         path.write_text(self.to_json(), encoding="utf-8")
-
-
-def _plain(value: Any) -> Any:
-    """JSON has neither tuples, nor NaN, nor NumPy scalars."""
-    if isinstance(value, dict):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(v) for v in value]
-    if hasattr(value, "item"):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.analysis.plain import plain
+from daq_app.plain import plain
 from daq_app.rocking.estimators import RestitutionEstimate
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.verdict import FamilyView, RVerdict

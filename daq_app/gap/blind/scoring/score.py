@@ -23,6 +23,7 @@ from daq_app.gap.blind.scoring.statistics import (
     share,
 )
 from daq_app.gap.blind.seal import SealBroken, open_label
+from daq_app.plain import plain
 from daq_app.runfile.digest import file_sha256
 
 _SURE = 0.95
@@ -78,8 +79,8 @@ class Score:
     def to_dict(self) -> dict[str, Any]:
         """JSON-able: rows and judged cases; NaN and infinity as null."""
         rows = [{**asdict(row), "target": row.target, "met": row.met} for row in self.rows]
-        data = {"rows": rows, "cases": [asdict(j) for j in self.judged], "waiting": list(self.waiting)}
-        cleaned: dict[str, Any] = _finite(data)
+        data = {"rows": rows, "cases": self.judged, "waiting": self.waiting}
+        cleaned: dict[str, Any] = plain(data)
         return cleaned
 
 
@@ -221,13 +222,3 @@ def claims(judged: Sequence[Judged]) -> tuple[list[float], list[bool]]:
     spoken = [j for j in judged if j.decision not in ("failed", "none_of_these")]
     kept = [j for j in spoken if not math.isnan(j.claimed)]
     return [j.claimed for j in kept], [j.first_right for j in kept]
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {k: _finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
