@@ -7,14 +7,14 @@ diagnosis; it becomes one of its stated limits.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.gap.core import Effect, Library, Model, Parameter, Prediction, Run
+from daq_app.gap.core import Effect, Library, Model, Parameter, Run
 from daq_app.gap.core.fitting.experiment import Experiment
 from daq_app.gap.core.fitting.problem import Problem
 
@@ -55,7 +55,7 @@ def check_model(model: Model, library: Library, runs: Sequence[Run]) -> Lint:
     if refusals:
         return Lint(tuple(refusals), ())
     asked = _Asked(model, runs)
-    refusals = [*asked.silent_unknowns(), *_scatters_without_use(model, runs)]
+    refusals = [*asked.silent_unknowns(), *asked.scatters_without_use()]
     notes = [*_amplitudes(runs), *asked.run_that_stands_out(), *asked.features_that_stand_out()]
     for effect in library.values():
         if effect.kind == "departure":
@@ -93,9 +93,14 @@ def _recordings(runs: Sequence[Run]) -> list[str]:
     return doubts
 
 
+def _problem(model: Model, run: Run, effects: Sequence[Effect] = ()) -> Problem:
+    """One run by itself, to be predicted."""
+    return Problem(Experiment.without_groups(model, [run]), effects)
+
+
 def _prediction(model: Model, run: Run) -> list[str]:
     """Whether the model predicts this run at the centre of its priors."""
-    problem = Problem(Experiment.without_groups(model, [run]), ())
+    problem = _problem(model, run)
     try:
         predicted = problem.predict(0, problem.start({}))
     except KeyError as error:
@@ -139,24 +144,6 @@ def _loadings(model: Model, run: Run, loadings: Mapping[str, FloatArray], n: int
     ]
 
 
-def _scatters_without_use(model: Model, runs: Sequence[Run]) -> list[str]:
-    unused = []
-    for scatter in model.scatters:
-        sizes = [_loading_size(model, run, scatter.name) for run in runs]
-        if max(sizes) == 0.0:
-            unused.append(
-                f"The scatter {scatter.name} is declared, but no prediction has a loading of it: its size "
-                "could be anything. Return Prediction(features, {name: loadings}), or leave it out."
-            )
-    return unused
-
-
-def _loading_size(model: Model, run: Run, name: str) -> float:
-    problem = Problem(Experiment.without_groups(model, [run]), ())
-    loading = problem.predict(0, problem.start({})).loadings.get(name)
-    return 0.0 if loading is None else float(np.max(np.abs(loading), initial=0.0))
-
-
 def _amplitudes(runs: Sequence[Run]) -> list[str]:
     """`Label.amplitude` carries the side: without its sign no left and right can be told apart."""
     sizes = np.array([label.amplitude for run in runs for label in run.features.labels])
@@ -178,16 +165,24 @@ class _Asked:
 
     def __init__(self, model: Model, runs: Sequence[Run]) -> None:
         self.model, self.runs = model, runs
-        self.centre = [
-            self._predict(Problem(Experiment.without_groups(model, [run]), ()), {}) for run in runs
+        problems = [_problem(model, run) for run in runs]
+        self.centre = [problem.predict(0, problem.start({})) for problem in problems]
+
+    def scatters_without_use(self) -> list[str]:
+        """Scatters that no prediction has a loading of."""
+        loadings = [prediction.loadings for prediction in self.centre]
+        return [
+            f"The scatter {scatter.name} is declared, but no prediction has a loading of it: its size "
+            "could be anything. Return Prediction(features, {name: loadings}), or leave it out."
+            for scatter in self.model.scatters
+            if not any(np.any(one.get(scatter.name, 0.0)) for one in loadings)
         ]
 
     def silent_unknowns(self) -> list[str]:
         """Parameters of the model itself that change no feature."""
         doubts = []
         for index, run in enumerate(self.runs):
-            problem = Problem(Experiment.without_groups(self.model, [run]), ())
-            for unknown in problem.unknowns:
+            for unknown in _problem(self.model, run).unknowns:
                 if unknown.run is None and index > 0:
                     continue  # shared by all runs: asked once, of all of them
                 others = self.runs if unknown.run is None else [run]
@@ -224,7 +219,7 @@ class _Asked:
         if len(self.runs) < 3:
             return []
         misfit = [
-            np.abs(run.features.values - centre) / run.features.sd
+            np.abs(run.features.values - centre.features) / run.features.sd
             for run, centre in zip(self.runs, self.centre, strict=True)
         ]
         sizes = np.array([np.sqrt(np.mean(z**2)) for z in misfit])
@@ -242,7 +237,7 @@ class _Asked:
         """The wildest features of their kind, beside what each run's parameters can follow."""
         kinds: dict[tuple[str, str], list[tuple[float, str]]] = {}
         for run in self.runs:
-            misfit = np.abs(_robust_residual(Problem(Experiment.without_groups(self.model, [run]), ())))
+            misfit = np.abs(_robust_residual(_problem(self.model, run)))
             for k, label in enumerate(run.features.labels):
                 where = f"feature {k + 1} of run {run.name} ({label.observable} of {label.channel})"
                 kinds.setdefault((label.channel, label.observable), []).append((float(misfit[k]), where))
@@ -260,7 +255,7 @@ class _Asked:
 
     def _change(self, run: Run, effects: Sequence[Effect], key: str, parameter: Parameter) -> float:
         """Largest change of a feature of a run, in noise sd, that a parameter makes from its centre."""
-        problem = Problem(Experiment.without_groups(self.model, [run]), effects)
+        problem = _problem(self.model, run, effects)
         low, high = parameter.unit_bounds
         # An effect's time constant does nothing while its strength is zero.
         beside = {e.key(p): p.start_coordinates()[-1] for e in effects for p in e.parameters}
@@ -278,9 +273,8 @@ class _Asked:
         u = problem.start({})
         for k, unknown in enumerate(problem.unknowns):
             u[k] = moved.get(unknown.key, u[k])
-        ask: Callable[[int, FloatArray], Prediction] = problem.predict
         try:
-            return np.asarray(ask(0, u).features, dtype=np.float64)
+            return np.asarray(problem.predict(0, u).features, dtype=np.float64)
         except (ArithmeticError, ValueError):
             return np.full(len(problem.runs[0].features), np.nan)
 

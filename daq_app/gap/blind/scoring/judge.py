@@ -253,8 +253,6 @@ def _parameter(label: dict[str, Any], result: dict[str, Any], decision: str) -> 
 
 def _number(values: dict[str, Any], key: str) -> float:
     value = values.get(key)
-    if isinstance(value, dict):
-        value = value.get("value")
     return float(value) if isinstance(value, int | float) else math.nan
 
 

@@ -72,26 +72,25 @@ class Base:
     """A fit, linearised, that further effects are put on."""
 
     def __init__(
-        self, experiment: Experiment, effects: Sequence[Effect], found: Fit, columns: Columns
+        self, experiment: Experiment, effects: Sequence[Effect], found: Fit, frozen: Columns
     ) -> None:
-        self.experiment, self.effects = experiment, tuple(effects)
-        self.problem = Problem(experiment, effects)
-        self.u = self.problem.start(found.known())
-        lines = [
-            self.problem.linearise(i, self.u, None, columns, exact=False) for i in range(len(experiment.runs))
-        ]
-        self.robust = Linear(self.problem, self.u, lines, found.sizes)
+        """`frozen`: columns of the Jacobian without any effect."""
+        self.experiment, self.effects, self.known = experiment, tuple(effects), found.known()
+        problem = Problem(experiment, effects)
+        u = problem.start(self.known)
+        columns = {**frozen, **found.columns}
+        lines = [problem.linearise(i, u, None, columns, exact=False) for i in range(len(experiment.runs))]
+        self.robust = Linear(problem, u, lines, found.sizes)
         nominal = Sizes.nominal(experiment).discrepancy
         self.strict = self.robust.under(Sizes(found.sizes.log_scatter, nominal))
 
     def screened(self, effect: Effect, begin: Sequence[FloatArray] = ()) -> Screened:
         """The best step from any start of the effect, or from those of its unknowns at `begin`."""
         problem = Problem(self.experiment, (*self.effects, effect))
-        base = problem.start(dict(zip(_keys(self.problem), self.u.tolist(), strict=True)))
-        known = set(_keys(self.problem))
+        base = problem.start(self.known)
         robust: list[tuple[Step, _Attached]] = []
         strict: list[tuple[Step, _Attached]] = []
-        for u in _begun(problem, base, effect, begin) or starts(problem, base, dict.fromkeys(known, 0.0)):
+        for u in _begun(problem, base, effect, begin) or starts(problem, base, self.known):
             lines = _beside(problem, u, effect)
             if not all(np.all(np.isfinite(line.residual)) for line in lines):
                 continue  # the model diverges there
@@ -113,9 +112,9 @@ class Base:
         weaker is no evidence for another form of it.
         """
         problem = Problem(self.experiment, (*self.effects, form))
-        u = problem.start(dict(zip(_keys(self.problem), self.u.tolist(), strict=True)))
+        u = problem.start(self.known)
         lines = _beside(problem, u, form)
-        named = np.array([_FLAT * bool(q.effect) for q in self.problem.unknowns])
+        named = np.array([_FLAT * bool(q.effect) for q in self.robust.problem.unknowns])
         attached = _Attached(self.robust, problem, u, lines, form.name, named)
         free = attached.free(np.zeros(len(attached.unknowns)))
         own = attached.own[np.ix_(free, free)]
@@ -146,10 +145,6 @@ def _begun(
     for u, coordinates in zip(vectors, begin, strict=True):
         u[own] = coordinates
     return vectors
-
-
-def _keys(problem: Problem) -> list[tuple[str, int | None]]:
-    return [(q.key, q.run) for q in problem.unknowns]
 
 
 class _Attached:
@@ -225,9 +220,10 @@ class _Attached:
         without -= 0.5 * float(linear.gradient @ dense.solve(linear.factor, linear.gradient))
         gain = without - reached
         moved = linear.u - dense.solve(self._factor, self._slope_base + self._across @ move)
-        known = dict(zip(_keys(linear.problem), moved.tolist(), strict=True))
-        for j, k in enumerate(self.unknowns):
-            unknown = self.problem.unknowns[k]
-            known[(unknown.key, unknown.run)] = float(self.start[j] + move[j])
+        own = [self.problem.unknowns[k] for k in self.unknowns]
+        ends = zip(
+            (*linear.problem.unknowns, *own), (*moved.tolist(), *(self.start + move).tolist()), strict=True
+        )
+        known = {(unknown.key, unknown.run): u for unknown, u in ends}
         evidence = gain - 0.5 * float(np.linalg.slogdet(self.own)[1])
         return Step(gain, evidence, known, linear.sizes)

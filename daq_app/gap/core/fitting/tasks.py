@@ -50,7 +50,7 @@ class ScreenTask:
     """Coordinates from which each effect's steps begin; from all its starts where there are none."""
 
     def run(self, experiment: Experiment, frozen: Columns) -> list[Screened]:
-        base = Base(experiment, self.base, self.found, {**frozen, **self.found.columns})
+        base = Base(experiment, self.base, self.found, frozen)
         return [base.screened(*job) for job in zip(self.effects, self.begin, strict=True)]
 
 
@@ -63,7 +63,7 @@ class FormsTask:
     forms: tuple[Effect, ...]
 
     def run(self, experiment: Experiment, frozen: Columns) -> list[Score]:
-        base = Base(experiment, self.base, self.found, {**frozen, **self.found.columns})
+        base = Base(experiment, self.base, self.found, frozen)
         return [base.score(form) for form in self.forms]
 
 

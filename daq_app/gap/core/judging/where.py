@@ -151,10 +151,6 @@ def _sentence(cells: Sequence[Cell], policy: Policy) -> str:
         repeat = f"; {100 * worst.repeatable:.0f} % of it repeats from run to run"
     return (
         f"The gap is largest in the {worst.observable} of {worst.channel} ({worst.phase}): "
-        f"{_number(worst.rms)} {worst.unit} rms, {worst.in_noise:.1f} times noise and scatter, "
+        f"{worst.rms:.3g} {worst.unit} rms, {worst.in_noise:.1f} times noise and scatter, "
         f"in {spread}{trend}{repeat}."
     )
-
-
-def _number(value: float) -> str:
-    return f"{value:.3g}"

@@ -41,18 +41,12 @@ def lateness(mine: FloatArray, other: FloatArray) -> float:
 def common_lateness(mine: FloatArray, other: FloatArray, rate_hz: float) -> float:
     """Samples by which all of `mine` come later than `other`, both (k, m), whatever their signs and sizes."""
     most = round(MOST_LATE_S * rate_hz)
-    pairs = [(y, e) for y, e in zip(mine, other, strict=True) if np.ptp(y) > 0.0 and np.ptp(e) > 0.0]
-    if not pairs:
-        return 0.0
-    power = [
-        float(np.gradient(y) @ np.gradient(y)) * float(np.gradient(e) @ np.gradient(e)) for y, e in pairs
-    ]
-    return _largest(
-        np.sum(
-            [_correlation(y, e, most) ** 2 / product for (y, e), product in zip(pairs, power, strict=True)],
-            axis=0,
-        )
-    )
+    shares = []
+    for y, e in zip(mine, other, strict=True):
+        if np.ptp(y) > 0.0 and np.ptp(e) > 0.0:
+            power = float(np.gradient(y) @ np.gradient(y)) * float(np.gradient(e) @ np.gradient(e))
+            shares.append(_correlation(y, e, most) ** 2 / power)
+    return _largest(np.sum(shares, axis=0)) if shares else 0.0
 
 
 def _correlation(mine: FloatArray, other: FloatArray, most: int) -> FloatArray:
@@ -74,11 +68,7 @@ def in_step(joint: Rotation, grid: Grid, rate_hz: float) -> InStep:
     """
     late_s = lateness(coarse(joint.theta, rate_hz), grid.theta) / GRID_HZ
     early = round(late_s * rate_hz)
-    moved = replace(
-        joint,
-        theta=sooner(joint.theta, early),
-        lift=sooner(joint.lift, early),
-        twist=sooner(joint.twist, early),
-    )
+    theta, lift, twist = (sooner(row, early) for row in (joint.theta, joint.lift, joint.twist))
+    moved = replace(joint, theta=theta, lift=lift, twist=twist)
     apart = grid.from_impact_s > MASK_S + abs(late_s)
     return InStep(moved, replace(grid, theta=coarse(moved.theta, rate_hz)), apart, early / rate_hz)
