@@ -61,9 +61,9 @@ def draw_maps(before: Axes, after: Axes, result: Diagnosis) -> None:
     after.set_yticks([])
 
 
-def draw_evidence(axes: Axes, result: Diagnosis, most: int = 9) -> None:
-    """Log evidence less that of the best."""
-    ranked = sorted(result.which, key=lambda r: -r.log_evidence)[:most][::-1]
+def draw_evidence(axes: Axes, result: Diagnosis) -> None:
+    """Log evidence less that of the best, of the first nine."""
+    ranked = sorted(result.which, key=lambda r: -r.log_evidence)[:9][::-1]
     best = ranked[-1].log_evidence
     lengths = [max(r.log_evidence - best, -60.0) for r in ranked]
     names = [result.in_words(r.effects) for r in ranked]
@@ -190,26 +190,17 @@ _MAPS: Final[dict[str, tuple[str, str, float]]] = {
 }
 
 
-def probe_maps(
-    result: Diagnosis, meanings: Mapping[str, str], units: Mapping[str, str] | None = None
-) -> list[ProbeMap]:
-    """The maps of the free forms: r(v), restoring moment, loss, and those of other models.
+def probe_maps(result: Diagnosis, meanings: Mapping[str, str]) -> list[ProbeMap]:
+    """The maps of the free forms: r(v), restoring moment, loss, then those of other models.
 
-    `meanings`: probe parameter → its meaning; ``X at 0.15 α`` makes a curve. `units` go over the
-    units of probes that are not known here.
+    `meanings`: probe parameter → its meaning; ``X at 0.15 α`` makes a curve.
     """
-    maps: list[ProbeMap] = []
-    for name, shape in result.probe_shapes.items():
-        if not shape:
-            continue
-        if name in _MAPS:
-            title, unit, factor = _MAPS[name]
-            scaled = {key: (factor * a, factor * b, factor * c) for key, (a, b, c) in shape.items()}
+    shapes, maps = result.probe_shapes, []
+    for name in sorted(shapes, key=lambda name: list(_MAPS).index(name) if name in _MAPS else len(_MAPS)):
+        if shapes[name]:
+            title, unit, factor = _MAPS.get(name, (name, "", 1.0))
+            scaled = {key: (factor * a, factor * b, factor * c) for key, (a, b, c) in shapes[name].items()}
             maps.append(ProbeMap(title, scaled, meanings, unit))
-        else:
-            maps.append(ProbeMap(name, shape, meanings, (units or {}).get(name, "")))
-    order = list(_MAPS)
-    maps.sort(key=lambda m: next((i for i, k in enumerate(order) if _MAPS[k][0] == m.title), len(order)))
     return maps
 
 

@@ -96,8 +96,8 @@ def noted(shown: Sequence[Trace]) -> list[dict[str, object]]:
     ]
 
 
-def traces(result: Diagnosis, runs: Sequence[GapRun], most: int = 2) -> list[Trace]:
-    """Traces of the run with the largest and of the one with the smallest release (at most `most`).
+def traces(result: Diagnosis, runs: Sequence[GapRun]) -> list[Trace]:
+    """Traces of the run with the largest and of the one with the smallest release.
 
     Runs that cannot be followed (no motion, channels that reach their range) are passed over.
     """
@@ -108,8 +108,7 @@ def traces(result: Diagnosis, runs: Sequence[GapRun], most: int = 2) -> list[Tra
         except CannotDiagnose:
             continue
     traced.sort(key=lambda entry: -abs(float(entry[1].peak_rad[0])))
-    chosen = traced if len(traced) <= most else [*traced[: most - 1], traced[-1]]
-    return [_trace(result, *entry) for entry in chosen]
+    return [_trace(result, *entry) for entry in ([traced[0], traced[-1]] if len(traced) > 1 else traced)]
 
 
 def _effects_of(result: Diagnosis) -> dict[str, dict[str, float]]:

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 _Z95: Final = 1.959963984540054
 _RESAMPLES: Final = 2000
+_BINS: Final = 10
+"""Equal parts of the claimed probability, 0 to 1."""
 _DEAR_RESAMPLES: Final = 500
 """Of statistics that cost more than a median."""
 
@@ -64,28 +66,26 @@ def _resampled(statistic: Callable[..., float], *groups: NDArray[Any], resamples
 class Bin:
     """One bar of a reliability diagram."""
 
-    low: float
-    high: float
     claimed: float
     """Mean claimed probability."""
     found: Value
     """Share that was right."""
 
 
-def reliability(claimed: Sequence[float], right: Sequence[bool], bins: int = 10) -> list[Bin]:
+def reliability(claimed: Sequence[float], right: Sequence[bool]) -> list[Bin]:
     """Claimed probability against the share that was right, in equal bins; empty bins left out."""
     p, hit = np.asarray(claimed, dtype=np.float64), np.asarray(right, dtype=bool)
-    index = np.minimum((p * bins).astype(int), bins - 1)
+    index = np.minimum((p * _BINS).astype(int), _BINS - 1)
     return [
-        Bin(k / bins, (k + 1) / bins, float(p[index == k].mean()), share(hit[index == k].tolist()))
-        for k in range(bins)
+        Bin(float(p[index == k].mean()), share(hit[index == k].tolist()))
+        for k in range(_BINS)
         if np.any(index == k)
     ]
 
 
-def calibration_error(claimed: Sequence[float], right: Sequence[bool], bins: int = 10) -> float:
+def calibration_error(claimed: Sequence[float], right: Sequence[bool]) -> float:
     """Expected calibration error: Σ n_bin/n · |claimed − found|; NaN without cases."""
-    found = reliability(claimed, right, bins)
+    found = reliability(claimed, right)
     n = sum(b.found.n for b in found)
     return sum(b.found.n * abs(b.claimed - b.found.value) for b in found) / n if n else math.nan
 
@@ -98,7 +98,7 @@ def calibration(claimed: Sequence[float], right: Sequence[bool]) -> Value:
     return _resampled(lambda drawn: calibration_error(*drawn.T), cases, resamples=_DEAR_RESAMPLES)
 
 
-def calibration_error_by_chance(claimed: Sequence[float], bins: int = 10) -> Value:
+def calibration_error_by_chance(claimed: Sequence[float]) -> Value:
     """Calibration error of answers that are right exactly as often as they claim: mean and 95 % range.
 
     A bin of few cases is off by chance alone, so the error of a finite number of cases is never zero.
@@ -106,9 +106,9 @@ def calibration_error_by_chance(claimed: Sequence[float], bins: int = 10) -> Val
     p = np.asarray(claimed, dtype=np.float64)
     if not p.size:
         return NOTHING
-    index = np.minimum((p * bins).astype(int), bins - 1)
+    index = np.minimum((p * _BINS).astype(int), _BINS - 1)
     right = np.random.default_rng(0).random((_RESAMPLES, p.size)) < p
-    off = [np.abs((right - p)[:, index == k].sum(axis=1)) for k in range(bins)]
+    off = [np.abs((right - p)[:, index == k].sum(axis=1)) for k in range(_BINS)]
     errors = np.sum(off, axis=0) / p.size
     low, high = np.quantile(errors, [0.025, 0.975])
     return Value(float(errors.mean()), float(low), float(high), p.size)

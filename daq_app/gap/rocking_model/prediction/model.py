@@ -101,34 +101,17 @@ class RockingModel:
         assert isinstance(run, RockingRun)
         values = with_measured_inputs(run, values)
         predicted = np.empty(len(run.features))
-        loading_r = np.zeros(len(run.features))
         count = len(run.places)
-        predicted[:count], peaks, slopes = run.cache.part("swings", values, partial(self._swings, run))
         last = count + run.peaks.size
-        predicted[count:last] = peaks
-        loading_r[count:last] = 1.0 / slopes
+        predicted[:count], predicted[count:last] = run.cache.part(
+            "swings", values, partial(self._swings, run)
+        )
         predicted[last:] = block_coefficients(run, values)
-        loadings = {SCATTER_R: loading_r, **self._fixed_scatters(run)}
+        loadings = run.cache.constant("loadings", partial(_loadings, run))
         return Prediction(predicted, loadings, run.block_loadings)
 
-    @staticmethod
-    def _fixed_scatters(run: RockingRun) -> dict[str, FloatArray]:
-        """Loadings that no parameter changes, worked out once per run."""
-
-        def make() -> dict[str, FloatArray]:
-            times, releases, sensors = (np.zeros(len(run.features)) for _ in range(3))
-            count = len(run.places)
-            times[:count] = 1.0
-            releases[:count] = (run.places[:, 0] == 0) & (run.places[:, 2] == 0)
-            sensors[count + run.peaks.size :] = np.concatenate([np.zeros(0), *units(run)])
-            return {SCATTER_TIME: times, SCATTER_RELEASE: releases, SCATTER_SENSOR: sensors}
-
-        return run.cache.constant("loadings", make)
-
-    def _swings(
-        self, run: RockingRun, values: Mapping[str, float]
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Times (T,), log peaks (P,) and d ln speed / d ln peak (P,)."""
+    def _swings(self, run: RockingRun, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
+        """Times (T,) and log peaks (P,)."""
         # r and what else acts at impacts only moves none of the half-cycles.
         cycles = run.cache.part("half-cycles", values, partial(_half_cycles, run))
         table, true = departed(run, values, cycles), cycles.true
@@ -158,7 +141,18 @@ class RockingModel:
         )
         slopes = run.cache.constant("slopes", partial(_slopes, run))
         measured = np.log(np.abs(run.swings.peak_rad[k]))
-        return times, measured - excess / slopes, slopes
+        return times, measured - excess / slopes
+
+
+def _loadings(run: RockingRun) -> dict[str, FloatArray]:
+    """What each scatter does to the features, (n,) each: no parameter changes it."""
+    r, times, releases, sensors = (np.zeros(len(run.features)) for _ in range(4))
+    count, last = len(run.places), len(run.places) + run.peaks.size
+    r[count:last] = 1.0 / _slopes(run)
+    times[:count] = 1.0
+    releases[:count] = (run.places[:, 0] == 0) & (run.places[:, 2] == 0)
+    sensors[last:] = np.concatenate([np.zeros(0), *units(run)])
+    return {SCATTER_R: r, SCATTER_TIME: times, SCATTER_RELEASE: releases, SCATTER_SENSOR: sensors}
 
 
 def _crossings_of(run: RockingRun) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:

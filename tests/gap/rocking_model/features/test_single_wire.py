@@ -70,6 +70,6 @@ def test_a_sag_of_the_lowest_wire_is_not_taken_for_a_fault_of_the_next(gains: di
 
 
 def test_a_gain_of_the_wire_that_is_scanned_after_the_lvdts_is_seen() -> None:
-    """What leaks into it from the last LVDT looks like a gain and a side of one size, never like one alone."""
+    """What leaks into it from the last LVDT looks like a gain and a side of one size, not like one alone."""
     runs = simulate({"gain@WP-1": {"error": -0.06}}, (-0.35, 0.25))
     assert found_channels(prepare(runs)[0]) == {"WP-1": "wire"}

@@ -25,8 +25,6 @@ ImpactTerm = Callable[["Impact"], float]
 class Impact:
     """What the impact law may depend on."""
 
-    number: int
-    """From 0 in this run."""
     total: int
     """Impacts of the specimen before this one, over all runs of the case."""
     speed: float

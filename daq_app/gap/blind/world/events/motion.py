@@ -181,13 +181,12 @@ def _strike(
         pieces.append(Piece(t, t + mechanics.dwell_s, side, None))
         t += mechanics.dwell_s
     since = t - (impacts[-1].time if impacts else 0.0)
-    number = mechanics.impacts_done
-    seen = Impact(number, release.impacts_before + number, abs(omega), side, since)
+    seen = Impact(release.impacts_before + mechanics.impacts_done, abs(omega), side, since)
     epsilon = mechanics.wall.restitution_scatter * scatter.standard_normal()
     r = mechanics.restitution(seen, float(epsilon))
     after = r * omega
     impacts.append(ImpactRecord(t, omega, after, side, r))
-    mechanics.impacts_done = number + 1
+    mechanics.impacts_done += 1
     return t, after
 
 
