@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from daq_app.gap.core import FeatureSet, Label, Model, Parameter, Prediction, Run, Scatter
+from daq_app.gap.core.features import FloatArray
 
-FloatArray = NDArray[np.float64]
 Simulate = Callable[["Measured", Mapping[str, float]], "ArrayLike | Prediction"]
 
 

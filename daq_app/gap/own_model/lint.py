@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq_app.gap.core import Effect, Library, Model, Parameter, Run
+from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.fitting.experiment import Experiment
 from daq_app.gap.core.fitting.problem import Problem
-
-FloatArray = NDArray[np.float64]
 
 _CONSTANT_FROM: Final = 5
 """Equal values of one kind of feature from which they count as constant data; fewer may be chance."""

@@ -14,8 +14,8 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.campaign import PlannedRun, World
 from daq_app.gap.blind.world.course import Course
 from daq_app.gap.blind.world.effects.catalogue import Drawn
@@ -24,8 +24,6 @@ from daq_app.gap.blind.world.sensors.chain import CALIBRATION_TOLERANCE, Place, 
 from daq_app.gap.blind.world.sensors.faults import Bench, through_electronics
 from daq_app.gap.blind.world.surroundings import Surroundings
 from daq_app.gap.blind.world.wall import Wall
-
-FloatArray = NDArray[np.float64]
 
 _SMALLEST_PEAK_RAD: Final = 4e-3
 _TIME_SD_S: Final = 3e-4

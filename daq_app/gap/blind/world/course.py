@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.contact.motion import rock
 from daq_app.gap.blind.world.contact.scene import contact_stage
 from daq_app.gap.blind.world.events.mechanics import Effects, Release, build
@@ -17,8 +17,6 @@ from daq_app.gap.blind.world.events.scene import Scene, stage
 from daq_app.gap.blind.world.laboratories.numerics import Engine, Numerics
 from daq_app.gap.blind.world.sway import Sway, swaying
 from daq_app.gap.blind.world.wall import Wall
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from daq_app.gap.blind.world.arrays import FloatArray
+
 ShockForm = Literal["half_sine", "two_lobed", "ringing", "gamma"]
 
 _FADE: Final = 8.0

@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.events.scene import Scene
 from daq_app.gap.blind.world.wall import Wall
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,15 +13,13 @@ from types import ModuleType
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.contact.feet import Foot, feet, plastic_restitution
 from daq_app.gap.blind.world.events.mechanics import Effects, Release
 from daq_app.gap.blind.world.events.motion import LONGEST_S, REST_RAD, ImpactRecord
 from daq_app.gap.blind.world.laboratories.numerics import Numerics
 from daq_app.gap.blind.world.wall import GRAVITY_M_S2, Wall
-
-FloatArray = NDArray[np.float64]
 
 _AS_OWN: Final = Numerics()
 _STONE: Final = 'solimp="0.99 0.999 0.0001 0.5 2"'

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.contact.motion import ContactMotion
 from daq_app.gap.blind.world.events.mechanics import Effects
 from daq_app.gap.blind.world.events.scene import Scene, corner_twist
 from daq_app.gap.blind.world.wall import Wall
-
-FloatArray = NDArray[np.float64]
 
 
 def contact_stage(motion: ContactMotion, wall: Wall, effects: Effects, time_s: FloatArray) -> Scene:

@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.events.mechanics import Impact, Mechanics, Release
 from daq_app.gap.blind.world.laboratories.numerics import Numerics
-
-FloatArray = NDArray[np.float64]
 
 REST_RAD = 4e-5
 """A swing smaller than this is rest: half of what an LVDT's noise amounts to."""

@@ -7,15 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.events.joint import Parameters
 from daq_app.gap.blind.world.events.mechanics import Effects, Mechanics, ground_acceleration
 from daq_app.gap.blind.world.events.motion import Followed, ImpactRecord
 from daq_app.gap.blind.world.shock import Shock
-
-FloatArray = NDArray[np.float64]
 
 _SETTLE_S = 0.003
 _TURN_S = 0.02

@@ -6,16 +6,14 @@ import math
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from daq_app.config import Scaling
+from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.events.scene import Scene
 from daq_app.gap.blind.world.sensors.chain import Calibration, Place, clipped_readings, quiet_signals
 from daq_app.gap.blind.world.sensors.faults import Bench, Fault, through_electronics
 from daq_app.gap.blind.world.sensors.installation import Installation, Sizes
-
-FloatArray = NDArray[np.float64]
 
 _FORGETS: Final = 0.05
 """Share that slow noise forgets with each sample."""

@@ -6,14 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq_app.config import Rig, Scaling
+from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.events.scene import Scene
 from daq_app.gap.blind.world.sensors.faults import RESPONSES, Bench, Fault, through_electronics
 from daq_app.gap.blind.world.sensors.instruments import ideal
-
-FloatArray = NDArray[np.float64]
 
 CALIBRATION_TOLERANCE = 0.003
 ADC_STEP_V = 20.5 / 65536

@@ -11,14 +11,13 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from daq_app.config.rig import Channel
+from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.events.scene import Scene
 from daq_app.gap.blind.world.sensors.instruments import first_order, ideal
 
-FloatArray = NDArray[np.float64]
 Parameters = dict[str, float]
 
 

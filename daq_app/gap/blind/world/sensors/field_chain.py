@@ -10,16 +10,14 @@ import math
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from daq_app.config import Scaling
+from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.events.scene import Scene
 from daq_app.gap.blind.world.sensors.chain import Calibration, Place, clipped_readings, quiet_signals
 from daq_app.gap.blind.world.sensors.faults import Bench, Fault, through_electronics
 from daq_app.gap.blind.world.sensors.installation import Installation, Sizes
-
-FloatArray = NDArray[np.float64]
 
 _PASS: Final = 0.7
 """Corner of the anti-alias filter as a share of half the sampling rate."""

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq_app.config import Rig
 from daq_app.config.rig import Channel
+from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.sensors.chain import ADC_STEP_V
 from daq_app.gap.blind.world.sensors.faults import Fault
 
-FloatArray = NDArray[np.float64]
 Sizes = Mapping[str, float]
 """Imperfection → its size in this case."""
 

@@ -9,13 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from daq_app.config.rig import G_M_S2, Channel
+from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.events.scene import Scene
-
-FloatArray = NDArray[np.float64]
 
 _BEND_EXPONENT = 1.5
 
