@@ -162,7 +162,8 @@ def _combine(
         fused = fuse(wire_rotation, joint.rotation_rad, max(wire_noise, 1e-7), max(lvdt_noise, 1e-7))
     leads = lead == "lvdts" and joint is not None
     rotation = joint.rotation_rad if leads and joint is not None else wire_rotation
-    noise = lvdt_noise if leads else wire_noise
+    # Readings with steps so wide that a held wall shows none: the noise that the rig file states is left.
+    noise = (lvdt_noise if leads else wire_noise) or geometry.rotation_noise_rad()
     return Signals(
         record=record,
         geometry=geometry,
