@@ -261,10 +261,7 @@ def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float, 
     solution = inverse @ (np.swapaxes(design, 2, 3) @ target)
     misfit = ((target - design @ solution) ** 2).sum(axis=(2, 3))
     likelihood = -0.5 * (log_spread + np.linalg.slogdet(normal)[1] + misfit)
-    usual = int(np.argmin(np.abs(_SCATTERS - _USUAL_SCATTER)))
-    for series, of_each in zip(together, likelihood, strict=True):
-        if len(series.points) < FEWEST_POINTS:
-            of_each[np.arange(_SCATTERS.size) != (usual if series.may_scatter else 0)] = -np.inf
+    _assume_usual_scatter(together, likelihood)
     weights = _SCATTER_WEIGHTS * np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
     weights /= weights.sum(axis=1, keepdims=True)
     slopes, variances_of_slope = solution[..., -1, 0], inverse[..., -1, -1]
@@ -273,3 +270,12 @@ def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float, 
     best = _SCATTERS[np.argmax(likelihood, axis=1)]
     least = _SCATTERS[np.argmax(np.cumsum(weights, axis=1) >= _SURELY, axis=1)]
     return list(zip(*(found.tolist() for found in (slope, variance, best, least)), strict=True))
+
+
+def _assume_usual_scatter(together: Sequence[DecaySeries], likelihood: Floats) -> None:
+    """Of too few points no scatter but the usual one keeps a likelihood, (series, scatters); of differences
+    none but zero."""
+    usual = int(np.argmin(np.abs(_SCATTERS - _USUAL_SCATTER)))
+    for series, of_each in zip(together, likelihood, strict=True):
+        if len(series.points) < FEWEST_POINTS:
+            of_each[np.arange(_SCATTERS.size) != (usual if series.may_scatter else 0)] = -np.inf
