@@ -1,10 +1,9 @@
-"""Each wire against the others: gain, lag, drift, strays; and how well the family's gain is known."""
+"""Each wire against the others: its gain, lag and drift, and how well the family's gain is known."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,6 @@ from scipy.special import stdtr
 from daq_app.rocking.families.gain_error import gain_sigma_of_mean, single_gain_share
 
 Floats = NDArray[np.float64]
-WireKind = Literal["gain", "late", "drift", "motion"]
 
 _MEAN_S = 0.005
 _FEWEST = 100
@@ -25,13 +23,6 @@ _LEAST_GAIN = 0.006
 _LEAST_LAG_S = 0.004
 _LEAST_DRIFT_RAD = 4e-4
 """Over the record; a fifth of what a wall's sway does to one wire alone."""
-_STRAY_MEANS = 10
-"""Strays are of this many means, 50 ms: white noise counts for little, and each half-cycle still shows."""
-_LEAST_STRAY_RAD = 8e-5
-"""rms about the others that is named; sound wires stay below 7e-5. A wire of five that sticks by 1.5 mm
-strays by 1e-4 and moves r by EAV by up to 0.005: raising it lets that pass."""
-_STRAY_RATIO = 3.75
-"""The same over the median of the other wires; sound ones and those of a wall that rings stay below 3.6."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,15 +33,13 @@ class SingleWires:
     lag_s: Floats
     drift_rad: Floats
     """Over the span looked at."""
-    stray_rad: Floats
-    """rms of what gain, lag and drift leave: a wire that sticks or slips."""
 
-    def outlier(self) -> tuple[int, WireKind] | None:
-        """The wire that deviates most beyond its kind's limit, and the kind: gain, late, drift or motion."""
+    def outlier(self) -> tuple[int, str] | None:
+        """The wire that deviates most beyond its kind's limit, and the kind: gain, late or drift."""
         count = self.gain.size
         if count < 4:
             return None
-        candidates: list[tuple[float, int, WireKind]] = []
+        candidates: list[tuple[float, int, str]] = []
         worst = int(np.argmax(np.abs(self.gain - np.median(self.gain))))
         others = np.delete(self.gain, worst)
         deviation = float(self.gain[worst] - others.mean())
@@ -58,20 +47,13 @@ class SingleWires:
         t = abs(deviation) / (spread * math.sqrt(1.0 + 1.0 / others.size))
         if 2.0 * count * float(stdtr(freedom, -t)) < _GAIN_CHANCE and abs(deviation) > _LEAST_GAIN:
             candidates.append((abs(deviation) / _LEAST_GAIN, worst, "gain"))
-        kinds: tuple[tuple[Floats, float, WireKind], ...] = (
-            (self.lag_s, _LEAST_LAG_S, "late"),
-            (self.drift_rad, _LEAST_DRIFT_RAD, "drift"),
-        )
+        kinds = ((self.lag_s, _LEAST_LAG_S, "late"), (self.drift_rad, _LEAST_DRIFT_RAD, "drift"))
         for values, limit, kind in kinds:
             apart = values - np.median(values)
             place = int(np.argmax(np.abs(apart)))
             rest = float(np.median(np.abs(np.delete(apart, place))))
             if abs(apart[place]) > max(limit, 5.0 * rest):
                 candidates.append((abs(float(apart[place])) / limit, place, kind))
-        place = int(np.argmax(self.stray_rad))
-        stray = float(self.stray_rad[place])
-        if stray > max(_LEAST_STRAY_RAD, _STRAY_RATIO * float(np.median(np.delete(self.stray_rad, place)))):
-            candidates.append((stray / _LEAST_STRAY_RAD, place, "motion"))
         if not candidates:
             return None
         _, place, kind = max(candidates)
@@ -107,7 +89,4 @@ def compare_wires(own_rad: Floats, rate_hz: float, y_over_lever: Floats) -> Sing
         twist = twist - table @ np.linalg.lstsq(table, twist, rcond=None)[0]
         table = np.column_stack([table, twist])
     solution = np.linalg.lstsq(table, apart.T, rcond=None)[0]
-    left = apart - (table @ solution).T
-    pieces = left.shape[1] // _STRAY_MEANS
-    slow = left[:, : pieces * _STRAY_MEANS].reshape(left.shape[0], pieces, _STRAY_MEANS).mean(axis=2)
-    return SingleWires(solution[0], -solution[1], solution[2], slow.std(axis=1))
+    return SingleWires(solution[0], -solution[1], solution[2])

@@ -8,7 +8,7 @@ from typing import Final, Literal
 from daq_app.config.rig import Family
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.scales import factor_words
-from daq_app.rocking.families.single_wires import SingleWires, WireKind
+from daq_app.rocking.families.single_wires import SingleWires
 
 FAMILY_NAMES: Final[dict[Family, str]] = {
     "wire": "wires",
@@ -57,7 +57,7 @@ def scale(family: str, factor: float) -> FamilyFinding:
     return FamilyFinding(family, (), kind, factor, "1", "put right", "warning", text)
 
 
-def single_wire(name: str, kind: WireKind, wires: SingleWires, place: int) -> FamilyFinding:
+def single_wire(name: str, kind: str, wires: SingleWires, place: int) -> FamilyFinding:
     """A wire that deviates from the other wires; it is left out of the rotation."""
     if kind == "gain":
         size, unit = float(wires.gain[place]), "1"
@@ -65,14 +65,13 @@ def single_wire(name: str, kind: WireKind, wires: SingleWires, place: int) -> Fa
     elif kind == "late":
         size, unit = float(wires.lag_s[place]), "s"
         what = f"wire {name} is {size * 1e3:+.1f} ms late against the others: slow, or an unknown delay"
-    elif kind == "motion":
-        size, unit = float(wires.stray_rad[place]), "rad"
-        what = f"wire {name} strays by {size * 1e3:.2f} mrad rms about the others: it sticks or slips"
     else:
         size, unit = float(wires.drift_rad[place]), "rad"
         what = f"wire {name} drifts by {size * 1e3:+.2f} mrad against the others: a zero or a fixture moves"
-    text = what + "; it is left out of the rotation"
-    return FamilyFinding("wires", (name,), kind, size, unit, "left out", "warning", text)
+    return FamilyFinding(
+        "wires", (name,), "gain" if kind == "gain" else "late" if kind == "late" else "drift", size, unit,
+        "left out", "warning", what + "; it is left out of the rotation",
+    )  # fmt: skip
 
 
 def slow(family: str, time_constant_s: float, *, left_out: bool) -> FamilyFinding:
@@ -116,8 +115,6 @@ def late(family: str, by_s: float, others: str) -> FamilyFinding:
     word = "late" if by_s > 0 else "early"
     text = f"{family} are {abs(by_s) * 1e3:.1f} ms {word} against {others}: a delay unknown to the task plan"
     if family == "accelerometers":
-        if by_s < 0:
-            text += f", or a filter that {others} have in common and that makes r by EAV too low"
         return FamilyFinding(family, (), "late", by_s, "s", "none", "warning", text)
     return FamilyFinding(
         family, (), "late", by_s, "s", "put in step", "warning", text + "; they were put in step"
@@ -302,14 +299,6 @@ def late_while_live(family: str, by_s: float, others: str) -> str:
     """A family that is late, said during the test: r is not off by it, times are."""
     late = f"{family} are {by_s * 1e3:.1f} ms late against {others}"
     return f"{late}: impact times are off by as much, r is not"
-
-
-def after_shocks_while_live(by_s: float) -> str:
-    """Wires that show the impacts after the accelerometers, said during the test."""
-    return (
-        f"wires are {by_s * 1e3:.1f} ms late against the accelerometers: times are off by as much, and "
-        "r by EAV is too low if a filter makes them so"
-    )
 
 
 def drift_while_live(by_rad: float) -> str:
