@@ -65,7 +65,7 @@ def _processor_percent(connection: str, folder: Path | None, blocks: int) -> flo
     reader = Reader(lambda: open_driver(connection), plan, recorder.inbox.put)
     reader.start()
     _wait_for(warm)
-    # Not by the ticks of the system's own count: 10 ms are more than a quick run takes.
+    # The system's own count goes in ticks of 10 ms, which is more than a quick run takes.
     before_s = time.process_time()
     _wait_for(enough)
     used_s = time.process_time() - before_s

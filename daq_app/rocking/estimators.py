@@ -95,7 +95,8 @@ class DecaySeries:
     levels: Floats
     """(n, levels) 1 where a value counts from this level."""
     may_scatter: bool = True
-    """Whether the usual scatter is assumed of few points: not of differences, which it does not reach."""
+    """Whether few points are assumed to have the usual scatter. Differences of two families of one wall have
+    none."""
 
 
 def eav(
@@ -273,8 +274,10 @@ def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float, 
 
 
 def _assume_usual_scatter(together: Sequence[DecaySeries], likelihood: Floats) -> None:
-    """Of too few points no scatter but the usual one keeps a likelihood, (series, scatters); of differences
-    none but zero."""
+    """Take the likelihood, (series, scatters), of too few points from every scatter but the usual one.
+
+    A series that may not scatter keeps that of no scatter.
+    """
     usual = int(np.argmin(np.abs(_SCATTERS - _USUAL_SCATTER)))
     for series, of_each in zip(together, likelihood, strict=True):
         if len(series.points) < FEWEST_POINTS:

@@ -163,7 +163,8 @@ class Analyst(threading.Thread):
         elif not self._moves_on:
             self._keep_unarmed(events)
         elif not self._live.moves:
-            self._new_live()  # a disk may keep the journal open for long: the next release is looked for now
+            # A disk may keep the journal open for long, and the next release does not wait for it.
+            self._new_live()
         self._judge()
 
     def _keep_unarmed(self, events: Sequence[PhaseEvent]) -> None:

@@ -72,8 +72,8 @@ class MotionFit:
     from_release: bool = True
     """Whether the fall is fitted; else θ0 and release are those of a free fall to the same impact."""
     degrees_of_freedom: float = math.inf
-    """Of the standard error of r: what r scatters by is known from these impacts only. Infinite where the
-    usual scatter is taken."""
+    """Degrees of freedom of the standard error of r, which knows what r scatters by from these impacts only.
+    They are infinite where the usual scatter is taken."""
 
     @property
     def explains_the_motion(self) -> bool:

@@ -31,6 +31,7 @@ a wire whose anchor is not as high as the rig file says slopes and sees it. A jo
 time: LVDTs have no other side. Where they close or open at an impact their readings have a corner, which
 every response rounds by the variance of its delays over two: a delay by none, a first order by most."""
 FURTHER = {family: shapes[len(_SHAPES) :] for family, shapes in SHAPES.items()}
+"""Those shapes of a family that not all families have."""
 _UNITS: dict[Family, tuple[str, ...]] = {
     "lvdt": ("1", "s", "1/m", "m/s", "s²"),
     "wire": ("1", "s", "1/m", "m/s", "1"),
@@ -70,7 +71,7 @@ class Others:
     further: tuple[str, ...] = ()
     """Shapes of its family beyond those of all."""
     weights: FloatArray | None = None
-    """By which the channels of the family make up the prediction, (c,)."""
+    """Weights, (c,), with which the channels of the family make up the prediction."""
     imperfections: FloatArray | None = None
     """What one sd of each ordinary imperfection adds to what this channel shows beyond the others, (k, m),
     SI: crosstalk from the channels that are scanned before, mounts that are turned."""
