@@ -41,6 +41,14 @@ class TestName:
         return f"{self.specimen}-{self.level}-{number}"
 
 
+def level_in(test: str) -> str:
+    """``L3`` of ``FR1-L3-2``; empty where `test` is no name of a test."""
+    try:
+        return TestName.parse(test).level
+    except ValueError:
+        return ""
+
+
 @dataclass(frozen=True, slots=True, order=True)
 class TestSeries:
     """Tests that are counted together: one level of one specimen, repetitions apart."""

@@ -107,6 +107,7 @@ def test_samples_and_tables_open_with_foreign_readers(published: Path, runs: Pat
     results = pandas.read_csv(published / "tables" / "results.csv")
     fused = results[(results.quantity == "r") & results.source.str.startswith("verdict")]
     assert fused.value.tolist() == tests.r.tolist()
+    assert set(results.level) == {"L1"}
     meanings = pandas.read_csv(published / "tables" / "columns.csv")
     assert set(tests.columns) == set(meanings[meanings.table == "tests.csv"].column)
 

@@ -18,7 +18,16 @@ import xarray as xr
 from nptdms import TdmsFile
 from scipy.io import loadmat
 
-from daq_app.runfile import DerivedData, DerivedSignal, JournalWriter, Run, RunHeader, finalise
+from daq_app.campaign.names import level_in
+from daq_app.runfile import (
+    DerivedData,
+    DerivedSignal,
+    JournalWriter,
+    Run,
+    RunHeader,
+    TestPlan,
+    finalise,
+)
 from daq_app.runfile.exporters import FORMATS, export_run, selection
 
 ROTATION = np.linspace(-0.07, 0.07, 900)
@@ -108,12 +117,16 @@ READERS: dict[str, Read] = {
 }
 
 
-@pytest.fixture
-def run(tmp_path: Path, header: RunHeader) -> Path:
-    journal = tmp_path / "demo.journal"
+def recorded(folder: Path, header: RunHeader) -> Path:
+    journal = folder / "demo.journal"
     with JournalWriter(journal, header) as writer:
         writer.append_block(1000, np.random.default_rng(8).normal(size=(4, 900)))
-    return finalise(journal, tmp_path / "FR1-L3-2.h5")
+    return finalise(journal, folder / "FR1-L3-2.h5")
+
+
+@pytest.fixture
+def run(tmp_path: Path, header: RunHeader) -> Path:
+    return recorded(tmp_path, header)
 
 
 @pytest.mark.parametrize("format_", FORMATS)
@@ -128,10 +141,19 @@ def test_rotation_and_r_are_read_back(
 
 def test_the_tidy_table_has_a_row_per_number(tmp_path: Path, run: Path) -> None:
     table = columns_of(beside(export_run(run, tmp_path, "npz", derive=derive)))
-    assert list(table) == ["test", "quantity", "source", "n", "value", "sigma", "unit"]
+    assert list(table) == ["test", "level", "quantity", "source", "n", "value", "sigma", "unit"]
     rows = list(zip(table["quantity"], table["n"], table["value"], table["sigma"], strict=True))
     assert ("peak rotation", "0", "-0.0752", "0.0001") in rows
     assert set(table["test"]) == {"FR1-L3-2"}
+
+
+@pytest.mark.parametrize(("planned", "told"), [("L2", "L2"), ("", "L3")])
+def test_the_tidy_table_has_the_level_of_the_plan_or_of_the_tests_name(
+    tmp_path: Path, header: RunHeader, planned: str, told: str
+) -> None:
+    run = recorded(tmp_path, header.model_copy(update={"test_plan": TestPlan(level=planned)}))
+    path = export_run(run, tmp_path, "npz", derive=derive, level_of=level_in)
+    assert set(columns_of(beside(path))["level"]) == {told}
 
 
 def test_decimal_commas_go_with_semicolons(tmp_path: Path, run: Path) -> None:

@@ -51,6 +51,7 @@ _CHANNELS: Final = (
 )
 _RESULT_WORDS: Final = {
     "test": "name of the test",
+    "level": "level of the test, as in its name",
     "quantity": "what was found",
     "source": "method, family or empty",
     "n": "impact that begins the half-cycle (0: the release), or empty",
@@ -100,6 +101,7 @@ def results_csv(tests: Sequence[PublishedTest]) -> str:
     rows = [
         {
             "test": test.name,
+            "level": test.recorded.name.level,
             "quantity": row.quantity,
             "source": row.source,
             "n": None if row.n < 0 else row.n,

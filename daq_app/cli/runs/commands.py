@@ -209,6 +209,7 @@ def export_command(
     The file appears under its name only when it is complete; gaps are NaN. What `analyse` computes goes with
     it, and stands as a tidy table in NAME.results.csv.
     """
+    from daq_app.campaign.names import level_in
     from daq_app.cli.analyse.derived import derived_of
 
     with (
@@ -228,6 +229,7 @@ def export_command(
             report=lambda fraction: progress.update(task, completed=fraction),
             derive=derived_of if derived else lambda run: None,
             decimal=decimal,
+            level_of=level_in,
         )
     if not place.is_dir():
         say_other_name(place, path)

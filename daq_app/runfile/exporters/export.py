@@ -41,6 +41,7 @@ def export_run(
     report: Callable[[float], None] = lambda fraction: None,
     derive: Callable[[Run], DerivedData | None] = lambda run: None,
     decimal: Decimal = "point",
+    level_of: Callable[[str], str] = lambda test: "",
 ) -> Path:
     """Write a run, or the times ``from_s ≤ t < to_s`` of it, in another format; returns the file's path.
 
@@ -49,7 +50,8 @@ def export_run(
     `out` is the file, or a folder in which it is named after the run.  An hour of recording needs no
     more memory than a minute (MAT: one channel at a time).  Samples in gaps are NaN.  What `derive`
     computes of the run goes with it: its signals beside the channels, its results within the file and as a
-    tidy table ``….results.csv`` beside it.  Raises `RunFileError`; then, or when interrupted, nothing new is
+    tidy table ``….results.csv`` beside it; `level_of` the test's name is its level there where the run's plan
+    names none.  Raises `RunFileError`; then, or when interrupted, nothing new is
     left on disk.
     """
     suffix = FORMATS.get(format_)
@@ -69,7 +71,10 @@ def export_run(
         selection = Selection.of(run, units, from_s, to_s, report, derive(run), decimal)
         write = importlib.import_module(f"daq_app.runfile.exporters.to_{format_}").write
         beside = final.with_suffix(RESULTS_SUFFIX)
-        table = tidy_csv(run.header.test or run.header.run_id, selection.results, decimal).encode()
+        header = run.header
+        planned = "" if header.test_plan is None else header.test_plan.level
+        level = planned or level_of(header.test)
+        table = tidy_csv(header.test or header.run_id, level, selection.results, decimal).encode()
         try:
             if selection.results and not overwrite and beside.exists() and beside.read_bytes() != table:
                 raise RunFileError(

@@ -12,7 +12,7 @@ from daq_app.config.shown_text import csv_cell
 
 Decimal = Literal["point", "comma"]
 
-COLUMNS: Final = ("test", "quantity", "source", "n", "value", "sigma", "unit")
+COLUMNS: Final = ("test", "level", "quantity", "source", "n", "value", "sigma", "unit")
 _HALF_CYCLE: Final = (
     ("impact time", "start_s", "sigma_start_s", "s"),
     ("half-cycle duration", "duration_s", "sigma_duration_s", "s"),
@@ -66,15 +66,18 @@ def result_rows(analysis: Mapping[str, Any]) -> list[ResultRow]:
     return rows
 
 
-def tidy_csv(test: str, rows: Sequence[ResultRow], decimal: Decimal) -> str:
-    """The table as text: comma and point, or semicolon and comma, as the spreadsheet's country wants it."""
+def tidy_csv(test: str, level: str, rows: Sequence[ResultRow], decimal: Decimal) -> str:
+    """The table as text: comma and point, or semicolon and comma, as the spreadsheet's country wants it.
+
+    `level`: of the test, empty where it has none.
+    """
     out = io.StringIO()
     writer = csv.writer(out, delimiter=";" if decimal == "comma" else ",")
     writer.writerow(COLUMNS)
     for row in rows:
         n = "" if row.n < 0 else row.n
         numbers = (_number(row.value, decimal), _number(row.sigma, decimal))
-        words = map(csv_cell, (test, row.quantity, row.source))
+        words = map(csv_cell, (test, level, row.quantity, row.source))
         writer.writerow((*words, n, *numbers, row.unit))
     return out.getvalue()
 
