@@ -93,6 +93,20 @@ def test_the_repetition_is_compared_with_the_first_tests(tests: list[TestSummary
     assert high - low == pytest.approx(2 * 2.776 * row.change_standard_error, rel=1e-3)  # t, 4 degrees
 
 
+def test_what_tests_scatter_by_is_asked_of_all_levels_of_the_specimen(tests: list[TestSummary]) -> None:
+    """Five first tests and one repetition know it badly: their interval is too wide."""
+    others = [summary(f"FR1-L2-{k}", 0.885 + 0.002 * (k - 3)) for k in range(1, 6)]
+    others.append(summary("FR1-L2-6", 0.7, good=False))
+    others += [summary(f"FR2-L2-{k}", 0.5 + 0.1 * k) for k in (1, 2)]
+    alone, pooled = (
+        next(row for row in repetition_effect(group) if row.method == "CRT")
+        for group in (tests, tests + others)
+    )
+    assert (alone.degrees_of_freedom, pooled.degrees_of_freedom) == (4, 8)
+    assert pooled.change == pytest.approx(alone.change)
+    assert np.ptp(pooled.change_interval95) < 0.9 * np.ptp(alone.change_interval95)
+
+
 def test_the_last_row_is_the_mean_of_the_specimens(tests: list[TestSummary]) -> None:
     rows = table_4_1(tests)
     means = {row.method: row for row in mean_of_specimens(rows)}

@@ -12,7 +12,7 @@ from typing import Final
 
 import scipy  # its `special` is loaded with the first use: what draws needs none of it
 
-from daq_app.campaign.report.statistics import GroupMean, random_effects_mean
+from daq_app.campaign.report.statistics import GroupMean, random_effects_mean, shared_scatter
 from daq_app.campaign.status import CampaignStatus
 from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.config.shown_text import csv_cell
@@ -61,22 +61,19 @@ class RepetitionRow:
     method: str
     first: GroupMean
     repeated: GroupMean
+    change_standard_error: float
+    """With what tests of any level of the specimen scatter by."""
+    degrees_of_freedom: int
+    """How well that scatter is known; at least 1."""
 
     @property
     def change(self) -> float:
         return self.repeated.mean - self.first.mean
 
     @property
-    def change_standard_error(self) -> float:
-        """Two independent groups; a single test's error includes the scatter of the others."""
-        scatter = 0.0 if math.isnan(self.first.scatter) else self.first.scatter
-        repeated = math.hypot(self.repeated.standard_error, scatter if self.repeated.tests == 1 else 0.0)
-        return math.hypot(self.first.standard_error, repeated)
-
-    @property
     def change_interval95(self) -> tuple[float, float]:
         """Student's t with as many degrees of freedom as the scatter is known with."""
-        freedom = max(self.first.tests + self.repeated.tests - 2, 1)
+        freedom = self.degrees_of_freedom
         reach = float(scipy.special.stdtrit(freedom, 0.975)) * self.change_standard_error
         return self.change - reach, self.change + reach
 
@@ -164,29 +161,45 @@ def mean_of_specimens(rows: Sequence[RestitutionRow]) -> list[RestitutionRow]:
 
 
 def repetition_effect(tests: Sequence[TestSummary]) -> list[RepetitionRow]:
-    """Levels of which a repetition at the end exists, against their first tests."""
+    """Levels of which a repetition at the end exists, against their first tests.
+
+    How much tests of one wall scatter is asked of all its levels: a level has too few to tell.
+    """
     rows = []
     series = dict.fromkeys((t.specimen, t.level) for t in tests if t.repetition and t.good)
     for specimen, level in series:
-        good_tests = [t for t in tests if (t.specimen, t.level) == (specimen, level) and t.good]
-        first = [t for t in good_tests if not t.repetition]
-        repeated = [t for t in good_tests if t.repetition]
-        if not first:
+        by_series: dict[tuple[str, bool], list[TestSummary]] = {}
+        for test in tests:
+            if test.specimen == specimen and test.good:
+                by_series.setdefault((test.level, test.repetition), []).append(test)
+        if (level, False) not in by_series:
             continue
+        first, repeated = by_series[level, False], by_series[level, True]
         for method in METHODS:
             a, b = (_mean(group, method, corrected=True) for group in (first, repeated))
             if a.known and b.known:
-                rows.append(RepetitionRow(specimen, level, method, a, b))
+                shared = shared_scatter([_corrected(group, method) for group in by_series.values()])
+                error = math.hypot(
+                    *(shared.error_of_mean(_corrected(group, method)[1]) for group in (first, repeated))
+                )
+                freedom = max(shared.degrees_of_freedom, 1)
+                rows.append(RepetitionRow(specimen, level, method, a, b, error, freedom))
     return rows
 
 
-def _mean(tests: Iterable[TestSummary], method: str, *, corrected: bool) -> GroupMean:
+def _corrected(tests: Iterable[TestSummary], method: str) -> tuple[list[float], list[float]]:
+    """Values less the bias of the method, and their standard errors."""
     results = [test.methods[method] for test in tests if method in test.methods]
+    return (
+        [result.corrected for result in results],
+        [result.corrected_standard_error for result in results],
+    )
+
+
+def _mean(tests: Iterable[TestSummary], method: str, *, corrected: bool) -> GroupMean:
     if corrected:
-        return random_effects_mean(
-            [result.corrected for result in results],
-            [result.corrected_standard_error for result in results],
-        )
+        return random_effects_mean(*_corrected(tests, method))
+    results = [test.methods[method] for test in tests if method in test.methods]
     return random_effects_mean(
         [result.r for result in results], [result.standard_error for result in results]
     )
