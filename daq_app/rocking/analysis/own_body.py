@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.families.body import body_of
+from daq_app.rocking.families.body import SURVEY_P_SHARE, body_of
 from daq_app.rocking.motion.swings import MotionTrack
 
 Floats = NDArray[np.float64]
@@ -20,9 +20,6 @@ Floats = NDArray[np.float64]
 _P_SHARE: Final = 0.1
 _ALPHA_SHARE: Final = 0.2
 """p and α by the half-cycles that are further from the survey's than this are no property of the wall."""
-_SURVEY_P_SHARE: Final = 0.007
-"""Relative standard uncertainty of the survey's p: R and I/R² known to 1 % each, assumed. Raising it widens
-the errors of speeds of tests whose half-cycles tell no p."""
 _STEP: Final = 0.01
 """Relative step of p for the derivative of speeds: their change is many times the noise of rounding."""
 
@@ -56,7 +53,7 @@ def with_own_body(track: MotionTrack, time_s: Floats, rotation_rad: Floats) -> O
     ):
         again = track.fitted_again(body.p_rad_s, body.alpha_rad, time_s, rotation_rad)
         return OwnTrack(again, body.sigma_p_rad_s / body.p_rad_s)
-    return OwnTrack(track, _SURVEY_P_SHARE)
+    return OwnTrack(track, SURVEY_P_SHARE)
 
 
 def impact_speeds(track: MotionTrack, own: OwnTrack, time_s: Floats, rotation_rad: Floats) -> ImpactSpeeds:
@@ -65,7 +62,7 @@ def impact_speeds(track: MotionTrack, own: OwnTrack, time_s: Floats, rotation_ra
     `time_s`, `rotation_rad` (n,) cover the half-cycles. The error of α is left out: 1 % of it moves speeds by
     0.002 %.
     """
-    known = own if own.sigma_p_share < _SURVEY_P_SHARE else OwnTrack(track, _SURVEY_P_SHARE)
+    known = own if own.sigma_p_share < SURVEY_P_SHARE else OwnTrack(track, SURVEY_P_SHARE)
     settings = known.track.settings
     other = known.track.fitted_again(
         settings.p_rad_s * (1.0 + _STEP), settings.alpha_rad, time_s, rotation_rad

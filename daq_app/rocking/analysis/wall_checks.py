@@ -15,6 +15,8 @@ from daq_app.rocking.families import words
 from daq_app.rocking.families.block_checks import (
     alpha_findings,
     duration_findings,
+    is_rigid_block,
+    p_findings,
     pattern_findings,
     pivot_findings,
     weaker_change_by_speed,
@@ -72,6 +74,8 @@ def wall_findings(
     if any(f.kind == "drift" and f.treatment == "none" and LEADS[lead] in f.family for f in findings):
         found = [finding for finding in found if finding.kind not in _MADE_BY_A_DRIFT]
     found += alpha_findings(bodies[LEADS[lead]], tracks.lead)
+    if is_rigid_block([*findings, *found]):
+        found += p_findings(bodies[LEADS[lead]], tracks.lead.settings.p_rad_s)
     if not tracks.lead.fell_freely:
         found.append(words.slow_release(tracks.lead.misfit_of_fall))
     if joint is not None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 from daq_app.rocking.estimators import RestitutionEstimate, estimate_all
 from daq_app.rocking.families import words
-from daq_app.rocking.families.body import BodyEstimate
+from daq_app.rocking.families.body import SURVEY_P_SHARE, BodyEstimate
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.motion.impact_pattern import Coefficient, ImpactPattern
 from daq_app.rocking.theory.block import RigidBlock
@@ -54,6 +54,11 @@ _ALPHA_SHARE: Final = 0.03
 """Difference of the motion's α from the survey's that is looked at: bodies that are off by 1 % (assumed) and
 a calibration stay below it. Lowering it tells what moves CRT by less than 0.0002."""
 _ALPHA_SIGMAS: Final = 4.0
+_P_SIGMAS: Final = 3.0
+"""Difference of the motion's p from the survey's, in standard errors of both, that is told: chance makes it
+in three sound tests of a thousand, and r does not feel it."""
+_P_NAMED_SIGMAS: Final = 5.0
+"""The same that is a warning. Raising it leaves sampling rates that are wrong by 4 % to a note."""
 _CRT_TOLD: Final = 2e-4
 """What α makes of CRT that is told and counted in its error; half of `R_TOLERANCE` is a warning, for scatter
 of r between impacts comes to it."""
@@ -214,6 +219,20 @@ def survey_off(body: BodyEstimate | None, track: MotionTrack) -> SurveyOff | Non
     if by_survey is None or by_motion is None or abs(by_survey - by_motion) <= _CRT_TOLD:
         return None
     return SurveyOff(body.alpha_rad / survey_rad - 1.0, by_survey - by_motion)
+
+
+def p_findings(body: BodyEstimate | None, survey_p_rad_s: float) -> list[FamilyFinding]:
+    """A p of the motion that the survey's does not allow for: a wrong body, or a wrong sampling rate.
+
+    Only durations that a block explains tell a p.
+    """
+    if body is None or not math.sqrt(body.misfit) <= _DURATION_SIGMAS:
+        return []
+    share = body.p_rad_s / survey_p_rad_s - 1.0
+    sigmas = abs(share) / math.hypot(body.sigma_p_rad_s / survey_p_rad_s, SURVEY_P_SHARE)
+    if not sigmas > _P_SIGMAS:
+        return []
+    return [words.p_of_survey(share, body.p_rad_s, survey_p_rad_s, notable=sigmas > _P_NAMED_SIGMAS)]
 
 
 def pivot_findings(block: RigidBlock, inset_left_m: float, inset_right_m: float) -> list[FamilyFinding]:

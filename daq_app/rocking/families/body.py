@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ Floats = NDArray[np.float64]
 _ROUNDS = 20
 _STEP = 1e-5
 _FEWEST = 4
+SURVEY_P_SHARE: Final = 0.007
+"""Relative standard uncertainty of the survey's p: R and I/R² known to 1 % each, assumed. Raising it widens
+the errors of speeds of tests whose half-cycles tell no p, and hides sampling rates that are wrong by more."""
 _MODEL_SHARE = 2e-4
 """Relative standard uncertainty of a duration that is not Housner's."""
 

@@ -9,7 +9,7 @@ Family = Literal["wires", "LVDTs", "tiltmeters", "accelerometers", "survey", "wa
 Kind = Literal[
     "slow", "late", "gain", "zero", "hum", "reversed", "unit", "drift", "motion",
     "speed", "side", "loss", "pause", "hop", "duration", "scatter", "release",
-    "misfit", "pivot", "bending", "alpha",
+    "misfit", "pivot", "bending", "alpha", "p",
 ]  # fmt: skip
 Treatment = Literal["none", "left out", "put in step", "put right", "removed"]
 
@@ -24,7 +24,7 @@ class FamilyFinding:
     """The channels concerned; none where it is the whole family."""
     kind: Kind
     size: float
-    """SI; a share for gain, loss, pause, hop, scatter and release, the factor for unit, a change of r for
+    """SI; a share for gain, p, loss, pause, hop, scatter and release, the factor for unit, a change of r for
     speed, side and alpha, standard errors for duration."""
     unit: str
     treatment: Treatment

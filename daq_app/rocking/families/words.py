@@ -16,6 +16,10 @@ FAMILY_NAMES: Final[dict[Family, str]] = {
     "accelerometer": "accelerometers",
     "tiltmeter": "tiltmeters",
 }
+_MAINS_SHARE: Final = 0.004
+"""Largest deviation of the frequency of mains (0.2 Hz: largest steady one of the synchronous area of
+continental Europe, Regulation (EU) 2017/1485). Raising it hides sampling rates that are wrong by as much."""
+_BETWEEN_MAINS_HZ: Final = 55.0
 _IN_UNIT: Final[dict[str, tuple[float, str]]] = {
     "m": (1e3, "mm"),
     "rad": (1e3, "mrad"),
@@ -46,6 +50,18 @@ def hum(
         "it was taken out. Usual causes: a missing shield, an earth loop, a cable beside mains"
     )
     return FamilyFinding(family, channels, "hum", amplitude, unit, "removed", severity, text)
+
+
+def with_rate_by_hum(finding: FamilyFinding, frequency_hz: float) -> FamilyFinding:
+    """The finding of a hum, with what its frequency says of the sampling rate where no mains have it."""
+    off = frequency_hz / (60.0 if frequency_hz > _BETWEEN_MAINS_HZ else 50.0) - 1.0
+    if abs(off) <= _MAINS_SHARE:
+        return finding
+    text = (
+        f"{finding.text}. Mains keep their frequency to {_MAINS_SHARE:.1%}: the sampling rate may be "
+        f"{off:+.1%} off the true one, and all times, periods and speeds with it. r is not"
+    )
+    return replace(finding, text=text)
 
 
 def scale(family: str, factor: float) -> FamilyFinding:
@@ -182,6 +198,17 @@ def alpha_of_survey(share: float, shift: float, *, notable: bool) -> FamilyFindi
         "inside them, a survey of another wall"
     )
     return FamilyFinding("survey", (), "alpha", shift, "1", "none", severity, text)
+
+
+def p_of_survey(share: float, p_rad_s: float, survey_rad_s: float, *, notable: bool) -> FamilyFinding:
+    """The wall rocks faster or slower than the survey's block; a warning where it is `notable`."""
+    severity: Literal["info", "warning"] = "warning" if notable else "info"
+    text = (
+        f"the wall rocks with p = {p_rad_s:.3f} rad/s, {share:+.1%} off the survey's {survey_rad_s:.3f}: "
+        f"its size, mass or inertia is another one, or the sampling rate is {share:+.1%} off the true one, "
+        "and all times, periods and speeds with it. r is not"
+    )
+    return FamilyFinding("survey", (), "p", share, "1", "none", severity, text)
 
 
 def r_by_side(r_right: float, r_left: float) -> FamilyFinding:

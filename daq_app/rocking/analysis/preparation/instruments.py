@@ -142,6 +142,7 @@ def _without_hum(
             largest = float(np.abs(hum.amplitude[rows]).max())
             channels = tuple(ids[k] for k in rows)
             findings.append(words.hum(name, channels, largest, unit, hum.frequency_hz, notable=notable))
+    findings[:1] = [words.with_rate_by_hum(finding, hum.frequency_hz) for finding in findings[:1]]
     return without_hum(record, ids, hum), findings
 
 
