@@ -14,7 +14,7 @@ from daq_app.rocking import TestRecord
 from studies.restitution.laboratory import LaboratoryTest
 
 Floats = NDArray[np.float64]
-FaultKind = Literal["none", "slow", "late", "hum", "gain", "reversed", "unit", "drift"]
+FaultKind = Literal["none", "slow", "late", "hum", "gain", "reversed", "unit", "drift", "sticks", "jumps"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +44,34 @@ class Fault:
         if self.kind == "slow":
             keep = float(np.exp(-1.0 / rate_hz / self.size))
             return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, axis=1))
+        if self.kind in ("sticks", "jumps"):
+            follow = _sticking if self.kind == "sticks" else _jumping
+            return np.array([follow(row, self.size) for row in values])
         if self.kind == "late":
             by = round(self.size * rate_hz)
             return np.concatenate([np.repeat(values[:, :1], by, axis=1), values[:, :-by]], axis=1)
         added = {"hum": self.size * np.sin(2.0 * np.pi * 50.02 * time), "drift": self.size * time}
         factor = {"gain": 1.0 + self.size, "reversed": -1.0, "unit": self.size}
         return np.asarray(values * factor.get(self.kind, 1.0) + added.get(self.kind, 0.0))
+
+
+def _sticking(values: Floats, play: float) -> Floats:
+    """Values (n,) of an instrument that is dragged along: by half of `play` behind, each way."""
+    shown, followed = float(values[0]), []
+    for value in values.tolist():
+        shown = min(max(shown, value - play / 2.0), value + play / 2.0)
+        followed.append(shown)
+    return np.array(followed)
+
+
+def _jumping(values: Floats, pull: float) -> Floats:
+    """Values (n,) of an instrument that stays where it is until it is off by `pull`, and jumps there."""
+    shown, followed = float(values[0]), []
+    for value in values.tolist():
+        if abs(value - shown) > pull:
+            shown = value
+        followed.append(shown)
+    return np.array(followed)
 
 
 FAULTS = (
@@ -71,6 +93,7 @@ FAULTS = (
     *(Fault("wire", "drift", size, single=2) for size in (0.3e-3, 1e-3)),
     *(Fault("wire", "drift", size) for size in (0.1e-3, 0.3e-3)),
     Fault("lvdt", "drift", 0.3e-3),
+    *(Fault("wire", kind, size, single=4) for kind in ("sticks", "jumps") for size in (1e-3, 2e-3)),
     Fault("wire", "slow", 0.02, single=2),
     Fault("wire", "late", 0.02, single=2),
 )

@@ -10,6 +10,7 @@ Kind = Literal[
     "slow", "late", "gain", "zero", "hum", "reversed", "unit", "drift", "motion",
     "speed", "side", "loss", "pause", "hop", "duration", "scatter", "release",
     "misfit", "pivot", "bending", "alpha", "p",
+    "hysteresis",
 ]  # fmt: skip
 Treatment = Literal["none", "left out", "put in step", "put right", "removed"]
 

@@ -64,24 +64,37 @@ class SingleWires:
         return gain_sigma_of_mean(self.gain - self.gain.mean(), weights, self.gain.size - 1.0)
 
 
-def compare_wires(own_rad: Floats, rate_hz: float, y_over_lever: Floats) -> SingleWires | None:
-    """Each wire's own rotation (wires, n) against the median of all, less what of a twist is out of step.
+@dataclass(frozen=True, slots=True)
+class WireMeans:
+    """Each wire's own rotation as means of 5 ms."""
 
-    `y_over_lever` (wires,) is how much of a twist each wire shows. None for less than half a second.
+    means_rad: Floats
+    """(wires, n), where all are finite."""
+    step_s: float
+
+    @classmethod
+    def of(cls, own_rad: Floats, rate_hz: float) -> WireMeans | None:
+        """From each wire's rotation (wires, n); None for two wires, or less than half a second."""
+        size = max(1, round(_MEAN_S * rate_hz))
+        groups = own_rad.shape[1] // size
+        if groups < _FEWEST or own_rad.shape[0] < 3:
+            return None
+        means = own_rad[:, : groups * size].reshape(own_rad.shape[0], groups, size).mean(axis=2)
+        means = means[:, np.isfinite(means).all(axis=0)]
+        return None if means.shape[1] < _FEWEST else cls(means, size / rate_hz)
+
+
+def compare_wires(wires: WireMeans, y_over_lever: Floats) -> SingleWires:
+    """Each wire's own rotation against the median of all, less what of a twist is out of step.
+
+    `y_over_lever` (wires,) is how much of a twist each wire shows.
     """
-    size = max(1, round(_MEAN_S * rate_hz))
-    groups = own_rad.shape[1] // size
-    if groups < _FEWEST or own_rad.shape[0] < 3:
-        return None
-    means = own_rad[:, : groups * size].reshape(own_rad.shape[0], groups, size).mean(axis=2)
-    means = means[:, np.isfinite(means).all(axis=0)]
-    if means.shape[1] < _FEWEST:
-        return None
+    means = wires.means_rad
     middle = np.median(means, axis=0)
     apart = means - middle
     twisted = y_over_lever - y_over_lever.mean()
     time = np.linspace(-0.5, 0.5, middle.size)
-    speed = np.gradient(middle, size / rate_hz)
+    speed = np.gradient(middle, wires.step_s)
     table = np.column_stack([middle, speed, time, np.ones(middle.size)])
     if float(twisted @ twisted) > 1e-6:
         # Only what of the twist is not in step with the rotation: the rest may be a gain.

@@ -90,6 +90,16 @@ def single_wire(name: str, kind: str, wires: SingleWires, place: int) -> FamilyF
     )  # fmt: skip
 
 
+def sticks(name: str, width_m: float) -> FamilyFinding:
+    """A wire that lags behind the others by a length, whatever the speed; it is left out of the rotation."""
+    text = (
+        f"wire {name} sticks: where the others show the same rotation, it differs by {width_m * 1e3:.2f} mm "
+        "between the way out and the way back; it is left out of the rotation. Usual causes: a drum or "
+        "pulley that jams, a wire that rubs, play in its end"
+    )
+    return FamilyFinding("wires", (name,), "hysteresis", width_m, "m", "left out", "warning", text)
+
+
 def slow(family: str, time_constant_s: float, *, left_out: bool) -> FamilyFinding:
     done = (
         "r is taken from the other family"
@@ -205,8 +215,8 @@ def p_of_survey(share: float, p_rad_s: float, survey_rad_s: float, *, notable: b
     severity: Literal["info", "warning"] = "warning" if notable else "info"
     text = (
         f"the wall rocks with p = {p_rad_s:.3f} rad/s, {share:+.1%} off the survey's {survey_rad_s:.3f}: "
-        f"its size, mass or inertia is another one, or the sampling rate is {share:+.1%} off the true one, "
-        "and all times, periods and speeds with it. r is not"
+        "its size, inertia or pivots are others, or the sampling rate is "
+        f"{share:+.1%} off the true one, and all times, periods and speeds with it. r is not"
     )
     return FamilyFinding("survey", (), "p", share, "1", "none", severity, text)
 

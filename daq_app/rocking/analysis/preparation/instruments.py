@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.rocking.analysis.preparation.gains import FamilyGains, gains_of
+from daq_app.rocking.analysis.preparation.odd_wire import compared_wires, odd_wire
 from daq_app.rocking.analysis.preparation.signals import (
     Lead,
     Signals,
@@ -30,7 +31,6 @@ from daq_app.rocking.families.noise import slow_noise
 from daq_app.rocking.families.response import DRIFT_RAD, LATE_S, SLOW_S, Response, compare
 from daq_app.rocking.families.scales import wrong_scales
 from daq_app.rocking.families.shocks import LATE_SHOCKS_S, ShockTiming, shock_timing
-from daq_app.rocking.families.single_wires import SingleWires, compare_wires
 from daq_app.rocking.families.treated import Corrections, held_in_memory, without_hum
 from daq_app.rocking.geometry.joint import BaseJoint
 from daq_app.rocking.geometry.kinematics import RotationGeometry
@@ -205,16 +205,15 @@ def _in_step(
     """Single wires and the timing of families; read again where something had to be put right."""
     read = _zeroed_at_rest if from_rest else _as_recorded
     lead: Lead = "wires"
-    wires = _single_wires(signals, times)
+    wires = compared_wires(signals, _motion(signals, times))
     changed = Corrections()
-    if wires is not None and (outlier := wires.outlier()) is not None:
-        place, kind = outlier
-        name = signals.geometry.wires.ids[place]
-        findings.append(words.single_wire(name, kind, wires, place))
-        changed = replace(changed, left_out=frozenset({name}))
+    bending = _bending(signals, times, None)
+    odd = odd_wire(signals, _motion(signals, times), wires, bends=bending is not None)
+    if odd is not None:
+        findings.append(odd)
+        changed = replace(changed, left_out=frozenset(odd.channels))
     response = _follow(signals, times)
     shocks = _shocks(record, signals, times)
-    bending = _bending(signals, times, None)
     if bending is not None:
         # Delays and first orders are no answer to what the wall does between the two families.
         lead = "lvdts" if _lvdts_cover(signals, times) else "wires"
@@ -236,7 +235,7 @@ def _in_step(
         again, times_again = read(corrected, lead, ask_tiltmeters=bending is None)
         if times_again.impacts_s:
             record, signals, times = corrected, again, times_again
-            wires = _single_wires(signals, times)
+            wires = compared_wires(signals, _motion(signals, times))
             response = _follow(signals, times)
             shocks = _shocks(record, signals, times)
         else:
@@ -264,14 +263,6 @@ def _motion(signals: Signals, times: TestTimes) -> slice:
     last = times.impacts_s[min(len(times.impacts_s), _COMPARED_IMPACTS) - 1]
     start, stop = np.searchsorted(signals.time_s, [times.release_s - 0.3, last + 0.2])
     return slice(int(start), int(stop))
-
-
-def _single_wires(signals: Signals, times: TestTimes) -> SingleWires | None:
-    if len(signals.excluded_share) > 1:
-        return None  # they are named already, and the median of the rest is no judge
-    wires = signals.geometry.wires
-    of_each_wire = wires.rotation_of_each(signals.wires_m[:, _motion(signals, times)])
-    return compare_wires(of_each_wire, signals.record.rate_hz, wires.position_m[:, 1] / wires.lever_m)
 
 
 def _follow(signals: Signals, times: TestTimes) -> Response | None:
