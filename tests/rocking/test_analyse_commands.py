@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -51,6 +52,12 @@ def rig_text(configs):
 def run(made, rig_text, tmp_path_factory):
     test = made(phi=0.35, r=0.895, side=-1, seed=8, full=True)
     return write_run(tmp_path_factory.mktemp("runs"), test, rig_text)
+
+
+def test_no_number_is_parted_from_its_error_in_a_pipe_and_no_error_is_zero(run):
+    result = call("analyse", run, "--bias-runs", 0)
+    assert result.exit_code == 0, result.output
+    assert not [line for line in result.output.splitlines() if re.search(r"[±…]\s*│|± 0\.0+│", line)]
 
 
 def test_analyse_prints_the_table_of_results(run):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -17,6 +17,9 @@ from daq_app.runfile.folder import require_replaceable
 
 if TYPE_CHECKING:
     from daq_app.rocking import AnalysisOptions, TestAnalysis
+
+_WIDTH: Final = 160
+"""Characters of a line in a file or pipe, which has no width: no number is parted from its error."""
 
 
 def register(app: typer.Typer) -> None:
@@ -108,7 +111,7 @@ def _show(analysis: TestAnalysis, *, as_json: bool) -> None:
         return
     console = Console()
     if not console.is_terminal:
-        console = Console(width=130)  # a file or pipe has no width of its own
+        console = Console(width=_WIDTH)
     for part in analysis_tables(analysis):
         console.print(part)
 

@@ -79,8 +79,7 @@ def _families_table(analysis: TestAnalysis) -> Table:
 
 
 def _value(value: float, sigma: float, digits: int, scale: float = 1.0) -> str:
-    error = f" ± {sigma * scale:.{digits}f}" if math.isfinite(sigma) else ""
-    return _number(value, digits, scale) + error
+    return f"{_number(value, digits, scale)} {plus_minus(sigma * scale, digits)}".rstrip()
 
 
 def _headline(analysis: TestAnalysis) -> str:
@@ -102,7 +101,7 @@ def _number(value: float, digits: int, scale: float = 1.0) -> str:
 def _pm(value: ValueWithSigma | None, digits: int, scale: float) -> str:
     if value is None or not math.isfinite(value.value):
         return "–"
-    return f"{value.value * scale:.{digits}f} ± {value.sigma * scale:.{digits}f}"
+    return _value(value.value, value.sigma, digits, scale)
 
 
 def _table(title: str, *columns: str) -> Table:
@@ -116,6 +115,7 @@ def _table(title: str, *columns: str) -> Table:
 def _theta0_table(analysis: TestAnalysis) -> Table:
     table = _table("Release rotation θ0", "from", "mrad", "θ0/α")
     for name, value in analysis.theta0_by_family.items():
+        name = "LVDTs" if name == "lvdts" else name
         table.add_row(name, _pm(value, 3, 1e3), _pm(value, 5, 1.0 / analysis.theory.alpha_rad))
     return table
 
