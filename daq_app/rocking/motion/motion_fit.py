@@ -222,7 +222,8 @@ def _least(
     """The fit of the first `span` impacts; `thorough`: where it leaves too much, in other ways as well.
 
     A search that used up its evaluations on its way along a valley, where the level and the deviations from
-    it change against each other, goes on from the level that suits them.
+    it change against each other, begins again within a trust region, which comes to its end in some ten
+    evaluations where Levenberg's steps creep, or goes on from the level that suits them.
     """
     search = partial(
         least_squares, problem.residual, jac=problem.jacobian, args=(span, stop_s), x_scale="jac", max_nfev=60
@@ -231,9 +232,9 @@ def _least(
     if best.status == 0 and problem.spread is not None:
         levelled = problem.levelled(best.x)
         kept = np.concatenate((levelled[:FIXED], np.clip(levelled[FIXED:], -1.0, 1.0)))
-        for other in (kept, levelled):
+        for other, method in ((start, "trf"), (kept, "lm"), (levelled, "lm")):
             if best.status == 0:
-                best = min(best, search(other, method="lm"), key=lambda found: float(found.cost))
+                best = min(best, search(other, method=method), key=lambda found: float(found.cost))
     if not thorough:
         return best
     settled = np.concatenate((best.x[:FIXED], np.clip(best.x[FIXED:], -1.0, 1.0)))
