@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import rich.console
 import typer
 from rich.segment import Segment
 
 from daq_app.config.shown_text import has_picture, visible
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, ProgressColumn
 
 _STRING: Final = re.compile(r'"(?:[^"\\]|\\.)*"')
 
@@ -30,6 +33,14 @@ class Console(rich.console.Console):
         """As Rich does; colours and cursor are added to the text only afterwards."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else Segment(visible(segment.text), segment.style)
+
+
+def progress_on_stderr(*columns: ProgressColumn | str) -> Progress:
+    """A bar that goes away again, so that standard output is clean; none in a file or pipe."""
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
 
 
 def echo(text: object) -> None:

@@ -77,9 +77,11 @@ def test_export_writes_what_was_asked(app: typer.Typer, folder: Path) -> None:
     options = ["--format", "npz", "--raw", "--from", "0.1", "--to", "0.2", "--out", str(folder)]
     done = cli.invoke(app, ["export", run, *options])
     assert done.exit_code == 0, done.output
+    assert done.stderr == "", "a bar is for a terminal"
     with np.load(folder / "FR1-L1-1.npz") as content:
         assert content["data"].shape == (1, 10)
-    assert cli.invoke(app, ["export", run, *options]).exit_code == 2
+    again = cli.invoke(app, ["export", run, *options])
+    assert again.exit_code == 2 and "--overwrite" in again.stderr
     assert cli.invoke(app, ["export", run, *options, "--overwrite"]).exit_code == 0
     assert cli.invoke(app, ["export", run, "--format", "xls"]).exit_code == 2
     new = folder / "exported" / "today"

@@ -7,10 +7,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
 from daq_app.campaign.plan import Campaign, load_campaign
-from daq_app.cli.terminal import Console
+from daq_app.cli.terminal import progress_on_stderr
 from daq_app.config.shipped import here_or_shipped
 
 DEFAULT_PLAN: Final = Path("configs/campaigns/costa.toml")
@@ -26,7 +26,7 @@ def progress_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
         TextColumn("{task.description}", markup=False),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with progress_on_stderr(*columns) as bar:
         task = bar.add_task("", total=None)
 
         def advance(done: int, total: int, name: str) -> None:

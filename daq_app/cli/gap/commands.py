@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, TextColumn
 from rich.table import Table
 
 from daq_app.cli.errors import (
@@ -23,7 +23,7 @@ from daq_app.cli.errors import (
 )
 from daq_app.cli.gap.many import campaigns
 from daq_app.cli.help_page import command_group
-from daq_app.cli.terminal import Console, echo, echo_json
+from daq_app.cli.terminal import Console, echo, echo_json, progress_on_stderr
 from daq_app.config import load_rig
 from daq_app.runfile.durable import write_whole
 from daq_app.runfile.folder import require_replaceable
@@ -163,7 +163,7 @@ def _options(asked: _Asked) -> Iterator[Options]:
         BarColumn(),
         TextColumn("{task.completed}/{task.total}"),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    with progress_on_stderr(*columns) as progress:
         bar = progress.add_task("reading features", total=1)
 
         def show(done: int, total: int, text: str) -> None:

@@ -8,13 +8,12 @@ from typing import Annotated, Any
 
 import typer
 from rich.markup import escape
-from rich.progress import Progress
 from rich.table import Table
 from rich.text import Text
 
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported, say_other_name
 from daq_app.cli.runs.output_place import file_or_folder
-from daq_app.cli.terminal import Console, echo, echo_json
+from daq_app.cli.terminal import Console, echo, echo_json, progress_on_stderr
 from daq_app.runfile import (
     DerivedData,
     JournalContents,
@@ -215,7 +214,7 @@ def export_command(
     with (
         reported(),
         file_or_folder(out) as place,
-        Progress(console=Console(stderr=True), transient=True) as progress,
+        progress_on_stderr() as progress,
     ):
         task = progress.add_task(escape(f"{run.name} → {format_}"), total=1.0)
         path = export_run(

@@ -16,6 +16,12 @@ from daq_app.rocking.record import TestRecord
 
 _THETA0_DISAGREEMENT = 0.005
 _REST_TOLERANCE_RAD = 3e-4
+_SEEN_ROTATION_RAD = 5e-3
+"""Range of the LVDTs' rotation that tells the lever of a wire to a few percent."""
+_FOLLOWED_SHARE = 0.02
+"""Share of its variance that a wire may leave about a straight line in the LVDTs' rotation."""
+_LEVER_TOLERANCE = 0.1
+"""Difference of a wire's lever from that of its place that is told: three times what it is left out for."""
 _SLIDING_TOLERANCE_M = 5e-4
 
 
@@ -62,6 +68,7 @@ def _sensors(record: TestRecord, signals: Signals) -> list[QualityNote]:
         notes.append(
             _warn(f"wire {name} disagreed with the others and was left out for {share:.1%} of the record")
         )
+    notes += _places_of_wires(signals)
     bad = 1.0 - float(np.isfinite(signals.rotation_rad).mean())
     if bad > 0:
         notes.append(_warn(f"{bad:.2%} of the record has no rotation (gaps); half-cycles there are left out"))
@@ -85,6 +92,39 @@ def _sensors(record: TestRecord, signals: Signals) -> list[QualityNote]:
         if joint.clipped:
             notes.append(_info(f"LVDTs that reached the end of their range: {', '.join(joint.clipped)}"))
     return notes
+
+
+def _places_of_wires(signals: Signals) -> list[QualityNote]:
+    """Wires that follow the LVDTs' rotation by another lever than their place in the rig file gives.
+
+    One wire may have any fault: only where several disagree, the rig is likely that of another set-up.
+    """
+    joint = signals.joint
+    if joint is None or len(signals.excluded_share) < 2:
+        return []
+    known = np.isfinite(joint.rotation_rad) & np.isfinite(signals.wires_m).all(axis=0)
+    rotation, shown = joint.rotation_rad[known], signals.wires_m[:, known]
+    if np.count_nonzero(known) < 2 or float(np.ptp(rotation)) < _SEEN_ROTATION_RAD:
+        return []
+    apart = rotation - rotation.mean()
+    levers = shown @ apart / float(apart @ apart)
+    left = shown - shown.mean(axis=1, keepdims=True) - levers[:, None] * apart
+    if np.any(left.var(axis=1) > _FOLLOWED_SHARE * shown.var(axis=1)):
+        return []
+    wires = signals.geometry.wires
+    told = [
+        f"{name} {lever:.2f} m (rig file {expected:.2f} m)"
+        for name, lever, expected in zip(wires.ids, levers, wires.lever_m, strict=True)
+        if abs(lever / expected - 1.0) > _LEVER_TOLERANCE
+    ]
+    if len(told) < 2:
+        return []
+    return [
+        _warn(
+            "wires follow the LVDTs' rotation as if they were at other heights than in the rig file: "
+            f"{', '.join(told)}. Give the rig file of this set-up"
+        )
+    ]
 
 
 def _zero(record: TestRecord, signals: Signals) -> list[QualityNote]:

@@ -63,7 +63,7 @@ def export_run(
             f"{final} is a recording, which an export never replaces", advice="Choose another name."
         )
     if final.exists() and not overwrite:
-        raise RunFileError(f"{final} exists already", advice="Choose another name, or overwrite it.")
+        raise RunFileError(f"{final} exists already", advice="Choose another name, or overwrite it: --overwrite.")
     if not final.parent.is_dir():
         raise RunFileError(f"the folder {final.parent} does not exist", advice="Make it first.")
     temporary = name_beside(final)
@@ -79,7 +79,7 @@ def export_run(
             if selection.results and not overwrite and beside.exists() and beside.read_bytes() != table:
                 raise RunFileError(
                     f"{beside} exists already and says something else",
-                    advice="Choose another name, or overwrite it.",
+                    advice="Choose another name, or overwrite it: --overwrite.",
                 )
             temporary.unlink(missing_ok=True)  # it may be a link to another file
             write(temporary, selection)
