@@ -63,7 +63,9 @@ def export_run(
             f"{final} is a recording, which an export never replaces", advice="Choose another name."
         )
     if final.exists() and not overwrite:
-        raise RunFileError(f"{final} exists already", advice="Choose another name, or overwrite it: --overwrite.")
+        raise RunFileError(
+            f"{final} exists already", advice="Choose another name, or overwrite it: --overwrite."
+        )
     if not final.parent.is_dir():
         raise RunFileError(f"the folder {final.parent} does not exist", advice="Make it first.")
     temporary = name_beside(final)
