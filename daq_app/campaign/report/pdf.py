@@ -32,6 +32,8 @@ _LINE: Final = 0.26
 """Height of a line of a table, inches."""
 _GAP: Final = 0.35
 _MARGIN: Final = 0.4
+_PAGE: Final = 11.0
+"""Width of a page of a table, inches; wider only where its columns are."""
 _FONT: Final = FontProperties(size=9)
 _HEADER_FONT: Final = FontProperties(size=9, weight="bold")
 
@@ -55,9 +57,11 @@ def report_pdf(
         for picture in campaign_figures(tests):
             figure = picture.figure
             width, height = figure.get_size_inches()
-            figure.text(0.02, -0.02, picture.caption, fontsize=9, va="top")
+            caption = in_lines(picture.caption, 0.98 * width)
+            figure.text(0.02, -0.02, "\n".join(caption), fontsize=9, va="top")
             # Room for the caption below: a tight box would lay out and draw everything once more to find it.
-            pages.savefig(figure, bbox_inches=Bbox([[-_MARGIN, -0.8], [width + _MARGIN, height + _MARGIN]]))
+            low = -0.6 - 0.2 * len(caption)
+            pages.savefig(figure, bbox_inches=Bbox([[-_MARGIN, low], [width + _MARGIN, height + _MARGIN]]))
         for page in _tables(title, "Table 3.2: sequence and status", *_place_rows(places)):
             pages.savefig(page)
         for page in _tables(title, "All tests", *_test_rows(tests)):
@@ -150,11 +154,11 @@ def _lines(row: list[str]) -> int:
 
 def _page(title: str, heading: str, header: list[str], rows: list[list[str]], lines: int) -> Figure:
     """Cells as plain texts on measured columns: a table of matplotlib costs five times as much to draw."""
-    width, height = 11.0, max(4.0, 1.2 + _LINE * (lines + 2))
+    columns = _columns(header, rows, 0.9 * _PAGE)
+    width, height = max(_PAGE, columns[-1] / 0.9), max(4.0, 1.2 + _LINE * (lines + 2))
     figure = Figure(figsize=(width, height))
     figure.text(0.05, 1.0 - 0.35 / height, title, fontsize=14, fontweight="bold", va="center")
     figure.text(0.05, 1.0 - 0.70 / height, heading, fontsize=11, va="center")
-    columns = _columns(header, rows, 0.9 * width)
     top, rules = 1.2, []
     for place, row in enumerate([header, *rows]):
         deep = _LINE * _lines(row)
@@ -178,6 +182,18 @@ def _columns(header: list[str], rows: list[list[str]], room: float) -> list[floa
     widths = [max(map(_width, cells)) for cells in zip(header, *rows, strict=True)]
     gap = min(_GAP, max(0.08, (room - sum(widths)) / len(widths)))
     return [0.0, *accumulate(width + gap for width in widths)]
+
+
+def in_lines(text: str, room: float) -> list[str]:
+    """The text in lines of at most `room` inches, a longer word in a line of its own."""
+    lines = [""]
+    for word in text.split():
+        longer = f"{lines[-1]} {word}".strip()
+        if lines[-1] and _width(longer) > room:
+            lines.append(word)
+        else:
+            lines[-1] = longer
+    return lines
 
 
 @lru_cache(maxsize=4096)
