@@ -156,6 +156,16 @@ def test_bad_options_are_told(run, extra, words):
     assert result.exit_code == 2 and words in result.output
 
 
+def test_another_rig_than_the_runs_is_told(run, configs):
+    quick = ("--bias-runs", 0, "--json")
+    other, same = (
+        json.loads(call("analyse", run, "--rig", configs / name, *quick).stdout)["notes"]
+        for name in ("fr2.toml", "fr1.toml")
+    )
+    assert any("with the rig fr2 of --rig, which differs from fr1" in note["text"] for note in other)
+    assert not any("--rig" in note["text"] for note in same)
+
+
 def test_an_unwritable_folder_is_told(run, tmp_path):
     (tmp_path / "file").write_text("in the way")
     result = call("analyse", run, "--out", tmp_path / "file", "--bias-runs", 0)

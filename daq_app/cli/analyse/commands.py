@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -99,10 +100,21 @@ def _analysis(run: Path, replacement: Rig | None, options: AnalysisOptions) -> t
             )
             raise typer.Exit(EXIT_BAD_INPUT)
         try:
-            return analyse_record(TestRecord.from_run(opened, used), options), used
+            analysis = analyse_record(TestRecord.from_run(opened, used), options)
         except (ValueError, KeyError) as error:
             print_paragraph("Error", f"{run}: {error}")
             raise typer.Exit(EXIT_BAD_INPUT) from None
+        if replacement is not None and opened.rig not in (None, replacement):
+            analysis = _with_rig_told(analysis, replacement, opened.header.rig_name)
+        return analysis, used
+
+
+def _with_rig_told(analysis: TestAnalysis, used: Rig, kept: str) -> TestAnalysis:
+    """The analysis with a note that its rig is another one than the run was recorded with."""
+    from daq_app.rocking.analysis.results import QualityNote
+
+    text = f"analysed with the rig {used.name} of --rig, which differs from {kept}, the one kept in the run"
+    return replace(analysis, notes=(QualityNote("info", text), *analysis.notes))
 
 
 def _show(analysis: TestAnalysis, *, as_json: bool) -> None:
