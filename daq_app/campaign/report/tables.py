@@ -10,9 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import scipy  # its `special` is loaded with the first use: what draws needs none of it
-
-from daq_app.campaign.report.statistics import GroupMean, random_effects_mean, shared_scatter
+from daq_app.campaign.report.statistics import GroupMean, random_effects_mean, shared_scatter, student_reach
 from daq_app.campaign.status import CampaignStatus
 from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.config.shown_text import csv_cell
@@ -73,8 +71,7 @@ class RepetitionRow:
     @property
     def change_interval95(self) -> tuple[float, float]:
         """Student's t with as many degrees of freedom as the scatter is known with."""
-        freedom = self.degrees_of_freedom
-        reach = float(scipy.special.stdtrit(freedom, 0.975)) * self.change_standard_error
+        reach = student_reach(self.degrees_of_freedom) * self.change_standard_error
         return self.change - reach, self.change + reach
 
 
