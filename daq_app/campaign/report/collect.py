@@ -47,6 +47,8 @@ class Collected:
     """Tests whose analysis was taken as it is kept beside the run."""
     anew: Mapping[str, tuple[str, ...]]
     """The other ones that were analysed, by the reason."""
+    nameless: tuple[Path, ...] = ()
+    """Files that hold no release of a named test, or cannot be read and have no test's name."""
 
     @property
     def origin(self) -> str:
@@ -101,6 +103,7 @@ def collect(
             reason: tuple(one.made.test for one in answers if one.anew == reason and one.made is not None)
             for reason in reasons
         },
+        nameless=tuple(path for path in runs if found[path].test is None),
     )
 
 

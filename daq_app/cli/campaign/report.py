@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from daq_app.campaign.status import TestVerdict
 from daq_app.cli.campaign.progress import DEFAULT_PLAN, open_plan, progress_bar
 from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported, say_other_name
 from daq_app.cli.scheduler_option import SchedulerOption
 from daq_app.cli.terminal import Console, echo_json
 from daq_app.runfile import RunFileError
 from daq_app.workers import warm_up
+
+_NAMED: Final = 6
+"""Files that are named; more of them are counted."""
 
 if TYPE_CHECKING:
     from daq_app.campaign.report.collect import Collected
@@ -67,6 +71,7 @@ def report(
                 anew=anew,
             )
         tests, failures = found.tests, found.failures
+        _tell_what_is_not_in_it(found, folder)
         for failure in failures:
             print_paragraph("Not analysed", f"{failure.test} ({failure.path}): {failure.reason}")
         if not tests:
@@ -81,6 +86,28 @@ def report(
         _print(rows + mean_of_specimens(rows), found, page, as_json)
     if any(not failure.flagged_bad for failure in failures):
         raise typer.Exit(EXIT_FAILED)
+
+
+def _tell_what_is_not_in_it(found: Collected, folder: Path) -> None:
+    """Lost tests, and files of the folder that are no tests, on stderr: nobody should miss them unawares."""
+    for test in found.recorded:
+        if test.verdict is TestVerdict.LOST:
+            print_paragraph("Lost", f"{test.name}: {test.reason}")
+    if found.nameless:
+        # Machines of a scheduler are given whole paths.
+        below = [folder, folder.resolve()]
+        names = [
+            next((str(path.relative_to(top)) for top in below if path.is_relative_to(top)), str(path))
+            for path in found.nameless[:_NAMED]
+        ]
+        more = len(found.nameless) - len(names)
+        told = ", ".join(names) + (f" and {more} more" if more else "")
+        print_paragraph(
+            "Not in it",
+            f"{told}: no release of a named test, or not readable (`daq-app verify`). `daq-app campaign "
+            "assign` gives a run its place",
+            style="bold yellow",
+        )
 
 
 def _warm_up(folder: Path, *, anew: bool) -> None:
