@@ -8,11 +8,13 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from benchmarks.support.byte_code import surroundings
 from benchmarks.support.effort import Effort
 from benchmarks.support.figure import Figure
+from daq_app.runfile.digest import file_sha256
 
 _ROOT = Path(__file__).parents[1]
 _REPORTS = 3
@@ -44,6 +46,7 @@ def figures(effort: Effort) -> list[Figure]:
         report = ("report", runs, code, "--plan", str(plan))
         reported = statistics.median(_seconds(*report) for _ in range(reports))
         anew = statistics.median(_seconds(*report, "--anew") for _ in range(reports))
+        read = statistics.median(_read(runs) for _ in range(reports))
         count = len(list(runs.glob("*.h5")))
         assert (runs / "report" / "report.pdf").exists()
     cores = f"{os.cpu_count()} cores"
@@ -62,6 +65,13 @@ def figures(effort: Effort) -> list[Figure]:
             reports,
             aim=4,
             note=f"analyses kept beside the runs, HTML, PDF, CSV, {cores}, byte code there",
+        ),
+        Figure(
+            f"reading {count} runs",
+            read,
+            "s",
+            reports,
+            note=f"SHA-256 of every byte, {cores}, files in memory: the floor of a report of kept analyses",
         ),
         Figure(
             f"campaign report of {count} runs, --anew",
@@ -96,6 +106,15 @@ def _all_cores_over_one(summands: int) -> float:
 
     count = os.cpu_count() or 1
     return count * slowest(1) / slowest(count)
+
+
+def _read(runs: Path) -> float:
+    """Every run's hash, on all cores as the report takes it."""
+    started = time.perf_counter()
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for _ in pool.map(file_sha256, runs.glob("*.h5")):
+            pass
+    return time.perf_counter() - started
 
 
 def _seconds(command: str, runs: Path, code: Path, *options: str) -> float:
