@@ -187,7 +187,8 @@ class LiveAnalyser:
                 # In a gap no wire has a value: none disagrees with the others.
                 excluded |= (wires.excluded & ~wires.excluded.all(axis=0)).any(axis=1)
             self._log.append(wires.rotation_rad[None], piece[self._tilts])
-            self._families.append(self._first, wires.rotation_rad, piece[self._tilts.stop :])
+            of_wires, of_families = piece[: self._n_wires], piece[self._tilts.stop :]
+            self._families.append(self._first, wires.rotation_rad, of_wires, of_families)
             bridged = _bridge(wires.rotation_rad, self._last_rotation)
             self._last_rotation = float(bridged[-1])
             rotations.append(bridged)

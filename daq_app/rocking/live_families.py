@@ -18,11 +18,14 @@ from daq_app.rocking.estimators import RestitutionEstimate
 from daq_app.rocking.families import words
 from daq_app.rocking.families.block_checks import pattern_findings, survey_off
 from daq_app.rocking.families.body import body_of
+from daq_app.rocking.families.hysteresis import sticking_wire
 from daq_app.rocking.families.levels import level_outlier
 from daq_app.rocking.families.response import DRIFT_RAD, LATE_S, SLOW_S, Response, compare
 from daq_app.rocking.families.shocks import LATE_SHOCKS_S, shock_timing
+from daq_app.rocking.families.single_wires import WireMeans
 from daq_app.rocking.families.verdict import compare_series, families_apart, methods_apart
 from daq_app.rocking.geometry.joint import BaseJoint
+from daq_app.rocking.geometry.kinematics import RotationGeometry
 from daq_app.rocking.motion.bending import find_bending
 from daq_app.rocking.motion.impact_pattern import impact_pattern
 from daq_app.rocking.motion.rolling import RollingArray
@@ -58,9 +61,12 @@ class LiveFamilies:
         lvdts = () if self._joint is None else self._joint.ids
         self.ids = (*lvdts, *(channel.id for channel in rig.of_family("accelerometer")))
         """Channels that are looked at beside the wires and tiltmeters."""
-        self._lvdts = slice(1, 1 + len(lvdts))
-        self._shaken = slice(1 + len(lvdts), 1 + len(self.ids))
-        self._log = RollingArray(round(_MEMORY_S * rate_hz), 1 + len(self.ids))
+        self._geometry = RotationGeometry.from_rig(rig).wires
+        before = 1 + len(self._geometry.ids)
+        self._wires = slice(1, before)
+        self._lvdts = slice(before, before + len(lvdts))
+        self._shaken = slice(before + len(lvdts), before + len(self.ids))
+        self._log = RollingArray(round(_MEMORY_S * rate_hz), before + len(self.ids))
         self._first = 0
         self.forget()
 
@@ -71,14 +77,15 @@ class LiveFamilies:
         self._level: tuple[str, ...] = ()
         self._bends = self._base_follows_badly = False
         self._timing: tuple[str, ...] = ()
+        self._sticking: tuple[str, ...] = ()
         self._survey: tuple[str, ...] = ()
         self._values: tuple[str, ...] = ()
 
-    def append(self, first_sample: int, rotation_rad: Floats, values: Floats) -> None:
-        """Rotation (n,) of the wires and SI values (ids, n) from sample `first_sample` on."""
+    def append(self, first_sample: int, rotation_rad: Floats, wires_m: Floats, values: Floats) -> None:
+        """Rotation (n,) of the wires, what each shows (wires, n), SI values (ids, n) from a sample on."""
         if not self._log.end:
             self._first = first_sample
-        self._log.append(rotation_rad[None], values)
+        self._log.append(rotation_rad[None], wires_m, values)
 
     def look(
         self, wires: MotionTrack, tilt_rad: float, eav: RestitutionEstimate, crt: RestitutionEstimate
@@ -96,7 +103,7 @@ class LiveFamilies:
     @property
     def doubts(self) -> tuple[str, ...]:
         """What speaks against r, as far as was looked."""
-        said = (*self._release, *self._level, *self._timing, *self._survey, *self._values)
+        said = (*self._release, *self._level, *self._timing, *self._sticking, *self._survey, *self._values)
         return tuple(true_minus(sentence) for sentence in said)
 
     def _compare(
@@ -112,6 +119,7 @@ class LiveFamilies:
             self._timing = self._between_families(wires)
             if not self._bends:  # ringing moves the crossings of the wires: shocks then tell no delay
                 self._timing += self._lag_of_shocks(wires)
+            self._sticking = () if self._bends else self._stuck(wires)
         if impacts in _SURVEYED_AT:
             self._survey = self._alpha(self._wall(wires))
         if impacts in _COMPARED_AT:
@@ -188,6 +196,17 @@ class LiveFamilies:
             said.append(words.drift_while_live(found.drift_rad_s * found.span_s))
         return tuple(said)
 
+    def _stuck(self, wires: MotionTrack) -> tuple[str, ...]:
+        """One wire that lags behind the others by a length, whatever the speed."""
+        _, kept = self._between(wires.release.time_s - 0.3, wires.crossings_s[-1])
+        means = WireMeans.of(self._geometry.rotation_of_each(kept[self._wires]), self._rate)
+        if means is None:
+            return ()
+        found = sticking_wire(means.means_rad, self._geometry.lever_m, self._geometry.noise_m)
+        if found is None:
+            return ()
+        return (words.sticks_while_live(self._geometry.ids[found[0]], found[1].width_m),)
+
     def _lag_of_shocks(self, wires: MotionTrack) -> tuple[str, ...]:
         """Shocks that come elsewhere than the zero crossings of the wires."""
         start = self._log.start
@@ -206,7 +225,7 @@ class LiveFamilies:
         return (words.late_while_live(later, abs(found.lag_s), others),)
 
     def _between(self, start_s: float, stop_s: float) -> tuple[Floats, Floats]:
-        """Times (n,) and rows (1 + ids, n) from one time to another, cut to what is kept."""
+        """Times (n,) and rows (1 + wires + ids, n) from one time to another, cut to what is kept."""
         start = max(math.floor(start_s * self._rate) - self._first, self._log.start)
         stop = min(math.ceil(stop_s * self._rate) - self._first + 1, self._log.end)
         time = (self._first + np.arange(start, stop)) / self._rate

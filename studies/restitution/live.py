@@ -31,6 +31,7 @@ _TOLD: Final = {
     "are slow": "slow",
     "drift apart": "drift",
     "where a lean to": "side",
+    "sticks": "sticking wire",
 }
 """What a sentence is counted as, by words in it."""
 
@@ -60,12 +61,18 @@ def drifting_wires(rig: Rig, seed: int) -> LaboratoryTest:
     return Fault("wire", "drift", 1e-4).test(draw_test(rig, seed))
 
 
+def sticking_wire(rig: Rig, seed: int) -> LaboratoryTest:
+    """The laboratory of `seed` with a wire at the top that has 2 mm of play."""
+    return Fault("wire", "sticks", 2e-3, single=4).test(draw_test(rig, seed))
+
+
 WALLS: Final[dict[str, Callable[[Rig, int], LaboratoryTest]]] = {
     "sound": draw_test,
     "bends": ringing_test,
     "bends, LVDTs slow": behind_slow_lvdts,
     "bends, wires slow": behind_slow_wires,
     "wires drift": drifting_wires,
+    "one wire sticks": sticking_wire,
     "round edges": round_edges,
     "slow release": slowly_released,
 }

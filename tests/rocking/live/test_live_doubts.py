@@ -20,6 +20,7 @@ from studies.restitution.live import (
     live_estimates,
     round_edges,
     slowly_released,
+    sticking_wire,
 )
 from studies.restitution.walls import Wall, ringing_test
 
@@ -126,3 +127,11 @@ def test_the_last_half_cycles_which_slow_noise_hides_do_not_lead_the_live_r_astr
 
     assert len(errors) > 10
     assert max(errors) < 0.005
+
+
+def test_a_wire_that_sticks_is_told_while_the_wall_rocks():
+    """The live r, which is that of all wires, is off by it."""
+    test = sticking_wire(RIG, 91000)
+    later = [estimate for estimate in live_estimates(test) if len(estimate.impact_samples) >= 6]
+
+    assert all(any("wire WP-5 sticks" in doubt for doubt in estimate.doubts) for estimate in later)
