@@ -301,7 +301,7 @@ MOTION_EFFECTS: Final[tuple[EffectSpec, ...]] = (
         "slow_release",
         "release",
         "the holding force dies away slowly",
-        "θ̈ ∋ p² sin(α − θ₀) h(t), h = (1 − e x)^(1/e), x = t/(τ (1 + e)); exp(−t/τ) for e = 0",
+        "θ̈ ∋ p² sin(α − θ₀) h(t) until it turns; h = (1 − e x)^(1/e), x = t/(τ (1 + e)); exp(−t/τ) at e = 0",
         "imperfect release",
         (
             Parameter("tau", "s", 0.005, 0.1, "mean time of the force", index=par.SLOW_RELEASE, minimum=0.0),

@@ -185,7 +185,8 @@ def _swing(
     out[3], out[4] = t, q
     # p h = 0.22 meets a tolerance of 1e-11; the rest of the swing adapts
     h = min(_first_guess(q, v, c), 0.22 * _eighth_root(tolerance / 1e-11) / math.sqrt(c[terms.C_STIFF]))
-    friction = c[terms.C_COULOMB] != 0.0
+    # Friction changes its sign where the wall turns, and a rope that is paid out goes slack there.
+    turns = c[terms.C_COULOMB] != 0.0 or c[terms.C_HOLD] < 0.0
     kinked = c[terms.C_PLAIN] == 0.0
     while True:
         if n >= pieces.shape[0]:
@@ -204,7 +205,7 @@ def _swing(
         if x_turn > 0.0 and x_turn <= x_end:
             rising = False
             out[3], out[4] = t + h * x_turn, q_turn
-            if friction:
+            if turns:
                 x_end, on_kink = x_turn, -1.0
         if not rising and v1 > 0.0 and q1 > 0.0 and x_end == 1.0:
             rising = True
@@ -213,7 +214,7 @@ def _swing(
         if t + h * x_end >= t_end:
             x_end, ended, on_kink = (t_end - t) / h, _END, -1.0
         if x_end < 1.0 or ended >= 0:
-            q1, v1 = _cut_state(row, x_end, on_kink, friction and x_end == x_turn)
+            q1, v1 = _cut_state(row, x_end, on_kink, turns and x_end == x_turn)
         for k in range(pc.ROTATION, pc.N_COLUMNS):
             row[k] *= side
         t += h * x_end
@@ -301,6 +302,7 @@ def integrate(
         terms.setup(vector, 2.0 * i - 1.0, n_peaks, release_side, both[i])
         rest_energy[i] = terms.work_to(vector[par.REST_AMPLITUDE], both[i])
     terms.hold_back(vector, q, both[1 if side > 0.0 else 0])
+    held = both[1 if side > 0.0 else 0, terms.C_HOLD]
     changes = vector[par.CRUSH_ALPHA] != 0.0 or vector[par.SLOW_RELEASE] != 0.0
     limit = min(impacts.shape[0] - 2, peaks.shape[0] - 1)
     while True:
@@ -324,7 +326,10 @@ def integrate(
         q, v = 0.0, r * speed
         side = -side
         if changes:
-            terms.setup(vector, side, n_peaks, release_side, both[1 if side > 0.0 else 0])
+            c = both[1 if side > 0.0 else 0]
+            terms.setup(vector, side, n_peaks, release_side, c)
+            if n_peaks == 1:
+                terms.hold_on(vector, held, t, 0.0, -1.0, c)
         if vector[par.DWELL] > 0.0:
             n = _fill_flat(pieces, n, t, 0.0, 0.0, side)
             t += vector[par.DWELL]

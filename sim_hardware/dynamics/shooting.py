@@ -27,6 +27,8 @@ SPEED_IN: Final = 3  # |θ̇| after the impact that began it; 0 in row 0
 PEAK: Final = 4  # |θ| at the turning point; differs from the start only where row 0 has a velocity
 FIRST_CROSSING: Final = 5  # then F times of the fall and F of the rise, s from the peak
 _LIMIT_S: Final = 20.0
+_PASSES: Final = 8
+_SAME_S: Final = 1e-7
 
 
 @part
@@ -64,6 +66,40 @@ def _reverse(vector: NDArray[np.float64], time: float, out: NDArray[np.float64])
     out[par.AMBIENT_PHASE] = vector[par.AMBIENT_PHASE] + 4.0 * math.pi * vector[par.AMBIENT_HZ] * time
 
 
+@part
+def _fall(
+    vector: NDArray[np.float64],
+    start: tuple[float, float, float, float],
+    levels: NDArray[np.float64],
+    c: NDArray[np.float64],
+    pieces: NDArray[np.float64],
+    row: NDArray[np.float64],
+) -> None:
+    """The fall of one half-cycle from `start`, (s, |θ|, its rate, side)."""
+    t, q, v, side = start
+    end, count = np.zeros(5), levels.size
+    _, used = _swing(t, q, v, side, t + _LIMIT_S, vector[par.TOLERANCE], c, pieces, 0, end)
+    row[FALL_S], row[SPEED_OUT], row[PEAK] = end[0] - t, max(-end[2], 0.0), end[4]
+    _crossings(pieces, used, end[0], t, side, levels, row[FIRST_CROSSING : FIRST_CROSSING + count])
+
+
+@part
+def _rise(
+    vector: NDArray[np.float64],
+    start: tuple[float, float, float, float],
+    levels: NDArray[np.float64],
+    c: NDArray[np.float64],
+    pieces: NDArray[np.float64],
+    row: NDArray[np.float64],
+) -> None:
+    """The rise to the same peak, as a fall in which time runs backwards."""
+    t, q, v, side = start
+    end, count = np.zeros(5), levels.size
+    _, used = _swing(t, q, v, side, t + _LIMIT_S, vector[par.TOLERANCE], c, pieces, 0, end)
+    row[RISE_S], row[SPEED_IN] = end[0] - t, max(-end[2], 0.0)
+    _crossings(pieces, used, end[0], t, side, levels, row[FIRST_CROSSING + count :])
+
+
 @kernel
 def half_cycles(
     vector: NDArray[np.float64],
@@ -80,29 +116,32 @@ def half_cycles(
     impacts. With `first_is_release` row 0 starts as the vector says (initial velocity, slow release)
     and has no rise.
     """
-    c, end = np.zeros(terms.N_COEFFICIENTS), np.zeros(5)
+    c = np.zeros(terms.N_COEFFICIENTS)
     pieces = np.empty((400, pc.N_COLUMNS))
     back = vector.copy()
-    count = levels.shape[1]
+    held, later = 0.0, 0.0
     for k in range(times.size):
         side = -1.0 if rotations[k] < 0.0 else 1.0
         q, t = abs(rotations[k]), times[k]
-        released = first_is_release and k == 0
-        row = out[k]
         terms.setup(vector, side, k, release_side, c)
-        v = 0.0
-        if released:
+        if first_is_release and k == 0:
             terms.hold_back(vector, q, c)
-            v = vector[par.OMEGA0]
-        _, used = _swing(t, q, v, side, t + _LIMIT_S, vector[par.TOLERANCE], c, pieces, 0, end)
-        row[FALL_S], row[SPEED_OUT], row[PEAK] = end[0] - t, max(-end[2], 0.0), end[4]
-        _crossings(pieces, used, end[0], t, side, levels[k], row[FIRST_CROSSING : FIRST_CROSSING + count])
-        if released:
-            row[RISE_S], row[SPEED_IN] = 0.0, 0.0
-            row[FIRST_CROSSING + count :] = 0.0
+            held = c[terms.C_HOLD]
+            _fall(vector, (t, q, vector[par.OMEGA0], side), levels[k], c, pieces, out[k])
+            out[k, RISE_S], out[k, SPEED_IN] = 0.0, 0.0
+            out[k, FIRST_CROSSING + levels.shape[1] :] = 0.0
             continue
         _reverse(vector, t, back)
-        terms.setup(back, side, k, release_side, c)
-        _, used = _swing(t, q, 0.0, side, t + _LIMIT_S, vector[par.TOLERANCE], c, pieces, 0, end)
-        row[RISE_S], row[SPEED_IN] = end[0] - t, max(-end[2], 0.0)
-        _crossings(pieces, used, end[0], t, side, levels[k], row[FIRST_CROSSING + count :])
+        # Nobody sees when a slow release begins: the first half-cycle after it says how long before its time.
+        for _ in range(_PASSES if k == 1 and held > 0.0 else 1):
+            terms.setup(back, side, k, release_side, c)
+            if k == 1:
+                terms.hold_on(vector, held, 0.0, later, t, c)
+            _rise(back, (t, q, 0.0, side), levels[k], c, pieces, out[k])
+            before = later
+            if k == 1 and held > 0.0:
+                later = out[0, FALL_S] + out[k, RISE_S] - t
+            if abs(later - before) < _SAME_S:
+                break
+        terms.setup(vector, side, k, release_side, c)
+        _fall(vector, (t, q, 0.0, side), levels[k], c, pieces, out[k])

@@ -44,7 +44,9 @@ C_RISING: Final = 22  # sign of v, for Coulomb friction
 C_OPEN: Final = 23  # 1 beyond θc of the compliant joint
 C_TAUT: Final = 24  # 1 beyond θs of the residual cable
 C_HOLD_EVEN: Final = 25
-N_COEFFICIENTS: Final = 26
+C_HOLD_START: Final = 26  # time since the release, in units of 1/C_HOLD_RATE, at t = 0
+N_COEFFICIENTS: Final = 27
+_HOLDS: Final = 1e-6  # share of a holding force below which it is gone
 
 _GAUSS_X: Final = (0.0469100770306680, 0.2307653449471585, 0.5, 0.7692346550528415, 0.9530899229693320)
 _GAUSS_W: Final = (
@@ -85,6 +87,7 @@ def setup(
     c[C_HOLD] = 0.0
     c[C_HOLD_RATE] = 0.0
     c[C_HOLD_EVEN] = 0.0
+    c[C_HOLD_START] = 0.0
     c[C_AMBIENT] = -side * vector[par.AMBIENT] / g * c[C_STIFF]
     c[C_AMBIENT_W] = 2.0 * math.pi * vector[par.AMBIENT_HZ]
     c[C_AMBIENT_PHASE] = vector[par.AMBIENT_PHASE]
@@ -160,8 +163,8 @@ def acceleration(q: float, v: float, t: float, c: NDArray[np.float64]) -> float:
     if c[C_AMBIENT] != 0.0:
         forcing = math.sin(c[C_AMBIENT_W] * t + c[C_AMBIENT_PHASE])
         a += c[C_AMBIENT] * forcing * math.cos(c[C_ALPHA] - q)
-    if c[C_HOLD] > 0.0:
-        a += c[C_HOLD] * _held_share(t * c[C_HOLD_RATE], c[C_HOLD_EVEN])
+    if c[C_HOLD] > 0.0 or c[C_HOLD] < 0.0 < c[C_RISING] * c[C_HOLD_RATE]:
+        a += c[C_HOLD] * _held_share(c[C_HOLD_START] + t * c[C_HOLD_RATE], c[C_HOLD_EVEN])
     return float(a)
 
 
@@ -174,6 +177,32 @@ def hold_back(vector: NDArray[np.float64], q: float, c: NDArray[np.float64]) -> 
         c[C_HOLD_EVEN] = vector[par.RELEASE_EVEN]
         c[C_HOLD_RATE] = 1.0 / (vector[par.SLOW_RELEASE] * (1.0 + c[C_HOLD_EVEN]))
         c[C_PLAIN] = 0.0
+
+
+@part
+def hold_on(
+    vector: NDArray[np.float64],
+    held: float,
+    begin: float,
+    later: float,
+    back_from: float,
+    c: NDArray[np.float64],
+) -> None:
+    """What is left of the holding force after the first impact, at `begin`, until the wall turns back.
+
+    It is a rope that is paid out: it pulls the wall back while that goes on, and is slack when it returns.
+    `held`: what `hold_back` found. `later`: how long after the release the time is zero. `back_from`: the
+    time from which time runs backwards; negative: it does not.
+    """
+    if held == 0.0:
+        return
+    even = vector[par.RELEASE_EVEN]
+    rate = 1.0 / (vector[par.SLOW_RELEASE] * (1.0 + even))
+    if _held_share(max(begin + later, 0.0) * rate, even) < _HOLDS:
+        return
+    c[C_HOLD], c[C_HOLD_EVEN], c[C_PLAIN] = -held, even, 0.0
+    c[C_HOLD_START] = (later if back_from < 0.0 else later + 2.0 * back_from) * rate
+    c[C_HOLD_RATE] = rate if back_from < 0.0 else -rate
 
 
 @part

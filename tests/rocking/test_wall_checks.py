@@ -169,8 +169,9 @@ def test_a_hop_that_noise_may_make_is_told_and_in_the_stated_error_of_every_r():
     assert error < 2.0 * analysis.estimates["crt"].standard_error
 
 
-def test_a_wall_that_is_let_go_slowly_is_fitted_from_its_first_impact_on():
-    test = draw_test(RIG, SEED, effects={"slow_release": {"tau": 0.3}})
+@pytest.mark.parametrize("tau_s", [0.1, 0.3])
+def test_a_wall_that_is_let_go_slowly_is_fitted_from_where_nothing_holds_it_any_more(tau_s: float):
+    test = draw_test(RIG, SEED, effects={"slow_release": {"tau": tau_s}})
     analysis = analyse_record(test.record(), AnalysisOptions(bias_runs=0, keep_series=False))
     fit = analysis.fit
 

@@ -42,8 +42,11 @@ class BodyEstimate:
 
 
 def body_of(track: MotionTrack, gain_sigma: float) -> BodyEstimate | None:
-    """α and p by the half-cycles of one family; the error of its gain counts for α."""
-    arcs = [arc for arc in track.arcs[1:] if arc is not None]
+    """α and p by the half-cycles of one family; the error of its gain counts for α.
+
+    What lets go slowly may hold the wall back until it first turns: the first half-cycle then is no free one.
+    """
+    arcs = [arc for arc in track.arcs[1 if track.fell_freely else 2 :] if arc is not None]
     columns = np.array(
         [
             (arc.peak_rad, arc.sigma_peak_rad, arc.duration_s, math.hypot(arc.sigma_start_s, arc.sigma_end_s))

@@ -125,11 +125,12 @@ def fit_motion(
     amplitude, begin_s, own = _fall_to_first_impact(
         impacts_s[0], peaks_rad[1], _deviations(speeds_rad_s[1:], count, log_r), log_r, p_rad_s, alpha_rad
     )
-    at_impact = _Start(impacts_s[0] + POINT_S, begin_s, amplitude, own, scatter)
+    # What lets go slowly may hold the wall back beyond the impact, until it first turns: midway between two.
+    at_turn = _Start(0.5 * (impacts_s[0] + impacts_s[1]), begin_s, amplitude, own, scatter)
     later: MotionFit | None = None
     for thorough in (False, True):
         if math.isfinite(begin_s) and (later is None or later.residual_rad > _POOR * later.noise_rad):
-            later = record.fit(at_impact, thorough=thorough)
+            later = record.fit(at_turn, thorough=thorough)
     if later is None or not later.explains_the_motion:
         whole = record.fit(at_release, thorough=True)
         if later is None or (whole is not None and later.residual_rad > _FALL_TO_BLAME * whole.residual_rad):

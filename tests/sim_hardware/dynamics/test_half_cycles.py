@@ -23,6 +23,8 @@ FRACTIONS = np.array([0.85, 0.5, 0.15])
         {"winkler": {"theta_c": 2e-4}},
         {"initial_velocity": {"omega": 0.02}},
         {"residual_cable": {"k": 0.05}},
+        {"slow_release": {"tau": 0.3}},
+        {"slow_release": {"tau": 0.5, "even": 1.0}},
     ],
 )
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -48,3 +50,19 @@ def test_times_and_speeds_are_those_of_the_whole_motion(
         rising = motion.rotation(times[1:] - out[1:, FIRST_CROSSING + 3 + j])
         np.testing.assert_allclose(np.abs(falling), levels[:, j], atol=1e-8)
         np.testing.assert_allclose(np.abs(rising), levels[1:, j], atol=1e-8)
+
+
+@pytest.mark.parametrize("unseen_s", [0.0, 0.06])
+def test_a_slow_release_may_begin_before_anybody_sees_it(unseen_s: float) -> None:
+    effects = {"slow_release": {"tau": 0.35, "even": 1.0}}
+    vector = motion_vector(BODY, Release(0.033), Restitution(0.93), effects)
+    motion = simulate_vector(vector)
+    rotations = motion.peak_rotation_rad[:4].copy()
+    times = np.append(0.0, motion.peak_time_s[1:4] - unseen_s)
+    out = np.empty((4, FIRST_CROSSING + 6))
+    half_cycles(vector, times, rotations, np.abs(rotations)[:, None] * FRACTIONS, 1.0, True, out)
+    # The rope holds on for a third of a second after the first impact.
+    assert motion.impact_time_s[0] < 0.55
+    np.testing.assert_allclose(out[:, SPEED_OUT], np.abs(motion.velocity_before_rad_s[:4]), rtol=1e-6)
+    np.testing.assert_allclose(out[1:, SPEED_IN], np.abs(motion.velocity_after_rad_s[:3]), rtol=1e-4)
+    np.testing.assert_allclose(out[1:, RISE_S], motion.peak_time_s[1:4] - motion.impact_time_s[:3], rtol=1e-4)
