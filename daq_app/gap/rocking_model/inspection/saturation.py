@@ -154,20 +154,39 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None, rough: float) ->
     `rough` is the share of its largest by which the rotation itself goes in steps.
     """
     i = run.place(name)
-    sensor = run.sensors[i]
     if rotation is None or not run.reads(i):
         return 0.0, 0.0
+    furthest = float(np.abs(coarse(run.aligned(i), run.rate_hz)).max())
+    if reaches_its_range(run.aligned(i), run.sensors[i].range_si):
+        return 0.0, furthest
+    limit = _stops_at(run, i, rotation, rough)
+    if limit > 0.0:
+        # A channel that alone is late stands still, too, while a rotation that comes sooner moves on.
+        limit = _stops_at(run, i, _as_late(run, i, rotation), rough)
+    return limit, furthest
+
+
+def _as_late(run: GapRun, i: int, rotation: FloatArray) -> FloatArray:
+    """A rotation, (m,), rad, as late as one channel shows it."""
+    place = np.arange(rotation.size, dtype=float)
+    late = lateness(np.abs(gridded(run, i)), _expected(run, i, rotation))
+    return np.asarray(np.interp(place - late, place, rotation))
+
+
+def _expected(run: GapRun, i: int, rotation: FloatArray) -> FloatArray:
+    """Size of what a channel reads of a rotation, both (m,), m."""
+    sensor, half = run.sensors[i], run.survey.half_base_m
+    if sensor.family == "wire" and sensor.anchor_m is not None:
+        return np.abs(Wire(sensor, half).shortening(rotation))
+    return opening(rotation, sensor.position_m[0], half)
+
+
+def _stops_at(run: GapRun, i: int, rotation: FloatArray, rough: float) -> float:
+    """Reading, m, at which a channel stands still while the rotation moves on; 0 where it does not."""
     mine = np.abs(gridded(run, i))
     # A channel stops at a reading, wherever its zero has gone since.
     reading = np.abs(coarse(run.aligned(i), run.rate_hz))
-    furthest = float(reading.max())
-    half = run.survey.half_base_m
-    if sensor.family == "wire" and sensor.anchor_m is not None:
-        expected = np.abs(Wire(sensor, half).shortening(rotation))
-    else:
-        expected = opening(rotation, sensor.position_m[0], half)
-    if reaches_its_range(run.aligned(i), sensor.range_si):
-        return 0.0, furthest
+    expected = _expected(run, i, rotation)
     # On the side of its largest reading only: the other side may have another gain, and where the zero
     # is far off it may travel further there without an end.
     side = np.sign(rotation[int(np.argmax(reading))])
@@ -176,15 +195,15 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None, rough: float) ->
     below = same & (mine > IN_PROPORTION[0] * largest) & (mine < IN_PROPORTION[1] * largest)
     top = same & (mine > FLAT_TOP * largest)
     if below.sum() < 20 or top.sum() < round(SHORTEST_TOP_S * GRID_HZ):
-        return 0.0, furthest
+        return 0.0
     gain = float(np.median(mine[below] / np.maximum(expected[below], 1e-9)))
     reach = gain * expected[top]
     if float(np.quantile(reach, TOP_OF_REACH)) <= (GOES_ON + rough) * largest:
-        return 0.0, furthest
+        return 0.0
     # Standing still while the rotation moves on is clipping; following at another rate is not.
     noise = float(np.std(mine[-40:]))
     travel = float(np.ptp(np.quantile(reach, (0.01, 0.99))))
     moved = float(np.ptp(np.quantile(mine[top], (0.05, 0.95))))
     goes_on = travel > (TRAVELS_ON[0] + rough) * largest + TRAVELS_ON[1] * noise
     stopped = goes_on and moved < STANDS_STILL[0] * travel + STANDS_STILL[1] * noise
-    return (float(np.median(reading[top])) if stopped else 0.0), furthest
+    return float(np.median(reading[top])) if stopped else 0.0

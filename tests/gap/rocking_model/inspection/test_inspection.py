@@ -286,6 +286,13 @@ def test_a_limit_is_found_where_the_other_side_travels_further_from_a_zero_that_
     assert conditions_found(prepare(runs)[0]) == {"saturation@WP-4"}
 
 
+@pytest.mark.parametrize("name", ["LV-A06", "WP-3"])
+def test_one_channel_that_comes_late_does_not_stop_short(name: str) -> None:
+    """Its family is in time: it stands at its top while the rotation has gone on."""
+    _, findings = saturated(simulate({f"lag@{name}": {"tau": 0.07}}, (0.4,)))
+    assert [finding.value for finding in findings[0]] == [0.0, 0.0]
+
+
 @pytest.mark.parametrize("fault", [{"lag@lvdt": {"tau": 0.049}}, {"slow_response@wire": {"tau": 0.047}}])
 def test_a_family_that_comes_late_does_not_make_the_other_stop_short(
     fault: dict[str, dict[str, float]],
