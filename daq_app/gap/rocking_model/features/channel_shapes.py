@@ -16,7 +16,7 @@ from daq_app.gap.core.features import FloatArray, robust_sd
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.noise import coefficient_covariance
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Wire
-from daq_app.gap.rocking_model.tolerances.inspection import REMAINS_SD, SOUND
+from daq_app.gap.rocking_model.tolerances.inspection import REMAINS_SD, SOUND, SOUND_WIRE
 from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, CERTIFIED
 
 _SHAPES = ("gain", "lag", "curvature", "drift")
@@ -48,6 +48,7 @@ its family may be late by: a twelfth of it is in the time across every impact, t
 down, and those times repeat to some hundredths of a millisecond. A wire is straight to 0.1 % of its travel of
 ± 0.45 m; its side is an anchor known to 5 mm. An LVDT rounds as sensors do that respond within a
 millisecond."""
+_OF_ANCHORS = ("curvature", "side")
 RINGING: tuple[Family, ...] = ("accelerometer",)
 """Families whose channels differ in how they ring: what remains of one says nothing."""
 
@@ -215,7 +216,8 @@ def block_of(
 
 def _levers(family: Family, beside: Others, gain: float) -> tuple[float, ...]:
     """What a sound channel is off by from the others' prediction (sd), by shape; `gain`: its calibration."""
-    usual = SOUND * beside.spread * np.array(TOLERANCE[family])
+    shares = [SOUND_WIRE if family == "wire" and name in _OF_ANCHORS else SOUND for name in SHAPES[family]]
+    usual = beside.spread * np.array(shares) * np.array(TOLERANCE[family])
     usual[_GAIN] = gain * beside.spread
     usual[_CURVATURE] *= max(beside.curved / beside.spread, 1.0)
     return tuple(usual.tolist())

@@ -260,6 +260,13 @@ SOUND = 0.5
 Raising it hides effects on a single channel that is suspect.
 """
 
+SOUND_WIRE = 1.0
+"""The same for the curvature and the side of a wire, 1, which its anchor and its sag decide.
+
+An anchor is measured by tape, to 5 mm (assumed). Raising it hides wrong anchors of single wires, most of all
+of the lowest, which is predicted from those above.
+"""
+
 REMAINS = 0.5
 """Excess, 1, of the logarithm of what remains over noise from which a channel is suspect for it alone.
 
