@@ -30,6 +30,9 @@ def family_difference(run: RockingRun, family: str, values: Mapping[str, float])
 
 def _family_difference(run: RockingRun, family: str, values: Mapping[str, float]) -> FloatArray | None:
     shown = run.grid.theta
+    if family != run.reference:
+        of_reference = family_difference(run, run.reference, values)
+        shown = shown if of_reference is None else shown - of_reference
     if family == "wire" and family != run.reference and "sliding.c" in values:
         # A slip is a step to whatever the wires answer with.
         slips = run.cache.constant("slips", lambda: slip_shape(run.grid) / run.wire_height_m)

@@ -36,6 +36,20 @@ def pivots(run: RockingRun, values: Mapping[str, float]) -> tuple[float, float]:
     return inwards, apart - values.get("uneven_edges.rho", 0.0)
 
 
+def turned_by(run: RockingRun, values: Mapping[str, float], theta: FloatArray, name: str) -> FloatArray:
+    """What such pivots add to rotations `theta`, rad, of any shape, that are read from the wires.
+
+    `name` is that of the rotations, which are always the same of one run.
+    """
+    inwards, apart = pivots(run, values)
+    each = run.cache.constant(("pivots of", name), lambda: pivots_off(run.wires, theta)[0])
+    further = inwards + apart * np.sign(theta)
+    if "winkler.theta_c" in values:
+        root = np.sqrt(values["winkler.theta_c"] / np.maximum(np.abs(theta), values["winkler.theta_c"]))
+        further = further - 2.0 * values["half_base"] * root
+    return np.asarray(further * each)
+
+
 def travel(run: RockingRun, block: Block, values: Mapping[str, float], of_base: bool) -> FloatArray:
     """What pivots that are not where the survey has them make of the wires' rotation (rad) or base (m).
 

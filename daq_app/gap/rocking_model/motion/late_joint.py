@@ -64,11 +64,13 @@ def _largest(correlation: FloatArray) -> float:
 def in_step(joint: Rotation, grid: Grid, rate_hz: float) -> InStep:
     """The joint put in step with a grid whose rotation is read from wires.
 
-    Around impacts, where rotation and opening have corners, as much more is left out as the joint is late by.
+    Around impacts, where rotation and opening have corners, as much more is left out as the joint is late by,
+    and everything after the last impact that is known.
     """
     late_s = lateness(coarse(joint.theta, rate_hz), grid.theta) / GRID_HZ
     early = round(late_s * rate_hz)
     theta, lift, twist = (sooner(row, early) for row in (joint.theta, joint.lift, joint.twist))
     moved = replace(joint, theta=theta, lift=lift, twist=twist)
     apart = grid.from_impact_s > MASK_S + abs(late_s)
+    apart &= grid.time_s < grid.impact_s.max(initial=-np.inf)
     return InStep(moved, replace(grid, theta=coarse(moved.theta, rate_hz)), apart, early / rate_hz)

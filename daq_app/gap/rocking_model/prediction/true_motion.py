@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.differences import face_gain
+from daq_app.gap.rocking_model.features.pivots import turned_by
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.rotation import anchors_turn
 from daq_app.gap.rocking_model.prediction.wires_alone import peaks_carry
@@ -27,8 +29,8 @@ def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
     drift = values.get("drift@wire.rate", 0.0) / run.wire_height_m if name == "wire" else 0.0
     offset = values["zero"] + drift * (run.swings.peak_s - run.grid.rest_s) + peaks_carry(run, values)
     levels = side[:, None] * run.swings.levels
-    true = peaks - offset - _bent(run, values, peaks)
-    behind = levels - offset[:, None] - _bent(run, values, levels)
+    true = peaks - offset - _bent(run, values, peaks, "peaks")
+    behind = levels - offset[:, None] - _bent(run, values, levels, "levels")
     if second := _second_order(values, name):
         # A delay moves peaks and crossings alike; what a response rounds beyond it goes with the
         # acceleration. At the first peak the wall is held.
@@ -40,21 +42,30 @@ def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
     return true, np.abs(behind / gain[:, None])
 
 
-def _bent(run: RockingRun, values: Mapping[str, float], theta: FloatArray) -> FloatArray | float:
-    """What wires out of line add to a rotation that is read from them."""
-    added: FloatArray | float = 0.0
-    if bend := values.get(f"wire_cosine@{run.reference}.kappa", 0.0):
+def _bent(run: RockingRun, values: Mapping[str, float], theta: FloatArray, name: str) -> FloatArray | float:
+    """What wires out of line, or on a wall with other pivots, add to the rotation that is read from them."""
+    if run.reference != "wire":
+        return 0.0
+    added: FloatArray | float = turned_by(run, values, theta, name)
+    if bend := values.get("wire_cosine@wire.kappa", 0.0):
         added = bend * run.wire_bend_m * theta**2
-    if higher := values.get(f"wire_anchor@{run.reference}.height", 0.0):
+    if higher := values.get("wire_anchor@wire.height", 0.0):
         added = added + anchors_turn(run.wires, theta, higher)
     return added
 
 
 def _second_order(values: Mapping[str, float], name: str) -> float:
-    """Second moment of a sensor's response less half the square of its delay, s²: what rounds a peak."""
+    """Second moment of a sensor's response less half the square of its delay, s²: what rounds a peak.
+
+    It is negative for a wire that swings, whose peaks are higher than the wall's.
+    """
     slow = values.get(f"slow_response@{name}.tau", 0.0)
     delay = values.get(f"filter_delay@{name}.tau", 0.0)
-    return 0.5 * slow**2 + delay**2 / 6.0
+    rounded = 0.5 * slow**2 + delay**2 / 6.0
+    if frequency := values.get(f"wire_inertia@{name}.frequency", 0.0):
+        zeta = values.get(f"wire_inertia@{name}.zeta", 0.2)
+        rounded += (2.0 * zeta**2 - 1.0) / (2.0 * math.pi * frequency) ** 2
+    return rounded
 
 
 def pause_at_impact(values: Mapping[str, float], speeds: FloatArray) -> FloatArray:

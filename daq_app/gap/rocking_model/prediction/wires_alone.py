@@ -1,4 +1,5 @@
-"""What wires show besides the wall's rotation, where they are the reference: slips, bending, play, crosstalk.
+"""What wires show besides the wall's rotation, where they are the reference: slips, bending, play, crosstalk,
+and how they settle after impacts.
 
 The motion is read from them where the LVDTs are late or go in steps, and then every peak and every crossing
 carries it.
@@ -6,7 +7,8 @@ carries it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -17,6 +19,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.differences import at_impacts
 from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE
 from daq_app.gap.rocking_model.features.oscillations.ring_response import bent_form, bent_share, bent_wall
+from daq_app.gap.rocking_model.features.response import delay
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import play_shape, slip_shape
 from daq_app.gap.rocking_model.features.turns import turn_share, turned, turns
@@ -44,10 +47,66 @@ def times_carry(run: RockingRun, values: Mapping[str, float]) -> FloatArray | fl
 
     Beside what the peaks carry already, by which the levels of a half-cycle are moved.
     """
-    carried_s: FloatArray | float = 0.0
+    carried_s: FloatArray | float = _settling(run, values)
     for size, carried in _forms(run, values):
         carried_s = carried_s + size * carried.times
     return carried_s
+
+
+def _settling(run: RockingRun, values: Mapping[str, float]) -> FloatArray | float:
+    """What the time features, (T,), s, have of wires that still settle after an impact.
+
+    At an impact the speed jumps and the restoring changes its sign. Afterwards a response comes down to the
+    delayed and rounded rotation, which is in the peaks and levels, from what it lacks of it at the impact.
+    """
+    if run.reference != "wire" or not run.grid.impact_s.size:
+        return 0.0
+    responses = list(_responses(values))
+    if not responses:
+        return 0.0
+    swings, grid = run.swings, run.grid
+    late_s = delay("wire", values)
+    begin = np.fmin.reduce(swings.rise_s, axis=1)
+    place = np.maximum(np.searchsorted(grid.impact_s, np.nan_to_num(begin)) - 1, 0)
+    since = np.maximum(swings.rise_s - grid.impact_s[place, None] + late_s, 0.0)
+    jump = grid.jumps[place, None]
+    turn = -2.0 * np.sign(grid.approach[place, None]) * values["p"] ** 2 * math.sin(values["alpha"])
+    left = np.sum([response(since, jump, turn) for response in responses], axis=0)
+    speeds = np.interp(swings.rise_s, grid.time_s, grid.omega)
+    late = np.hstack([np.zeros_like(swings.fall_s), -left / np.where(speeds == 0.0, np.inf, speeds)])
+    late[0] = 0.0
+    first, a, second, b = run.places.T
+    return np.asarray(late[second, b] - late[first, a])
+
+
+_AT_ONCE_S = 1e-4
+_Settles = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+"""(time since the impact in s, jump of the speed, jump of the acceleration) → what is left, in rad."""
+
+
+def _responses(values: Mapping[str, float]) -> Iterator[_Settles]:
+    """How each response of the wires settles that is not over at once."""
+    if (slow := values.get("slow_response@wire.tau", 0.0)) > _AT_ONCE_S:
+        yield lambda since, jump, turn: (jump * slow - turn * slow**2) * np.exp(-since / slow)
+    if (tau := values.get("filter_delay@wire.tau", 0.0)) > _AT_ONCE_S:
+        yield partial(_swinging, math.sqrt(3.0) / tau, math.sqrt(3.0) / 2.0)
+    if frequency := values.get("wire_inertia@wire.frequency", 0.0):
+        yield partial(_swinging, 2.0 * math.pi * frequency, values.get("wire_inertia@wire.zeta", 0.2))
+
+
+def _swinging(
+    natural: float, zeta: float, since: FloatArray, jump: FloatArray, turn: FloatArray
+) -> FloatArray:
+    """What is left of a resonator, rad, (…): it starts at rest where its delayed and rounded input does not.
+
+    `natural`: ω, rad/s. The input jump · t + ½ turn · t² is followed by jump (t − d) + turn (½ t² − d t + c).
+    """
+    late, rounded = 2.0 * zeta / natural, (4.0 * zeta**2 - 1.0) / natural**2
+    begin, speed = jump * late - turn * rounded, turn * late - jump
+    damped = natural * math.sqrt(max(1.0 - zeta**2, 1e-6))
+    phase = damped * since
+    swung = begin * np.cos(phase) + (speed + zeta * natural * begin) / damped * np.sin(phase)
+    return np.asarray(np.exp(-zeta * natural * since) * swung)
 
 
 def _forms(run: RockingRun, values: Mapping[str, float]) -> Iterator[tuple[float, _Carried]]:

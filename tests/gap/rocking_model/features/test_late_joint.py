@@ -34,7 +34,9 @@ def test_what_a_late_joint_shows_of_itself_is_what_it_shows_in_time(effect: str,
         for family in ("joint", "twist"):
             seen, expected = _block(run, family), _block(known, family)
             assert seen.names == expected.names
-            smeared = _predicted(run, family, {f"{effect}.tau": tau}) - _predicted(run, family, {})
+            further_in = {"pivot_shift.a": WALL["pivot_shift"]["a"]}
+            slow = _predicted(run, family, further_in | {f"{effect}.tau": tau})
+            smeared = slow - _predicted(run, family, further_in)
             sd = np.sqrt(np.diag(seen.covariance) + np.diag(expected.covariance))
             np.testing.assert_array_less(np.abs(seen.values - smeared - expected.values), 4.0 * sd)
         assert abs(_block(run, "joint").values[0]) > 0.02, "the wall turns 30 mm further in"
@@ -79,6 +81,46 @@ def test_what_moves_the_wires_alone_is_predicted_where_the_motion_is_read_from_t
     told = np.array([left[k] - before[k] for k in shared])
     seen = np.array([ignored[k] - before[k] for k in shared])
     assert np.std(told) < max(0.2 * np.std(seen), 5e-5)
+
+
+@pytest.mark.parametrize(
+    ("effect", "known"),
+    [
+        ({"pivot_shift": {"a": 0.05}}, {"pivot_shift.a": 0.05}),
+        ({"rounded_edge": {"rho": 0.05}}, {"rounded_edge.rho": 0.05}),
+    ],
+    ids=lambda effect: next(iter(effect)),
+)
+def test_wires_that_the_motion_is_read_from_show_where_the_wall_turns(
+    effect: dict[str, dict[str, float]], known: dict[str, float]
+) -> None:
+    """Behind them are the peaks that LVDTs show which are in time."""
+    late = {"lag@lvdt": {"tau": 0.02}}
+    (run,), (prompt,) = (prepare(simulate(more | effect, (0.4,)))[0] for more in (late, {}))
+    assert (run.reference, prompt.reference) == ("wire", "lvdt")
+    shown = _peaks(prompt, {})[: run.swings.peak_rad.size]
+    # Families differ in calibration, which may be another at the other face, and in where they rest.
+    alike = np.column_stack([shown, np.abs(shown), np.ones_like(shown)])
+    seen, told = (_peaks(run, values)[: shown.size] - shown for values in ({}, known))
+    seen, told = (off - alike @ np.linalg.lstsq(alike, off, rcond=None)[0] for off in (seen, told))
+    assert np.std(told) < 0.5 * np.std(seen)
+
+
+def test_wires_that_swing_show_higher_peaks_and_settle_after_impacts() -> None:
+    late, swing = {"lag@lvdt": {"tau": 0.02}}, {"frequency": 24.0, "zeta": 0.2}
+    (run,), (plain,) = (
+        prepare(simulate(late | more, (0.35,)))[0] for more in ({"wire_inertia@wire": swing}, {})
+    )
+    assert run.reference == plain.reference == "wire"
+    known = {f"wire_inertia@wire.{name}": value for name, value in swing.items()}
+    behind = _peaks(plain, {})[: run.swings.peak_rad.size]
+    seen, told = (_peaks(run, values)[: behind.size] - behind for values in ({}, known))
+    assert np.std(told) < 0.2 * np.std(seen)
+    left, ignored, before = _left_of_times(run, known), _left_of_times(run, {}), _left_of_times(plain, {})
+    shared = sorted(set(left) & set(before))
+    told = np.array([left[k] - before[k] for k in shared])
+    seen = np.array([ignored[k] - before[k] for k in shared])
+    assert np.median(np.abs(told)) < 0.5 * np.median(np.abs(seen))
 
 
 def _usual(run: RockingRun, effect: dict[str, float]) -> dict[str, float]:

@@ -13,7 +13,7 @@ from daq_app.gap.core import Parameter
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.parameters import known
 from daq_app.gap.rocking_model.features.block import Block, regress
-from daq_app.gap.rocking_model.features.differences import Term, of_shapes
+from daq_app.gap.rocking_model.features.differences import Term, family_difference, of_shapes
 from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size
 from daq_app.gap.rocking_model.features.pivots import pivots
 from daq_app.gap.rocking_model.features.response import bessel, first_order
@@ -28,7 +28,10 @@ FACE_SKEW = "face_skew"
 """Parameter by which the two faces are sampled apart: the face that opens is the one that tells the time."""
 
 
-def _lift_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:
+def _lift_block(
+    run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_], own_zero: bool = False
+) -> Block | None:
+    """`own_zero`: the rotation is that of the LVDTs and the reference's is not, which rests elsewhere."""
     size = np.abs(grid.theta)
     expected = run.survey.half_base_m * np.sin(size)
     columns = {
@@ -40,9 +43,10 @@ def _lift_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_
         "contact length": (np.sqrt(size), "m"),
         "drift": (grid.time_s, "m/s"),
     }
-    return regress(
-        "joint", coarse(joint.lift, run.rate_hz) - expected, columns, pick & ~grid.near_impact, ("zero",)
-    )
+    if own_zero:
+        columns["sides"] = (np.sign(grid.theta), "m")
+    opened = coarse(joint.lift, run.rate_hz) - expected
+    return regress("joint", opened, columns, pick & ~grid.near_impact, ("zero", "sides"))
 
 
 def _twist_block(run: GapRun, joint: Rotation, grid: Grid, pick: NDArray[np.bool_]) -> Block | None:
@@ -63,40 +67,65 @@ def _predict_joint(run: RockingRun, block: Block, values: Mapping[str, float]) -
     size = np.abs(theta)
     inwards, apart = pivots(run, values)
     curved = 0.5 * (values.get("rounded_edge.rho", 0.0) - values["mount_height"])
-    shapes: tuple[Term, ...] = (
+    opened: tuple[Term, ...] = (
         (inwards, "size", lambda: size),
         (apart, "theta", lambda: theta),
         (curved, "square", lambda: size**2),
         (0.5 * values.get("uneven_edges.rho", 0.0), "lopsided square", lambda: size * theta),
+    )
+    of_sensors: tuple[Term, ...] = (
         # The opening is told against |θ|, whose zero is where the wall came to rest: a wall that rests a
         # hundredth of a milliradian off upright makes a step from side to side of it.
         (-values["half_base"] * values["zero"], "sides", lambda: np.sign(theta)),
         (values.get("drift@lvdt.rate", 0.0), "time", lambda: run.grid.time_s - run.grid.rest_s),
     )
-    coefficients = of_shapes(run, block, shapes)
-    if "winkler.theta_c" in values:
-        theta_c, half = values["winkler.theta_c"], values["half_base"]
-        opened = half * (theta_c - 2.0 * np.sqrt(theta_c * np.maximum(size, theta_c)))
-        coefficients += block.coefficients(np.where(size > theta_c, opened, -half * size))
-    smeared = _smeared_opening(run, block.undone_s, values) if block.undone_s else None
-    return coefficients if smeared is None else coefficients + block.coefficients(smeared)
+    coefficients = of_shapes(run, block, of_sensors)
+    if slow := _slow_effects(values) if block.undone_s else {}:
+        beyond = np.sum([amount * shape() for amount, _, shape in opened], axis=0) + _rounded(run, values)
+        return coefficients + block.coefficients(_smeared_opening(run, block, values, beyond, slow))
+    coefficients = coefficients + of_shapes(run, block, opened)
+    return coefficients + block.coefficients(_rounded(run, values)) if _soft(values) else coefficients
 
 
-def _smeared_opening(run: RockingRun, undone_s: float, values: Mapping[str, float]) -> FloatArray | None:
-    """What slow LVDTs make of an opening beyond that of their own rotation, m, put in step; None for nothing.
+def _soft(values: Mapping[str, float]) -> bool:
+    return "winkler.theta_c" in values
+
+
+def _rounded(run: RockingRun, values: Mapping[str, float]) -> FloatArray:
+    """What a joint of springs opens more than one of edges, (m,), m."""
+    size = np.abs(run.grid.theta)
+    if not _soft(values):
+        return np.zeros_like(size)
+    theta_c, half = values["winkler.theta_c"], values["half_base"]
+    opened = half * (theta_c - 2.0 * np.sqrt(theta_c * np.maximum(size, theta_c)))
+    return np.where(size > theta_c, opened, -half * size)
+
+
+def _slow_effects(values: Mapping[str, float]) -> dict[str, float]:
+    """Effects of the LVDTs that smear what they show, each with its time constant or delay, s."""
+    taus = {effect: values.get(f"{effect}@lvdt.tau", 0.0) for effect in ("slow_response", "filter_delay")}
+    return {effect: tau for effect, tau in taus.items() if tau}
+
+
+def _smeared_opening(
+    run: RockingRun, block: Block, values: Mapping[str, float], beyond: FloatArray, slow: Mapping[str, float]
+) -> FloatArray:
+    """What slow LVDTs make of an opening beyond that of their own rotation, (m,), m, put in step.
 
     The opening goes with the size of the rotation: after an impact, where that has a corner, a response is
-    still on its way down while the other face opens.
+    still on its way down while the other face opens. `beyond` is what the true joint opens more than edges
+    at the survey's places do, (m,), m; `slow` are the effects of `_slow_effects`.
     """
-    theta, half = run.grid.theta, values["half_base"]
-    turned, opened = theta, half * np.abs(np.sin(theta))
-    for effect, response in (("slow_response", first_order), ("filter_delay", bessel)):
-        if tau := values.get(f"{effect}@lvdt.tau", 0.0):
-            turned, opened = response(turned, tau), response(opened, tau)
-    if turned is theta:
-        return None
+    theta, half = run.grid.theta, run.survey.half_base_m
+    if (of_wires := family_difference(run, run.reference, values)) is not None:
+        theta = theta - of_wires
+    turned, opened = theta, half * np.abs(np.sin(theta)) + beyond
+    for effect, tau in slow.items():
+        response = first_order if effect == "slow_response" else bessel
+        turned, opened = response(turned, tau), response(opened, tau)
     time_s = run.grid.time_s
-    return np.asarray(np.interp(time_s + undone_s, time_s, opened - half * np.abs(np.sin(turned))))
+    shown = opened - half * np.abs(np.sin(turned))
+    return np.asarray(np.interp(time_s + block.undone_s, time_s, shown))
 
 
 def _predict_twist(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
@@ -111,7 +140,7 @@ def _observe(scene: Scene) -> Iterator[Block | None]:
         yield _twist_block(run, joint, grid, scene.in_range)
     elif scene.late and joint.whole:
         stepped = in_step(joint, grid, run.rate_hz)
-        lifted = _lift_block(run, stepped.joint, stepped.grid, scene.in_range & stepped.pick)
+        lifted = _lift_block(run, stepped.joint, stepped.grid, scene.in_range & stepped.pick, True)
         yield lifted and replace(lifted, undone_s=stepped.late_s)
         yield _twist_block(run, stepped.joint, stepped.grid, scene.in_range & stepped.pick)
 
