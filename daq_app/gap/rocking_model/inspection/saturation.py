@@ -156,21 +156,21 @@ def _limit(run: GapRun, name: str, rotation: FloatArray | None, rough: float) ->
     i = run.place(name)
     if rotation is None or not run.reads(i):
         return 0.0, 0.0
-    furthest = float(np.abs(coarse(run.aligned(i), run.rate_hz)).max())
-    if reaches_its_range(run.aligned(i), run.sensors[i].range_si):
+    mine = np.abs(gridded(run, i))
+    # A channel stops at a reading, wherever its zero has gone since.
+    aligned = run.aligned(i)
+    reading = np.abs(coarse(aligned, run.rate_hz))
+    furthest = float(reading.max())
+    if reaches_its_range(aligned, run.sensors[i].range_si):
         return 0.0, furthest
-    limit = _stops_at(run, i, rotation, rough)
+    expected = _expected(run, i, rotation)
+    limit = _stops_at(mine, reading, expected, rotation, rough)
     if limit > 0.0:
         # A channel that alone is late stands still, too, while a rotation that comes sooner moves on.
-        limit = _stops_at(run, i, _as_late(run, i, rotation), rough)
+        place = np.arange(rotation.size, dtype=float)
+        late = np.interp(place - lateness(mine, expected), place, rotation)
+        limit = _stops_at(mine, reading, _expected(run, i, late), late, rough)
     return limit, furthest
-
-
-def _as_late(run: GapRun, i: int, rotation: FloatArray) -> FloatArray:
-    """A rotation, (m,), rad, as late as one channel shows it."""
-    place = np.arange(rotation.size, dtype=float)
-    late = lateness(np.abs(gridded(run, i)), _expected(run, i, rotation))
-    return np.asarray(np.interp(place - late, place, rotation))
 
 
 def _expected(run: GapRun, i: int, rotation: FloatArray) -> FloatArray:
@@ -181,12 +181,13 @@ def _expected(run: GapRun, i: int, rotation: FloatArray) -> FloatArray:
     return opening(rotation, sensor.position_m[0], half)
 
 
-def _stops_at(run: GapRun, i: int, rotation: FloatArray, rough: float) -> float:
-    """Reading, m, at which a channel stands still while the rotation moves on; 0 where it does not."""
-    mine = np.abs(gridded(run, i))
-    # A channel stops at a reading, wherever its zero has gone since.
-    reading = np.abs(coarse(run.aligned(i), run.rate_hz))
-    expected = _expected(run, i, rotation)
+def _stops_at(
+    mine: FloatArray, reading: FloatArray, expected: FloatArray, rotation: FloatArray, rough: float
+) -> float:
+    """Reading, m, at which a channel stands still while the rotation moves on; 0 where it does not.
+
+    `mine`, `reading`, `expected`: size of what it shows from its rest, from zero, and should show, (m,), m.
+    """
     # On the side of its largest reading only: the other side may have another gain, and where the zero
     # is far off it may travel further there without an end.
     side = np.sign(rotation[int(np.argmax(reading))])

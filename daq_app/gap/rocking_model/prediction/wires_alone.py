@@ -65,7 +65,8 @@ def _settling(run: RockingRun, values: Mapping[str, float]) -> FloatArray | floa
     if not responses:
         return 0.0
     swings, grid = run.swings, run.grid
-    late_s = delay("wire", values)
+    # What comes late as a whole shows impacts and crossings alike late.
+    late_s = delay("wire", values) - values.get("lag@wire.tau", 0.0)
     begin = np.fmin.reduce(swings.rise_s, axis=1)
     place = np.maximum(np.searchsorted(grid.impact_s, np.nan_to_num(begin)) - 1, 0)
     since = np.maximum(swings.rise_s - grid.impact_s[place, None] + late_s, 0.0)
