@@ -263,8 +263,9 @@ Raising it hides effects on a single channel that is suspect.
 SOUND_WIRE = 1.0
 """The same for the curvature and the side of a wire, 1, which its anchor and its sag decide.
 
-An anchor is measured by tape, to 5 mm (assumed). Raising it hides wrong anchors of single wires, most of all
-of the lowest, which is predicted from those above.
+Anchors are measured by tape: to a centimetre at the lowest wire, to one and a half at the highest, which show
+as much (assumed). Raising it hides wrong anchors of single wires, most of all of the lowest, which is
+predicted from those above.
 """
 
 REMAINS = 0.5

@@ -73,3 +73,17 @@ def test_a_gain_of_the_wire_that_is_scanned_after_the_lvdts_is_seen() -> None:
     """What leaks into it from the last LVDT looks like a gain and a side of one size, not like one alone."""
     runs = simulate({"gain@WP-1": {"error": -0.06}}, (-0.35, 0.25))
     assert found_channels(prepare(runs)[0]) == {"WP-1": "wire"}
+
+
+@pytest.mark.parametrize("name", ["WP-1", "WP-5"])
+def test_a_sound_wire_may_have_an_anchor_a_centimetre_off_and_not_six(name: str) -> None:
+    """A laboratory measures anchors by tape: what that leaves is no cause."""
+    key = f"wire_anchor@{name}"
+    (run,) = prepare(simulate({key: {"height": 0.15}}, LEVEL))[0]
+    block = next(b for b in run.blocks if b.kind == "channel")
+    side = block.names.index("side")
+    of_tape, of_a_mistake = (
+        abs(channel(run, block, {f"{key}.height": off_m})[side]) for off_m in (0.01, 0.06)
+    )
+    assert of_tape < 1.05 * block.levers[side]
+    assert of_a_mistake > 1.5 * block.levers[side]
