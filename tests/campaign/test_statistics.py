@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from daq_app.campaign.report.statistics import random_effects_mean, shared_scatter, student_reach
+from daq_app.campaign.report.statistics import random_effects_mean, shared_scatter
 
 
 def test_equal_values_have_no_scatter_and_the_error_of_the_mean() -> None:
@@ -79,19 +77,3 @@ def test_a_change_without_and_with_scatter_is_covered_as_often_as_it_says(scatte
 def test_groups_of_one_test_each_tell_no_scatter() -> None:
     shared = shared_scatter([([0.9], [0.001]), ([0.8], [0.001]), ([math.nan], [0.001])])
     assert (shared.scatter, shared.stretch, shared.degrees_of_freedom) == (0.0, 1.0, 0)
-
-
-@pytest.mark.parametrize("freedom", [1, 2, 3, 4, 5, 17, 34, 100, 501])
-def test_students_interval_is_that_of_scipy(freedom: int) -> None:
-    assert student_reach(freedom) == pytest.approx(stats.t.ppf(0.975, freedom), rel=1e-12)
-
-
-def test_the_tables_of_a_report_load_no_scipy() -> None:
-    """It took a tenth of a report of kept analyses."""
-    program = (
-        "import sys; import daq_app.campaign.report.tables; "
-        "from daq_app.campaign.report.statistics import random_effects_mean; "
-        "random_effects_mean([0.9, 0.91, 0.92], [0.001] * 3); print('scipy.special' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from daq_app.campaign.names import TestName
 from daq_app.campaign.recorded import verdicts_of
 from daq_app.campaign.result.result import NoResult, load_result, make_result
 from daq_app.campaign.summaries.summary import TestSummary
@@ -86,14 +85,6 @@ def read_source(path: Path) -> RecordSource:
         no_result=no_result,
         made_utc=dt.datetime.now(dt.UTC),
     )
-
-
-def planned_level(name: str) -> str:
-    """The level that the name of a test says; empty where it says none."""
-    try:
-        return TestName.parse(name).level
-    except ValueError:
-        return ""
 
 
 def _result(path: Path) -> tuple[TestSummary | None, str]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from daq_app.campaign.names import level_in
 from daq_app.campaign.record.number_text import MISSING, figure, moment, moment_of, said
 from daq_app.campaign.record.parts import Grid, Pairs, Part, Section, Tone, Words
 from daq_app.campaign.record.picture import record_picture
-from daq_app.campaign.record.source import RecordSource, planned_level
+from daq_app.campaign.record.source import RecordSource
 from daq_app.campaign.result.family_rows import CAPTION, HEADINGS, family_rows
 from daq_app.campaign.summaries.summary import TestSummary
 from daq_app.config.wording import plus_minus, true_minus
@@ -28,7 +29,7 @@ def identity_section(source: RecordSource) -> Section:
     rows = [
         ("Test", source.name),
         ("Specimen", _specimen(header.specimen, plan.specimen if plan is not None else "")),
-        ("Level", said((plan.level if plan is not None else "") or planned_level(source.name))),
+        ("Level", said((plan.level if plan is not None else "") or level_in(source.name))),
         ("Operator", said(plan.operator if plan is not None else "")),
         ("First sample", moment(source.start_utc)),
         ("Length", f"{end:.3f} s, {source.attributes.n_samples} samples of {header.n_channels} channels"),
