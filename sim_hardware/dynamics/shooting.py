@@ -27,8 +27,8 @@ SPEED_IN: Final = 3  # |θ̇| after the impact that began it; 0 in row 0
 PEAK: Final = 4  # |θ| at the turning point; differs from the start only where row 0 has a velocity
 FIRST_CROSSING: Final = 5  # then F times of the fall and F of the rise, s from the peak
 _LIMIT_S: Final = 20.0
-_PASSES: Final = 8
-_SAME_S: Final = 1e-7
+_PASSES: Final = 8  # over when a slow release begins …
+_SAME_S: Final = 1e-7  # … which is known once it moves by less
 
 
 @part
@@ -67,37 +67,23 @@ def _reverse(vector: NDArray[np.float64], time: float, out: NDArray[np.float64])
 
 
 @part
-def _fall(
+def _way(
     vector: NDArray[np.float64],
     start: tuple[float, float, float, float],
     levels: NDArray[np.float64],
     c: NDArray[np.float64],
     pieces: NDArray[np.float64],
-    row: NDArray[np.float64],
-) -> None:
-    """The fall of one half-cycle from `start`, (s, |θ|, its rate, side)."""
-    t, q, v, side = start
-    end, count = np.zeros(5), levels.size
-    _, used = _swing(t, q, v, side, t + _LIMIT_S, vector[par.TOLERANCE], c, pieces, 0, end)
-    row[FALL_S], row[SPEED_OUT], row[PEAK] = end[0] - t, max(-end[2], 0.0), end[4]
-    _crossings(pieces, used, end[0], t, side, levels, row[FIRST_CROSSING : FIRST_CROSSING + count])
+    crossings: NDArray[np.float64],
+) -> tuple[float, float, float]:
+    """(s, rad/s, rad): how long the way from `start` to upright takes, |θ̇| there, |θ| at the turning point.
 
-
-@part
-def _rise(
-    vector: NDArray[np.float64],
-    start: tuple[float, float, float, float],
-    levels: NDArray[np.float64],
-    c: NDArray[np.float64],
-    pieces: NDArray[np.float64],
-    row: NDArray[np.float64],
-) -> None:
-    """The rise to the same peak, as a fall in which time runs backwards."""
+    `start`: (s, |θ|, its rate, side). `crossings` (F,) become the times at which `levels` are passed.
+    """
     t, q, v, side = start
-    end, count = np.zeros(5), levels.size
+    end = np.zeros(5)
     _, used = _swing(t, q, v, side, t + _LIMIT_S, vector[par.TOLERANCE], c, pieces, 0, end)
-    row[RISE_S], row[SPEED_IN] = end[0] - t, max(-end[2], 0.0)
-    _crossings(pieces, used, end[0], t, side, levels, row[FIRST_CROSSING + count :])
+    _crossings(pieces, used, end[0], t, side, levels, crossings)
+    return end[0] - t, max(-end[2], 0.0), end[4]
 
 
 @kernel
@@ -119,29 +105,31 @@ def half_cycles(
     c = np.zeros(terms.N_COEFFICIENTS)
     pieces = np.empty((400, pc.N_COLUMNS))
     back = vector.copy()
+    first_rise = FIRST_CROSSING + levels.shape[1]
     held, later = 0.0, 0.0
     for k in range(times.size):
         side = -1.0 if rotations[k] < 0.0 else 1.0
-        q, t = abs(rotations[k]), times[k]
+        q, t, row = abs(rotations[k]), times[k], out[k]
+        released = first_is_release and k == 0
         terms.setup(vector, side, k, release_side, c)
-        if first_is_release and k == 0:
+        if released:
             terms.hold_back(vector, q, c)
             held = c[terms.C_HOLD]
-            _fall(vector, (t, q, vector[par.OMEGA0], side), levels[k], c, pieces, out[k])
-            out[k, RISE_S], out[k, SPEED_IN] = 0.0, 0.0
-            out[k, FIRST_CROSSING + levels.shape[1] :] = 0.0
+        start = (t, q, vector[par.OMEGA0] if released else 0.0, side)
+        falls = row[FIRST_CROSSING:first_rise]
+        row[FALL_S], row[SPEED_OUT], row[PEAK] = _way(vector, start, levels[k], c, pieces, falls)
+        if released:
+            row[RISE_S], row[SPEED_IN] = 0.0, 0.0
+            row[first_rise:] = 0.0
             continue
         _reverse(vector, t, back)
         # Nobody sees when a slow release begins: the first half-cycle after it says how long before its time.
         for _ in range(_PASSES if k == 1 and held > 0.0 else 1):
+            before = later
             terms.setup(back, side, k, release_side, c)
             if k == 1:
                 terms.hold_on(vector, held, 0.0, later, t, c)
-            _rise(back, (t, q, 0.0, side), levels[k], c, pieces, out[k])
-            before = later
-            if k == 1 and held > 0.0:
-                later = out[0, FALL_S] + out[k, RISE_S] - t
+            row[RISE_S], row[SPEED_IN], _ = _way(back, start, levels[k], c, pieces, row[first_rise:])
+            later = out[0, FALL_S] + row[RISE_S] - t if k == 1 else later
             if abs(later - before) < _SAME_S:
                 break
-        terms.setup(vector, side, k, release_side, c)
-        _fall(vector, (t, q, 0.0, side), levels[k], c, pieces, out[k])
