@@ -45,9 +45,15 @@ def turned_by(run: RockingRun, values: Mapping[str, float], theta: FloatArray, n
     each = run.cache.constant(("pivots of", name), lambda: pivots_off(run.wires, theta)[0])
     further = inwards + apart * np.sign(theta)
     if "winkler.theta_c" in values:
-        root = np.sqrt(values["winkler.theta_c"] / np.maximum(np.abs(theta), values["winkler.theta_c"]))
-        further = further - 2.0 * values["half_base"] * root
+        further = further + _on_springs(values, theta)
     return np.asarray(further * each)
+
+
+def _on_springs(values: Mapping[str, float], theta: FloatArray) -> FloatArray:
+    """How much further out, m, a wall on springs turns than on edges, at rotations of any shape, rad."""
+    theta_c = values["winkler.theta_c"]
+    further: FloatArray = -2.0 * values["half_base"] * np.sqrt(theta_c / np.maximum(np.abs(theta), theta_c))
+    return further
 
 
 def travel(run: RockingRun, block: Block, values: Mapping[str, float], of_base: bool) -> FloatArray:
@@ -65,6 +71,5 @@ def travel(run: RockingRun, block: Block, values: Mapping[str, float], of_base: 
     )
     coefficients = of_shapes(run, block, shapes)
     if "winkler.theta_c" in values:
-        root = np.sqrt(values["winkler.theta_c"] / np.maximum(np.abs(theta), values["winkler.theta_c"]))
-        coefficients += block.coefficients(-2.0 * values["half_base"] * root * each)
+        coefficients += block.coefficients(_on_springs(values, theta) * each)
     return coefficients

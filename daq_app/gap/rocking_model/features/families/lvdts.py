@@ -80,22 +80,17 @@ def _predict_joint(run: RockingRun, block: Block, values: Mapping[str, float]) -
         (values.get("drift@lvdt.rate", 0.0), "time", lambda: run.grid.time_s - run.grid.rest_s),
     )
     coefficients = of_shapes(run, block, of_sensors)
+    of_springs = _opened_by_springs(size, values) if "winkler.theta_c" in values else None
     if slow := _slow_effects(values) if block.undone_s else {}:
-        beyond = np.sum([amount * shape() for amount, _, shape in opened], axis=0) + _rounded(run, values)
+        beyond = np.sum([amount * shape() for amount, _, shape in opened], axis=0)
+        beyond = beyond if of_springs is None else beyond + of_springs
         return coefficients + block.coefficients(_smeared_opening(run, block, values, beyond, slow))
     coefficients = coefficients + of_shapes(run, block, opened)
-    return coefficients + block.coefficients(_rounded(run, values)) if _soft(values) else coefficients
+    return coefficients if of_springs is None else coefficients + block.coefficients(of_springs)
 
 
-def _soft(values: Mapping[str, float]) -> bool:
-    return "winkler.theta_c" in values
-
-
-def _rounded(run: RockingRun, values: Mapping[str, float]) -> FloatArray:
-    """What a joint of springs opens more than one of edges, (m,), m."""
-    size = np.abs(run.grid.theta)
-    if not _soft(values):
-        return np.zeros_like(size)
+def _opened_by_springs(size: FloatArray, values: Mapping[str, float]) -> FloatArray:
+    """What a joint of springs opens more than one of edges, m, at rotations of this size, rad; (m,) both."""
     theta_c, half = values["winkler.theta_c"], values["half_base"]
     opened = half * (theta_c - 2.0 * np.sqrt(theta_c * np.maximum(size, theta_c)))
     return np.where(size > theta_c, opened, -half * size)
