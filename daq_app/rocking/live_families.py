@@ -220,9 +220,9 @@ class LiveFamilies:
         found = shock_timing(read, self._log.end - start, self._rate, first_s, offsets, inside)
         if found is None or abs(found.lag_s) <= LATE_SHOCKS_S:
             return ()
-        later = "accelerometers" if found.lag_s > 0 else "wires"
-        others = "the wires" if found.lag_s > 0 else "the accelerometers"
-        return (words.late_while_live(later, abs(found.lag_s), others),)
+        if found.lag_s < 0:
+            return (words.after_shocks_while_live(-found.lag_s),)
+        return (words.late_while_live("accelerometers", found.lag_s, "the wires"),)
 
     def _between(self, start_s: float, stop_s: float) -> tuple[Floats, Floats]:
         """Times (n,) and rows (1 + wires + ids, n) from one time to another, cut to what is kept."""

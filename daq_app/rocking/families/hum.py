@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +29,24 @@ _NOTABLE_NOISES = 1.0
 _SHORTEST_S = 2.0
 
 
+MAINS_SHARE: Final = 0.004
+"""Largest deviation of the frequency of mains (0.2 Hz: largest steady one of the synchronous area of
+continental Europe, Regulation (EU) 2017/1485). Raising it hides sampling rates that are wrong by as much."""
+_MAINS_HZ: Final = (50.0, 60.0)
+
+
 @dataclass(frozen=True)
 class Hum:
     """One line: `amplitude` (channels,) complex, of exp(2πi f t) with t from sample 0 of the record."""
 
     frequency_hz: float
     amplitude: NDArray[np.complex128]
+
+    @property
+    def wrong_rate_share(self) -> float:
+        """Share by which the sampling rate is told too high, if mains hum here; 0 where mains may do so."""
+        off = min((self.frequency_hz / mains - 1.0 for mains in _MAINS_HZ), key=abs)
+        return off if abs(off) > MAINS_SHARE else 0.0
 
     def waves(self, row: int, start: int, stop: int, rate_hz: float) -> Floats:
         """The line in samples start … stop of one channel."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from scipy.special import stdtr
 from daq_app.rocking.families.gain_error import gain_sigma_of_mean, single_gain_share
 
 Floats = NDArray[np.float64]
+WireKind = Literal["gain", "late", "drift"]
 
 _MEAN_S = 0.005
 _FEWEST = 100
@@ -34,12 +36,12 @@ class SingleWires:
     drift_rad: Floats
     """Over the span looked at."""
 
-    def outlier(self) -> tuple[int, str] | None:
+    def outlier(self) -> tuple[int, WireKind] | None:
         """The wire that deviates most beyond its kind's limit, and the kind: gain, late or drift."""
         count = self.gain.size
         if count < 4:
             return None
-        candidates: list[tuple[float, int, str]] = []
+        candidates: list[tuple[float, int, WireKind]] = []
         worst = int(np.argmax(np.abs(self.gain - np.median(self.gain))))
         others = np.delete(self.gain, worst)
         deviation = float(self.gain[worst] - others.mean())
@@ -47,7 +49,10 @@ class SingleWires:
         t = abs(deviation) / (spread * math.sqrt(1.0 + 1.0 / others.size))
         if 2.0 * count * float(stdtr(freedom, -t)) < _GAIN_CHANCE and abs(deviation) > _LEAST_GAIN:
             candidates.append((abs(deviation) / _LEAST_GAIN, worst, "gain"))
-        kinds = ((self.lag_s, _LEAST_LAG_S, "late"), (self.drift_rad, _LEAST_DRIFT_RAD, "drift"))
+        kinds: tuple[tuple[Floats, float, WireKind], ...] = (
+            (self.lag_s, _LEAST_LAG_S, "late"),
+            (self.drift_rad, _LEAST_DRIFT_RAD, "drift"),
+        )
         for values, limit, kind in kinds:
             apart = values - np.median(values)
             place = int(np.argmax(np.abs(apart)))

@@ -7,8 +7,9 @@ from typing import Final, Literal
 
 from daq_app.config.rig import Family
 from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.families.hum import MAINS_SHARE
 from daq_app.rocking.families.scales import factor_words
-from daq_app.rocking.families.single_wires import SingleWires
+from daq_app.rocking.families.single_wires import SingleWires, WireKind
 
 FAMILY_NAMES: Final[dict[Family, str]] = {
     "wire": "wires",
@@ -16,10 +17,6 @@ FAMILY_NAMES: Final[dict[Family, str]] = {
     "accelerometer": "accelerometers",
     "tiltmeter": "tiltmeters",
 }
-_MAINS_SHARE: Final = 0.004
-"""Largest deviation of the frequency of mains (0.2 Hz: largest steady one of the synchronous area of
-continental Europe, Regulation (EU) 2017/1485). Raising it hides sampling rates that are wrong by as much."""
-_BETWEEN_MAINS_HZ: Final = 55.0
 _IN_UNIT: Final[dict[str, tuple[float, str]]] = {
     "m": (1e3, "mm"),
     "rad": (1e3, "mrad"),
@@ -52,16 +49,13 @@ def hum(
     return FamilyFinding(family, channels, "hum", amplitude, unit, "removed", severity, text)
 
 
-def with_rate_by_hum(finding: FamilyFinding, frequency_hz: float) -> FamilyFinding:
-    """The finding of a hum, with what its frequency says of the sampling rate where no mains have it."""
-    off = frequency_hz / (60.0 if frequency_hz > _BETWEEN_MAINS_HZ else 50.0) - 1.0
-    if abs(off) <= _MAINS_SHARE:
-        return finding
+def with_wrong_rate(hum_found: FamilyFinding, share: float) -> FamilyFinding:
+    """The finding of a hum that no mains have, with what that says of the sampling rate."""
     text = (
-        f"{finding.text}. Mains keep their frequency to {_MAINS_SHARE:.1%}: the sampling rate may be "
-        f"{off:+.1%} off the true one, and all times, periods and speeds with it. r is not"
+        f"{hum_found.text}. Mains keep their frequency to {MAINS_SHARE:.1%}: the sampling rate may be "
+        f"{share:+.1%} off the true one, and all times, periods and speeds with it. r is not"
     )
-    return replace(finding, text=text)
+    return replace(hum_found, text=text)
 
 
 def scale(family: str, factor: float) -> FamilyFinding:
@@ -73,7 +67,7 @@ def scale(family: str, factor: float) -> FamilyFinding:
     return FamilyFinding(family, (), kind, factor, "1", "put right", "warning", text)
 
 
-def single_wire(name: str, kind: str, wires: SingleWires, place: int) -> FamilyFinding:
+def single_wire(name: str, kind: WireKind, wires: SingleWires, place: int) -> FamilyFinding:
     """A wire that deviates from the other wires; it is left out of the rotation."""
     if kind == "gain":
         size, unit = float(wires.gain[place]), "1"
@@ -84,10 +78,8 @@ def single_wire(name: str, kind: str, wires: SingleWires, place: int) -> FamilyF
     else:
         size, unit = float(wires.drift_rad[place]), "rad"
         what = f"wire {name} drifts by {size * 1e3:+.2f} mrad against the others: a zero or a fixture moves"
-    return FamilyFinding(
-        "wires", (name,), "gain" if kind == "gain" else "late" if kind == "late" else "drift", size, unit,
-        "left out", "warning", what + "; it is left out of the rotation",
-    )  # fmt: skip
+    text = what + "; it is left out of the rotation"
+    return FamilyFinding("wires", (name,), kind, size, unit, "left out", "warning", text)
 
 
 def sticks(name: str, width_m: float) -> FamilyFinding:
@@ -149,6 +141,8 @@ def late(family: str, by_s: float, others: str) -> FamilyFinding:
     word = "late" if by_s > 0 else "early"
     text = f"{family} are {abs(by_s) * 1e3:.1f} ms {word} against {others}: a delay unknown to the task plan"
     if family == "accelerometers":
+        if by_s < 0:
+            text += f", or a filter that {others} have in common and that makes r by EAV too low"
         return FamilyFinding(family, (), "late", by_s, "s", "none", "warning", text)
     return FamilyFinding(
         family, (), "late", by_s, "s", "put in step", "warning", text + "; they were put in step"
@@ -344,6 +338,14 @@ def late_while_live(family: str, by_s: float, others: str) -> str:
     """A family that is late, said during the test: r is not off by it, times are."""
     late = f"{family} are {by_s * 1e3:.1f} ms late against {others}"
     return f"{late}: impact times are off by as much, r is not"
+
+
+def after_shocks_while_live(by_s: float) -> str:
+    """Wires that show the impacts after the accelerometers, said during the test."""
+    return (
+        f"wires are {by_s * 1e3:.1f} ms late against the accelerometers: times are off by as much, and "
+        "r by EAV is too low if a filter makes them so"
+    )
 
 
 def drift_while_live(by_rad: float) -> str:

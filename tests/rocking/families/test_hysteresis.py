@@ -90,6 +90,18 @@ def test_a_wire_of_a_recording_that_sticks_is_left_out_and_named(kind: str, size
     assert analysis.verdict.r == pytest.approx(sound.verdict.r, abs=0.001)
 
 
+@pytest.mark.parametrize("play_m", [0.002, 0.003])
+def test_r_without_a_wire_that_sticks_halfway_up_is_that_of_the_sound_test(play_m: float) -> None:
+    test = draw_test(load_rig(RIG), 98001)
+    sound = analyse_record(test.record(), OPTIONS)
+    analysis = analyse_record(Fault("wire", "sticks", play_m, single=2).record(test), OPTIONS)
+    (finding,) = [f for f in analysis.findings if f.severity == "warning"]
+
+    assert finding.channels == ("WP-3",) and "sticks" in finding.text
+    assert analysis.verdict.trust == "remarks" and analysis.verdict.left_out == ("WP-3",)
+    assert analysis.verdict.r == pytest.approx(sound.verdict.r, abs=0.0005)
+
+
 @pytest.mark.parametrize(("kind", "size"), [("slow", 0.02), ("late", 0.02), ("gain", 0.02), ("drift", 1e-3)])
 def test_a_wire_with_another_fault_is_not_said_to_stick(kind: str, size: float) -> None:
     test = draw_test(load_rig(RIG), 78502)

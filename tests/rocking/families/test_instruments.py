@@ -142,6 +142,16 @@ def test_the_error_of_theta0_holds_the_noise_that_the_tiltmeters_show(made):
     assert 0.8 * of_noise < np.sqrt(loud**2 - quiet**2) < 2.5 * of_noise
 
 
+def test_a_filter_that_wires_and_lvdts_have_in_common_is_told_and_r_is_not_called_good(made):
+    """They agree with each other; the accelerometers alone show the impacts before them."""
+    analysis = analysed(made, (*WIRES, *LVDTS), slow(0.01))
+    (finding,) = [f for f in analysis.findings if f.kind == "late"]
+
+    assert finding.size == pytest.approx(-0.01, abs=0.002)
+    assert "a filter that wires and LVDTs have in common" in finding.text and "EAV too low" in finding.text
+    assert analysis.verdict.trust != "good"
+
+
 def test_readings_so_coarse_that_a_held_wall_shows_no_noise_are_analysed(made):
     test = made(phi=0.35, r=TRUE_R, side=-1, seed=8, full=True)
     si = test.si.copy()

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.rocking.analysis.preparation.gains import FamilyGains, gains_of
-from daq_app.rocking.analysis.preparation.odd_wire import compared_wires, odd_wire
+from daq_app.rocking.analysis.preparation.odd_wire import compared_wires, odd_wire, wire_means
 from daq_app.rocking.analysis.preparation.signals import (
     Lead,
     Signals,
@@ -142,7 +142,8 @@ def _without_hum(
             largest = float(np.abs(hum.amplitude[rows]).max())
             channels = tuple(ids[k] for k in rows)
             findings.append(words.hum(name, channels, largest, unit, hum.frequency_hz, notable=notable))
-    findings[:1] = [words.with_rate_by_hum(finding, hum.frequency_hz) for finding in findings[:1]]
+    if findings and hum.wrong_rate_share:
+        findings[0] = words.with_wrong_rate(findings[0], hum.wrong_rate_share)
     return without_hum(record, ids, hum), findings
 
 
@@ -205,10 +206,11 @@ def _in_step(
     """Single wires and the timing of families; read again where something had to be put right."""
     read = _zeroed_at_rest if from_rest else _as_recorded
     lead: Lead = "wires"
-    wires = compared_wires(signals, _motion(signals, times))
+    means = wire_means(signals, _motion(signals, times))
+    wires = compared_wires(signals, means)
     changed = Corrections()
     bending = _bending(signals, times, None)
-    odd = odd_wire(signals, _motion(signals, times), wires, bends=bending is not None)
+    odd = odd_wire(signals, means, wires, bends=bending is not None)
     if odd is not None:
         findings.append(odd)
         changed = replace(changed, left_out=frozenset(odd.channels))
@@ -235,7 +237,7 @@ def _in_step(
         again, times_again = read(corrected, lead, ask_tiltmeters=bending is None)
         if times_again.impacts_s:
             record, signals, times = corrected, again, times_again
-            wires = compared_wires(signals, _motion(signals, times))
+            wires = compared_wires(signals, wire_means(signals, _motion(signals, times)))
             response = _follow(signals, times)
             shocks = _shocks(record, signals, times)
         else:

@@ -9,36 +9,34 @@ from daq_app.rocking.families.hysteresis import sticking_wire
 from daq_app.rocking.families.single_wires import SingleWires, WireMeans, compare_wires
 
 
-def compared_wires(signals: Signals, motion: slice) -> SingleWires | None:
-    """How each wire deviates from the others during the samples of the motion; None where none can tell."""
-    means = _means(signals, motion)
+def wire_means(signals: Signals, motion: slice) -> WireMeans | None:
+    """What each wire shows during the samples of the motion; None where they are too few to judge one."""
+    if len(signals.excluded_share) > 1:
+        return None  # they are named already, and the rest is no judge
+    of_each_wire = signals.geometry.wires.rotation_of_each(signals.wires_m[:, motion])
+    return WireMeans.of(of_each_wire, signals.record.rate_hz)
+
+
+def compared_wires(signals: Signals, means: WireMeans | None) -> SingleWires | None:
+    """How each wire deviates from the others; None where none can tell."""
     wires = signals.geometry.wires
     return None if means is None else compare_wires(means, wires.position_m[:, 1] / wires.lever_m)
 
 
 def odd_wire(
-    signals: Signals, motion: slice, compared: SingleWires | None, *, bends: bool
+    signals: Signals, means: WireMeans | None, compared: SingleWires | None, *, bends: bool
 ) -> FamilyFinding | None:
     """The wire that is to be left out, and why. A wall that `bends` pulls wires of each height otherwise.
 
     Sticking comes first, for it also looks like a delay.
     """
-    ids = signals.geometry.wires.ids
-    means = None if bends else _means(signals, motion)
-    if means is not None:
-        wires = signals.geometry.wires
+    wires = signals.geometry.wires
+    if means is not None and not bends:
         sticking = sticking_wire(means.means_rad, wires.lever_m, wires.noise_m)
         if sticking is not None:
-            return words.sticks(ids[sticking[0]], sticking[1].width_m)
+            return words.sticks(wires.ids[sticking[0]], sticking[1].width_m)
     outlier = None if compared is None else compared.outlier()
     if compared is None or outlier is None:
         return None
     place, kind = outlier
-    return words.single_wire(ids[place], kind, compared, place)
-
-
-def _means(signals: Signals, motion: slice) -> WireMeans | None:
-    if len(signals.excluded_share) > 1:
-        return None  # they are named already, and the rest is no judge
-    of_each_wire = signals.geometry.wires.rotation_of_each(signals.wires_m[:, motion])
-    return WireMeans.of(of_each_wire, signals.record.rate_hz)
+    return words.single_wire(wires.ids[place], kind, compared, place)
