@@ -25,12 +25,13 @@ Floats = NDArray[np.float64]
 
 _USABLE_RELATIVE_SIGMA = 0.15
 """Speeds and energies known worse than this are listed but not used."""
-_SCATTERS = np.concatenate(([0.0], np.geomspace(5e-5, 0.15, 56)))
+SCATTERS = np.concatenate(([0.0], np.geomspace(5e-5, 0.15, 56)))
+"""Relative sizes of the scatter of r, (k,), that are tried."""
 _USUAL_SCATTER = 0.004
 """Relative scatter of r that walls have (assumed: `campaign simulate` draws this). Lowering it makes standard
 errors of tests with few impacts too small, raising it makes them too large: with all sizes up to 15 % alike,
 intervals from six values held r in 99 to 100 % of tests whose r scatters by 0.4 to 2 %."""
-_SCATTER_WEIGHTS = np.gradient(_SCATTERS) / np.maximum(_SCATTERS, _USUAL_SCATTER)
+SCATTER_WEIGHTS = np.gradient(SCATTERS) / np.maximum(SCATTERS, _USUAL_SCATTER)
 """Weight of each size of the scatter before the values are seen: all sizes alike up to the usual one, beyond
 it all ratios alike (the scale-invariant prior of Jeffreys)."""
 _SURELY = 0.05
@@ -181,12 +182,15 @@ def _usable(values: Floats, sigmas: Floats) -> NDArray[np.bool_]:
         )
 
 
-def estimate_all(wanted: Sequence[DecaySeries]) -> list[RestitutionEstimate]:
+def estimate_all(
+    wanted: Sequence[DecaySeries], weights: Floats = SCATTER_WEIGHTS
+) -> list[RestitutionEstimate]:
     """Weighted mean of each series from values that fall by ln r per impact, and plain mean of its points.
 
-    They are worked on together: many cost little more than one.
+    They are worked on together: many cost little more than one. `weights` (k,) of `SCATTERS` are those before
+    the values are seen.
     """
-    slopes = iter(_slopes([series for series in wanted if series.points]))
+    slopes = iter(_slopes([series for series in wanted if series.points], weights))
     return [
         _estimate(series, *next(slopes)) if series.points else RestitutionEstimate(series.method, ())
         for series in wanted
@@ -213,7 +217,7 @@ def _estimate(
     )
 
 
-def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float, float]]:
+def _slopes(together: Sequence[DecaySeries], weights: Floats) -> list[tuple[float, float, float, float]]:
     """Generalised least-squares slope of the values against their index, its variance, scatter and its least.
 
     Errors are independent (`variances`) plus a random walk of step s. Every s of a grid is tried at
@@ -235,8 +239,8 @@ def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float, 
         usable[:n, k] = series.usable
         variances[:n, k, 0][series.usable] = series.variances[series.usable]
         rows[:n, k, 0, 0], rows[:n, k, 1 : 1 + of_series, 0] = series.values, series.levels
-    walk = np.broadcast_to(_SCATTERS**2, (len(together), _SCATTERS.size))
-    state, spread = np.zeros((len(together), rows.shape[2], _SCATTERS.size)), np.zeros(walk.shape)
+    walk = np.broadcast_to(SCATTERS**2, (len(together), SCATTERS.size))
+    state, spread = np.zeros((len(together), rows.shape[2], SCATTERS.size)), np.zeros(walk.shape)
     errors, totals = np.empty((length, *state.shape)), np.empty((length, *walk.shape))
     for error, total, row, variance in zip(errors, totals, rows, variances, strict=True):
         np.add(spread, variance, out=total)
@@ -263,13 +267,13 @@ def _slopes(together: Sequence[DecaySeries]) -> list[tuple[float, float, float, 
     misfit = ((target - design @ solution) ** 2).sum(axis=(2, 3))
     likelihood = -0.5 * (log_spread + np.linalg.slogdet(normal)[1] + misfit)
     _assume_usual_scatter(together, likelihood)
-    weights = _SCATTER_WEIGHTS * np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
+    weights = weights * np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
     weights /= weights.sum(axis=1, keepdims=True)
     slopes, variances_of_slope = solution[..., -1, 0], inverse[..., -1, -1]
     slope = (weights * slopes).sum(axis=1)
     variance = (weights * (variances_of_slope + (slopes - slope[:, None]) ** 2)).sum(axis=1)
-    best = _SCATTERS[np.argmax(likelihood, axis=1)]
-    least = _SCATTERS[np.argmax(np.cumsum(weights, axis=1) >= _SURELY, axis=1)]
+    best = SCATTERS[np.argmax(likelihood, axis=1)]
+    least = SCATTERS[np.argmax(np.cumsum(weights, axis=1) >= _SURELY, axis=1)]
     return list(zip(*(found.tolist() for found in (slope, variance, best, least)), strict=True))
 
 
@@ -278,7 +282,7 @@ def _assume_usual_scatter(together: Sequence[DecaySeries], likelihood: Floats) -
 
     A series that may not scatter keeps that of no scatter.
     """
-    usual = int(np.argmin(np.abs(_SCATTERS - _USUAL_SCATTER)))
+    usual = int(np.argmin(np.abs(SCATTERS - _USUAL_SCATTER)))
     for series, of_each in zip(together, likelihood, strict=True):
         if len(series.points) < FEWEST_POINTS:
-            of_each[np.arange(_SCATTERS.size) != (usual if series.may_scatter else 0)] = -np.inf
+            of_each[np.arange(SCATTERS.size) != (usual if series.may_scatter else 0)] = -np.inf

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -26,23 +25,16 @@ _PEAK_SHARE: Final = 2e-4
 _USUAL: Final = 0.004
 _SCATTERS: Final = (None, 0.01, 0.02)
 """Relative scatters of r; None: any from 0.1 to 0.6 %."""
-_WEIGHTS: Final[dict[str, Callable[[Floats], Floats]]] = {
+WEIGHTS: Final[dict[str, Callable[[Floats], Floats]]] = {
     "power 1": lambda scatter: 1.0 / np.maximum(1.0, scatter / _USUAL),
     "power 1.5": lambda scatter: 1.0 / np.maximum(1.0, scatter / _USUAL) ** 1.5,
     "half-Cauchy": lambda scatter: 1.0 / (1.0 + (scatter / _USUAL) ** 2),
 }
 
 
-@contextmanager
-def weighted(weight: Callable[[Floats], Floats]) -> Iterator[None]:
-    """Estimates with this weight of each scatter, before the values are seen."""
-    weights, scatters = estimators._SCATTER_WEIGHTS, estimators._SCATTERS
-    before = weights.copy()
-    weights[:] = np.gradient(scatters) * weight(scatters)
-    try:
-        yield
-    finally:
-        weights[:] = before
+def scatter_weights(name: str) -> Floats:
+    """Weights of `estimators.SCATTERS`, (k,), before the values are seen, by name."""
+    return np.asarray(np.gradient(estimators.SCATTERS) * WEIGHTS[name](estimators.SCATTERS))
 
 
 def decay(
@@ -71,11 +63,10 @@ def main() -> None:
         drawn = {
             scatter: [decay(rng, points, scatter) for _ in range(options.decays)] for scatter in _SCATTERS
         }
-        for name, weight in _WEIGHTS.items():
+        for name in WEIGHTS:
             told = []
             for scatter, decays in drawn.items():
-                with weighted(weight):
-                    estimates = estimators.estimate_all([series for _, series in decays])
+                estimates = estimators.estimate_all([series for _, series in decays], scatter_weights(name))
                 intervals = [estimate.interval95() for estimate in estimates]
                 known = [(r, i) for (r, _), i in zip(decays, intervals, strict=True) if i is not None]
                 holds = float(np.mean([low <= r <= high for r, (low, high) in known]))

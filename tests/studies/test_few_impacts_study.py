@@ -1,28 +1,26 @@
-"""The study of r from few peaks weighs scatters for itself alone, and draws decays that CRT holds."""
+"""The study of r from few peaks weighs scatters as the analysis does, and draws decays that CRT holds."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from daq_app.rocking import estimators
-from studies.restitution.few_impacts import _WEIGHTS, decay, weighted
+from studies.restitution.few_impacts import decay, scatter_weights
 
 
-def test_a_weight_holds_within_the_study_only() -> None:
-    before = estimators._SCATTER_WEIGHTS.copy()
+def test_a_weight_that_falls_faster_makes_an_error_smaller() -> None:
     _, series = decay(np.random.default_rng(1), 4, None)
     (usual,) = estimators.estimate_all([series])
-    with weighted(_WEIGHTS["half-Cauchy"]):
-        (narrow,) = estimators.estimate_all([series])
+    (narrow,) = estimators.estimate_all([series], scatter_weights("half-Cauchy"))
     assert usual.standard_error and narrow.standard_error
     assert narrow.standard_error < usual.standard_error
-    np.testing.assert_array_equal(estimators._SCATTER_WEIGHTS, before)
 
 
 def test_the_weight_of_the_analysis_is_power_1() -> None:
-    with weighted(_WEIGHTS["power 1"]):
-        weights = estimators._SCATTER_WEIGHTS / estimators._SCATTER_WEIGHTS[1]
-    np.testing.assert_allclose(weights, estimators._SCATTER_WEIGHTS / estimators._SCATTER_WEIGHTS[1])
+    weights = scatter_weights("power 1")
+    np.testing.assert_allclose(
+        weights / weights[1], estimators.SCATTER_WEIGHTS / estimators.SCATTER_WEIGHTS[1]
+    )
 
 
 def test_four_points_hold_r_more_often_than_promised() -> None:

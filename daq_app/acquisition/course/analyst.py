@@ -163,8 +163,7 @@ class Analyst(threading.Thread):
         elif not self._moves_on:
             self._keep_unarmed(events)
         elif not self._live.moves:
-            # A disk may keep the journal open for long, and the next release does not wait for it.
-            self._new_live()
+            self._new_live()  # a disk may keep the journal open for long, and no release waits for it
         self._judge()
 
     def _keep_unarmed(self, events: Sequence[PhaseEvent]) -> None:
