@@ -22,5 +22,5 @@ def test_the_report_names_lost_tests_and_files_that_are_no_tests(tmp_path: Path,
     assert done.exit_code == 0, done.output
     said = " ".join(done.stderr.split())
     assert "Lost: FR1-L1-2:" in said and "is cut short or damaged" in said
-    assert "Not in it: warm-up.h5: no release of a named test" in said
+    assert "Not in the report: warm-up.h5: no release of a named test" in said
     assert "FR1-L1-1.h5" not in said

@@ -103,7 +103,7 @@ def _tell_what_is_not_in_it(found: Collected, folder: Path) -> None:
         more = len(found.nameless) - len(names)
         told = ", ".join(names) + (f" and {more} more" if more else "")
         print_paragraph(
-            "Not in it",
+            "Not in the report",
             f"{told}: no release of a named test, or not readable (`daq-app verify`). `daq-app campaign "
             "assign` gives a run its place",
             style="bold yellow",
