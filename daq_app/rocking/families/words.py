@@ -9,7 +9,7 @@ from daq_app.config.rig import Family
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.hum import MAINS_SHARE
 from daq_app.rocking.families.scales import factor_words
-from daq_app.rocking.families.single_wires import SingleWires, WireKind
+from daq_app.rocking.families.wires.single_wires import SingleWires, WireKind
 
 FAMILY_NAMES: Final[dict[Family, str]] = {
     "wire": "wires",

@@ -13,7 +13,7 @@ from daq_app.runfile.exporters.results import Decimal, tidy_csv
 from daq_app.runfile.exporters.selection import Selection, Units
 from daq_app.runfile.folder import JOURNAL_SUFFIX, RUN_SUFFIX
 from daq_app.runfile.hdf5.read import Run, open_run
-from daq_app.runfile.model import DerivedData
+from daq_app.runfile.model import DerivedData, RunHeader
 
 ExportFormat = Literal["csv", "mat", "tdms", "parquet", "netcdf", "npz"]
 FORMATS: Final[dict[str, str]] = {
@@ -54,29 +54,13 @@ def export_run(
     names none.  Raises `RunFileError`; then, or when interrupted, nothing new is
     left on disk.
     """
-    suffix = FORMATS.get(format_)
-    if suffix is None:
-        raise RunFileError(f"there is no export format {format_}", advice=f"Formats: {', '.join(FORMATS)}.")
-    final = out / f"{path.stem}{suffix}" if out.is_dir() else out
-    if final.exists() and (final.suffix in (RUN_SUFFIX, JOURNAL_SUFFIX) or final.samefile(path)):
-        raise RunFileError(
-            f"{final} is a recording, which an export never replaces", advice="Choose another name."
-        )
-    if final.exists() and not overwrite:
-        raise RunFileError(
-            f"{final} exists already", advice="Choose another name, or overwrite it: --overwrite."
-        )
-    if not final.parent.is_dir():
-        raise RunFileError(f"the folder {final.parent} does not exist", advice="Make it first.")
+    final = _final_name(path, out, format_, overwrite=overwrite)
     temporary = name_beside(final)
     with open_run(path) as run:
         selection = Selection.of(run, units, from_s, to_s, report, derive(run), decimal)
         write = importlib.import_module(f"daq_app.runfile.exporters.to_{format_}").write
         beside = final.with_suffix(RESULTS_SUFFIX)
-        header = run.header
-        planned = "" if header.test_plan is None else header.test_plan.level
-        level = planned or level_of(header.test)
-        table = tidy_csv(header.test or header.run_id, level, selection.results, decimal).encode()
+        table = _tidy_table(run.header, selection, level_of).encode()
         try:
             if selection.results and not overwrite and beside.exists() and beside.read_bytes() != table:
                 raise RunFileError(
@@ -96,3 +80,28 @@ def export_run(
         finally:
             temporary.unlink(missing_ok=True)
     return final
+
+
+def _final_name(path: Path, out: Path, format_: ExportFormat, *, overwrite: bool) -> Path:
+    """Where the export of the run `path` goes; raises `RunFileError` where it cannot or must not."""
+    suffix = FORMATS.get(format_)
+    if suffix is None:
+        raise RunFileError(f"there is no export format {format_}", advice=f"Formats: {', '.join(FORMATS)}.")
+    final = out / f"{path.stem}{suffix}" if out.is_dir() else out
+    if final.exists() and (final.suffix in (RUN_SUFFIX, JOURNAL_SUFFIX) or final.samefile(path)):
+        raise RunFileError(
+            f"{final} is a recording, which an export never replaces", advice="Choose another name."
+        )
+    if final.exists() and not overwrite:
+        raise RunFileError(
+            f"{final} exists already", advice="Choose another name, or overwrite it: --overwrite."
+        )
+    if not final.parent.is_dir():
+        raise RunFileError(f"the folder {final.parent} does not exist", advice="Make it first.")
+    return final
+
+
+def _tidy_table(header: RunHeader, selection: Selection, level_of: Callable[[str], str]) -> str:
+    planned = "" if header.test_plan is None else header.test_plan.level
+    level = planned or level_of(header.test)
+    return tidy_csv(header.test or header.run_id, level, selection.results, selection.decimal)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from daq_app.rocking import AnalysisOptions, TestAnalysis, TestRecord, analyse_record
-from daq_app.rocking.families.single_wires import SingleWires
+from daq_app.rocking.families.wires.single_wires import SingleWires
 
 Floats = NDArray[np.float64]
 Change = Callable[[Floats, float], Floats]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from daq_app.rocking.analysis.preparation.signals import Signals, TestTimes
 from daq_app.rocking.families.gain_error import CALIBRATION_SHARE, gain_sigma_of_mean
-from daq_app.rocking.families.single_wires import SingleWires
+from daq_app.rocking.families.wires.single_wires import SingleWires
 from daq_app.rocking.geometry.joint import BaseJoint
 
 Floats = NDArray[np.float64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from daq_app.rocking.analysis.preparation.signals import Signals
 from daq_app.rocking.families import words
 from daq_app.rocking.families.finding import FamilyFinding
-from daq_app.rocking.families.hysteresis import sticking_wire
-from daq_app.rocking.families.single_wires import SingleWires, WireMeans, compare_wires
+from daq_app.rocking.families.wires.hysteresis import sticking_wire
+from daq_app.rocking.families.wires.single_wires import SingleWires, WireMeans, compare_wires
 
 
 def wire_means(signals: Signals, motion: slice) -> WireMeans | None:

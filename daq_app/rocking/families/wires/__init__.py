@@ -1,0 +1,1 @@
+"""Each wire against the others: gain, lag, drift, and whether it sticks."""
