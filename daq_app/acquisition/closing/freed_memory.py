@@ -14,22 +14,39 @@ import ctypes
 import sys
 from collections.abc import Callable
 from functools import cache
-from typing import Any, Final
+from typing import Any, Final, cast
 
 _TOP_PAD: Final = -2
 _ARENA_MAX: Final = -8
+_MMAP_MAX: Final = -4
 """Numbers of these parameters for ``mallopt`` (mallopt(3))."""
 _RESERVE_BYTES: Final = 32 * 2**20
 """Address space that the heap has beyond what is in use: blocks of some seconds, texts, messages. Pages of
 it that nobody has written to take no memory."""
+_LEAST_RESERVE_BYTES: Final = 16 * 2**20
+"""What of it there is at any time in one piece. Where a product of matrices gets no memory, OpenBLAS ends the
+process."""
+_MOST_MAPPED: Final = 65536
+"""Blocks that the library maps on their own unless told otherwise (mallopt(3))."""
+_ARGUMENTS: Final = {
+    "mallopt": (ctypes.c_int, ctypes.c_int),
+    "malloc_trim": (ctypes.c_size_t,),
+    "malloc": (ctypes.c_size_t,),
+    "free": (ctypes.c_void_p,),
+}
+_RESULTS: Final = {"malloc": ctypes.c_void_p, "free": None}
 
 
 @cache
 def _of_c_library(function: str) -> Callable[..., Any] | None:
     if sys.platform != "linux":
         return None
-    # musl has no such functions.
-    return getattr(ctypes.CDLL(None), function, None)
+    # musl has neither mallopt nor malloc_trim.
+    found: Any = getattr(ctypes.CDLL(None), function, None)
+    if found is not None:
+        found.restype = _RESULTS.get(function, ctypes.c_int)
+        found.argtypes = _ARGUMENTS[function]
+    return cast("Callable[..., Any] | None", found)
 
 
 def share_one_heap() -> None:
@@ -42,6 +59,22 @@ def share_one_heap() -> None:
     if mallopt is not None:
         mallopt(_ARENA_MAX, 1)
         mallopt(_TOP_PAD, _RESERVE_BYTES)
+
+
+def renew_reserve() -> None:
+    """Give the heap its reserve again where threads have used it up; to be called now and then.
+
+    The heap grows when it has no room for a small block, not for one that can be mapped on its own. So what
+    is left of the reserve is whatever has not been used since it grew last.
+    """
+    mallopt, malloc, free = map(_of_c_library, ("mallopt", "malloc", "free"))
+    if mallopt is None or malloc is None or free is None:
+        return
+    mallopt(_MMAP_MAX, 0)
+    try:
+        free(malloc(_LEAST_RESERVE_BYTES))
+    finally:
+        mallopt(_MMAP_MAX, _MOST_MAPPED)
 
 
 def give_back() -> None:

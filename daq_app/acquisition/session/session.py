@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from daq_app.acquisition.closing.finaliser import Finaliser, Finished
-from daq_app.acquisition.closing.freed_memory import give_back
+from daq_app.acquisition.closing.freed_memory import give_back, renew_reserve
 from daq_app.acquisition.closing.result_maker import ResultMaker
 from daq_app.acquisition.course.analyst import Analyst
 from daq_app.acquisition.course.header import make_header
@@ -172,6 +172,7 @@ class Session:
             self._wakefulness.hold()
         else:
             self._wakefulness.allow_sleep()
+        renew_reserve()
         self._publisher.send("health", self.watchdog.look(self._reader, self.analyst.overloaded))
 
     def tell_fault(self, text: str) -> None:

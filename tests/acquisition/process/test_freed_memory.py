@@ -56,6 +56,23 @@ except MemoryError:
 print(count * 0.096)
 """
 
+_USED_UP = """
+import resource, sys
+from daq_app.acquisition.closing.freed_memory import renew_reserve, share_one_heap
+share_one_heap()
+blocks = [bytes(100_000) for _ in range(int(sys.argv[1]))]
+renew_reserve()
+resource.setrlimit(resource.RLIMIT_AS, (2**25, resource.RLIM_INFINITY))  # less than there is already
+held = []
+try:
+    while True:
+        held.append(bytes(1_000_000))
+except MemoryError:
+    count = len(held)
+    del held
+print(count)
+"""
+
 
 def _glibc() -> bool:
     return platform.libc_ver()[0] == "glibc"
@@ -96,6 +113,16 @@ def test_some_memory_is_left_for_the_last_words_where_the_system_gives_none() ->
     # What is left goes in steps of 13.7 MB, as the size of the environment moves the end of the heap: with
     # the reserve it is 20, 33 or 47 MB more; with one of nothing 14 less, as much, or 14 more.
     assert left_mb("reserve") > left_mb("none") + 16.7
+
+
+@pytest.mark.skipif(not _glibc(), reason="other allocators keep what they keep")
+def test_the_reserve_is_there_again_however_much_of_it_was_used() -> None:
+    def left_mb(blocks: int) -> int:
+        program = [sys.executable, "-c", _USED_UP, str(blocks)]
+        return int(subprocess.run(program, capture_output=True, text=True, check=True).stdout)
+
+    # 33 MB of reserve are used up by 0.1 MB at a time; without renewal 0 to 31 MB of it are left.
+    assert min(map(left_mb, range(0, 400, 40))) >= 14
 
 
 @pytest.mark.skipif(not _glibc(), reason="other allocators give pages back by themselves")
