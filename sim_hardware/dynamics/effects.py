@@ -15,6 +15,19 @@ from numpy.typing import NDArray
 from sim_hardware.dynamics import parameters as par
 from sim_hardware.dynamics.spec import EffectSpec, Parameter, find_effect
 
+_PLASTIC: Final = Parameter(
+    "plastic",
+    "1",
+    0.0,
+    1.0,
+    "share s of a plastic impact's difference of r between the sides",
+    0.0,
+    par.UNEVEN_IMPACT,
+    0.0,
+    1.0,
+)
+"""Walls lose another share of their speed than a plastic impact takes, and its difference is unknown."""
+
 MOTION_EFFECTS: Final[tuple[EffectSpec, ...]] = (
     EffectSpec(
         "pivot_shift",
@@ -131,9 +144,12 @@ MOTION_EFFECTS: Final[tuple[EffectSpec, ...]] = (
         "alpha_asymmetry",
         "geometry",
         "the two edges have different α",
-        "α± = α ± δ, + for swings to +x",
-        "unequal edges",
-        (Parameter("delta", "rad", -5e-3, 5e-3, "half the difference of α", index=par.ALPHA_ASYMMETRY),),
+        "α± = α ± δ, + for swings to +x; r as with u± = b/2 ± δ h/cos²α",
+        "unequal edges; angular momentum about the edge that the wall comes down on",
+        (
+            Parameter("delta", "rad", -5e-3, 5e-3, "half the difference of α", index=par.ALPHA_ASYMMETRY),
+            _PLASTIC,
+        ),
         ("drift", "base_tilt", "eccentric_mass"),
         "static tilt",
     ),
@@ -151,9 +167,12 @@ MOTION_EFFECTS: Final[tuple[EffectSpec, ...]] = (
         "eccentric_mass",
         "geometry",
         "the centre of mass is off the middle of the base",
-        "u± = b/2 ∓ e",
-        "eccentric block",
-        (Parameter("e", "m", -7e-3, 7e-3, "eccentricity towards +x", index=par.ECCENTRICITY),),
+        "u± = b/2 ∓ e; r of impacts that end a swing to ±x is r (1 ∓ 2 s e p² sin α / g)",
+        "eccentric block; angular momentum about the edge that the wall comes down on",
+        (
+            Parameter("e", "m", -7e-3, 7e-3, "eccentricity towards +x", index=par.ECCENTRICITY),
+            _PLASTIC,
+        ),
         ("alpha_asymmetry", "base_tilt"),
         "static tilt",
     ),

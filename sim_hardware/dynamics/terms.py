@@ -217,10 +217,23 @@ def work_to(q: float, c: NDArray[np.float64]) -> float:
 
 
 @part
+def uneven_impact(vector: NDArray[np.float64]) -> float:
+    """What a plastic impact that ends a swing to +x takes beyond the mean of both sides, relative to r.
+
+    r of a plastic impact goes with 1/(I_G + m (h² + u²)), u the lever of the edge that the wall comes down
+    on; m/I_O = p²/(g R). To first order in the difference of the levers.
+    """
+    alpha, p = vector[par.ALPHA], vector[par.P]
+    eccentricity = vector[par.ECCENTRICITY] - vector[par.ALPHA_ASYMMETRY] * vector[par.R0] / math.cos(alpha)
+    return float(2.0 * eccentricity * p * p * math.sin(alpha) / G_M_S2)
+
+
+@part
 def restitution(vector: NDArray[np.float64], speed: float, side: float, n: int, deviate: float) -> float:
     """r of the n-th impact (from 0) that ends a swing on `side` with `speed` > 0; kept within 0 … 1."""
     r = vector[par.RESTITUTION] + vector[par.R_SLOPE] * (speed - vector[par.R_SLOPE_SPEED])
     r += side * vector[par.R_ASYMMETRY]
+    r *= 1.0 - side * vector[par.UNEVEN_IMPACT] * uneven_impact(vector)
     r *= 1.0 - vector[par.CRUSH_R] * 0.01 * (vector[par.IMPACTS_BEFORE] + n)
     r *= 1.0 + vector[par.SCATTER] * deviate
     return float(min(max(r, 0.0), 1.0))

@@ -25,6 +25,8 @@ _FREE = {
     "ambient": ("amplitude", "frequency"),
     "slow_release": ("tau",),
     "corner_twist": ("c",),
+    "alpha_asymmetry": ("delta",),
+    "eccentric_mass": ("e",),
 }
 """Which parameters are fitted where not all are; the others keep the simulator's defaults."""
 _LOGARITHMIC = {("winkler", "theta_c"), ("slow_release", "tau"), ("residual_cable", "slack")} | {
@@ -111,7 +113,14 @@ def _parameter(spec: EffectSpec, parameter: SpecParameter) -> Parameter:
     return prior if per_run else replace(prior, smallest=_smallest(spec, parameter))
 
 
+_PLASTIC = Parameter(
+    "plastic", 0.5, 0.5, "1", 0.0, 1.0, meaning="share of a plastic impact's difference of r"
+)
+"""Unequal levers make r of the two sides differ where impacts are plastic. Walls lose another share of their
+speed, and their r may differ by anything from nothing to that."""
 _FORMS = {
+    "alpha_asymmetry": (_PLASTIC,),
+    "eccentric_mass": (_PLASTIC,),
     "compliance": (
         Parameter("fall", 0.5, 0.4, "1", 0.0, 1.0, meaning="share that falls with the overturning moment"),
     ),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Literal
@@ -33,6 +34,8 @@ from daq_app.gap.blind.world.events.scene import stage
 from daq_app.gap.blind.world.laboratories.numerics import Numerics
 from daq_app.gap.blind.world.sensors.chain import Place, quiet_signals
 from daq_app.gap.blind.world.wall import Wall
+from sim_hardware.dynamics import Body, Restitution, simulate_motion
+from sim_hardware.dynamics import Release as SimulatedRelease
 
 THETA0 = -0.05
 
@@ -90,6 +93,27 @@ def test_what_leans_is_the_same_by_forces_and_by_lever_arms(wall: Wall, effects:
     assert abs(plain.impacts[1].time - contact.impacts[1].time) > 0.01
     for mine, theirs in zip(contact.impacts[:6], events.impacts, strict=False):
         assert mine.time == pytest.approx(theirs.time, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("world", "name", "parameter", "size"),
+    [
+        ({"e_m": -0.006}, "eccentric_mass", "e", -0.006),
+        ({"delta_rad": 0.004}, "alpha_asymmetry", "delta", 0.004),
+    ],
+)
+def test_forces_make_r_differ_by_side_as_the_simulator_says_of_plastic_impacts(
+    wall: Wall, world: dict[str, float], name: str, parameter: str, size: float
+) -> None:
+    contact, _ = both(wall, {name: world})
+    by_side = {s: np.mean([i.restitution for i in contact.impacts[:12] if i.side == s]) for s in (1, -1)}
+    body = Body(wall.alpha, wall.p, math.hypot(wall.half_width, wall.centroid_height), 5000.0, 1.2)
+    r = Restitution(plastic_restitution(wall))
+    told = simulate_motion(body, SimulatedRelease(THETA0), r, {name: {parameter: size, "plastic": 1.0}})
+    from_minus, from_plus = (told.velocity_after_rad_s / told.velocity_before_rad_s)[:2]
+    # r is read from the engine to half a per cent, and to a twentieth of that from one impact to the next.
+    assert by_side[1] - by_side[-1] == pytest.approx(from_plus - from_minus, abs=7e-4)
+    assert abs(from_plus - from_minus) > 2e-3
 
 
 @pytest.mark.parametrize(

@@ -179,6 +179,21 @@ def test_unequal_edges_tilted_base_and_eccentric_mass() -> None:
     )
 
 
+def test_unequal_levers_take_at_a_plastic_impact_what_the_edge_that_comes_down_asks_for() -> None:
+    delta, e = 2e-3, 3e-3
+    edges = HEIGHT * math.tan(ALPHA + delta) - HALF
+    for effects, off in (
+        ({"eccentric_mass": {"e": e, "plastic": 1.0}}, e),
+        ({"alpha_asymmetry": {"delta": delta, "plastic": 1.0}}, -edges),
+    ):
+        ratio = simulated(effects)
+        taken = (ratio.velocity_after_rad_s / ratio.velocity_before_rad_s)[:6]
+        # The first swing ends on the edge of the − side, whose lever is longer by e.
+        inertia = [GYRATION2 + HEIGHT**2 + (HALF + side * off) ** 2 for side in (1, -1, 1, -1, 1, -1)]
+        plastic = 1.0 / np.array(inertia)
+        np.testing.assert_allclose(taken / R, plastic / plastic[:2].mean(), rtol=2e-5)
+
+
 def test_wear_counts_the_impacts_of_the_whole_campaign() -> None:
     loss, before = 0.03, 250
     effects = {"crushing": {"loss": loss}}

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.config.rig import G_M_S2
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from sim_hardware.dynamics import parameters as par
@@ -17,7 +18,7 @@ from sim_hardware.dynamics.effects import MOTION_EFFECTS
 
 TOLERANCE = 1e-10
 """Local error of the integrator, relative to the half-cycle: times good to nanoseconds."""
-_OF_IMPACTS = (par.R_SLOPE, par.R_SLOPE_SPEED, par.R_ASYMMETRY, par.CRUSH_R)
+_OF_IMPACTS = (par.R_SLOPE, par.R_SLOPE_SPEED, par.R_ASYMMETRY, par.CRUSH_R, par.UNEVEN_IMPACT)
 _BESIDE = ("flexible_wall", "yaw", "twist", "sliding", "corner_twist")
 """Effects that do not move the rotation of the joint."""
 _INDEX = {
@@ -95,6 +96,18 @@ def _curvature(run: RockingRun, values: Mapping[str, float], speeds: FloatArray)
     return power * (speeds * np.log(np.maximum(speeds, 1e-6) / middle) - off) + square * off**2
 
 
+def _uneven_impact(values: Mapping[str, float]) -> float:
+    """What an impact that ends a swing to +x takes beyond the mean of both sides, relative to r.
+
+    As `sim_hardware.dynamics.terms.uneven_impact`, with a share of each effect's own.
+    """
+    alpha, p = values["alpha"], values["p"]
+    lever = values.get("eccentric_mass.e", 0.0) * values.get("eccentric_mass.plastic", 0.0)
+    unequal = values.get("alpha_asymmetry.delta", 0.0) * values.get("alpha_asymmetry.plastic", 0.0)
+    lever -= unequal * values["half_base"] / (math.sin(alpha) * math.cos(alpha))
+    return 2.0 * lever * p * p * math.sin(alpha) / G_M_S2
+
+
 def restitution_of(
     run: RockingRun,
     values: Mapping[str, float],
@@ -109,6 +122,7 @@ def restitution_of(
     r = values["r"] + values.get("restitution_slope.k", 0.0) * (speeds - 0.2)
     r = r + _curvature(run, values, speeds)
     r = r + sides * values.get("restitution_asymmetry.d", 0.0)
+    r = r * (1.0 - sides * _uneven_impact(values))
     if "free_restitution.k0" in values:
         knots = [values[f"free_restitution.k{i}"] for i in range(len(PROBE_SPEEDS))]
         r = r + np.interp(speeds, PROBE_SPEEDS, knots) + sides * values["free_restitution.side"]
