@@ -6,7 +6,7 @@ many channels, so that a few wrong ones cannot spoil it.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -34,16 +34,39 @@ LOW_PASS_HZ = 12.0
 """Impacts ring above this."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """Channels of one run that follow the rotation, smoothed and thinned out: what they show, and should."""
+
+    measured: FloatArray
+    """(k, n)"""
+    expected: FloatArray
+    """(k, n)"""
+    ids: list[str]
+
+    def of(self, run: GapRun, group: list[str]) -> tuple[FloatArray, FloatArray]:
+        """(shown, due) of channels of one kind, (k, n) each."""
+        at = [self.ids.index(name) for name in group]
+        measured, expected = self.measured[at], self.expected[at]
+        # What is read away from impacts only has the edges of that choice, which are late with nothing.
+        away = _away_from_impacts(run.sensors[run.place(group[0])])
+        return measured, expected if away else _as_late_as(measured, expected)
+
+
 def mend(runs: list[GapRun]) -> tuple[list[GapRun], Wiring]:
     """Runs with reversed channels turned round and exchanged ones put back, and what was done."""
-    wirings = [_check(run) for run in runs]
-    first = wirings[0]
-    same = all(w.exchanged == first.exchanged for w in wirings)
-    kept = Wiring(
-        tuple(name for name in first.reversed_ids if all(name in w.reversed_ids for w in wirings)),
-        first.exchanged if same else (),
-        min(w.places for w in wirings) if same else 0,
-    )
+    seen = [_compare(run) for run in runs]
+    ids = [name for name in seen[0].ids if all(name in one.ids for one in seen)]
+    exchanged: list[tuple[str, str]] = []
+    places = 0
+    for group in _groups(runs[0], ids):
+        order, turn = _order_of_all([one.of(run, group) for run, one in zip(runs, seen, strict=True)])
+        exchanged += [(group[i], group[j]) for i, j in enumerate(order) if i != j]
+        places = max(places, turn)
+    turned = [_turned(run, one) for run, one in zip(runs, seen, strict=True)]
+    involved = {name for pair in exchanged for name in pair}
+    reversed_ids = [n for n in ids if n not in involved and all(n in names for names in turned)]
+    kept = Wiring(tuple(reversed_ids), tuple(exchanged), places)
     if kept == Wiring():
         return runs, kept
     return [_mended(run, kept) for run in runs], kept
@@ -73,31 +96,16 @@ def _mended(run: GapRun, wiring: Wiring) -> GapRun:
     )
 
 
-def _check(run: GapRun) -> Wiring:
-    measured, expected, ids = _compare(run)
-    if not ids:
-        return Wiring()
-    size = np.sum(expected**2, axis=1)
-    slope = np.array([_slope(run, name, y, e) for name, y, e in zip(ids, measured, expected, strict=True)])
+def _turned(run: GapRun, seen: _Seen) -> list[str]:
+    """Channels that show the opposite of what they should."""
+    size = np.sum(seen.expected**2, axis=1)
     # A channel that should show next to nothing cannot be judged by its slope.
-    lively = size > LIVELY * np.median(size)
-    exchanged: list[tuple[str, str]] = []
-    parted = {sensor.id for sensor in run.sensors if _away_from_impacts(sensor)}
-    places = 0
-    for group in _groups(run, ids):
-        at = [ids.index(name) for name in group]
-        # What is read away from impacts only has the edges of that choice, which are late with nothing.
-        due = expected[at] if group[0] in parted else _as_late_as(measured[at], expected[at])
-        order, turn = _order(_misfits(measured[at], due))
-        exchanged += [(group[i], group[j]) for i, j in enumerate(order) if i != j]
-        places = max(places, turn)
-    involved = {name for pair in exchanged for name in pair}
-    turned = tuple(
+    lively = size > LIVELY * np.median(size) if size.size else size > 0.0
+    return [
         name
-        for name, s, alive in zip(ids, slope, lively, strict=True)
-        if alive and s < REVERSED_BELOW and name not in involved
-    )
-    return Wiring(turned, tuple(exchanged), places)
+        for name, y, e, alive in zip(seen.ids, seen.measured, seen.expected, lively, strict=True)
+        if alive and _slope(run, name, y, e) < REVERSED_BELOW
+    ]
 
 
 def _slope(run: GapRun, name: str, measured: FloatArray, expected: FloatArray) -> float:
@@ -132,6 +140,21 @@ def _as_late_as(measured: FloatArray, expected: FloatArray) -> FloatArray:
     late = common_lateness(measured, expected, WORK_HZ)
     at = np.arange(expected.shape[1])
     return np.array([np.interp(at - late, at, row) for row in expected])
+
+
+def _order_of_all(shown: list[tuple[FloatArray, FloatArray]]) -> tuple[list[int], int]:
+    """The order of all runs together: a test with small rotations says little, and overrules no other.
+
+    None where plugs are elsewhere in some test: there the order fits worse than none.
+    """
+    order, turn = _order(_misfits(*(np.hstack(rows) for rows in zip(*shown, strict=True))))
+    at = np.arange(len(order))
+    moved = at != order
+    for measured, due in shown:
+        misfit = _misfits(measured, due)
+        if misfit[at, order][moved].sum() > misfit[at, at][moved].sum():
+            return at.tolist(), 0
+    return order, turn
 
 
 def _order(misfit: FloatArray) -> tuple[list[int], int]:
@@ -172,8 +195,8 @@ def _misfits(measured: FloatArray, expected: FloatArray) -> FloatArray:
     return np.asarray(left / np.maximum(np.maximum(power, due), 1e-30))
 
 
-def _compare(run: GapRun) -> tuple[FloatArray, FloatArray, list[str]]:
-    """(measured, expected, ids) of all channels that follow the rotation, smoothed and thinned out."""
+def _compare(run: GapRun) -> _Seen:
+    """All channels that follow the rotation."""
     step = max(round(run.rate_hz / WORK_HZ), 1)
     low_pass = butter(3, LOW_PASS_HZ, fs=WORK_HZ, output="sos")
     reading = np.flatnonzero(np.isfinite(run.channels).all(axis=1)).tolist()
@@ -181,18 +204,19 @@ def _compare(run: GapRun) -> tuple[FloatArray, FloatArray, list[str]]:
     smooth = dict(zip(reading, sosfiltfilt(low_pass, thinned), strict=True)) if reading else {}
     theta = _median_rotation(run, smooth)
     if theta is None:
-        return np.zeros((0, 0)), np.zeros((0, 0)), []
-    acceleration = np.gradient(np.gradient(theta, step / run.rate_hz), step / run.rate_hz)
+        return _Seen(np.zeros((0, 0)), np.zeros((0, 0)), [])
+    speed = np.gradient(theta, step / run.rate_hz)
+    motion = (theta, speed, np.gradient(speed, step / run.rate_hz))
     away = np.abs(theta) > FAR_FROM_UPRIGHT * np.max(np.abs(theta))
     measured, expected, ids = [], [], []
     for i, values in smooth.items():
-        shape = _expected(run, i, theta, acceleration)
+        shape = _expected(run, i, *motion)
         if shape is not None:
             seen = away if _away_from_impacts(run.sensors[i]) else 1.0
             measured.append(values * seen)
             expected.append(shape * seen)
             ids.append(run.sensors[i].id)
-    return np.array(measured), np.array(expected), ids
+    return _Seen(np.array(measured), np.array(expected), ids)
 
 
 def _away_from_impacts(sensor: Sensor) -> bool:
@@ -216,7 +240,9 @@ def _median_rotation(run: GapRun, smooth: dict[int, FloatArray]) -> FloatArray |
     return np.asarray(np.median(wires, axis=0), dtype=float) if len(wires) >= 3 else None
 
 
-def _expected(run: GapRun, i: int, theta: FloatArray, acceleration: FloatArray) -> FloatArray | None:
+def _expected(
+    run: GapRun, i: int, theta: FloatArray, speed: FloatArray, acceleration: FloatArray
+) -> FloatArray | None:
     """What a channel shows of a rotation of small size; None for one that sees none of it."""
     sensor = run.sensors[i]
     x, _, z = sensor.position_m
@@ -228,7 +254,7 @@ def _expected(run: GapRun, i: int, theta: FloatArray, acceleration: FloatArray) 
             toward = 1.0 if sensor.anchor_m is None or sensor.anchor_m[0] > x else -1.0
             return toward * z * theta
         case "accelerometer" if sensor.axis == "x" and not sensor.ac_coupled:
-            return z * acceleration - GRAVITY_M_S2 * theta
+            return z * acceleration - GRAVITY_M_S2 * theta - speed**2 * (x - half * np.sign(theta))
         case "accelerometer" if sensor.axis == "z" and not sensor.ac_coupled:
             return -acceleration * (x - half * np.sign(theta))
         case "tiltmeter" if sensor.axis == "x":

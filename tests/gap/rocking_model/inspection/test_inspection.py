@@ -163,6 +163,25 @@ def test_a_plug_is_scanned_when_it_was_and_after_the_same_one_wherever_its_senso
     assert crosstalk(mended, [place["WP-4"]]) == pytest.approx(of_lvdt)
 
 
+def test_a_small_test_does_not_overrule_the_others_about_plugs() -> None:
+    """Slow noise is a twentieth of what one accelerometer shows there, and less in a large test."""
+    small, large = simulate({}, (0.12, 0.5))
+    for run in (small, large):
+        _exchange(run, "AC-1", "AC-2")
+    place, at = small.place("AC-2"), np.arange(small.channels.shape[1])
+    shown = small.channels[place]
+    shown += 0.12 * float(np.std(shown)) * np.sin(2.0 * np.pi * 0.7 / small.rate_hz * at)
+    assert mend([small])[1].exchanged == ()
+    assert dict(mend([small, large])[1].exchanged) == {"AC-1": "AC-2", "AC-2": "AC-1"}
+
+
+def test_plugs_that_are_exchanged_in_some_tests_only_are_put_back_in_none() -> None:
+    small, large = simulate({}, (0.25, 0.5))
+    _exchange(large, "WP-1", "WP-4")
+    assert mend([large])[1].exchanged
+    assert mend([small, large])[1].exchanged == ()
+
+
 def test_exchanged_plugs_of_wires_that_are_late_are_put_back() -> None:
     """What is left of a signal that comes 30 ms late is as much as an exchange leaves of it."""
     runs = simulate({"lag@wire": {"tau": 0.03}}, ONE)
