@@ -101,9 +101,11 @@ def _uneven_impact(values: Mapping[str, float]) -> float:
 
     As `sim_hardware.dynamics.terms.uneven_impact`, with a share of each effect's own.
     """
-    alpha, p = values["alpha"], values["p"]
     lever = values.get("eccentric_mass.e", 0.0) * values.get("eccentric_mass.plastic", 0.0)
     unequal = values.get("alpha_asymmetry.delta", 0.0) * values.get("alpha_asymmetry.plastic", 0.0)
+    if lever == unequal == 0.0:
+        return 0.0
+    alpha, p = values["alpha"], values["p"]
     lever -= unequal * values["half_base"] / (math.sin(alpha) * math.cos(alpha))
     return 2.0 * lever * p * p * math.sin(alpha) / G_M_S2
 
