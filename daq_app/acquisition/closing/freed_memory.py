@@ -28,13 +28,13 @@ _LEAST_RESERVE_BYTES: Final = 16 * 2**20
 process."""
 _MOST_MAPPED: Final = 65536
 """Blocks that the library maps on their own unless told otherwise (mallopt(3))."""
-_ARGUMENTS: Final = {
-    "mallopt": (ctypes.c_int, ctypes.c_int),
-    "malloc_trim": (ctypes.c_size_t,),
-    "malloc": (ctypes.c_size_t,),
-    "free": (ctypes.c_void_p,),
+_SIGNATURES: Final = {
+    "mallopt": (ctypes.c_int, (ctypes.c_int, ctypes.c_int)),
+    "malloc_trim": (ctypes.c_int, (ctypes.c_size_t,)),
+    "malloc": (ctypes.c_void_p, (ctypes.c_size_t,)),
+    "free": (None, (ctypes.c_void_p,)),
 }
-_RESULTS: Final = {"malloc": ctypes.c_void_p, "free": None}
+"""Type of the result and types of the arguments of each function of the C library that is called here."""
 
 
 @cache
@@ -44,8 +44,7 @@ def _of_c_library(function: str) -> Callable[..., Any] | None:
     # musl has neither mallopt nor malloc_trim.
     found: Any = getattr(ctypes.CDLL(None), function, None)
     if found is not None:
-        found.restype = _RESULTS.get(function, ctypes.c_int)
-        found.argtypes = _ARGUMENTS[function]
+        found.restype, found.argtypes = _SIGNATURES[function]
     return cast("Callable[..., Any] | None", found)
 
 

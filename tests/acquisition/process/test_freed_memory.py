@@ -133,9 +133,9 @@ def test_pages_between_what_is_still_in_use_go_back_to_the_system() -> None:
     assert given_back < 30.0
 
 
-def test_it_is_nothing_where_the_library_has_no_such_function() -> None:
+def test_nothing_is_done_where_the_library_has_no_such_function() -> None:
     program = (
         "import ctypes; from daq_app.acquisition.closing import freed_memory\n"
-        "ctypes.CDLL = lambda name: object(); freed_memory.give_back()"
+        "ctypes.CDLL = lambda name: object(); freed_memory.give_back(); freed_memory.renew_reserve()"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
