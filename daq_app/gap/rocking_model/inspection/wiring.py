@@ -150,6 +150,8 @@ def _order_of_all(shown: list[tuple[FloatArray, FloatArray]]) -> tuple[list[int]
     order, turn = _order(_misfits(*(np.hstack(rows) for rows in zip(*shown, strict=True))))
     at = np.arange(len(order))
     moved = at != order
+    if not moved.any():
+        return order, turn
     for measured, due in shown:
         misfit = _misfits(measured, due)
         if misfit[at, order][moved].sum() > misfit[at, at][moved].sum():
