@@ -26,7 +26,7 @@ _PLASTIC: Final = Parameter(
     0.0,
     1.0,
 )
-"""Walls lose another share of their speed than a plastic impact takes, and its difference is unknown."""
+"""A wall loses another share of its speed than a plastic impact takes. How this differs by side is open."""
 
 MOTION_EFFECTS: Final[tuple[EffectSpec, ...]] = (
     EffectSpec(

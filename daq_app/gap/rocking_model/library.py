@@ -116,8 +116,8 @@ def _parameter(spec: EffectSpec, parameter: SpecParameter) -> Parameter:
 _PLASTIC = Parameter(
     "plastic", 0.5, 0.5, "1", 0.0, 1.0, meaning="share of a plastic impact's difference of r"
 )
-"""Unequal levers make r of the two sides differ where impacts are plastic. Walls lose another share of their
-speed, and their r may differ by anything from nothing to that."""
+"""Unequal levers make r of the two sides differ where impacts are plastic. A real wall loses another share of
+its speed than a plastic impact takes: its r may differ by anything from nothing to that."""
 _FORMS = {
     "alpha_asymmetry": (_PLASTIC,),
     "eccentric_mass": (_PLASTIC,),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +25,7 @@ from daq_app.gap.rocking_model.prediction.vector import (
 )
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import prepare
+from sim_hardware.dynamics import Body, Release, Restitution, simulate_motion
 from sim_hardware.dynamics import parameters as par
 from tests.support.gap.simulated_campaign import campaign
 from tests.support.simulated_wall import short_rig, simulate
@@ -201,3 +203,19 @@ def test_a_curvature_of_r_is_neither_a_level_nor_a_slope_of_it(run: RockingRun) 
         assert min(slow, fast) > 1e-4
     assert added("slope_square.c")[3] == pytest.approx(0.1 * middle**2)
     assert added("slope_power.c")[3] == pytest.approx(0.1 * middle * (2 * np.log(2.0) - 1.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "size"), [("eccentric_mass", "e", 3e-3), ("alpha_asymmetry", "delta", -2e-3)]
+)
+def test_unequal_levers_make_r_of_the_two_sides_that_of_the_simulator(
+    run: RockingRun, name: str, parameter: str, size: float
+) -> None:
+    survey = run.survey
+    body = Body(survey.alpha_rad, survey.p_rad_s, survey.half_base_m / math.sin(survey.alpha_rad), 5000.0)
+    motion = simulate_motion(body, Release(0.07), Restitution(0.9), {name: {parameter: size, "plastic": 0.7}})
+    before, after = motion.velocity_before_rad_s[:4], motion.velocity_after_rad_s[:4]
+    values = {**at_priors(run), "r": 0.9, f"{name}.{parameter}": size, f"{name}.plastic": 0.7}
+    found = restitution_of(run, values, np.abs(before), -np.sign(before), np.arange(4))
+    assert abs(found[0] - found[1]) > 5e-4
+    assert found == pytest.approx(after / before, abs=1e-9)
