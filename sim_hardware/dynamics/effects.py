@@ -20,7 +20,7 @@ _PLASTIC: Final = Parameter(
     "1",
     0.0,
     1.0,
-    "share s of a plastic impact's difference of r between the sides",
+    "share λ of a plastic impact's difference of r between the sides",
     0.0,
     par.UNEVEN_IMPACT,
     0.0,
@@ -144,7 +144,7 @@ MOTION_EFFECTS: Final[tuple[EffectSpec, ...]] = (
         "alpha_asymmetry",
         "geometry",
         "the two edges have different α",
-        "α± = α ± δ, + for swings to +x; r as with u± = b/2 ± δ h/cos²α",
+        "α± = α ± δ, + for swings to +x; r as with e = −δ h/cos²α (eccentric_mass)",
         "unequal edges; angular momentum about the edge that the wall comes down on",
         (
             Parameter("delta", "rad", -5e-3, 5e-3, "half the difference of α", index=par.ALPHA_ASYMMETRY),
@@ -167,7 +167,7 @@ MOTION_EFFECTS: Final[tuple[EffectSpec, ...]] = (
         "eccentric_mass",
         "geometry",
         "the centre of mass is off the middle of the base",
-        "u± = b/2 ∓ e; r of impacts that end a swing to ±x is r (1 ∓ 2 s e p² sin α / g)",
+        "u± = b/2 ∓ e; r of impacts that end a swing to ±x is r (1 ∓ 2 λ e p² sin α / g)",
         "eccentric block; angular momentum about the edge that the wall comes down on",
         (
             Parameter("e", "m", -7e-3, 7e-3, "eccentricity towards +x", index=par.ECCENTRICITY),
