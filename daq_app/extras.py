@@ -13,6 +13,7 @@ EXTRA_OF: Final[Mapping[str, str]] = {
     "matplotlib": "report",
     "jinja2": "report",
     "fpdf": "report",
+    "pypdf": "report",
     "pyarrow": "formats",
     "xarray": "formats",
     "h5netcdf": "formats",

@@ -10,10 +10,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from daq_app.campaign.names import TestName, TestSeries
-from daq_app.campaign.plan import Campaign, PlannedTest
+
+if TYPE_CHECKING:
+    from daq_app.campaign.plan import Campaign, PlannedTest
 
 
 class TestVerdict(StrEnum):

@@ -8,8 +8,8 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Annotated, Any, Final
 
 import typer
@@ -27,6 +27,9 @@ class _Entry:
     """Modules of daq_app.cli with a ``register(app)`` function that make the command."""
     help: str
     """First sentence of its help, as the command itself has it (a test compares them)."""
+    preloads: Mapping[tuple[str, ...], tuple[str, ...]] = field(default_factory=dict)
+    """Words of a command line, its first one first → modules of daq_app that processes of the command begin
+    to import before it is loaded itself."""
 
 
 _COMMANDS: Final[Mapping[str, _Entry]] = {
@@ -53,7 +56,15 @@ _COMMANDS: Final[Mapping[str, _Entry]] = {
         "Write the run of a simulated test without real time, through the same sensors and modules.",
     ),
     "keys": _Entry(("record.commands",), "Keys of viewers elsewhere, and of other recorders to be trusted."),
-    "campaign": _Entry(("campaign.commands",), "Plan and follow a campaign of tests."),
+    "campaign": _Entry(
+        ("campaign.commands",),
+        "Plan and follow a campaign of tests.",
+        # The program itself too, which each process would import anew.
+        preloads={
+            ("report",): ("campaign.report.drawing", "campaign.report.report_tables", "cli.app"),
+            ("report", "--anew"): ("rocking.analysis.analyse", "campaign.summaries.of_run"),
+        },
+    ),
     "publish": _Entry(
         ("campaign.publish",),
         "Make a folder that a repository takes: data, tables, figures, README, licence, metadata, checksums.",
@@ -111,8 +122,23 @@ class LazyCommands(PlainGroup):
             if ni_daqmx.is_asked_for(args) and not {"--help", "-h"} & {*args} and not ni_daqmx.is_installed():
                 print(f"Hardware: {ni_daqmx.NOT_INSTALLED}. {ni_daqmx.ADVICE}", file=sys.stderr)
                 raise typer.Exit(_EXIT_HARDWARE)
+            _preload(args)
             self.commands[args[0]] = load_command(args[0])
         return super().resolve_command(ctx, args)
+
+
+def _preload(args: Sequence[str]) -> None:
+    """Begin to import what processes of the command will need, on another core, unless help is asked for."""
+    modules = [
+        module
+        for words, needed in _COMMANDS[args[0]].preloads.items()
+        if args[1:2] == [words[0]] and {*words} <= {*args}
+        for module in needed
+    ]
+    if modules and not {"--help", "-h"} & {*args}:
+        from daq_app.workers import warm_up
+
+        warm_up(*(f"daq_app.{module}" for module in modules))
 
 
 def load_command(name: str) -> Any:

@@ -1,12 +1,33 @@
-"""Channel-configuration layer: rig model, hardware catalogue, planner."""
+"""Channel-configuration layer: rig model, hardware catalogue, planner.
 
-from daq_app.config.connection import Connection, parse_connection
-from daq_app.config.errors import ConfigError, Problem
-from daq_app.config.loader import load_rig, parse_rig
-from daq_app.config.planning.plan import PlannedChannel, PlannedTask, PlanNote, TaskPlan
-from daq_app.config.planning.planner import plan_tasks
-from daq_app.config.rig import Channel, Rig
-from daq_app.config.scaling import Scaling
+Each name is loaded when it is first used: what only words a number needs no catalogue of products.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from daq_app.config.connection import Connection, parse_connection
+    from daq_app.config.errors import ConfigError, Problem
+    from daq_app.config.loader import load_rig, parse_rig
+    from daq_app.config.planning.plan import PlannedChannel, PlannedTask, PlanNote, TaskPlan
+    from daq_app.config.planning.planner import plan_tasks
+    from daq_app.config.rig import Channel, Rig
+    from daq_app.config.scaling import Scaling
+
+_PLACES = {
+    "connection": ("Connection", "parse_connection"),
+    "errors": ("ConfigError", "Problem"),
+    "loader": ("load_rig", "parse_rig"),
+    "planning.plan": ("PlannedChannel", "PlannedTask", "PlanNote", "TaskPlan"),
+    "planning.planner": ("plan_tasks",),
+    "rig": ("Channel", "Rig"),
+    "scaling": ("Scaling",),
+}
+"""Module below this one → the names that it brings."""
+_MODULE_OF = {name: module for module, names in _PLACES.items() for name in names}
 
 __all__ = [
     "Channel",
@@ -24,3 +45,16 @@ __all__ = [
     "parse_rig",
     "plan_tasks",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Load the module of a name that is asked for."""
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

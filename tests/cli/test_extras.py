@@ -25,6 +25,7 @@ def _daq_app(missing: str, *arguments: str, cwd: Path) -> subprocess.CompletedPr
     [
         ("numba", "sim", ["gap", "effects"]),
         ("jinja2", "report", ["campaign", "report", "."]),
+        ("pypdf", "report", ["campaign", "report", "."]),
         ("PySide6", "window", ["monitor", "--connect", "tcp://127.0.0.1:1"]),
     ],
 )

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from daq_app.cli.app import LazyCommands, build_app, load_command
+from daq_app.cli.app import _COMMANDS, LazyCommands, build_app, load_command
 
 NAMES = LazyCommands(name="daq-app").list_commands(None)
 
@@ -59,3 +59,42 @@ def test_help_lists_every_command_and_an_unknown_one_is_told() -> None:
     wrong = CliRunner().invoke(build_app(), ["analyze"])
     assert wrong.exit_code == 2
     assert "No such command" in wrong.stderr
+
+
+def _modules_after(code: str) -> set[str]:
+    code += "\nimport sys; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_processes_that_draw_load_nothing_that_reads_runs() -> None:
+    """They are awaited: the report's first figure begins when their modules are there."""
+    preloads = _COMMANDS["campaign"].preloads[("report",)]
+    loaded = _modules_after("\n".join(f"import daq_app.{module}" for module in preloads))
+    assert {
+        "matplotlib.figure",
+        "matplotlib.backends.backend_pdf",
+        "matplotlib.backends.backend_svg",
+    } <= loaded
+    assert not {"h5py", "pydantic", "psutil", "scipy.special", "jinja2"} & loaded
+
+
+_DRAWING, _ANALYSIS = "daq_app.campaign.report.drawing", "daq_app.rocking.analysis.analyse"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "begun"),
+    [
+        (["report", "no-such-folder"], {_DRAWING}),
+        (["report", "no-such-folder", "--anew"], {_DRAWING, _ANALYSIS}),
+        (["report", "--anew", "--help"], set()),
+        (["status", "no-such-folder", "--anew"], set()),
+    ],
+)
+def test_a_report_begins_its_processes_early(
+    monkeypatch: pytest.MonkeyPatch, arguments: list[str], begun: set[str]
+) -> None:
+    warmed: list[str] = []
+    monkeypatch.setattr("daq_app.workers.warm_up", lambda *modules: warmed.extend(modules))
+    CliRunner().invoke(build_app(), ["campaign", *arguments])
+    assert {_DRAWING, _ANALYSIS} & {*warmed} == begun

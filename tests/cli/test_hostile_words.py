@@ -17,7 +17,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner, Result
 
-from daq_app.campaign.report.tables import write_csv
+from daq_app.campaign.report.csv_files import csv_files
+from daq_app.campaign.report.report_tables import ReportTables
 from daq_app.campaign.result.report import write_result
 from daq_app.campaign.summaries.summary import MethodResult, TestSummary
 from daq_app.cli.app import build_app
@@ -164,9 +165,9 @@ def test_reasons_add_no_tag_to_a_page_and_stop_no_pdf(tmp_path: Path) -> None:
     document = pypdfium2.PdfDocument(pdf)
     text = " ".join(page.get_textpage().get_text_range() for page in document)
     assert "cmd|" in text
-    tables = write_csv(tmp_path, [], [dataclasses.replace(plain, reasons=ALL_KNOWN)], [], [])
-    for table in tables:
-        assert formulas(table.read_text(encoding="utf-8"), ",") == []
+    hostile = dataclasses.replace(plain, reasons=ALL_KNOWN)
+    for _, table in csv_files(ReportTables("plain", (), (), (), (hostile,), ())):
+        assert formulas(table, ",") == []
 
 
 @given(hostile())

@@ -17,13 +17,12 @@ from daq_app.campaign.recorded import orphans, verdicts_of
 from daq_app.campaign.status import RecordedTest
 from daq_app.campaign.summaries.of_run import (
     Answer,
-    Failure,
     failure_of_journal,
     kept_answer,
     read_and_summarise,
 )
 from daq_app.campaign.summaries.store import NotKept
-from daq_app.campaign.summaries.summary import TestSummary
+from daq_app.campaign.summaries.summary import Failure, TestSummary
 from daq_app.campaign.verdicts import OperatorVerdict
 from daq_app.rocking.analysis.options import AnalysisOptions
 from daq_app.runfile.folder import find_runs

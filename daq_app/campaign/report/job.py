@@ -15,7 +15,7 @@ import psutil
 
 from daq_app.campaign.plan import Campaign
 from daq_app.campaign.report.collect import Collected, collect
-from daq_app.campaign.report.write import write_report
+from daq_app.campaign.report.write import WrittenReport, write_report
 from daq_app.campaign.status import CampaignStatus
 from daq_app.config import ConfigError
 from daq_app.runfile import RunFileError
@@ -23,7 +23,7 @@ from daq_app.runfile import RunFileError
 
 def write_collected(
     campaign: Campaign, folder: Path, found: Collected, out: Path, *, at_once: bool
-) -> list[Path]:
+) -> WrittenReport:
     """Write the report of what was collected in `folder`; raises `ValueError` where nothing was analysed."""
     made = time.strftime("%Y-%m-%d %H:%M", time.localtime())
     footer = f"Made {made} from {len(found.recorded)} recorded tests in {folder.name}. {found.origin}"

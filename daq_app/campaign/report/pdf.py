@@ -1,13 +1,13 @@
-"""The campaign report as PDF: the same tables and figures as the page, one after the other."""
+"""Parts of the campaign report as PDF: the same tables and figures as the page."""
 
 from __future__ import annotations
 
 import io
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
-from itertools import accumulate
-from typing import Final
+from itertools import accumulate, chain
+from typing import Any, Final
 
 import matplotlib as mpl
 from matplotlib.backends.backend_pdf import PdfPages
@@ -18,10 +18,9 @@ from matplotlib.textpath import text_to_path
 from matplotlib.transforms import Bbox
 
 from daq_app.campaign.report import tables
-from daq_app.campaign.report.captioned import PLAIN_TEXT, campaign_figures
+from daq_app.campaign.report.captioned import PLAIN_TEXT, CaptionedFigure
 from daq_app.campaign.report.number_words import interval, number, signed
-from daq_app.campaign.summaries.of_run import Failure
-from daq_app.campaign.summaries.summary import TestSummary
+from daq_app.campaign.summaries.summary import Failure, TestSummary
 from daq_app.config.shown_text import one_line
 
 _ROWS = 40
@@ -38,38 +37,51 @@ _FONT: Final = FontProperties(size=9)
 _HEADER_FONT: Final = FontProperties(size=9, weight="bold")
 
 
-def report_pdf(
+def first_pages(
+    title: str, restitution: Sequence[tables.RestitutionRow], repetitions: Sequence[tables.RepetitionRow]
+) -> bytes:
+    """What stands before the figures: Table 4.1 and the effect of the repetitions."""
+    pages = [_tables(title, "Table 4.1: coefficient of restitution", *_restitution_rows(restitution))]
+    if repetitions:
+        pages.append(_tables(title, "Effect of the repetitions", *_repetition_rows(repetitions)))
+    return _document(title, chain(*pages))
+
+
+def last_pages(
     title: str,
     places: Sequence[tables.PlaceRow],
-    restitution: Sequence[tables.RestitutionRow],
-    repetitions: Sequence[tables.RepetitionRow],
     tests: Sequence[TestSummary],
     failures: Sequence[Failure],
 ) -> bytes:
-    """A whole document."""
+    """What stands behind the figures: Table 3.2, all tests, and the runs without an analysis."""
+    pages = [
+        _tables(title, "Table 3.2: sequence and status", *_place_rows(places)),
+        _tables(title, "All tests", *_test_rows(tests)),
+    ]
+    if failures:
+        rows = [[failure.test, failure.path.name, _wrapped(failure.reason)] for failure in failures]
+        pages.append(_tables(title, "Not analysed", ["Test", "Run", "Why"], rows))
+    return _document(title, chain(*pages))
+
+
+def figure_page(picture: CaptionedFigure) -> bytes:
+    """A page with a figure and its caption, which is added to the figure."""
+    figure = picture.figure
+    width, height = figure.get_size_inches()
+    caption = in_lines(picture.caption, 0.98 * width)
+    figure.text(0.02, -0.02, "\n".join(caption), fontsize=9, va="top")
+    # Room for the caption below: a tight box would lay out and draw everything once more to find it.
+    low = -0.6 - 0.2 * len(caption)
+    box = Bbox([[-_MARGIN, low], [width + _MARGIN, height + _MARGIN]])
+    return _document(picture.name, [figure], bbox_inches=box)
+
+
+def _document(title: str, pages: Iterable[Figure], **how: Any) -> bytes:
+    """The pages in their order; each is made when its turn comes, with `how` as `savefig` takes it."""
     buffer = io.BytesIO()
-    with mpl.rc_context(PLAIN_TEXT), PdfPages(buffer, metadata={"Title": title}) as pages:
-        for page in _tables(title, "Table 4.1: coefficient of restitution", *_restitution_rows(restitution)):
-            pages.savefig(page)
-        if repetitions:
-            for page in _tables(title, "Effect of the repetitions", *_repetition_rows(repetitions)):
-                pages.savefig(page)
-        for picture in campaign_figures(tests):
-            figure = picture.figure
-            width, height = figure.get_size_inches()
-            caption = in_lines(picture.caption, 0.98 * width)
-            figure.text(0.02, -0.02, "\n".join(caption), fontsize=9, va="top")
-            # Room for the caption below: a tight box would lay out and draw everything once more to find it.
-            low = -0.6 - 0.2 * len(caption)
-            pages.savefig(figure, bbox_inches=Bbox([[-_MARGIN, low], [width + _MARGIN, height + _MARGIN]]))
-        for page in _tables(title, "Table 3.2: sequence and status", *_place_rows(places)):
-            pages.savefig(page)
-        for page in _tables(title, "All tests", *_test_rows(tests)):
-            pages.savefig(page)
-        if failures:
-            rows = [[failure.test, failure.path.name, _wrapped(failure.reason)] for failure in failures]
-            for page in _tables(title, "Not analysed", ["Test", "Run", "Why"], rows):
-                pages.savefig(page)
+    with mpl.rc_context(PLAIN_TEXT), PdfPages(buffer, metadata={"Title": title}) as document:
+        for page in pages:
+            document.savefig(page, **how)
     return buffer.getvalue()
 
 

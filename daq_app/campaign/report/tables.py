@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from daq_app.campaign.report.statistics import GroupMean, random_effects_mean, shared_scatter, student_reach
-from daq_app.campaign.status import CampaignStatus
 from daq_app.campaign.summaries.summary import TestSummary
-from daq_app.config.shown_text import csv_cell
-from daq_app.runfile.durable import write_whole
+
+if TYPE_CHECKING:
+    from daq_app.campaign.status import CampaignStatus
 
 METHODS: Final = ("CRT", "EAV", "fit")
 
@@ -200,96 +197,3 @@ def _mean(tests: Iterable[TestSummary], method: str, *, corrected: bool) -> Grou
     return random_effects_mean(
         [result.r for result in results], [result.standard_error for result in results]
     )
-
-
-def write_csv(
-    folder: Path,
-    places: Sequence[PlaceRow],
-    tests: Sequence[TestSummary],
-    restitution: Sequence[RestitutionRow],
-    repetitions: Sequence[RepetitionRow],
-) -> list[Path]:
-    """Every number of the report as CSV (UTF-8, comma, decimal point); returns the files."""
-    place_header = ("test", "specimen", "level", "theta0_over_alpha", "state", "runs", "remark")
-    place_rows: list[tuple[object, ...]] = [
-        (p.test, p.specimen, p.level, p.theta0_over_alpha, p.state, p.runs, p.remark) for p in places
-    ]
-    mean_header = ("specimen", "method", *_group_header("r"), *_group_header("r_corrected"), "r_max", "ratio")
-    mean_rows: list[tuple[object, ...]] = [
-        (r.specimen, r.method, *_group(r.mean), *_group(r.corrected), r.r_max, r.ratio) for r in restitution
-    ]
-    change_header = ("specimen", "level", "method", *_group_header("r_first"), *_group_header("r_repeated"))
-    change_header += ("change", "change_standard_error", "change_low95", "change_high95")
-    change_rows: list[tuple[object, ...]] = [
-        (
-            *(r.specimen, r.level, r.method, *_group(r.first), *_group(r.repeated)),
-            *(r.change, r.change_standard_error, *r.change_interval95),
-        )
-        for r in repetitions
-    ]
-    return [
-        _write(folder / "table_3_2.csv", place_header, place_rows),
-        _write(folder / "table_4_1.csv", mean_header, mean_rows),
-        _write(folder / "repetitions.csv", change_header, change_rows),
-        _write(folder / "tests.csv", *_test_table(tests)),
-        _write(folder / "half_cycles.csv", *_half_cycle_table(tests)),
-        _write(folder / "points.csv", *_point_table(tests)),
-    ]
-
-
-def _group_header(name: str) -> tuple[str, ...]:
-    parts = ("", "_standard_error", "_low95", "_high95", "_scatter", "_tests")
-    return tuple(name + part for part in parts)
-
-
-def _group(group: GroupMean) -> tuple[object, ...]:
-    return (group.mean, group.standard_error, group.low95, group.high95, group.scatter, group.tests)
-
-
-def _test_table(tests: Sequence[TestSummary]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
-    header = ["test", "run", "specimen", "level", "repetition", "good", "trust"]
-    header += ["reasons", "theta0_rad", "theta0_over_alpha", "impacts", "r_max"]
-    for method in METHODS:
-        header += [f"r_{method}", f"r_{method}_standard_error", f"r_{method}_bias"]
-    rows = []
-    for t in tests:
-        row: list[object] = [t.test, t.run, t.specimen, t.level, t.repetition, t.good, t.trust]
-        row += ["; ".join(t.reasons), t.theta0_rad, t.phi0, len(t.impacts_s), t.r_max]
-        for method in METHODS:
-            result = t.methods.get(method)
-            row += [result.r, result.standard_error, result.bias] if result else ["", "", ""]
-        rows.append(tuple(row))
-    return tuple(header), rows
-
-
-def _half_cycle_table(tests: Sequence[TestSummary]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
-    header = ("test", "n", "impact_s", "peak_rad", "peak_over_alpha", "period_s")
-    rows: list[tuple[object, ...]] = []
-    for t in tests:
-        for n, peak in enumerate(t.peaks_rad):
-            impact = t.impacts_s[n - 1] if 0 < n <= len(t.impacts_s) else ""
-            period = t.periods_s[n - 1] if 0 < n <= len(t.periods_s) else ""
-            rows.append((t.test, n, impact, peak, peak / t.alpha_rad, period))
-    return header, rows
-
-
-def _point_table(tests: Sequence[TestSummary]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
-    rows: list[tuple[object, ...]] = [
-        (t.test, method, impact, r)
-        for t in tests
-        for method, result in t.methods.items()
-        for impact, r in result.points
-    ]
-    return ("test", "method", "impact", "r"), rows
-
-
-def _write(path: Path, header: Sequence[str], rows: Sequence[Sequence[object]]) -> Path:
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(header)
-    writer.writerows([["" if _missing(cell) else csv_cell(cell) for cell in row] for row in rows])
-    return write_whole(path, text.getvalue(), other_name=True)
-
-
-def _missing(cell: object) -> bool:
-    return isinstance(cell, float) and math.isnan(cell)

@@ -5,64 +5,43 @@ What draws is imported by the processes that draw: this module is light.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final, Protocol, TypeVar
 
-from jinja2 import Environment
-
-from daq_app.campaign.pages import page_environment
-from daq_app.campaign.report import tables
-from daq_app.campaign.report.number_words import interval, number, signed
+from daq_app.campaign.report.csv_files import csv_files
+from daq_app.campaign.report.planned_figures import campaign_figures
+from daq_app.campaign.report.report_tables import ReportTables
+from daq_app.campaign.report.tables import RestitutionRow
 from daq_app.campaign.status import CampaignStatus
-from daq_app.campaign.summaries.of_run import Failure
-from daq_app.campaign.summaries.summary import TestSummary
+from daq_app.campaign.summaries.summary import Failure, TestSummary
 from daq_app.runfile.durable import write_whole
 from daq_app.workers import process_pool
 
+_Made = TypeVar("_Made")
+
+
+class _Begin(Protocol):
+    def __call__(self, work: Callable[[], _Made]) -> Callable[[], _Made]:
+        """Begin the work; what is returned waits for its result."""
+
+
+_PROCESSES: Final = 4
+"""Processes that draw at most: of 36 tests, one figure takes a quarter of the time of all on one core."""
+_WRITERS: Final = 4
+"""Files that are flushed to the device at a time. Each waits for the device; more hardly gain (assumed)."""
+
 
 @dataclass(frozen=True, slots=True)
-class Picture:
-    """A drawn figure: the file name it is saved under, its caption, and itself as an SVG element."""
+class WrittenReport:
+    """The files of a report, and the rows of its Table 4.1."""
 
-    name: str
-    caption: str
-    svg: str
-
-
-@dataclass(frozen=True, slots=True)
-class _Content:
-    """All that the report shows."""
-
-    title: str
-    places: tuple[tables.PlaceRow, ...]
-    restitution: tuple[tables.RestitutionRow, ...]
-    repetitions: tuple[tables.RepetitionRow, ...]
-    tests: tuple[TestSummary, ...]
-    failures: tuple[Failure, ...]
-
-    def pictures(self) -> list[Picture]:
-        from daq_app.campaign.report.captioned import campaign_figures
-
-        return [Picture(one.name, one.caption, one.svg) for one in campaign_figures(self.tests)]
-
-    def pdf(self) -> bytes:
-        from daq_app.campaign.report.pdf import report_pdf
-
-        return report_pdf(
-            self.title, self.places, self.restitution, self.repetitions, self.tests, self.failures
-        )
-
-    @contextmanager
-    def drawing(self, *, at_once: bool) -> Iterator[tuple[Callable[[], list[Picture]], Callable[[], bytes]]]:
-        """Give pictures and PDF when asked: each is drawn in a process of its own, or in this one."""
-        if not at_once:
-            yield self.pictures, self.pdf
-            return
-        with process_pool(2) as pool:
-            pdf, pictures = pool.submit(self.pdf), pool.submit(self.pictures)
-            yield pictures.result, pdf.result
+    files: tuple[Path, ...]
+    restitution: tuple[RestitutionRow, ...]
 
 
 def write_report(
@@ -74,56 +53,58 @@ def write_report(
     failures: Sequence[Failure] = (),
     *,
     at_once: bool = False,
-) -> list[Path]:
+) -> WrittenReport:
     """Write ``report.html``, ``report.pdf``, the CSV files and each figure as SVG into `folder`.
 
-    `failures` are runs that could not be analysed: they are named. `at_once` draws in two processes.
-    Returns the files written. Raises `ValueError` if there is no analysed test at all.
+    `failures` are runs that could not be analysed: they are named. `at_once` draws in several processes.
+    A file is written as soon as it is made, HTML and PDF last: what is drawn is complete then.
+    Raises `ValueError` if there is no analysed test at all, `OSError` where a file cannot be written.
     """
     if not tests:
         raise ValueError("no run of this campaign could be analysed: there is nothing to report")
     folder.mkdir(parents=True, exist_ok=True)
-    restitution = tables.table_4_1(tests)
-    restitution += tables.mean_of_specimens(restitution)
-    content = _Content(
-        title=title,
-        places=tuple(tables.table_3_2(status)),
-        restitution=tuple(restitution),
-        repetitions=tuple(tables.repetition_effect(tests)),
-        tests=tuple(tests),
-        failures=tuple(failures),
-    )
-    with content.drawing(at_once=at_once) as (pictures, pdf):
-        page = _environment().get_template("campaign.html")
-        drawn = pictures()
-        html = page.render(
-            title=title,
-            subtitle=f"{len(tests)} runs analysed, {sum(test.good for test in tests)} of them in the means",
-            places=content.places,
-            tests=tests,
-            restitution=restitution,
-            repetitions=content.repetitions,
-            figures=drawn,
-            methods=[m for m in tables.METHODS if any(m in t.methods for t in tests)],
-            left_out=[test for test in tests if not test.good],
-            failures=failures,
-            footer=footer,
-        )
-        document = pdf()
-    written = tables.write_csv(folder, content.places, tests, restitution, content.repetitions)
-    for picture in drawn:
-        svg = '<?xml version="1.0" encoding="utf-8"?>\n' + picture.svg
-        written.append(write_whole(folder / f"{picture.name}.svg", svg, other_name=True))
-    written += [
-        write_whole(folder / "report.html", html.encode(), other_name=True),
-        write_whole(folder / "report.pdf", document, other_name=True),
-    ]
-    return written
+
+    def write(name: str, content: str | bytes) -> Path:
+        return write_whole(folder / name, content, other_name=True)
+
+    with _drawing(at_once) as begin, ThreadPoolExecutor(_WRITERS) as writers:
+        # The first figures keep the processes busy while tables are worked out. Their pages take longest,
+        # and must not be what is left for one process at the end.
+        planned = campaign_figures(tests)
+        figures = [begin(figure.draw) for figure in planned[:_PROCESSES]]
+        content = ReportTables.of(title, status, tests, failures)
+        last, first = begin(content.last_pages), begin(content.first_pages)
+        figures += [begin(figure.draw) for figure in planned[_PROCESSES:]]
+        # Imported here: meanwhile figures are drawn.
+        from daq_app.campaign.report.page import report_page
+        from daq_app.campaign.report.pdf_parts import joined
+
+        files = [writers.submit(write, name, text) for name, text in csv_files(content)]
+        drawn = []
+        for figure in figures:
+            drawn.append(picture := figure())
+            svg = '<?xml version="1.0" encoding="utf-8"?>\n' + picture.svg
+            files.append(writers.submit(write, f"{picture.name}.svg", svg))
+        page = report_page(content, drawn, footer)
+        files.append(writers.submit(write, "report.html", page))
+        document = joined([first(), *(picture.page for picture in drawn), last()])
+        files.append(writers.submit(write, "report.pdf", document))
+        return WrittenReport(tuple(file.result() for file in files), content.restitution)
 
 
-def _environment() -> Environment:
-    environment = page_environment()
-    environment.filters["number"] = number
-    environment.filters["signed"] = signed
-    environment.filters["interval"] = interval
-    return environment
+@contextmanager
+def _drawing(at_once: bool) -> Iterator[_Begin]:
+    """What begins a piece of work: in a process of a pool, or in this one when its result is asked for."""
+    if not at_once:
+        yield _when_asked
+        return
+    with process_pool(min(_PROCESSES, os.cpu_count() or 1)) as pool:
+
+        def in_pool(work: Callable[[], _Made]) -> Callable[[], _Made]:
+            return pool.submit(work).result
+
+        yield in_pool
+
+
+def _when_asked(work: Callable[[], _Made]) -> Callable[[], _Made]:
+    return work

@@ -115,7 +115,8 @@ def make_result(run: Path) -> Result:
     Raises `NoResult`, also where the summary is saved and the packages of its page are not installed.
     """
     # Imported here: reading a saved result needs neither the analysis nor matplotlib.
-    from daq_app.campaign.summaries.of_run import Failure, summarise_file
+    from daq_app.campaign.summaries.of_run import summarise_file
+    from daq_app.campaign.summaries.summary import Failure
 
     this, others = level_of(run)
     earlier = [test for test in others if test.released_ns < this.released_ns]

@@ -15,7 +15,7 @@ from daq_app.campaign.recorded import account_of, test_by, test_of, unreadable
 from daq_app.campaign.status import RecordedTest, TestVerdict
 from daq_app.campaign.summaries.mark import AnalysisMark
 from daq_app.campaign.summaries.store import KeptAnalysis, NotKept, keep_analysis, kept_analysis
-from daq_app.campaign.summaries.summary import MethodResult, TestSummary, judged
+from daq_app.campaign.summaries.summary import Failure, MethodResult, TestSummary, judged
 from daq_app.campaign.verdicts import OperatorVerdict
 from daq_app.config import Rig
 from daq_app.rocking.analysis.options import AnalysisOptions
@@ -30,17 +30,6 @@ _KEYS = {"CRT": "crt", "EAV": "eav"}
 _SHOWN_RATE_HZ = 200.0
 """Rate of the histories in figures: at 4000 Hz a picture would weigh megabytes and look the same."""
 _BEFORE_S = 0.3
-
-
-@dataclass(frozen=True, slots=True)
-class Failure:
-    """A run that could not be analysed, and why."""
-
-    test: str
-    path: Path
-    reason: str
-    flagged_bad: bool = False
-    """Somebody or the recorder had rejected it before: nobody expected an analysis."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,6 @@ from daq_app.campaign.summaries.mark import AnalysisMark
 from daq_app.campaign.summaries.summary import MethodResult, TestSummary
 from daq_app.rocking.families.verdict import FamilyView, RVerdict
 from daq_app.runfile.durable import write_whole
-from daq_app.runfile.folder import find_runs
 
 SUFFIX: Final = ".result.json"
 _FORMAT: Final = 4
@@ -59,11 +58,6 @@ def kept_analysis(run: Path, mark: AnalysisMark) -> KeptAnalysis:
         raise NotKept("no analysis is kept beside it") from None
     except (ValueError, KeyError, TypeError, AttributeError):
         raise NotKept("the analysis kept beside it cannot be read") from None
-
-
-def some_have_none(folder: Path) -> bool:
-    """Whether a run in a folder or below has nothing kept beside it: an analysis will be needed."""
-    return not all(run.with_suffix(SUFFIX).exists() for run in find_runs(folder))
 
 
 def _encoded(value: object) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +84,17 @@ class TestSummary:
     def phi0(self) -> float:
         """θ0/α of the release, from the tiltmeters."""
         return abs(self.theta0_rad) / self.alpha_rad
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A run that could not be analysed, and why."""
+
+    test: str
+    path: Path
+    reason: str
+    flagged_bad: bool = False
+    """Somebody or the recorder had rejected it before: nobody expected an analysis."""
 
 
 def judged(summary: TestSummary, test: RecordedTest) -> TestSummary:

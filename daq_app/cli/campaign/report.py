@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -12,11 +13,11 @@ from rich.table import Table
 
 from daq_app.campaign.status import TestVerdict
 from daq_app.cli.campaign.progress import DEFAULT_PLAN, open_plan, progress_bar
-from daq_app.cli.errors import EXIT_FAILED, print_paragraph, reported, say_other_name
+from daq_app.cli.errors import EXIT_BAD_INPUT, EXIT_FAILED, print_paragraph, reported, say_other_name
 from daq_app.cli.scheduler_option import SchedulerOption
 from daq_app.cli.terminal import Console, echo_json
+from daq_app.extras import absent
 from daq_app.runfile import RunFileError
-from daq_app.workers import warm_up
 
 _NAMED: Final = 6
 """Files that are named; more of them are counted."""
@@ -52,13 +53,10 @@ def report(
     """
     with reported():
         campaign = open_plan(plan_file)
-        if out is not None and not overwrite and out.is_dir() and any(out.iterdir()):
-            raise RunFileError(f"{out} holds files", advice="Choose another folder, or say --overwrite.")
-        _warm_up(folder, anew=anew)
+        _require_extra_and_place(out, overwrite=overwrite)
         # Imported here: `--help` should load none of it.
         from daq_app.campaign.report import collect as gathering
         from daq_app.campaign.report.job import write_collected
-        from daq_app.campaign.report.tables import mean_of_specimens, table_4_1
         from daq_app.rocking.analysis.options import AnalysisOptions
 
         with progress_bar("analysing") as advance:
@@ -79,13 +77,21 @@ def report(
             raise typer.Exit(EXIT_FAILED)
         target = out or folder / "report"
         written = write_collected(campaign, folder, found, target, at_once=workers != 1)
-        page = next(path for path in written if path.suffix == ".html")
+        page = next(path for path in written.files if path.suffix == ".html")
         say_other_name(target / "report.html", page)
-        say_other_name(target / "report.pdf", next(path for path in written if path.suffix == ".pdf"))
-        rows = table_4_1(tests)
-        _print(rows + mean_of_specimens(rows), found, page, as_json)
+        say_other_name(target / "report.pdf", next(path for path in written.files if path.suffix == ".pdf"))
+        _print(written.restitution, found, page, as_json)
     if any(not failure.flagged_bad for failure in failures):
         raise typer.Exit(EXIT_FAILED)
+
+
+def _require_extra_and_place(out: Path | None, *, overwrite: bool) -> None:
+    """End the command where the report could not be made or written: before runs are analysed for it."""
+    if needed := absent("report"):
+        print_paragraph("Error", needed)
+        raise typer.Exit(EXIT_BAD_INPUT)
+    if out is not None and not overwrite and out.is_dir() and any(out.iterdir()):
+        raise RunFileError(f"{out} holds files", advice="Choose another folder, or say --overwrite.")
 
 
 def _tell_what_is_not_in_it(found: Collected, folder: Path) -> None:
@@ -110,21 +116,12 @@ def _tell_what_is_not_in_it(found: Collected, folder: Path) -> None:
         )
 
 
-def _warm_up(folder: Path, *, anew: bool) -> None:
-    """Workers begin to import what they need; the program itself too, which each would import anew."""
-    from daq_app.campaign.summaries.store import some_have_none
-
-    drawing = (f"daq_app.campaign.report.{module}" for module in ("captioned", "pdf", "write"))
-    analysis = ("daq_app.rocking.analysis.analyse",) if anew or some_have_none(folder) else ()
-    warm_up(*analysis, *drawing, "daq_app.cli.app")
-
-
 def _known(value: float) -> float | None:
     """JSON has no NaN."""
     return None if math.isnan(value) else value
 
 
-def _print(rows: list[RestitutionRow], found: Collected, page: Path, as_json: bool) -> None:
+def _print(rows: Sequence[RestitutionRow], found: Collected, page: Path, as_json: bool) -> None:
     if as_json:
         document = [
             {

@@ -6,6 +6,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
+import pypdfium2
 import pytest
 
 from daq_app.campaign.names import TestName
@@ -13,8 +14,7 @@ from daq_app.campaign.plan import load_campaign
 from daq_app.campaign.report.tables import mean_of_specimens, repetition_effect, table_4_1
 from daq_app.campaign.report.write import write_report
 from daq_app.campaign.status import CampaignStatus, RecordedTest, TestVerdict
-from daq_app.campaign.summaries.of_run import Failure
-from daq_app.campaign.summaries.summary import MethodResult, TestSummary
+from daq_app.campaign.summaries.summary import Failure, MethodResult, TestSummary
 from daq_app.rocking import amplitude_after, period_after, time_of_impact
 
 
@@ -122,7 +122,7 @@ def report(
     folder = tmp_path_factory.mktemp("campaign") / "report"
     failure = Failure("FR1-L4-1", Path("FR1-L4-1_x.h5"), "a release but no impact")
     written = write_report(folder, "Campaign", status, tests, failures=[failure] * 41)
-    assert set(written) == set(folder.iterdir())
+    assert set(written.files) == set(folder.iterdir())
     return folder
 
 
@@ -134,8 +134,6 @@ def test_report_is_complete_and_names_what_it_leaves_out(report: Path) -> None:
     assert "FR2-L2-1: 400 samples lost while rocking" in html
     assert "FR1-L4-1 (FR1-L4-1_x.h5): a release but no impact" in html
     assert html.count("<svg") == 6
-    # Tables 4.1, 3.2, repetitions, all tests, not analysed (41 rows: two pages), and the figures.
-    assert (report / "report.pdf").read_bytes().count(b"/Type /Page ") == 6 + 6
     with (report / "table_3_2.csv").open(encoding="utf-8") as file:
         places = list(csv.DictReader(file))
     assert len(places) == 36
@@ -143,6 +141,30 @@ def test_report_is_complete_and_names_what_it_leaves_out(report: Path) -> None:
     assert states["FR1-L3-1"] == "done"
     assert states["FR2-L2-1"] == "to be repeated"
     assert states["FR1-L1-1"] == "missing"
+
+
+def test_pages_of_the_pdf_are_in_order_under_the_campaigns_title(report: Path) -> None:
+    document = pypdfium2.PdfDocument(report / "report.pdf")
+    headings = ["Table 4.1:", "Effect of the repetitions"]
+    headings += [f"Figure 4.{number}:" for number in (1, 1, 2, 3, 3, 4)]
+    headings += ["Table 3.2:", "All tests", "Not analysed", "Not analysed"]  # 41 rows: two pages
+    pages = [page.get_textpage().get_text_range() for page in document]
+    assert len(pages) == len(headings)
+    assert [heading for heading, page in zip(headings, pages, strict=True) if heading not in page] == []
+    assert document.get_metadata_value("Title") == "Campaign"
+
+
+def test_drawn_in_several_processes_it_is_the_same(
+    tests: list[TestSummary], status: CampaignStatus, report: Path, tmp_path: Path
+) -> None:
+    failure = Failure("FR1-L4-1", Path("FR1-L4-1_x.h5"), "a release but no impact")
+    write_report(tmp_path, "Campaign", status, tests, failures=[failure] * 41, at_once=True)
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in report.iterdir()}
+    for path in tmp_path.glob("*[!f]"):
+        assert path.read_bytes() == (report / path.name).read_bytes(), path.name
+    pages = zip(*(pypdfium2.PdfDocument(folder / "report.pdf") for folder in (report, tmp_path)), strict=True)
+    for here, elsewhere in pages:
+        assert np.array_equal(*(page.render().to_numpy() for page in (here, elsewhere)))
 
 
 def test_csv_holds_the_numbers_of_the_table(tests: list[TestSummary], report: Path) -> None:
