@@ -32,7 +32,8 @@ _RUNS = 1000
 
 def figures(effort: Effort) -> list[Figure]:
     """One process with one thread; the first job of a kind, which loads its libraries, is left out."""
-    repeats = effort.of(_REPEATS, 1)
+    repeats, left_out = effort.of((_REPEATS, 1), (1, 0))
+    causes = effort.of(3, 1)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         simulating = _simulate(folder, effort.of(_LEVELS, _TWO_LEVELS), effort.of(_TESTS_A_LEVEL, 1))
@@ -53,13 +54,13 @@ def figures(effort: Effort) -> list[Figure]:
         campaign = Specimen(folder, "FR1", runs, ())
         found = {
             "a test simulated and saved": (simulating, 1),
-            "a file imported and judged": (_spent(bring_in, repeats), 1),
+            "a file imported and judged": (_spent(bring_in, repeats, left_out), 1),
             "a run analysed, with bias": (
-                _spent(lambda: read_and_summarise(runs[0], {}, options, use_kept=False), repeats),
+                _spent(lambda: read_and_summarise(runs[0], {}, options, use_kept=False), repeats, left_out),
                 1,
             ),
             f"a specimen of {len(runs)} runs diagnosed": (
-                _spent(lambda: diagnose_one(campaign), repeats),
+                _spent(lambda: diagnose_one(campaign, causes=causes), repeats, left_out),
                 len(runs),
             ),
         }
@@ -96,10 +97,10 @@ def _simulate(folder: Path, ratios: Mapping[str, float], tests_a_level: int) -> 
     return times[1:]
 
 
-def _spent(job: Callable[[], object], repeats: int) -> list[float]:
+def _spent(job: Callable[[], object], repeats: int, left_out: int) -> list[float]:
     times = []
-    for _ in range(repeats + 1):
+    for _ in range(left_out + repeats):
         started = time.process_time()
         job()
         times.append(time.process_time() - started)
-    return times[1:]
+    return times[left_out:]
