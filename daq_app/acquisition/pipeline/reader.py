@@ -56,10 +56,16 @@ class Reader(threading.Thread):
         sink: Callable[[Item], None],
         patience: Patience | None = None,
         speed: float = 1.0,
+        saving: Callable[[], bool] = lambda: False,
     ) -> None:
-        """`speed` is how much faster than real time a simulated device or a replay runs."""
+        """`speed` is how much faster than real time a simulated device or a replay runs.
+
+        A device whose time moves with the reads (infinite) is read at the real rate while `saving`: the
+        processor belongs to the run that is being saved.
+        """
         super().__init__(name="reader", daemon=True)
         self._speed = speed
+        self._saving = saving
         self._clock_watch: ClockWatch | None = None
         self._overdue = False
         self._make_driver = make_driver
@@ -155,6 +161,8 @@ class Reader(threading.Thread):
                 self._recoveries = 0
                 self._overdue = False
                 self._deliver(block)
+                if math.isinf(self._speed) and self._saving():
+                    self._stop_asked.wait(block.n_samples / self._plan.rate_hz)
 
     def _deliver(self, block: Block) -> None:
         now = time.perf_counter()

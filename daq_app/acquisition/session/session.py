@@ -199,7 +199,7 @@ class Session:
     @property
     def busy(self) -> bool:
         """Whether a run is being recorded or made into its file."""
-        return self.recording or self.state is State.SAVING or not all(job.done() for job in self._saving)
+        return self.recording or self.state is State.SAVING or self._is_saving()
 
     # -- between the threads ---------------------------------------------------------------------
 
@@ -293,12 +293,9 @@ class Session:
         if self._reader is not None and self._reader.is_alive():
             return "Sampling already"
         self.error = None
+        settings, inbox = self._settings, self.recorder.inbox
         self._reader = Reader(
-            self._settings.make_driver,
-            self._settings.plan,
-            self.recorder.inbox.put,
-            self._settings.patience,
-            self._settings.speed,
+            settings.make_driver, settings.plan, inbox.put, settings.patience, settings.speed, self._is_saving
         )
         self._reader.start()
         return "Sampling begins"
@@ -363,6 +360,9 @@ class Session:
             settings.rig, settings.rig_text, settings.plan, opened, self.analyst.tare, test=UNARMED
         )
         return header.model_copy(update={"run_id": run_id, "kept": {"ring": self.ring.session}})
+
+    def _is_saving(self) -> bool:
+        return not all(run.done() for run in self._saving)
 
     def _disk_safe(self) -> bool:
         status = self.recorder.status
