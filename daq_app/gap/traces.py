@@ -211,9 +211,11 @@ def _follow(
     impacts_before: float,
 ) -> _Followed:
     """The simulation set to one run by least squares of its impact times; `bend` lets α and p move."""
-    # Nobody holds five tonnes still: rotation and speed at the release are known to the sway's size.
-    sway = (swings.hold_sd + 2e-5, swings.hold_rate_sd + 2e-5 + 0.03 * ("initial_velocity" in effects))
-    spread = np.array([0.01, *sway, survey.alpha_tolerance, survey.p_tolerance])
+    held = swings.held
+    swaying = math.copysign(held.speed_rad_s, held.speed_rad_s * held.rotation_rad)
+    pushed = 0.03 * ("initial_velocity" in effects)
+    known = (held.rotation_sd + 2e-5, held.speed_sd + 2e-5 + pushed)
+    spread = np.array([0.01, *known, survey.alpha_tolerance, survey.p_tolerance])
     free = np.array([True, True, True, bend, bend])
     timed = np.isfinite(swings.fall_s[0])
     first_fall = swings.fall_s[0][timed], np.sign(swings.peak_rad[0]) * swings.levels[0][timed]
@@ -222,7 +224,7 @@ def _follow(
         full = np.zeros(5)
         full[free] = u
         delay, theta0, omega, alpha, p = full * spread
-        terms = {**effects, "initial_velocity": {"omega": omega}}
+        terms = {**effects, "initial_velocity": {"omega": swaying + omega}}
         slender = survey.alpha_rad * (1.0 + alpha)
         # α may bend, the base stays as wide as it was surveyed.
         r0 = survey.half_base_m / math.sin(slender)

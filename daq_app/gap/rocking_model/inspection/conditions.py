@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, sosfiltfilt, sosfreqz
 
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
@@ -42,6 +43,7 @@ from daq_app.gap.rocking_model.tolerances.inspection import (
     GOES_ON_STEPS,
     HUM_SD,
     IN_STEPS,
+    OF_CONVERTER,
     OFF_STEP,
     RANGE_MARGIN,
     SMALLEST_STEP,
@@ -55,6 +57,10 @@ from daq_app.rocking.geometry.noise import white_noise
 MAINS_HZ = 50.0
 _SLOW_S = 0.1
 """Means over which a record that is turned back by the mains frequency keeps 0.6 Hz to a per cent."""
+_SWELLS_S, _MOST_SWELLS = 1.25, 12
+"""Time in which the mains may change, and the order of the polynomial up to which they are followed."""
+_LEAST_CALM = 0.3
+"""Share of a mean over 0.1 s that must be calm."""
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer")
 
 
@@ -110,32 +116,59 @@ def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray |
     amplitude = float(np.hypot(*coefficients[:2]))
     if amplitude < HUM_SD * sd:
         return 0.0, float(sd), None
-    # Over the whole record the frequency is sharp enough for the phase to hold.
-    high = values - sosfiltfilt(butter(2, 25.0, fs=rate_hz, output="sos"), values)
+    low_pass, kept = _below_mains(rate_hz)
+    high = values - sosfiltfilt(low_pass, values)
     # An impact has some of every frequency: its own share, taken for hum, would ring around every impact.
     loud = np.abs(high) > BEYOND_HUM * float(np.hypot(noise, amplitude))
     calm = ~maximum_filter1d(loud, 2 * round(AROUND_S * rate_hz) + 1, mode="constant")
     calm = calm if calm.sum() > count else np.ones_like(calm)
-    waves = _waves(values.size, rate_hz, _sharpened(np.where(calm, high, 0.0), rate_hz))
-    seen = waves * calm
-    wave = np.linalg.solve(seen @ waves.T, seen @ high) @ waves
+    wave = _mains(high, calm, rate_hz) / kept
     # A little hum is on every long cable. It is taken out, but it is nothing to be explained.
     shown = amplitude if amplitude > USUAL_HUM * noise else 0.0
-    return shown, float(sd), np.asarray(wave, dtype=float)
+    return shown, float(sd), wave
 
 
-def _sharpened(values: FloatArray, rate_hz: float) -> float:
-    """The frequency near that of the mains at which a record has most power, Hz.
+def _mains(values: FloatArray, calm: NDArray[np.bool_], rate_hz: float) -> FloatArray:
+    """The wave near the mains frequency, (n,), that the calm samples of a record show.
 
-    Turned back by the mains frequency, what is left goes round slowly: means over 0.1 s keep it.
+    Its frequency is that of most power; its size and phase change over seconds, as those of the mains do.
+    Turned back by 50 Hz, what is left goes round slowly: means over 0.1 s keep it.
     """
     block = round(_SLOW_S * rate_hz)
     count = values.size // block
-    turned = (values * _mains_phasor(values.size, rate_hz))[: count * block]
-    slow = turned.reshape(count, block).mean(axis=1)
-    offsets = np.linspace(-0.6, 0.6, 25)
-    angles = 2.0 * np.pi * np.outer(offsets, _SLOW_S * np.arange(count))
-    return MAINS_HZ + float(offsets[int(np.argmax(np.abs(np.exp(-1j * angles) @ slow)))])
+    phasor = _mains_phasor(values.size, rate_hz)
+    used = calm[: count * block].reshape(count, block)
+    turned = (values * phasor)[: count * block].reshape(count, block)
+    share = used.mean(axis=1)
+    slow = (turned * used).mean(axis=1) / np.maximum(share, _LEAST_CALM)
+    time_s: FloatArray = np.asarray(_SLOW_S * (np.arange(count) + 0.5), dtype=np.float64)
+    turn = np.exp(2j * np.pi * _most_power(slow * share, time_s) * time_s)
+    # Legendre's polynomials: those of a low order follow what changes over some seconds.
+    order = min(int(values.size / rate_hz / _SWELLS_S), _MOST_SWELLS)
+    shapes = legvander(np.linspace(-1.0, 1.0, count), order)
+    weights = np.sqrt(np.where(share < _LEAST_CALM, 0.0, share))
+    sizes, *_ = np.linalg.lstsq(shapes * weights[:, None], slow / turn * weights, rcond=None)
+    smooth = np.interp(np.arange(values.size) / rate_hz, time_s, (shapes @ sizes) * turn)
+    return np.asarray(2.0 * np.real(smooth * np.conj(phasor)), dtype=np.float64)
+
+
+def _most_power(slow: NDArray[np.complex128], time_s: FloatArray) -> float:
+    """Frequency within 0.6 Hz, Hz, at which a slow complex record, (k,), has most power."""
+    best = 0.0
+    # A twentieth of a hertz off, a wave is half a turn off after ten seconds: a dozen times finer each time.
+    for reach, step in ((0.6, 0.05), (0.05, 0.004), (0.004, 5e-4)):
+        offsets = best + np.arange(-reach, reach + 0.5 * step, step)
+        power = np.abs(np.exp(-2j * np.pi * np.outer(offsets, time_s)) @ slow)
+        best = float(offsets[int(np.argmax(power))])
+    return best
+
+
+@lru_cache(maxsize=2)
+def _below_mains(rate_hz: float) -> tuple[FloatArray, float]:
+    """Sections of a low pass that is run both ways, and the share of the mains that is above it."""
+    sections = butter(2, 25.0, fs=rate_hz, output="sos")
+    _, response = sosfreqz(sections, [MAINS_HZ], fs=rate_hz)
+    return sections, 1.0 - float(np.abs(response[0]) ** 2)
 
 
 @lru_cache(maxsize=2)
@@ -169,14 +202,20 @@ def _quantisation_step(values: FloatArray, noise_si: float) -> float:
     if top <= 0.0 or np.mean(large) < FEWEST_STEPS:
         return 0.0
     rest = float(np.sqrt(np.mean(change[~large] ** 2)))
-    if rest > BESIDE_STEPS * top:  # their median is smaller still, and takes longer to find
+    if rest > OF_CONVERTER * top:  # their median is smaller still, and takes longer to find
         return 0.0
     step = float(np.median(change[large]))
     whole = change[large] / step
-    if rest > BESIDE_STEPS * step or np.mean(np.abs(whole - np.round(whole)) < OFF_STEP) < IN_STEPS:
+    # Between two steps of its own the converter goes to and fro.
+    own = _resolution(values) if rest > BESIDE_STEPS * step else 0.0
+    beside = own if own < OF_CONVERTER * step else 0.0
+    if (
+        rest > max(BESIDE_STEPS * step, beside)
+        or np.mean(np.abs(whole - np.round(whole)) < OFF_STEP) < IN_STEPS
+    ):
         return 0.0
-    own = step < CONVERTER_STEP * noise_si or step < SMALLEST_STEP * float(np.ptp(values))
-    return 0.0 if own else step  # the converter's own step is none
+    none = step < CONVERTER_STEP * noise_si or step < SMALLEST_STEP * float(np.ptp(values))
+    return 0.0 if none else step  # the converter's own step is none
 
 
 def _quantile(values: FloatArray, share: float) -> float:

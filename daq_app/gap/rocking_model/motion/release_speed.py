@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.motion.held_state import HeldState
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import Survey
 from daq_app.gap.rocking_model.tolerances.walls import RELEASE_SPEED_RAD_S
@@ -30,7 +31,7 @@ def release_speed(
     """(speed away from upright in rad/s, its sd) at the release; None where the record is too short.
 
     Least squares of θ₀ + v sinh(pτ)/p − a (cosh(pτ) − 1)/p², τ the time since a release that is sought
-    too: the motion of the linearised block, held until then.
+    too: the motion of the linearised block, which sways as it is held until then.
     """
     step = max(round(rate_hz / _WORK_HZ), 1)
     first = round((swings.release_s - BEFORE_S - SEARCHED_S) * rate_hz)
@@ -42,17 +43,20 @@ def release_speed(
     seen = side * theta[first : first + count * step].reshape(count, step).mean(axis=1)
     time_s = (first + step * (np.arange(count, dtype=np.float64) + 0.5) - 0.5) / rate_hz - swings.release_s
     starts: FloatArray = np.linspace(-SEARCHED_S, SEARCHED_S, _STEPS, dtype=np.float64)
-    fits = _Fits.of(seen, time_s, starts, survey.p_rad_s)
+    held = swings.held
+    fits = _Fits.of(seen, time_s, starts, survey.p_rad_s, held, side)
     for _ in range(4):
         width = starts[1] - starts[0]
         starts = starts[fits.best] + np.linspace(-width, width, 9, dtype=np.float64)
-        fits = _Fits.of(seen, time_s, starts, survey.p_rad_s)
+        fits = _Fits.of(seen, time_s, starts, survey.p_rad_s, held, side)
     left = float(fits.left[fits.best])
     _, curvature, speed = np.linalg.solve(fits.triangle[fits.best], fits.along[fits.best]).tolist()
     variance = max(left / max(count - 4, 1), noise_rad**2 / step)
-    told = _told(seen, time_s, survey.p_rad_s, speed, variance)
-    # Thrown up the wall rises v²/2a above its hold; what the hold sways by is as good as that.
-    swayed = 2.0 * swings.hold_sd * abs(curvature) / max(abs(speed), 1e-6)
+    profiled = np.linspace(-SEARCHED_S, SEARCHED_S, _PROFILED, dtype=np.float64)
+    told = _told(_Fits.of(seen, time_s, profiled, survey.p_rad_s, held, side), speed, variance)
+    # Thrown up the wall rises v²/2a above its hold; what the hold is known to is as good as that.
+    rise = 2.0 * abs(curvature) * held.rotation_sd
+    swayed = 2.0 * (float(np.hypot(speed, np.sqrt(rise))) - abs(speed))
     return speed, float(np.linalg.norm([told, swayed, RELEASE_SPEED_RAD_S]))
 
 
@@ -68,12 +72,22 @@ class _Fits:
     """(k,) squares that are left."""
 
     @classmethod
-    def of(cls, seen: FloatArray, time_s: FloatArray, starts_s: FloatArray, p: float) -> _Fits:
+    def of(
+        cls,
+        seen: FloatArray,
+        time_s: FloatArray,
+        starts_s: FloatArray,
+        p: float,
+        held: HeldState,
+        side: float,
+    ) -> _Fits:
+        """Fits of a rotation (n,) at times (n,) from the release, folded to the side it is released on."""
         since = p * np.maximum(time_s - starts_s[:, None], 0.0)
+        beyond = seen - side * held.course(np.minimum(time_s, starts_s[:, None]))
         shapes = (np.ones_like(since), -(np.cosh(since) - 1.0) / p**2, np.sinh(since) / p)
         basis, triangle = np.linalg.qr(np.stack(shapes, axis=-1))
-        along = seen @ basis
-        left = seen - (basis @ along[:, :, None])[:, :, 0]
+        along = (beyond[:, None, :] @ basis)[:, 0, :]
+        left = beyond - (basis @ along[:, :, None])[:, :, 0]
         return cls(triangle, along, np.sum(left**2, axis=1))
 
     @property
@@ -81,14 +95,13 @@ class _Fits:
         return int(np.argmin(self.left))
 
 
-def _told(seen: FloatArray, time_s: FloatArray, p: float, speed: float, variance: float) -> float:
+def _told(fits: _Fits, speed: float, variance: float) -> float:
     """Sd of the speed, from its likelihood with every other unknown at its best.
 
     What is seen is how far the motion turns above the hold, v²/2a, which says little of a small v and of
     its sign: the curvature at the best speed would promise too much. The sd is that at which no speed
     at all is as unlikely as it is; where it is likely, how far off others are that are not.
     """
-    fits = _Fits.of(seen, time_s, np.linspace(-SEARCHED_S, SEARCHED_S, _PROFILED, dtype=np.float64), p)
     # The speed's shape comes last: what the others leave is a parabola in the speed.
     off = fits.along[:, 2:] - fits.triangle[:, 2, 2:] * _SPEEDS_RAD_S
     lost = np.min(fits.left[:, None] + off**2, axis=0)

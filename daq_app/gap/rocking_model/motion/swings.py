@@ -12,12 +12,14 @@ from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.motion.held_state import HeldState, held_state
 from daq_app.gap.rocking_model.motion.rotation import HOLD_S
 from daq_app.gap.rocking_model.tolerances.motion import (
     AT_REST_RAD,
     FALLEN,
     SHORTEST_HALF_CYCLE_S,
     SMALLEST_RAD,
+    SWAYS_ON,
     WITHIN_SWAY,
 )
 from sim_hardware.dynamics.parameters import REST_AMPLITUDE_RAD
@@ -35,8 +37,8 @@ _LAST = 9
 """Peaks from which the fall from one to the next is taken, where it no longer depends on the amplitude."""
 _SMOOTH_HZ = 30.0
 _WINDOW_S = 0.015
-_HOLD_MEAN_S = 0.02
-"""Means over which a held wall is looked at, which end as long before the release."""
+_FALL = (0.05, 0.3)
+"""Shares of the held rotation between which a fall is seen whatever the wall swayed by before it."""
 _HELD_S = (0.6, 0.25)
 """Before the wall is falling, s: from when to when it is held; it falls to nine tenths within 0.1–0.2 s."""
 
@@ -46,8 +48,9 @@ class Swings:
     """Half-cycles of a run; the first is the quarter-cycle from the release.
 
     `release_s`: s from the start of the record. `peak_s`, `peak_rad`, `peak_sd`: shape (n,), times
-    from the release; row 0 is the held rotation. `fall_s`, `rise_s` and their `…_sd`: times from
-    the release at which |θ| crosses the levels, shape (n, F), NaN where it could not be timed.
+    from the release; row 0 is the held rotation, whose error is an unknown of the fit itself.
+    `fall_s`, `rise_s` and their `…_sd`: times from the release at which |θ| crosses the levels,
+    shape (n, F), NaN where it could not be timed.
     `levels`: shape (n, F), rad.
     """
 
@@ -61,10 +64,8 @@ class Swings:
     rise_s: FloatArray
     rise_sd: FloatArray
     rest_s: float
-    hold_sd: float
-    """How far the held rotation sways, rad: nobody holds five tonnes still."""
-    hold_rate_sd: float
-    """Speed of that sway, rad/s."""
+    held: HeldState
+    """The wall at the release; its rotation is that of row 0."""
 
     @property
     def impacts(self) -> float:
@@ -96,7 +97,7 @@ def find_swings(theta: FloatArray, noise_rad: float, rate_hz: float, name: str) 
             f"Run {name}: the wall never rocks.", "Check that it was released in this record."
         )
     release = _release(smooth, noise_rad, int(crossings[0]), rate_hz)
-    held, held_sd, sway, sway_rate = _hold(theta, release, noise_rad, rate_hz)
+    state = held_state(theta, release, noise_rad, rate_hz)
     peaks = _peaks(theta, smooth, crossings, noise_rad, rate_hz)
     if len(peaks) < 3:
         raise CannotDiagnose(
@@ -104,28 +105,27 @@ def find_swings(theta: FloatArray, noise_rad: float, rate_hz: float, name: str) 
             "Release it from a larger rotation.",
         )
     offset = release / rate_hz
-    values = np.array([held, *(p[1] for p in peaks)])
+    values = np.array([state.rotation_rad, *(p[1] for p in peaks)])
     levels = np.abs(values)[:, None] * np.array(
         [*FRACTIONS, *[FRACTIONS[-1]] * (len(RELEASE_FRACTIONS) - len(FRACTIONS))]
     )
-    levels[0] = abs(held) * np.array(RELEASE_FRACTIONS)
+    levels[0] = abs(state.rotation_rad) * np.array(RELEASE_FRACTIONS)
     samples = [int(release), *(p[3] for p in peaks)]
     fall, fall_sd, rise, rise_sd = _level_times(
-        theta, smooth, samples, values, levels, sway, noise_rad, rate_hz
+        theta, smooth, samples, values, levels, state.rotation_sd, noise_rad, rate_hz
     )
     return Swings(
         release_s=offset,
         peak_s=np.array([offset, *(p[0] for p in peaks)]) - offset,
         peak_rad=values,
-        peak_sd=np.array([held_sd, *(p[2] for p in peaks)]),
+        peak_sd=np.array([0.0, *(p[2] for p in peaks)]),
         levels=levels,
         fall_s=fall - offset,
         fall_sd=fall_sd,
         rise_s=rise - offset,
         rise_sd=rise_sd,
         rest_s=float(np.flatnonzero(np.abs(smooth) > max(5 * noise_rad, AT_REST_RAD))[-1]) / rate_hz,
-        hold_sd=sway,
-        hold_rate_sd=sway_rate,
+        held=state,
     )
 
 
@@ -135,7 +135,7 @@ def _level_times(
     samples: Sequence[int],
     peaks: FloatArray,
     levels: FloatArray,
-    sway: float,
+    held_sd: float,
     noise: float,
     rate_hz: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -145,7 +145,7 @@ def _level_times(
     for k, value in enumerate(peaks):
         folded, near = np.sign(value) * theta, np.sign(value) * smooth
         for j in range(levels.shape[1] if k == 0 else len(FRACTIONS)):
-            if k == 0 and RELEASE_FRACTIONS[j] > 1.0 - WITHIN_SWAY * sway / abs(value):
+            if k == 0 and RELEASE_FRACTIONS[j] > 1.0 - WITHIN_SWAY * held_sd / abs(value):
                 continue  # the sway alone may keep the wall below this level
             level, begin = levels[k, j], samples[k]
             fall[k, j], fall_sd[k, j] = _crossing(folded, near, level, begin, after[k], noise, rate_hz)
@@ -155,35 +155,20 @@ def _level_times(
     return fall, fall_sd, rise, rise_sd
 
 
-def _hold(
-    theta: FloatArray, release: float, noise: float, rate_hz: float
-) -> tuple[float, float, float, float]:
-    """(rotation just before the release, its noise, sway, speed of the sway) while the wall is held."""
-    end = max(int(release - _HOLD_MEAN_S * rate_hz), int(0.3 * rate_hz))
-    start = max(int(end - HOLD_S * rate_hz), 0)
-    step = int(_HOLD_MEAN_S * rate_hz)
-    count = (end - start) // step
-    means = theta[end - count * step : end].reshape(count, step).mean(axis=1)
-    mean_noise = noise / np.sqrt(step)
-    sway = float(np.sqrt(max(np.var(means) - mean_noise**2, 0.0)))
-    rates = np.diff(means) * rate_hz / step
-    speed = float(np.sqrt(max(np.var(rates) - 2 * (mean_noise * rate_hz / step) ** 2, 0.0)))
-    if sway < 0.5 * mean_noise:
-        return float(means.mean()), float(noise / np.sqrt(count * step)), 0.0, 0.0
-    last = means[-4:]
-    return float(last.mean()), float(mean_noise / 2.0), sway, speed
-
-
 def _release(smooth: FloatArray, noise: float, first_crossing: int, rate_hz: float) -> float:
     """Sample of the release: the fall extrapolated back to the held rotation, |θ₀| − ½ a t².
 
     The held rotation is that of the last moments before the fall: a hand that sways and a zero that walks
-    move it by more than the first part of the fall does.
+    move it by more than the first part of the fall does. Where a sway is as large as that, the fall is
+    traced back to its own top instead, whatever the rotation there.
     """
     size = np.abs(smooth[:first_crossing])
     fallen = int(np.flatnonzero(size > FALLEN * size.max())[-1])
     first, last = (max(fallen - round(back * rate_hz), 0) for back in _HELD_S)
-    held = float(np.median(size[first : max(last, first + 1)]))
+    hold = size[first : max(last, first + 1)]
+    held = float(np.median(hold))
+    if float(np.std(hold)) > SWAYS_ON * held:
+        return _top_of_fall(size, held, fallen)
     moved = held - size
     low, high = max(2.0 * noise, 0.01 * held), 0.1 * held
     still = np.flatnonzero(moved[: fallen + 1] < low)
@@ -193,6 +178,17 @@ def _release(smooth: FloatArray, noise: float, first_crossing: int, rate_hz: flo
         return float(start)
     slope, intercept = np.polyfit(window, np.sqrt(np.maximum(moved[window], 0.0)), 1)
     return float(max(-intercept / slope, 0.0)) if slope > 0.0 else float(start)
+
+
+def _top_of_fall(size: FloatArray, held: float, fallen: int) -> float:
+    """Sample at which the parabola through a fall by a twentieth to three tenths has its top."""
+    begin = int(np.flatnonzero(size[: fallen + 1] > (1.0 - _FALL[0]) * held)[-1]) + 1
+    below = np.flatnonzero(size[begin:] < (1.0 - _FALL[1]) * held)
+    end = begin + int(below[0]) if below.size else size.size
+    if end - begin < 5:
+        return float(begin)
+    bend, slope, _ = np.polyfit(np.arange(end - begin), size[begin:end], 2)
+    return float(max(begin - 0.5 * slope / bend, 0.0)) if bend < 0.0 else float(begin)
 
 
 def _peaks(

@@ -145,6 +145,12 @@ BESIDE_STEPS = 0.05
 Raising it takes noise for steps.
 """
 
+OF_CONVERTER = 0.15
+"""Step of the converter over a coarser one of the reading, 1, up to which both are told apart (assumed).
+
+Raising it takes noise for steps.
+"""
+
 OFF_STEP = 0.15
 """Distance from a whole number of steps, 1, up to which a change is one (assumed).
 

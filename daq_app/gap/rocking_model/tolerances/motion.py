@@ -34,9 +34,33 @@ Raising it takes a sway of the hold for the fall.
 """
 
 WITHIN_SWAY = 6.0
-"""Rms sway of a held wall, 1, within which a level may be passed by swaying alone.
+"""Standard deviations of the held rotation, 1, within which a level may be passed by swaying alone.
 
 Raising it gives up the levels nearest to the hold.
+"""
+
+SWAYS_ON = 2e-3
+"""Rms sway of a hold over the held rotation, 1, from which the start of the fall is hidden by it (assumed).
+
+Raising it takes a sway for the start of the fall.
+"""
+
+SURELY_HELD_S = 0.25
+"""Time before the release, s, up to which a wall does nothing but sway (assumed).
+
+Raising it leaves less of the hold from which the size and the time scale of the sway are told.
+"""
+
+STILL_HELD_S = 0.015
+"""Time before the release, s, from which nothing is taken for the hold, as the release is timed (assumed).
+
+Raising it makes the state in which the wall is let go less certain.
+"""
+
+LEFT_ITS_HOLD = 3.0
+"""Standard deviations of what the sway predicts, 1, beyond which a wall has left its hold (assumed).
+
+Raising it takes the first motion of a slow release for sway.
 """
 
 HELD_UNTIL_S = 0.1

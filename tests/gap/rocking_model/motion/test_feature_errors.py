@@ -60,9 +60,10 @@ def test_no_speed_at_the_release_is_as_likely_as_it_is_said_to_be() -> None:
     time_s = np.arange(int(2.4 * RATE_HZ)) / RATE_HZ - 2.0
     theta = held - pull * (np.cosh(P * np.maximum(time_s, 0.0)) - 1.0) / P**2
     survey = cast(Any, SimpleNamespace(p_rad_s=P))
+    still = SimpleNamespace(rotation_sd=0.0, course=lambda time_s: np.zeros_like(time_s))
     off = []
     for _ in range(40):
-        swings = SimpleNamespace(release_s=2.0 + 2e-3 * rng.normal(), peak_rad=np.array([held]), hold_sd=0.0)
+        swings = SimpleNamespace(release_s=2.0 + 2e-3 * rng.normal(), peak_rad=np.array([held]), held=still)
         seen = theta + NOISE_RAD * rng.standard_normal(theta.size)
         found = release_speed(seen, NOISE_RAD, cast(Any, swings), survey, RATE_HZ)
         assert found is not None
