@@ -54,7 +54,7 @@ from daq_app.gap.rocking_model.tolerances.inspection import (
 )
 from daq_app.rocking.geometry.noise import white_noise
 
-MAINS_HZ = 50.0
+MAINS_HZ = (50.0, 60.0)
 _SLOW_S = 0.1
 """Means over which a record that is turned back by the mains frequency keeps 0.6 Hz to a per cent."""
 _SWELLS_S, _MOST_SWELLS = 1.25, 12
@@ -108,35 +108,38 @@ def _hum(values: FloatArray, rate_hz: float) -> tuple[float, float, FloatArray |
     if np.ptp(values[-count:]) == 0.0:  # between two steps of its converter
         return 0.0, 0.0, None
     rest = values[-count:] - values[-count:].mean()
-    design, inverse = _mains_at_rest(count, rate_hz)
-    coefficients = inverse @ rest
-    left = rest - design @ coefficients
-    noise = float(np.sqrt(np.mean(left**2)))
+    seen = {}
+    for mains_hz in MAINS_HZ:
+        design, inverse = _mains_at_rest(count, rate_hz, mains_hz)
+        coefficients = inverse @ rest
+        left = float(np.sqrt(np.mean((rest - design @ coefficients) ** 2)))
+        seen[mains_hz] = float(np.hypot(*coefficients[:2])), left
+    mains_hz = max(seen, key=lambda hz: seen[hz][0])
+    amplitude, noise = seen[mains_hz]
     sd = noise * np.sqrt(2.0 / count)
-    amplitude = float(np.hypot(*coefficients[:2]))
     if amplitude < HUM_SD * sd:
         return 0.0, float(sd), None
-    low_pass, kept = _below_mains(rate_hz)
+    low_pass, kept = _below_mains(rate_hz, mains_hz)
     high = values - sosfiltfilt(low_pass, values)
     # An impact has some of every frequency: its own share, taken for hum, would ring around every impact.
     loud = np.abs(high) > BEYOND_HUM * float(np.hypot(noise, amplitude))
     calm = ~maximum_filter1d(loud, 2 * round(AROUND_S * rate_hz) + 1, mode="constant")
     calm = calm if calm.sum() > count else np.ones_like(calm)
-    wave = _mains(high, calm, rate_hz) / kept
+    wave = _mains(high, calm, rate_hz, mains_hz) / kept
     # A little hum is on every long cable. It is taken out, but it is nothing to be explained.
     shown = amplitude if amplitude > USUAL_HUM * noise else 0.0
     return shown, float(sd), wave
 
 
-def _mains(values: FloatArray, calm: NDArray[np.bool_], rate_hz: float) -> FloatArray:
+def _mains(values: FloatArray, calm: NDArray[np.bool_], rate_hz: float, mains_hz: float) -> FloatArray:
     """The wave near the mains frequency, (n,), that the calm samples of a record show.
 
     Its frequency is that of most power; its size and phase change over seconds, as those of the mains do.
-    Turned back by 50 Hz, what is left goes round slowly: means over 0.1 s keep it.
+    Turned back by the nominal frequency, what is left goes round slowly: means over 0.1 s keep it.
     """
     block = round(_SLOW_S * rate_hz)
     count = values.size // block
-    phasor = _mains_phasor(values.size, rate_hz)
+    phasor = _mains_phasor(values.size, rate_hz, mains_hz)
     used = calm[: count * block].reshape(count, block)
     turned = (values * phasor)[: count * block].reshape(count, block)
     share = used.mean(axis=1)
@@ -163,25 +166,25 @@ def _most_power(slow: NDArray[np.complex128], time_s: FloatArray) -> float:
     return best
 
 
-@lru_cache(maxsize=2)
-def _below_mains(rate_hz: float) -> tuple[FloatArray, float]:
+@lru_cache(maxsize=4)
+def _below_mains(rate_hz: float, mains_hz: float) -> tuple[FloatArray, float]:
     """Sections of a low pass that is run both ways, and the share of the mains that is above it."""
     sections = butter(2, 25.0, fs=rate_hz, output="sos")
-    _, response = sosfreqz(sections, [MAINS_HZ], fs=rate_hz)
+    _, response = sosfreqz(sections, [mains_hz], fs=rate_hz)
     return sections, 1.0 - float(np.abs(response[0]) ** 2)
 
 
-@lru_cache(maxsize=2)
-def _mains_phasor(count: int, rate_hz: float) -> NDArray[np.complex128]:
+@lru_cache(maxsize=4)
+def _mains_phasor(count: int, rate_hz: float, mains_hz: float) -> NDArray[np.complex128]:
     """exp(−2πi f t) of the mains frequency, shape (count,)."""
-    turning: NDArray[np.complex128] = np.exp(-2j * np.pi * MAINS_HZ * np.arange(count) / rate_hz)
+    turning: NDArray[np.complex128] = np.exp(-2j * np.pi * mains_hz * np.arange(count) / rate_hz)
     return turning
 
 
-@lru_cache(maxsize=2)
-def _mains_at_rest(count: int, rate_hz: float) -> tuple[FloatArray, FloatArray]:
+@lru_cache(maxsize=4)
+def _mains_at_rest(count: int, rate_hz: float, mains_hz: float) -> tuple[FloatArray, FloatArray]:
     """Wave of the mains, offset and slope over `count` samples, (count, 4), and their pseudo-inverse."""
-    design = np.array([*_waves(count, rate_hz, MAINS_HZ), np.ones(count), np.arange(count) / rate_hz]).T
+    design = np.array([*_waves(count, rate_hz, mains_hz), np.ones(count), np.arange(count) / rate_hz]).T
     return design, np.linalg.pinv(design)
 
 
