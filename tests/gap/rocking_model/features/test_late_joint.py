@@ -14,6 +14,7 @@ from daq_app.gap.rocking_model.motion.late_joint import lateness
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.prediction.true_motion import true_rotations
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare
+from tests.support.gap.simulated_campaign import simulate as longer_held
 from tests.support.simulated_wall import simulate
 
 LEVELS = (0.25, -0.35)
@@ -94,9 +95,9 @@ def test_what_moves_the_wires_alone_is_predicted_where_the_motion_is_read_from_t
 def test_wires_that_the_motion_is_read_from_show_where_the_wall_turns(
     effect: dict[str, dict[str, float]], known: dict[str, float]
 ) -> None:
-    """Behind them are the peaks that LVDTs show which are in time."""
+    """Behind them are the peaks that LVDTs show which are in time, of a wall that is held still."""
     late = {"lag@lvdt": {"tau": 0.02}}
-    (run,), (prompt,) = (prepare(simulate(more | effect, (0.4,)))[0] for more in (late, {}))
+    (run,), (prompt,) = (prepare(longer_held(more | effect, 11, levels=(0.4,)))[0] for more in (late, {}))
     assert (run.reference, prompt.reference) == ("wire", "lvdt")
     shown = _peaks(prompt, {})[: run.swings.peak_rad.size]
     # Families differ in calibration, which may be another at the other face, and in where they rest.
