@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
+import scipy  # its `special` is loaded with the first use: what draws needs none of it
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -59,31 +59,9 @@ def random_effects_mean(values: Sequence[float], standard_errors: Sequence[float
     return GroupMean(mean, error, mean - reach, mean + reach, scatter, int(y.size))
 
 
-@lru_cache(maxsize=256)
 def student_reach(freedom: int) -> float:
-    """Half width, in standard errors, of the 95 % interval of Student's distribution of `freedom` ≥ 1.
-
-    `scipy.special` has the same, and takes longer to load than all tables of a report to make.
-    """
-    low, high = 0.0, 0.5 * math.pi
-    for _ in range(60):  # halvings: to the last digit of a double
-        middle = 0.5 * (low + high)
-        if _student_within(middle, freedom) < 0.95:
-            low = middle
-        else:
-            high = middle
-    return math.sqrt(freedom) * math.tan(0.5 * (low + high))
-
-
-def _student_within(angle: float, freedom: int) -> float:
-    """Probability of |t| ≤ √ν tan(angle), ν = `freedom` (Abramowitz and Stegun, 26.7.3 and 26.7.4)."""
-    cosine, sine = math.cos(angle), math.sin(angle)
-    odd = freedom % 2
-    term, total = (cosine if odd else 1.0), 0.0
-    for k in range(1 + odd, freedom, 2):
-        total += term
-        term *= k / (k + 1) * cosine**2
-    return (angle + sine * total) * 2.0 / math.pi if odd else sine * total
+    """Half width, in standard errors, of the 95 % interval of Student's distribution of `freedom` ≥ 1."""
+    return float(scipy.special.stdtrit(freedom, 0.975))
 
 
 @dataclass(frozen=True, slots=True)

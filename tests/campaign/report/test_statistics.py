@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 import pytest
-import scipy.stats
 from scipy import stats
 
-from daq_app.campaign.report.statistics import random_effects_mean, shared_scatter, student_reach
+from daq_app.campaign.report.statistics import random_effects_mean, shared_scatter
 
 
 def test_equal_values_have_no_scatter_and_the_error_of_the_mean() -> None:
@@ -78,9 +77,3 @@ def test_a_change_without_and_with_scatter_is_covered_as_often_as_it_says(scatte
 def test_groups_of_one_test_each_tell_no_scatter() -> None:
     shared = shared_scatter([([0.9], [0.001]), ([0.8], [0.001]), ([math.nan], [0.001])])
     assert (shared.scatter, shared.stretch, shared.degrees_of_freedom) == (0.0, 1.0, 0)
-
-
-def test_the_reach_of_an_interval_is_students() -> None:
-    freedoms = [*range(1, 61), 500]
-    expected = scipy.stats.t.ppf(0.975, freedoms)
-    np.testing.assert_allclose([student_reach(freedom) for freedom in freedoms], expected, rtol=1e-12)
