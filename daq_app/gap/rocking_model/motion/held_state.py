@@ -16,7 +16,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.tolerances.motion import LEFT_ITS_HOLD, STILL_HELD_S, SURELY_HELD_S
 
 MEAN_S = 0.02
-"""Means over which a held wall is looked at: a period of the mains, so that none of its hum is left."""
+"""Means over which a held wall is looked at: their noise is low, and a sway of 3 Hz hardly changes in one."""
 COURSE_S = np.linspace(-0.2, 0.06, 53)
 """Times about the release, s, at which the sway is told."""
 _LONGEST_S = 1.0
