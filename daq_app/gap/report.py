@@ -12,8 +12,8 @@ from typing import Any, Final
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
+from daq_app.campaign.captioned import CaptionedFigure
 from daq_app.campaign.pages import page_environment
-from daq_app.campaign.report.captioned import CaptionedFigure
 from daq_app.gap import report_figures as draw
 from daq_app.gap.core import Diagnosis
 from daq_app.gap.report_figures import ProbeMap

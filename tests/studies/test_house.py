@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ast
 
-from studies.house import bare_floats, code_lines, floors_and_circles, named_constants
+import grimp
+
+from studies.house import ROOTS, bare_floats, code_lines, floors_and_circles, named_constants
 
 CODE = '''"""A page of words."""
 
@@ -38,3 +40,10 @@ def test_numbers_that_decide_are_named_or_compared_with() -> None:
 def test_modules_that_import_each_other_are_one_floor_and_one_circle() -> None:
     edges = {"page": {"plot"}, "plot": {"data", "other"}, "other": {"plot"}, "data": set()}
     assert floors_and_circles(edges) == (3, [2])
+
+
+def test_no_two_modules_of_the_product_import_each_other() -> None:
+    """Layers hold between rooms; this holds between the files of one room as well."""
+    graph = grimp.build_graph(*ROOTS, cache_dir=None)
+    edges = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    assert floors_and_circles(edges)[1] == []

@@ -6,8 +6,8 @@ import matplotlib as mpl
 import matplotlib.backends.backend_svg  # else loaded with the first picture of each process
 from matplotlib.figure import Figure
 
+from daq_app.campaign.captioned import PLAIN_TEXT, CaptionedFigure
 from daq_app.campaign.report import figures
-from daq_app.campaign.report.captioned import PLAIN_TEXT, CaptionedFigure
 from daq_app.campaign.report.pdf import figure_page
 from daq_app.campaign.report.planned_figures import DrawnFigure, PlannedFigure
 

@@ -17,8 +17,8 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import text_to_path
 from matplotlib.transforms import Bbox
 
+from daq_app.campaign.captioned import PLAIN_TEXT, CaptionedFigure
 from daq_app.campaign.report import tables
-from daq_app.campaign.report.captioned import PLAIN_TEXT, CaptionedFigure
 from daq_app.campaign.report.number_words import interval, number, signed
 from daq_app.campaign.summaries.summary import Failure, TestSummary
 from daq_app.config.shown_text import one_line

@@ -1,7 +1,4 @@
-"""Which figures a campaign report has, and with which captions; each is drawn by whatever process is free.
-
-What draws is imported by the process that draws: this module is light.
-"""
+"""Which figures a campaign report has, and with which captions: what draws them is not loaded for it."""
 
 from __future__ import annotations
 
@@ -33,12 +30,6 @@ class PlannedFigure:
     caption: str
     tests: tuple[TestSummary, ...]
     title: str = ""
-
-    def draw(self) -> DrawnFigure:
-        """The figure, drawn here and now."""
-        from daq_app.campaign.report.drawing import draw
-
-        return draw(self)
 
 
 def campaign_figures(tests: Sequence[TestSummary]) -> list[PlannedFigure]:

@@ -10,10 +10,12 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final, Protocol, TypeVar
 
 from daq_app.campaign.report.csv_files import csv_files
+from daq_app.campaign.report.figure_job import drawn
 from daq_app.campaign.report.planned_figures import campaign_figures
 from daq_app.campaign.report.report_tables import ReportTables
 from daq_app.campaign.report.tables import RestitutionRow
@@ -71,23 +73,23 @@ def write_report(
         # The first figures keep the processes busy while tables are worked out. Their pages take longest,
         # and must not be what is left for one process at the end.
         planned = campaign_figures(tests)
-        figures = [begin(figure.draw) for figure in planned[:_PROCESSES]]
+        figures = [begin(partial(drawn, figure)) for figure in planned[:_PROCESSES]]
         content = ReportTables.of(title, status, tests, failures)
         last, first = begin(content.last_pages), begin(content.first_pages)
-        figures += [begin(figure.draw) for figure in planned[_PROCESSES:]]
+        figures += [begin(partial(drawn, figure)) for figure in planned[_PROCESSES:]]
         # Imported here: meanwhile figures are drawn.
         from daq_app.campaign.report.page import report_page
         from daq_app.campaign.report.pdf_parts import joined
 
         files = [writers.submit(write, name, text) for name, text in csv_files(content)]
-        drawn = []
+        pictures = []
         for figure in figures:
-            drawn.append(picture := figure())
+            pictures.append(picture := figure())
             svg = '<?xml version="1.0" encoding="utf-8"?>\n' + picture.svg
             files.append(writers.submit(write, f"{picture.name}.svg", svg))
-        page = report_page(content, drawn, footer)
+        page = report_page(content, pictures, footer)
         files.append(writers.submit(write, "report.html", page))
-        document = joined([first(), *(picture.page for picture in drawn), last()])
+        document = joined([first(), *(picture.page for picture in pictures), last()])
         files.append(writers.submit(write, "report.pdf", document))
         return WrittenReport(tuple(file.result() for file in files), content.restitution)
 

@@ -12,8 +12,8 @@ import matplotlib as mpl
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
+from daq_app.campaign.captioned import PLAIN_TEXT, CaptionedFigure
 from daq_app.campaign.pages import page_environment
-from daq_app.campaign.report.captioned import PLAIN_TEXT, CaptionedFigure
 from daq_app.campaign.result.family_rows import CAPTION, HEADINGS, family_rows
 from daq_app.campaign.result.figures import result_figure
 from daq_app.campaign.result.motions import period_deviation
