@@ -32,7 +32,7 @@ class _Entry:
     to import before it is loaded itself."""
 
 
-_COMMANDS: Final[Mapping[str, _Entry]] = {
+COMMANDS: Final[Mapping[str, _Entry]] = {
     "monitor": _Entry(
         ("monitor_commands",),
         "Open the operator's window: on a rig, or on an acquisition that runs already.",
@@ -107,18 +107,18 @@ class LazyCommands(PlainGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Names in the order of the help page."""
-        return list(_COMMANDS)
+        return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """The command if it was loaded; otherwise its name and first sentence, enough for a help page."""
-        entry = _COMMANDS.get(cmd_name)
+        entry = COMMANDS.get(cmd_name)
         if entry is None or cmd_name in self.commands:
             return self.commands.get(cmd_name)
         return TyperCommand(cmd_name, help=entry.help)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Load what the command line names, then do as any group does."""
-        if args and args[0] in _COMMANDS:
+        if args and args[0] in COMMANDS:
             if ni_daqmx.is_asked_for(args) and not {"--help", "-h"} & {*args} and not ni_daqmx.is_installed():
                 print(f"Hardware: {ni_daqmx.NOT_INSTALLED}. {ni_daqmx.ADVICE}", file=sys.stderr)
                 raise typer.Exit(_EXIT_HARDWARE)
@@ -131,7 +131,7 @@ def _preload(args: Sequence[str]) -> None:
     """Begin to import what processes of the command will need, on another core, unless help is asked for."""
     modules = [
         module
-        for words, needed in _COMMANDS[args[0]].preloads.items()
+        for words, needed in COMMANDS[args[0]].preloads.items()
         if args[1:2] == [words[0]] and {*words} <= {*args}
         for module in needed
     ]
@@ -144,7 +144,7 @@ def _preload(args: Sequence[str]) -> None:
 def load_command(name: str) -> Any:
     """The command of that name. `KeyError` if there is none."""
     app = typer.Typer(rich_markup_mode=None)
-    for module in _COMMANDS[name].modules:
+    for module in COMMANDS[name].modules:
         importlib.import_module(f"daq_app.cli.{module}").register(app)
     return typer.main.get_group(app).commands[name]
 

@@ -5,8 +5,9 @@ Each name is loaded when it is first used: what only words a number needs no cat
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from daq_app.config.first_use import at_first_use
 
 if TYPE_CHECKING:
     from daq_app.config.connection import Connection, parse_connection
@@ -27,7 +28,6 @@ _PLACES = {
     "scaling": ("Scaling",),
 }
 """Module below this one → the names that it brings."""
-_MODULE_OF = {name: module for module, names in _PLACES.items() for name in names}
 
 __all__ = [
     "Channel",
@@ -46,15 +46,4 @@ __all__ = [
     "plan_tasks",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    """Load the module of a name that is asked for."""
-    if name not in _MODULE_OF:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = at_first_use(__name__, _PLACES)

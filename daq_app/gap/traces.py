@@ -212,7 +212,6 @@ def _follow(
 ) -> _Followed:
     """The simulation set to one run by least squares of its impact times; `bend` lets α and p move."""
     held = swings.held
-    swaying = math.copysign(held.speed_rad_s, held.speed_rad_s * held.rotation_rad)
     pushed = 0.03 * ("initial_velocity" in effects)
     known = (held.rotation_sd + 2e-5, held.speed_sd + 2e-5 + pushed)
     spread = np.array([0.01, *known, survey.alpha_tolerance, survey.p_tolerance])
@@ -224,7 +223,7 @@ def _follow(
         full = np.zeros(5)
         full[free] = u
         delay, theta0, omega, alpha, p = full * spread
-        terms = {**effects, "initial_velocity": {"omega": swaying + omega}}
+        terms = {**effects, "initial_velocity": {"omega": held.away_rad_s + omega}}
         slender = survey.alpha_rad * (1.0 + alpha)
         # α may bend, the base stays as wide as it was surveyed.
         r0 = survey.half_base_m / math.sin(slender)

@@ -9,8 +9,9 @@ Each name is loaded when it is first used: the operator's window needs the theor
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from daq_app.config.first_use import at_first_use
 
 if TYPE_CHECKING:
     from daq_app.rocking.analysis.analyse import analyse_record
@@ -69,7 +70,6 @@ _PLACES = {
     "theory.housner": ("FreeRocking", "exact_period", "free_rocking"),
 }
 """Module below this one → the names that it brings."""
-_MODULE_OF = {name: module for module, names in _PLACES.items() for name in names}
 
 __all__ = [
     "AnalysisOptions",
@@ -109,15 +109,4 @@ __all__ = [
     "time_to_decay",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    """Load the module of a name that is asked for."""
-    if name not in _MODULE_OF:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = at_first_use(__name__, _PLACES)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from daq_app.cli.app import _COMMANDS, LazyCommands, build_app, load_command
+from daq_app.cli.app import COMMANDS, LazyCommands, build_app, load_command
 
 NAMES = LazyCommands(name="daq-app").list_commands(None)
 
@@ -69,7 +69,7 @@ def _modules_after(code: str) -> set[str]:
 
 def test_processes_that_draw_load_nothing_that_reads_runs() -> None:
     """They are awaited: the report's first figure begins when their modules are there."""
-    preloads = _COMMANDS["campaign"].preloads[("report",)]
+    preloads = COMMANDS["campaign"].preloads[("report",)]
     loaded = _modules_after("\n".join(f"import daq_app.{module}" for module in preloads))
     assert {
         "matplotlib.figure",

@@ -26,7 +26,7 @@ class PlannedFigure:
     number: Literal["4.1", "4.2", "4.3", "4.4"]
     """As in the paper: says what is drawn."""
     name: str
-    """Of the file it is saved under, without suffix."""
+    """Name of the file that the figure is saved under, without its suffix."""
     caption: str
     tests: tuple[TestSummary, ...]
     title: str = ""

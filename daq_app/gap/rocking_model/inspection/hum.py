@@ -1,7 +1,7 @@
 """Mains hum of one channel: found at rest, followed over the record, and taken out of it.
 
-Its own home beside `daq_app.rocking.families.hum`: that one looks for a line that all channels of a long
-record share, and this one for what a single channel picks up between impacts that have some of it.
+`daq_app.rocking.families.hum` looks for a line that all channels of a record share, whose size stays. This
+module follows what a single channel picks up, between impacts that have some of its frequency themselves.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import butter, sosfiltfilt, sosfreqz
@@ -22,9 +21,7 @@ MAINS_HZ = (50.0, 60.0)
 _SLOW_S = 0.1
 """Means over which a record that is turned back by the mains frequency keeps 0.6 Hz to a per cent."""
 _SWELLS_S, _MOST_SWELLS = 1.25, 12
-"""Time in which the mains may change, and the order of the polynomial up to which they are followed."""
-_USUAL_SWELL = 0.2
-"""Share of its size by which the mains swell."""
+"""Time in which the mains may change, and the number of slow cosines by which they are followed at most."""
 _ROUNDS, _HUBER = 4, 2.0
 """Rounds of reweighting, and the residual over the middle one from which less weight is given."""
 _LEAST_CALM = 0.3
@@ -70,6 +67,8 @@ def _mains(values: FloatArray, calm: NDArray[np.bool_], rate_hz: float, mains_hz
     count = values.size // block
     phasor = _mains_phasor(values.size, rate_hz, mains_hz)
     used = calm[: count * block].reshape(count, block)
+    if not (used.mean(axis=1) > _LEAST_CALM).any():
+        used = np.ones_like(used)  # knocks leave no mean that is calm enough: what they hold is noise
     turning = phasor[: count * block].reshape(count, block)
     share = np.maximum(used.mean(axis=1), _LEAST_CALM)
     seen = (values[: count * block].reshape(count, block) * turning * used).mean(axis=1)
@@ -79,9 +78,9 @@ def _mains(values: FloatArray, calm: NDArray[np.bool_], rate_hz: float, mains_hz
     time_s: FloatArray = np.asarray(_SLOW_S * (np.arange(count) + 0.5), dtype=np.float64)
     enough = used.mean(axis=1) > _LEAST_CALM
     turn = np.exp(2j * np.pi * _most_power(slow * enough, time_s) * time_s)
-    # Legendre's polynomials: those of a low order follow what changes over some seconds.
+    # Slow cosines: at its ends a polynomial follows a single mean, whatever that holds.
     order = min(int(_SLOW_S * enough.sum() / _SWELLS_S), _MOST_SWELLS)
-    shapes = np.asarray(legvander(np.linspace(-1.0, 1.0, count), order), dtype=np.float64)
+    shapes = np.cos(np.pi * np.outer((np.arange(count) + 0.5) / count, np.arange(order + 1)))
     weights = np.asarray(np.sqrt(share) * enough, dtype=np.float64)
     sizes = _sized(shapes, slow / turn, weights)
     smooth = np.interp(np.arange(values.size) / rate_hz, time_s, (shapes @ sizes) * turn)
@@ -89,25 +88,17 @@ def _mains(values: FloatArray, calm: NDArray[np.bool_], rate_hz: float, mains_hz
 
 
 def _sized(shapes: FloatArray, seen: NDArray[np.complex128], weights: FloatArray) -> NDArray[np.complex128]:
-    """Sizes of shapes (k, m), of which the first is constant and the others are a fifth of it or so.
+    """Sizes of shapes (k, m) by least squares of what is seen, (k,); `weights`, (k,), are one over its sd.
 
-    `weights`, (k,), are one over the sd of what is seen, up to a factor. Means beside an impact hold some of
-    it: what lies further off than most counts for less (Huber's weights).
+    Means beside an impact hold some of it: what lies further off than most counts for less (Huber's weights).
     """
-    sizes: NDArray[np.complex128] = np.zeros(shapes.shape[1], dtype=np.complex128)
     trusted = weights
     for _ in range(_ROUNDS):
-        design = shapes * trusted[:, None]
-        left = np.abs(seen - shapes @ sizes) * trusted
-        usual = (_USUAL_SWELL * float(np.abs(sizes[0]))) ** 2
-        noise = float(np.sum(left**2)) / max(int(np.count_nonzero(weights)) - sizes.size, 1)
-        ridge = noise / usual if usual > 0.0 else 0.0  # in the first round nothing is known of it
-        square = design.T @ design + np.diag([0.0, *[ridge] * (sizes.size - 1)])
-        sizes = np.asarray(np.linalg.solve(square, design.T @ (seen * trusted)), dtype=np.complex128)
+        sizes, *_ = np.linalg.lstsq(shapes * trusted[:, None], seen * trusted, rcond=None)
         apart = np.abs(seen - shapes @ sizes) * weights
         bar = _HUBER * float(np.median(apart[weights > 0.0]))
         trusted = weights * np.sqrt(np.minimum(1.0, bar / np.maximum(apart, 1e-300)))
-    return sizes
+    return np.asarray(sizes, dtype=np.complex128)
 
 
 def _most_power(slow: NDArray[np.complex128], time_s: FloatArray) -> float:

@@ -47,6 +47,11 @@ class HeldState:
     course_rad: FloatArray
     """(k,) rotation in which it sways at the times `COURSE_S` from the release."""
 
+    @property
+    def away_rad_s(self) -> float:
+        """Speed away from upright."""
+        return float(np.sign(self.rotation_rad)) * self.speed_rad_s
+
     def course(self, time_s: FloatArray) -> FloatArray:
         """Rotation, rad, at times from the release at which the wall is still held; constant beyond them."""
         return np.interp(time_s, COURSE_S, self.course_rad)
@@ -85,7 +90,7 @@ def held_state(theta: FloatArray, release: float, noise_rad: float, rate_hz: flo
     course, course_sd = process.rotation(time_s[:sure], means[:sure], np.append(COURSE_S, 0.0))
     rotation, rotation_sd = float(course[-1]), float(course_sd[-1])
     speed, speed_sd = process.speed(time_s[:sure], means[:sure])
-    fastest = float(np.sqrt(5.0 / 3.0)) * process.sway / process.scale_s
+    fastest = process.sway_speed
     off_s = _timed_within(theta, release, rotation, process.sway, rate_hz)
     return HeldState(
         rotation,
@@ -134,6 +139,11 @@ class _Process:
         return found
 
     @property
+    def sway_speed(self) -> float:
+        """Standard deviation of its speed, rad/s."""
+        return float(np.sqrt(5.0 / 3.0)) * self.sway / self.scale_s
+
+    @property
     def _level(self) -> float:
         """Variance, rad², by which the rotation that it goes about may differ from the mean of the seen."""
         return _LEVEL * max(self.sway, self.noise) ** 2
@@ -149,7 +159,7 @@ class _Process:
     def speed(self, time_s: FloatArray, seen: FloatArray) -> tuple[float, float]:
         """Speed at time 0 and its sd, from `seen`, (n,), at `time_s`."""
         across = self.sway**2 * _matern_rate(-time_s[None, :], self.scale_s)
-        speed, sd = self._off(time_s, seen, across, 5.0 / 3.0 * (self.sway / self.scale_s) ** 2)
+        speed, sd = self._off(time_s, seen, across, self.sway_speed**2)
         return float(speed[0]), float(sd[0])
 
     def _off(

@@ -85,13 +85,12 @@ class RockingModel:
     def local_nuisance(self, run: Run) -> tuple[Parameter, ...]:
         assert isinstance(run, RockingRun)
         held = run.swings.held
-        away = float(np.sign(held.rotation_rad))
         return (
             Parameter("zero", 0.0, 5e-5, "rad", meaning="rotation at which the wall stands upright"),
             Parameter("theta0", 0.0, held.rotation_sd + 2e-6, "rad", meaning="error of the held rotation"),
             Parameter(
                 "omega0",
-                away * held.speed_rad_s,
+                held.away_rad_s,
                 float(np.hypot(held.speed_sd, PUSH_RAD_S)),
                 "rad/s",
                 meaning="speed of the sway at release",

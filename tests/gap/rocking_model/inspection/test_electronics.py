@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from daq_app.gap.rocking_model.inspection.conditions import conditions_of, without_hum
+from daq_app.gap.rocking_model.inspection.hum import hum_of
 from daq_app.gap.rocking_model.study import prepare
 from tests.support.gap.conditions import conditions_found
 from tests.support.simulated_wall import simulate
@@ -40,3 +41,15 @@ def test_steps_that_are_coarser_than_those_of_the_converter_are_no_frozen_readin
         coarse += 4e-5 * rng.standard_normal(coarse.size)
         run.channels[place] = np.round(coarse / 1.25e-4) * 1.25e-4
     assert conditions_found(prepare(runs)[0]) == {"quantisation@WP-3"}
+
+
+def test_knocks_that_leave_no_tenth_of_a_second_calm_hide_no_hum() -> None:
+    """Every mean over 0.1 s then holds some of a knock: all of the record is used."""
+    rate_hz, amplitude = 4000.0, 1.0
+    time_s = np.arange(int(16.0 * rate_hz)) / rate_hz
+    wave = amplitude * np.sin(2.0 * np.pi * 50.0 * time_s)
+    values = wave + 0.05 * np.random.default_rng(8).standard_normal(time_s.size)
+    values[:: round(0.075 * rate_hz)] += 8.0
+    _, _, found = hum_of(values, rate_hz)
+    assert found is not None
+    assert np.max(np.abs(found - wave)) < 0.1 * amplitude

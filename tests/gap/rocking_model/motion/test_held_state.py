@@ -7,32 +7,21 @@ import pytest
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.run_features import extract
-from daq_app.gap.rocking_model.motion.held_state import HeldState, held_state
+from daq_app.gap.rocking_model.motion.held_state import HeldState
+from studies.gap.held_state import HELD_RAD, LET_GO_S, PULL_RAD_S2, RATE_HZ, found, swaying
 from tests.support.gap.simulated_campaign import simulate as longer_held
 from tests.support.simulated_wall import simulate
 
-RATE_HZ, HELD_RAD, NOISE_RAD = 4000.0, 0.05, 5e-5
+NOISE_RAD = 5e-5
 LEVELS = (0.25, -0.35, 0.4)
-PULL_RAD_S2 = 0.6
-"""Acceleration of the fall."""
 
 
 def _swaying(rng: np.random.Generator, amplitude_rad: float) -> tuple[FloatArray, float, float]:
-    """A record that is let go after 2 s, and the rotation and the speed at which it is."""
-    time_s = np.arange(int(2.4 * RATE_HZ)) / RATE_HZ - 2.0
-    held, free = np.minimum(time_s, 0.0), np.maximum(time_s, 0.0)
-    theta, speed = np.full(time_s.size, HELD_RAD), 0.0
-    for amplitude in (amplitude_rad, 0.5 * amplitude_rad):
-        rate, phase = 2.0 * np.pi * rng.uniform(0.4, 3.0), rng.uniform(0.0, 2.0 * np.pi)
-        theta = theta + amplitude * np.sin(rate * held + phase)
-        speed += amplitude * rate * np.cos(phase)
-    rotation = float(theta[-1])
-    theta = theta + speed * free - 0.5 * PULL_RAD_S2 * free**2
-    return theta + NOISE_RAD * rng.standard_normal(theta.size), rotation, speed
+    return swaying(rng, amplitude_rad, NOISE_RAD)
 
 
-def _found(theta: FloatArray, at_s: float = 2.0) -> HeldState:
-    return held_state(theta, at_s * RATE_HZ, NOISE_RAD, RATE_HZ)
+def _found(theta: FloatArray, at_s: float = LET_GO_S) -> HeldState:
+    return found(theta, NOISE_RAD, at_s)
 
 
 @pytest.mark.parametrize("amplitude_rad", [2e-5, 1e-4, 3e-4])
@@ -42,14 +31,14 @@ def test_a_swaying_wall_is_let_go_where_and_as_fast_as_it_is_said_to_be(amplitud
     for _ in range(60):
         theta, rotation, speed = _swaying(rng, amplitude_rad)
         # Nor is the release timed better than to some milliseconds.
-        found = _found(theta, 2.0 + 2e-3 * rng.standard_normal())
+        state = _found(theta, 2.0 + 2e-3 * rng.standard_normal())
         off.append(
             [
-                (found.rotation_rad - rotation) / found.rotation_sd,
-                (found.speed_rad_s - speed) / np.hypot(found.speed_sd, amplitude_rad),
+                (state.rotation_rad - rotation) / state.rotation_sd,
+                (state.speed_rad_s - speed) / np.hypot(state.speed_sd, amplitude_rad),
             ]
         )
-        sds.append(found.rotation_sd)
+        sds.append(state.rotation_sd)
     assert np.median(sds) < 0.2 * amplitude_rad + 5e-6, "far better than the sway"
     assert (np.sqrt(np.mean(np.square(off), axis=0)) < 1.4).all()
 
@@ -57,10 +46,10 @@ def test_a_swaying_wall_is_let_go_where_and_as_fast_as_it_is_said_to_be(amplitud
 def test_a_wall_that_stands_still_is_known_as_well_as_its_readings() -> None:
     rng = np.random.default_rng(5)
     theta, _, _ = _swaying(rng, 0.0)
-    found = _found(theta)
-    assert found.rotation_sd < 2e-6
-    assert found.rotation_rad == pytest.approx(HELD_RAD, abs=4 * found.rotation_sd)
-    assert found.speed_rad_s == pytest.approx(0.0, abs=1e-5)
+    state = _found(theta)
+    assert state.rotation_sd < 2e-6
+    assert state.rotation_rad == pytest.approx(HELD_RAD, abs=4 * state.rotation_sd)
+    assert state.speed_rad_s == pytest.approx(0.0, abs=1e-5)
 
 
 def test_the_first_motion_of_a_slow_release_is_no_sway() -> None:
@@ -70,16 +59,16 @@ def test_the_first_motion_of_a_slow_release_is_no_sway() -> None:
         theta, rotation, speed = _swaying(rng, 2e-5)
         time_s = np.arange(theta.size) / RATE_HZ - 2.0
         theta = theta - PULL_RAD_S2 * np.clip(time_s + 0.1, 0.0, None) ** 3 / (6.0 * 0.2)
-        found = _found(theta)
-        assert found.rotation_rad == pytest.approx(rotation, abs=4 * found.rotation_sd + 1e-5)
-        assert found.speed_rad_s == pytest.approx(speed, abs=4 * found.speed_sd + 1e-3)
+        state = _found(theta)
+        assert state.rotation_rad == pytest.approx(rotation, abs=4 * state.rotation_sd + 1e-5)
+        assert state.speed_rad_s == pytest.approx(speed, abs=4 * state.speed_sd + 1e-3)
 
 
 def test_a_hold_of_an_instant_says_how_far_it_swayed() -> None:
     rng = np.random.default_rng(7)
     theta, rotation, _ = _swaying(rng, 1e-4)
-    found = _found(theta[int(1.9 * RATE_HZ) :], 0.1)
-    assert found.rotation_rad == pytest.approx(rotation, abs=4 * found.rotation_sd)
+    state = _found(theta[int(1.9 * RATE_HZ) :], 0.1)
+    assert state.rotation_rad == pytest.approx(rotation, abs=4 * state.rotation_sd)
 
 
 def test_a_release_is_timed_whatever_the_wall_sways_by() -> None:
