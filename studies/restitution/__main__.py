@@ -1,6 +1,7 @@
 """``python -m studies.restitution faults --tests 20``, ``walls --tests 5`` and ``coverage --tests 200``.
 
 `walls`: the same for what walls do that a rigid block with one r does not.
+`sensors`: the same for the other effects on sensors that the simulator knows.
 `faults`: error of r by each method under each fault, how far the verdict trusts it, and what was said.
 `coverage`: how often each stated interval holds the truth on sound tests, and how many are warned falsely.
 """
@@ -21,7 +22,8 @@ from daq_app.rocking import AnalysisOptions, TestAnalysis, TestRecord, analyse_r
 from studies.restitution.faults import FAULTS, Fault
 from studies.restitution.foreign import foreign_tests
 from studies.restitution.laboratory import LaboratoryTest, draw_test
-from studies.restitution.walls import WALLS, Wall, mean_r_of_impacts, ringing_test
+from studies.restitution.sensors import SENSORS
+from studies.restitution.walls import WALLS, SimulatedEffect, mean_r_of_impacts, ringing_test
 
 RIG = Path(__file__).parents[2] / "configs" / "fr1.toml"
 _OPTIONS = AnalysisOptions(bias_runs=0, keep_series=False)
@@ -35,6 +37,7 @@ _CYCLES = 7
 
 
 _METHODS = ("EAV", "CRT", "verdict", "fit")
+_EFFECTS = {"walls": WALLS[1:], "sensors": SENSORS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,15 +114,15 @@ def fault_row(fault: Fault, tests: Sequence[LaboratoryTest], sound: Sequence[Ans
     return row_of(f"{fault.family}{single} {fault.kind} {fault.size:g}", answers, sound)
 
 
-def wall_row(wall: Wall, seeds: Sequence[int], sound: Mapping[bool, Sequence[Answer]]) -> str:
-    """The line of a wall in the laboratories of `seeds`; `sound` by whether r is that of a test's impacts."""
-    own = wall.changes_r
-    return row_of(wall.name, [wall_answer(wall, seed, own_impacts=own) for seed in seeds], sound[own])
+def effect_row(effect: SimulatedEffect, seeds: Sequence[int], sound: Mapping[bool, Sequence[Answer]]) -> str:
+    """The line of an effect in laboratories of `seeds`; `sound` by whether r is that of a test's impacts."""
+    own = effect.changes_r
+    return row_of(effect.name, [effect_answer(effect, seed, own_impacts=own) for seed in seeds], sound[own])
 
 
-def wall_answer(wall: Wall, seed: int, *, own_impacts: bool) -> Answer:
-    """What the analysis says of a wall in the laboratory of `seed`."""
-    test = wall.test(load_rig(RIG), seed)
+def effect_answer(effect: SimulatedEffect, seed: int, *, own_impacts: bool) -> Answer:
+    """What the analysis says of an effect in the laboratory of `seed`."""
+    test = effect.test(load_rig(RIG), seed)
     true_r = mean_r_of_impacts(test) if own_impacts else float(test.truth["restitution"])
     return answer_of(test.record(), true_r)
 
@@ -193,7 +196,7 @@ def coverage(tests: Iterable[LaboratoryTest]) -> list[str]:
 def main() -> None:
     """Print the table that was asked for."""
     parser = argparse.ArgumentParser(prog="python -m studies.restitution", description=__doc__)
-    parser.add_argument("table", choices=["faults", "walls", "coverage"])
+    parser.add_argument("table", choices=["faults", "walls", "sensors", "coverage"])
     parser.add_argument("--tests", type=int, default=20, help="simulated tests, for each fault or in all")
     parser.add_argument("--first-seed", type=int, default=5000)
     parser.add_argument("--foreign", type=Path, help="folder of labelled recordings instead")
@@ -217,14 +220,14 @@ def main() -> None:
         return
     methods = " ".join(f"{name:>8s}" for name in _METHODS)
     head = f"largest |error| of r:       {methods}  trusted  quiet missed  trust, said"
-    if options.table == "walls":
+    if options.table in _EFFECTS:
         seeds = range(options.first_seed, options.first_seed + options.tests)
         rigid = {
-            own: [wall_answer(WALLS[0], seed, own_impacts=own) for seed in seeds] for own in (False, True)
+            own: [effect_answer(WALLS[0], seed, own_impacts=own) for seed in seeds] for own in (False, True)
         }
         print(head)
-        for wall in WALLS:
-            print(wall_row(wall, seeds, rigid), flush=True)
+        for effect in (WALLS[0], *_EFFECTS[options.table]):
+            print(effect_row(effect, seeds, rigid), flush=True)
         return
     tests = list(tests)
     sound = [answer_of(test.record(), test.truth["restitution"]) for test in tests]

@@ -17,7 +17,7 @@ from daq_app.rocking import LiveAnalyser
 from daq_app.rocking.live import Estimate
 from studies.restitution.faults import Fault
 from studies.restitution.laboratory import LaboratoryTest, draw_test
-from studies.restitution.walls import Wall, ringing_test
+from studies.restitution.walls import SimulatedEffect, ringing_test
 
 RIG: Final = Path(__file__).parents[2] / "configs" / "fr1.toml"
 _BLOCK_S: Final = 0.1
@@ -38,12 +38,12 @@ _TOLD: Final = {
 
 def round_edges(rig: Rig, seed: int) -> LaboratoryTest:
     """The laboratory of `seed` whose wall rolls on edges with a radius of a tenth of its width."""
-    return Wall("rounded_edge", {"rho": 0.1}).test(rig, seed)
+    return SimulatedEffect("rounded_edge", {"rho": 0.1}).test(rig, seed)
 
 
 def slowly_released(rig: Rig, seed: int) -> LaboratoryTest:
     """The laboratory of `seed` whose wall is let go within 100 ms."""
-    return Wall("slow_release", {"tau": 0.1}).test(rig, seed)
+    return SimulatedEffect("slow_release", {"tau": 0.1}).test(rig, seed)
 
 
 def behind_slow_lvdts(rig: Rig, seed: int) -> LaboratoryTest:

@@ -19,8 +19,8 @@ of them: r is then the mean that the impacts are drawn about, as it is of every 
 
 
 @dataclass(frozen=True, slots=True)
-class Wall:
-    """One effect of the simulator; the size is that of its first parameter, in its unit."""
+class SimulatedEffect:
+    """One effect of the simulator, on the wall or on sensors; the size is that of its first parameter."""
 
     effect: str
     parameters: Mapping[str, float]
@@ -28,7 +28,7 @@ class Wall:
     """How long after the last impact the recording ends; as the rig file says if None."""
 
     def test(self, rig: Rig, seed: int) -> LaboratoryTest:
-        """The laboratory of `seed` with this wall."""
+        """The laboratory of `seed` with this effect."""
         test = draw_test(rig, seed, effects={self.effect: self.parameters} if self.effect else {})
         if self.ends_s is None:
             return test
@@ -59,7 +59,7 @@ def ringing_test(rig: Rig, seed: int) -> LaboratoryTest:
         "frequency": float(rng.uniform(2.5, 9.0)),
         "zeta": float(np.exp(rng.uniform(np.log(0.003), np.log(0.02)))),
     }
-    return Wall("flexible_wall", parameters, ends_s=float(rng.uniform(0.4, 1.5))).test(rig, seed)
+    return SimulatedEffect("flexible_wall", parameters, ends_s=float(rng.uniform(0.4, 1.5))).test(rig, seed)
 
 
 def mean_r_of_impacts(test: LaboratoryTest) -> float:
@@ -71,26 +71,36 @@ def mean_r_of_impacts(test: LaboratoryTest) -> float:
 
 
 WALLS = (
-    Wall("", {}),
-    *(Wall("coulomb", {"mu": size}) for size in (0.005, 0.02)),
-    *(Wall("viscous", {"zeta": size}) for size in (0.005, 0.02)),
-    *(Wall("restitution_slope", {"k": size}) for size in (0.02, 0.05)),
-    *(Wall("restitution_asymmetry", {"d": size}) for size in (0.01, 0.02)),
-    *(Wall("restitution_wear", {"loss": size}) for size in (0.002, 0.01)),
-    *(Wall("restitution_scatter", {"sigma": size}) for size in (0.01, 0.02)),
-    *(Wall("winkler", {"theta_c": size}) for size in (2e-4, 9e-4)),
-    *(Wall("rounded_edge", {"rho": size}) for size in (0.02, 0.1)),
-    *(Wall("pivot_shift", {"a": size}) for size in (0.01, 0.033)),
-    *(Wall("base_tilt", {"beta": size}) for size in (0.001, 0.004)),
-    *(Wall("bounce", {"tau": size}) for size in (0.002, 0.008)),
-    *(Wall("dwell", {"tau": size}) for size in (0.002, 0.008)),
-    *(Wall("compliance", {"phi": size}) for size in (0.0005, 0.002)),
-    *(Wall("flexible_wall", {"gain": size}) for size in (0.001, 0.005)),
+    SimulatedEffect("", {}),
+    *(SimulatedEffect("coulomb", {"mu": size}) for size in (0.005, 0.02)),
+    *(SimulatedEffect("viscous", {"zeta": size}) for size in (0.005, 0.02)),
+    *(SimulatedEffect("restitution_slope", {"k": size}) for size in (0.02, 0.05)),
+    *(SimulatedEffect("restitution_asymmetry", {"d": size}) for size in (0.01, 0.02)),
+    *(SimulatedEffect("restitution_wear", {"loss": size}) for size in (0.002, 0.01)),
+    *(SimulatedEffect("restitution_scatter", {"sigma": size}) for size in (0.01, 0.02)),
+    *(SimulatedEffect("winkler", {"theta_c": size}) for size in (2e-4, 9e-4)),
+    *(SimulatedEffect("rounded_edge", {"rho": size}) for size in (0.02, 0.1)),
+    *(SimulatedEffect("pivot_shift", {"a": size}) for size in (0.01, 0.033)),
+    *(SimulatedEffect("base_tilt", {"beta": size}) for size in (0.001, 0.004)),
+    *(SimulatedEffect("bounce", {"tau": size}) for size in (0.002, 0.008)),
+    *(SimulatedEffect("dwell", {"tau": size}) for size in (0.002, 0.008)),
+    *(SimulatedEffect("compliance", {"phi": size}) for size in (0.0005, 0.002)),
+    *(SimulatedEffect("flexible_wall", {"gain": size}) for size in (0.001, 0.005)),
     *(
-        Wall("flexible_wall", {"gain": size, "frequency": 4.6, "zeta": 0.005}, ends_s=0.7)
+        SimulatedEffect("flexible_wall", {"gain": size, "frequency": 4.6, "zeta": 0.005}, ends_s=0.7)
         for size in (0.02, 0.2)
     ),
-    *(Wall("twist", {"kick": size}) for size in (0.01, 0.05)),
-    *(Wall("residual_cable", {"k": size}) for size in (0.01, 0.05)),
-    *(Wall("slow_release", {"tau": size}) for size in (0.02, 0.1)),
+    *(SimulatedEffect("twist", {"kick": size}) for size in (0.01, 0.05)),
+    *(SimulatedEffect("residual_cable", {"k": size}) for size in (0.01, 0.05)),
+    *(SimulatedEffect("slow_release", {"tau": size}) for size in (0.02, 0.1)),
+    *(SimulatedEffect("crushing", {"loss": size}) for size in (0.01, 0.03)),
+    *(SimulatedEffect("quadratic_drag", {"c": size}) for size in (0.02, 0.1)),
+    *(SimulatedEffect("alpha_asymmetry", {"delta": size}) for size in (0.002, 0.005)),
+    *(SimulatedEffect("eccentric_mass", {"e": size}) for size in (0.002, 0.007)),
+    *(SimulatedEffect("cubic", {"kappa": size}) for size in (0.1, 0.3)),
+    *(SimulatedEffect("sliding", {"c": size}) for size in (0.002, 0.02)),
+    *(SimulatedEffect("corner_twist", {"c": size}) for size in (0.002, 0.006)),
+    *(SimulatedEffect("yaw", {"kick": size}) for size in (0.01, 0.05)),
+    *(SimulatedEffect("initial_velocity", {"omega": size}) for size in (0.01, 0.03)),
+    *(SimulatedEffect("ambient", {"amplitude": size}) for size in (0.05, 0.3)),
 )

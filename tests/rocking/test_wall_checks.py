@@ -16,7 +16,7 @@ from daq_app.rocking.theory.block import RigidBlock
 from sim_hardware.direct import synthesise_test
 from studies.restitution.faults import Fault
 from studies.restitution.laboratory import LaboratoryTest, draw_test
-from studies.restitution.walls import Wall, ringing_test
+from studies.restitution.walls import SimulatedEffect, ringing_test
 
 ROOT = Path(__file__).parents[2]
 RIG = load_rig(ROOT / "configs" / "fr1.toml")
@@ -303,7 +303,7 @@ def test_the_interval_of_each_method_holds_the_r_of_the_impacts_as_the_verdict_d
 
 @pytest.mark.parametrize("gain", [0.02, 0.2])
 def test_r_and_theta0_of_a_wall_that_still_rings_where_the_recording_ends_are_those_of_its_base(gain):
-    ringing = Wall("flexible_wall", {"gain": gain, "frequency": 4.6, "zeta": 0.005}, ends_s=0.7)
+    ringing = SimulatedEffect("flexible_wall", {"gain": gain, "frequency": 4.6, "zeta": 0.005}, ends_s=0.7)
     test = ringing.test(RIG, SEED)
     analysis = analyse_record(test.record(), AnalysisOptions(fit=False, bias_runs=0, keep_series=False))
     (bending,) = [finding for finding in analysis.findings if finding.kind == "bending"]
@@ -319,7 +319,7 @@ def test_r_and_theta0_of_a_wall_that_still_rings_where_the_recording_ends_are_th
 
 @pytest.mark.parametrize("factor", [0.05, 0.5])
 def test_r_of_a_wall_that_bends_is_doubted_where_its_lvdts_cannot_take_the_place_of_its_wires(factor: float):
-    ringing = Wall("flexible_wall", {"gain": 0.2, "frequency": 4.6, "zeta": 0.005}, ends_s=0.7)
+    ringing = SimulatedEffect("flexible_wall", {"gain": 0.2, "frequency": 4.6, "zeta": 0.005}, ends_s=0.7)
     record = Fault("lvdt", "unit", factor).record(ringing.test(RIG, SEED))
     analysis = analyse_record(record, AnalysisOptions(fit=False, bias_runs=0, keep_series=False))
     (bending,) = [finding for finding in analysis.findings if finding.kind == "bending"]
@@ -338,7 +338,7 @@ def test_r_of_a_wall_that_bends_is_doubted_where_its_lvdts_cannot_take_the_place
     ],
 )
 def test_a_wall_that_bends_is_told_behind_a_family_that_is_slow_or_late(fault: Fault, kind: str, trust: str):
-    ringing = Wall("flexible_wall", {"gain": 0.2, "frequency": 4.6, "zeta": 0.005}, ends_s=0.7)
+    ringing = SimulatedEffect("flexible_wall", {"gain": 0.2, "frequency": 4.6, "zeta": 0.005}, ends_s=0.7)
     test = ringing.test(RIG, SEED)
     analysis = analyse_record(fault.record(test), AnalysisOptions(bias_runs=0, keep_series=False))
     low, high = analysis.verdict.interval95

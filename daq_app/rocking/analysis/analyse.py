@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.rocking.analysis.bias import BiasSettings, method_bias
-from daq_app.rocking.analysis.families_table import families_of, verdict_of
+from daq_app.rocking.analysis.families_table import families_of, other_is_blamed, verdict_of
 from daq_app.rocking.analysis.half_cycles import half_cycles_of
 from daq_app.rocking.analysis.joint_summary import summarise_joint
 from daq_app.rocking.analysis.options import AnalysisOptions
@@ -69,7 +69,7 @@ def _analyse(
     options: AnalysisOptions,
 ) -> TestAnalysis:
     signals, times = instruments.signals, instruments.times
-    alone = any(finding.kind in ("slow", "bending") for finding in instruments.findings)
+    alone = other_is_blamed(instruments.findings, "wires" if signals.lead == "lvdts" else "lvdts")
     tracks = follow_families(signals, times, fuse=not alone)
     track = tracks.lead
     peaks = filtered_peaks(signals.time_s, lambda start, stop: velocity[start:stop], track.impacts_s)

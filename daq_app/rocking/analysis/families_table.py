@@ -32,7 +32,7 @@ from daq_app.rocking.theory.block import RigidBlock
 
 LEADS = {"wires": "wires", "lvdts": "LVDTs"}
 """Families that a motion can be read from: the reader's word by the key."""
-_FOLLOWS_BADLY = ("slow", "late", "drift", "bending")
+_FOLLOWS_BADLY = ("slow", "late", "drift", "bending", "steps", "still", "leaps", "motion")
 
 
 def families_of(
@@ -139,8 +139,14 @@ def verdict_of(
 
 
 def other_is_blamed(findings: Sequence[FamilyFinding], other: str) -> bool:
-    """Whether the family that does not lead, ``wires`` or ``lvdts``, is known to follow the wall badly."""
+    """Whether the family that does not lead, ``wires`` or ``lvdts``, is known to follow the wall badly.
+
+    A single channel that is left out says nothing of the others.
+    """
     return any(
-        f.kind in _FOLLOWS_BADLY and LEADS[other] in f.family and f.treatment != "put in step"
+        f.kind in _FOLLOWS_BADLY
+        and LEADS[other] in f.family
+        and not f.channels
+        and f.treatment != "put in step"
         for f in findings
     )

@@ -11,7 +11,7 @@ from daq_app.rocking.analysis.own_body import OwnTrack, with_own_body
 from daq_app.rocking.analysis.preparation.instruments import Instruments
 from daq_app.rocking.analysis.results import JointSummary
 from daq_app.rocking.analysis.tracks import FamilyTracks
-from daq_app.rocking.families import words
+from daq_app.rocking.families import unfit_words, words
 from daq_app.rocking.families.block_checks import (
     alpha_findings,
     duration_findings,
@@ -24,11 +24,15 @@ from daq_app.rocking.families.block_checks import (
 )
 from daq_app.rocking.families.body import body_of
 from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.families.floor import shaking_of_floor
 from daq_app.rocking.motion.impact_pattern import ImpactPattern, impact_pattern
 from daq_app.rocking.theory.block import RigidBlock
 
 _MADE_BY_A_DRIFT: Final = ("side", "duration", "pause", "hop")
 """A zero that moves makes leans to one side longer and faster than those to the other."""
+
+_SETTLED_S: Final = 0.5
+"""Time after the last impact in which a wall's own ringing dies away."""
 
 
 def pattern_of(
@@ -78,7 +82,21 @@ def wall_findings(
         found += p_findings(bodies[LEADS[lead]], tracks.lead.settings.p_rad_s)
     if not tracks.lead.fell_freely:
         found.append(words.slow_release(tracks.lead.misfit_of_fall))
+    found += _floor(instruments)
     if joint is not None:
         block = RigidBlock.from_specimen(instruments.record.rig.specimen)
         found += pivot_findings(block, joint.inset_left_m, joint.inset_right_m)
     return found
+
+
+def _floor(instruments: Instruments) -> list[FamilyFinding]:
+    """Whether the floor shakes, by the accelerometers at rest; a wall that bends rings on there by itself."""
+    rest, record = instruments.times.rest, instruments.record
+    ids = record.family("accelerometer", "x")
+    if rest is None or not ids or instruments.bending is not None:
+        return []
+    start = rest.start + round(_SETTLED_S * record.rate_hz)
+    if start >= rest.stop:
+        return []
+    rms = shaking_of_floor(record.load(ids, start, rest.stop), record.rate_hz)
+    return [] if rms is None else [unfit_words.shaking_floor(rms)]

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Family = Literal["wires", "LVDTs", "tiltmeters", "accelerometers", "survey", "wall"]
+Family = Literal["wires", "LVDTs", "tiltmeters", "accelerometers", "survey", "wall", "floor"]
 Kind = Literal[
     "slow", "late", "gain", "zero", "hum", "reversed", "unit", "drift", "motion",
     "speed", "side", "loss", "pause", "hop", "duration", "scatter", "release",
     "misfit", "pivot", "bending", "alpha", "p",
-    "hysteresis",
+    "hysteresis", "steps", "still", "leaps", "noise", "vibration",
 ]  # fmt: skip
 Treatment = Literal["none", "left out", "put in step", "put right", "removed"]
 
@@ -26,7 +26,7 @@ class FamilyFinding:
     kind: Kind
     size: float
     """SI; a share for gain, p, loss, pause, hop, scatter and release, the factor for unit, a change of r for
-    speed, side and alpha, standard errors for duration."""
+    speed, side and alpha, standard errors for duration, times the rig file's for noise, a count for leaps."""
     unit: str
     treatment: Treatment
     severity: Literal["info", "warning"]

@@ -46,6 +46,10 @@ class Response:
     span_s: float
     """Length of what was compared."""
 
+    def noise_of_means(self, rate_hz: float, noise_rad: float) -> float:
+        """What white noise of `noise_rad` rms in one sample leaves in the means that were compared."""
+        return noise_rad / math.sqrt(max(1, round(rate_hz / _RATE_HZ)))
+
     def made_alike(self, rate_hz: float, reference: Floats, follower: Floats) -> tuple[Floats, Floats]:
         """Both rotations, (n,), with the delay and the slowness of either; NaN where one is not known."""
         unknown = ~np.isfinite(reference + follower)

@@ -190,13 +190,12 @@ def judge(
 def _touches_r(finding: FamilyFinding) -> bool:
     """Whether r may be off by it: a gain cancels in EAV and moves CRT by 0.0001 for 1 %; no time is in r.
 
-    What a scatter makes of r is in its error, what the survey's α makes of it in that of CRT, and a misfit is
-    in the error of r by the fit alone. r is a ratio of speeds, and no p is in it.
+    What a scatter or noise makes of r is in its error, what the survey's α makes of it in that of CRT, and a
+    misfit is in the error of r by the fit alone. r is a ratio of speeds, and no p is in it.
     """
-    return finding.kind not in ("gain", "late", "scatter", "misfit", "alpha", "p") and finding.family not in (
-        "tiltmeters",
-        "accelerometers",
-    )
+    if finding.family in ("tiltmeters", "accelerometers"):
+        return False
+    return finding.kind not in ("gain", "late", "scatter", "misfit", "alpha", "p", "noise")
 
 
 def _share_of_r(finding: FamilyFinding, r: float) -> float:

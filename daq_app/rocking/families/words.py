@@ -137,13 +137,17 @@ def not_done(finding: FamilyFinding) -> FamilyFinding:
     return replace(finding, treatment="none", text=text)
 
 
-def late(family: str, by_s: float, others: str) -> FamilyFinding:
+def late(family: str, by_s: float, others: str, *, left_out: bool = False) -> FamilyFinding:
+    """A delay that no plan tells; `left_out`: the family's motion has another form, too."""
     word = "late" if by_s > 0 else "early"
     text = f"{family} are {abs(by_s) * 1e3:.1f} ms {word} against {others}: a delay unknown to the task plan"
     if family == "accelerometers":
         if by_s < 0:
             text += f", or a filter that {others} have in common and that makes r by EAV too low"
         return FamilyFinding(family, (), "late", by_s, "s", "none", "warning", text)
+    if left_out:
+        done = "; what makes them late (a filter, a drum that swings) bends their motion too: r is not theirs"
+        return FamilyFinding(family, (), "late", by_s, "s", "left out", "warning", text + done)
     return FamilyFinding(
         family, (), "late", by_s, "s", "put in step", "warning", text + "; they were put in step"
     )

@@ -22,7 +22,7 @@ from studies.restitution.live import (
     slowly_released,
     sticking_wire,
 )
-from studies.restitution.walls import Wall, ringing_test
+from studies.restitution.walls import SimulatedEffect, ringing_test
 
 RIG = load_rig(Path(__file__).parents[3] / "configs" / "fr1.toml")
 RINGING_SEED = 91001
@@ -59,7 +59,7 @@ def test_a_wall_that_bends_is_judged_by_the_lvdts_at_its_base_and_no_family_is_c
 def test_zero_crossings_that_ringing_moves_are_not_taken_for_a_delay_of_the_wires():
     """They come up to 35 ms after the shocks, and "impact times are off, r is not" would be wrong."""
     mode = {"gain": 0.2, "frequency": 4.6, "zeta": 0.005}
-    estimates = live_estimates(Wall("flexible_wall", mode, ends_s=0.7).test(RIG, 91000))
+    estimates = live_estimates(SimulatedEffect("flexible_wall", mode, ends_s=0.7).test(RIG, 91000))
 
     assert "the wall bends" in estimates[-1].doubts[0]
     assert not any("late against" in doubt for estimate in estimates for doubt in estimate.doubts)

@@ -28,22 +28,15 @@ from daq_app.gap.rocking_model.inspection.spikes import (
 )
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.tolerances.inspection import (
-    A_STEP,
-    BESIDE_STEPS,
-    CONVERTER_STEP,
-    FEWEST_STEPS,
     FROZEN_S,
     FROZEN_SD,
     GOES_ON_STEPS,
-    IN_STEPS,
-    OF_CONVERTER,
-    OFF_STEP,
     RANGE_MARGIN,
-    SMALLEST_STEP,
     SPIKES_SD_PER_S,
     STANDS_OUT,
     STEP_SD,
 )
+from daq_app.rocking.families.coarse_steps import coarse_step, resolution
 from daq_app.rocking.geometry.noise import white_noise
 
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer")
@@ -80,47 +73,11 @@ def inspect_channel(run: GapRun, index: int, still: Mask, shaken: Mask | None = 
     if accelerometer:
         lone = NO_LONE_SAMPLES if shaken is None else lone_samples(clean, usual, rate, still, ~shaken)
         return Condition(hum, hum_sd, wave, lone=lone, noise_si=usual)
-    step = _quantisation_step(values, run.sensors[index].noise_si)
+    step = coarse_step(values, run.sensors[index].noise_si)
     frozen = _frozen(values, rate, step, run.sensors[index].range_si)
     # A channel that rests at the end of its range shows no noise there.
     lone = lone_samples(clean, usual, rate, still) if step == 0.0 and frozen == 0.0 else NO_LONE_SAMPLES
     return Condition(hum, hum_sd, wave, step, frozen, lone, usual)
-
-
-def _quantisation_step(values: FloatArray, noise_si: float) -> float:
-    """Step of a reading that only takes values a step apart; 0 where it does not.
-
-    From sample to sample such a reading stays, or goes on by whole steps; noise does neither.
-    """
-    change = np.abs(np.diff(values))
-    top = _quantile(change, 0.9995)
-    large = change > A_STEP * top
-    if top <= 0.0 or np.mean(large) < FEWEST_STEPS:
-        return 0.0
-    rest = float(np.sqrt(np.mean(change[~large] ** 2)))
-    if rest > OF_CONVERTER * top:  # their median is smaller still, and takes longer to find
-        return 0.0
-    step = float(np.median(change[large]))
-    whole = change[large] / step
-    # Between two steps of its own the converter goes to and fro.
-    own = _resolution(values) if rest > BESIDE_STEPS * step else 0.0
-    beside = own if own < OF_CONVERTER * step else 0.0
-    if (
-        rest > max(BESIDE_STEPS * step, beside)
-        or np.mean(np.abs(whole - np.round(whole)) < OFF_STEP) < IN_STEPS
-    ):
-        return 0.0
-    none = step < CONVERTER_STEP * noise_si or step < SMALLEST_STEP * float(np.ptp(values))
-    return 0.0 if none else step  # the converter's own step is none
-
-
-def _quantile(values: FloatArray, share: float) -> float:
-    """As `np.quantile`, in a tenth of its time for one share of a long row."""
-    at = share * (values.size - 1)
-    low = int(at)
-    high = min(low + 1, values.size - 1)
-    ordered = np.partition(values, (low, high))
-    return float(ordered[low] + (at - low) * (ordered[high] - ordered[low]))
 
 
 def _frozen(values: FloatArray, rate_hz: float, step: float, limits: tuple[float, float]) -> float:
@@ -136,20 +93,13 @@ def _frozen(values: FloatArray, rate_hz: float, step: float, limits: tuple[float
     long = stops - starts > FROZEN_S * rate_hz
     if not long.any():
         return 0.0
-    coarsest = max(step, _resolution(values))
+    coarsest = max(step, resolution(values))
     if white_noise(values) < coarsest:
         # Between two steps of its converter, or of a coarser quantisation, a sound reading stands still too,
         # but then it goes on by one of them. Noise of more than a step keeps it moving on a wall at rest.
         after = np.minimum(stops + 1, values.size - 1)
         long &= np.abs(values[after] - values[starts]) > GOES_ON_STEPS * coarsest
     return float((stops - starts)[long].sum()) / values.size
-
-
-def _resolution(values: FloatArray) -> float:
-    """Step of the converter behind a reading: the least that it changes by; 0 for one that never changes."""
-    change = np.abs(np.diff(values))
-    change = change[change > 0.0]
-    return _quantile(change, 0.01) if change.size > 1 else 0.0
 
 
 def conditions_of(runs: Sequence[GapRun]) -> list[dict[str, Condition]]:

@@ -133,56 +133,8 @@ BEYOND_HUM = 4.0
 Raising it takes the share that an impact has of the mains frequency for hum.
 """
 
-A_STEP = 0.4
-"""Share of the largest changes from sample to sample, 1, from which one is a step or some (assumed).
-
-Raising it takes single steps for noise where readings go on by several at once.
-"""
-
-BESIDE_STEPS = 0.05
-"""Rms of the other changes over a step, 1, up to which a reading stands still between steps (assumed).
-
-Raising it takes noise for steps.
-"""
-
-OF_CONVERTER = 0.15
-"""Step of the converter over a coarser one of the reading, 1, up to which both are told apart (assumed).
-
-Raising it takes noise for steps.
-"""
-
-OFF_STEP = 0.15
-"""Distance from a whole number of steps, 1, up to which a change is one (assumed).
-
-Raising it takes noise for steps.
-"""
-
-IN_STEPS = 0.9
-"""Share of the large changes, 1, that must be whole numbers of steps (assumed).
-
-Raising it overlooks steps in readings with spikes.
-"""
-
 STEP_SD = 0.02
 """Relative sd, 1, of the step of a reading (assumed)."""
-
-FEWEST_STEPS = 0.004
-"""Share of samples, 1, at which a reading in steps goes on by a step at least.
-
-Raising it overlooks steps that are so coarse that the reading seldom goes on.
-"""
-
-SMALLEST_STEP = 5e-4
-"""Step over the span of the reading, 1, from which it matters: below, it is the converter's own.
-
-Raising it overlooks fine steps.
-"""
-
-CONVERTER_STEP = 3.0
-"""Step over the declared noise of a reading, 1, up to which it is the converter's own (assumed).
-
-Raising it overlooks fine steps.
-"""
 
 GOES_ON_STEPS = 2.5
 """Steps of its converter, 1, by which a reading goes on after it stood still for it to have been frozen.
