@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.families.wires.single_wires import WireKind
 
 
 def coarse_steps(family: str, name: str, step_m: float) -> FamilyFinding:
@@ -33,6 +34,20 @@ def leaps(family: str, name: str, count: int) -> FamilyFinding:
         "causes: a loose contact, missed conversions, interference"
     )
     return FamilyFinding(family, (name,), "leaps", float(count), "1", "left out", "warning", text)
+
+
+def odd_lvdt(name: str, kind: WireKind, size: float) -> FamilyFinding:
+    """An LVDT that deviates from the others of its face; it is left out."""
+    what, unit = {
+        "gain": (f"shows {size:+.1%} of opening against", "1"),
+        "late": (f"is {size * 1e3:+.1f} ms late against", "s"),
+        "drift": (f"drifts by {size * 1e3:+.2f} mrad against", "rad"),
+    }[kind]
+    text = (
+        f"{name} (LVDTs) {what} the others of its face: its calibration, its filter or its holder is not the "
+        "rig file's; it is left out"
+    )
+    return FamilyFinding("LVDTs", (name,), kind, size, unit, "left out", "warning", text)
 
 
 def whole_family_unfit(channels: Sequence[FamilyFinding]) -> FamilyFinding:

@@ -32,6 +32,10 @@ def analysed(made, which: tuple[str, ...], change: Change) -> TestAnalysis:
     )
 
 
+def times(factor: float) -> Change:
+    return lambda values, rate_hz: values * factor
+
+
 def in_steps(metres: float) -> Change:
     return lambda values, rate_hz: metres * np.round(values / metres)
 
@@ -101,6 +105,8 @@ def filtered(seconds: float) -> Change:
         (WIRES, at_its_stop(0.02), "wires", "still"),
         (("WP-3",), at_its_stop(0.02), "wires", "still"),
         (LVDTS, at_its_stop(0.005), "LVDTs", "still"),
+        (("LV-A03",), filtered(0.02), "LVDTs", "late"),
+        (("LV-A03",), times(1.1), "LVDTs", "gain"),
         (WIRES, filtered(0.02), "wires", "late"),
         (LVDTS, filtered(0.02), "LVDTs", "late"),
     ],

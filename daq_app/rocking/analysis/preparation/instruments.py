@@ -25,6 +25,7 @@ from daq_app.rocking.analysis.preparation.compared_families import (
 )
 from daq_app.rocking.analysis.preparation.crude_rotations import CrudeRotations, crude_rotations
 from daq_app.rocking.analysis.preparation.gains import FamilyGains, gains_of
+from daq_app.rocking.analysis.preparation.odd_lvdts import odd_lvdts
 from daq_app.rocking.analysis.preparation.odd_wire import compared_wires, odd_wire, wire_means
 from daq_app.rocking.analysis.preparation.reader import Reader, found_by_others, shows_test
 from daq_app.rocking.analysis.preparation.signals import Signals, TestTimes
@@ -172,6 +173,10 @@ def _in_step(
         findings = [f for f in findings if f.kind != "steps" or f.channels != odd.channels]
         findings.append(odd)
         left_out = in_steps.union(odd.channels)
+    if comparable:
+        odd_ones = odd_lvdts(signals, motion_samples(signals, times))
+        findings += odd_ones
+        left_out = left_out.union(*(finding.channels for finding in odd_ones))
     changed = replace(changed, left_out=left_out)
     response = follow(signals, times) if comparable else None
     shocks = shocks_of(record, signals, times)
