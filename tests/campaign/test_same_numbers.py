@@ -112,15 +112,15 @@ def test_the_zero_of_a_run_without_a_tare_can_be_chosen(tmp_path: Path, configs:
     assert command(run, "--keep-zero")["zero"] == "certificates"
 
 
-def imported(folder: Path, configs: Path, *, wires: bool = True) -> Path:
-    """The same test as another program would give it, imported; maybe its wires stand still."""
+def imported(folder: Path, configs: Path, *, unplugged: tuple[str, ...] = ()) -> Path:
+    """The same test as another program would give it, imported; channels that begin so show nothing."""
     source = folder / "source"
     source.mkdir()
     exported = export_run(write_run(source, configs, tared=False), folder / "demo.npz", "npz")
-    if not wires:
+    if unplugged:
         with np.load(exported) as content:
             values = dict(content)
-        rows = [k for k, name in enumerate(values["names"]) if str(name).startswith("WP")]
+        rows = [k for k, name in enumerate(values["names"]) if str(name).startswith(unplugged)]
         values["data"][rows] *= 0.0
         np.savez(exported, **values)
     (folder / "map.toml").write_text(f'[run]\ntest = "{_TEST}"\n', encoding="utf-8")
@@ -155,8 +155,20 @@ def test_an_imported_run_is_judged_and_has_one_r(tmp_path: Path, configs: Path) 
         assert r == by_command["estimates"][method]["r"] == summary.methods[method.upper()].r
 
 
+def test_an_imported_run_without_its_wires_has_the_r_of_its_lvdts_and_says_so(
+    tmp_path: Path, configs: Path
+) -> None:
+    run = imported(tmp_path, configs, unplugged=("WP",))
+    with open_run(run) as opened:
+        analysis = opened.results["analysis"]
+    assert analysis["verdict"]["trust"] == "remarks"
+    assert analysis["verdict"]["used"] == ["LVDTs"]
+    assert any("wires something else" in reason for reason in analysis["verdict"]["reasons"])
+    assert analysis["verdict"]["r"] == pytest.approx(0.895, abs=0.002)
+
+
 def test_an_imported_run_that_shows_no_release_is_bad(tmp_path: Path, configs: Path) -> None:
-    run = imported(tmp_path, configs, wires=False)
+    run = imported(tmp_path, configs, unplugged=("WP", "LV"))
     test = recorded_test(run, {})
     assert test is not None and test.verdict is TestVerdict.BAD
     assert "no release" in test.reason

@@ -40,7 +40,7 @@ def in_steps(metres: float) -> Change:
     return lambda values, rate_hz: metres * np.round(values / metres)
 
 
-def frozen_for_moments(share: float, seconds: float = 0.02) -> Change:
+def frozen_for_moments(share: float, seconds: float) -> Change:
     """A loose contact: the last reading stays for moments, a share of the time."""
 
     def change(values: Floats, rate_hz: float) -> Floats:
@@ -98,9 +98,10 @@ def filtered(seconds: float) -> Change:
         (("WP-3",), in_steps(1e-3), "wires", "steps"),
         (LVDTS, in_steps(1e-3), "LVDTs", "steps"),
         (("LV-A03",), in_steps(1e-3), "LVDTs", "steps"),
-        (WIRES, frozen_for_moments(0.1), "wires", "still"),
-        (("WP-3",), frozen_for_moments(0.1), "wires", "still"),
-        (LVDTS, frozen_for_moments(0.1), "LVDTs", "still"),
+        (WIRES, frozen_for_moments(0.1, 0.2), "wires", "still"),
+        (("WP-3",), frozen_for_moments(0.1, 0.2), "wires", "still"),
+        (LVDTS, frozen_for_moments(0.1, 0.2), "LVDTs", "still"),
+        (WIRES, frozen_for_moments(0.1, 0.02), "wires", "leaps"),
         (("WP-3",), struck(0.02), "wires", "leaps"),
         (WIRES, at_its_stop(0.02), "wires", "still"),
         (("WP-3",), at_its_stop(0.02), "wires", "still"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -89,10 +90,11 @@ def _readings(record: TestRecord, name: str, values: Floats) -> Readings:
 
 def _levers_m(record: TestRecord) -> dict[str, float]:
     """What each wire and LVDT moves by for a rotation of one rad, m, roughly."""
-    wires = RotationGeometry.from_rig(record.rig).wires
-    levers = {name: abs(float(lever)) for name, lever in zip(wires.ids, wires.lever_m, strict=True)}
-    width_m = record.rig.specimen.base_width_m
-    return {**dict.fromkeys(record.family("lvdt"), width_m), **levers}
+    levers = dict.fromkeys(record.family("lvdt"), record.rig.specimen.base_width_m)
+    if record.family("wire"):
+        wires = RotationGeometry.from_rig(record.rig).wires
+        levers.update(zip(wires.ids, np.abs(wires.lever_m).tolist(), strict=True))
+    return levers
 
 
 def _missed_s(readings: Readings, lever_m: float, rotations: CrudeRotations) -> float:
@@ -103,7 +105,9 @@ def _missed_s(readings: Readings, lever_m: float, rotations: CrudeRotations) -> 
     edges = np.flatnonzero(np.diff(np.concatenate([[False], readings.still, [False]]).astype(np.int8)))
     missed = 0
     for start, stop in edges.reshape(-1, 2).tolist():
-        span_rad = rotations.span_rad(start * readings.block_s, stop * readings.block_s)
+        # Of its first and its last block a part may have moved.
+        inner_s = ((start + 1) * readings.block_s, (stop - 1) * readings.block_s)
+        span_rad = rotations.span_rad(*inner_s)
         missed += (stop - start) * (span_rad * lever_m > _MISSED_M)
     return missed * readings.block_s
 
@@ -126,7 +130,9 @@ def _noisy(
     family: str, ids: Sequence[str], seen: Sequence[Readings], declared: Sequence[float]
 ) -> list[FamilyFinding]:
     """The whole family where half of it is noisy, else the single channels."""
-    ratios = np.array([r.noise_si / noise for r, noise in zip(seen, declared, strict=True)])
+    ratios = np.array(
+        [r.noise_si / noise if noise > 0.0 else math.nan for r, noise in zip(seen, declared, strict=True)]
+    )
     usual = float(np.median(ratios[np.isfinite(ratios)])) if np.isfinite(ratios).any() else 0.0
     if usual > _NOISY:
         return [unfit_words.noisy(family, (), usual)]
