@@ -78,7 +78,10 @@ def _analyse(
     onsets = _onsets(instruments.record, signals, track)
     fit = _fit(signals, track, estimates, instruments.gain_sigma) if options.fit else None
     theta0 = theta0_by_family(signals, track, instruments.gains, instruments.bent_at_rest_rad)
-    joint = summarise_joint(instruments.record, signals, track) if signals.joint is not None else None
+    joint = None
+    if signals.joint is not None:
+        joint = summarise_joint(instruments.record, signals, track)
+        joint = replace(joint, suspects=(*_lvdts_left_out(instruments.findings), *joint.suspects))
     bends = instruments.bending is not None
     # Wires and tiltmeters share the bending: that they agree speaks for neither.
     further = [] if bends else levels_apart(theta0)
@@ -121,6 +124,12 @@ def _analyse(
         series=_series(signals, velocity) if options.keep_series else None,
     )
     return replace(analysis, notes=quality_notes(record, signals, times, track, analysis, onsets, findings))
+
+
+def _lvdts_left_out(findings: Sequence[FamilyFinding]) -> list[str]:
+    """LVDTs that the joint was found without, for they had been left out by name."""
+    singles = (f for f in findings if f.family == "LVDTs" and f.treatment == "left out")
+    return [name for finding in singles for name in finding.channels]
 
 
 def _for_this_wall(fit: MotionFit, findings: Sequence[FamilyFinding], by_speed: float) -> MotionFit:

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
 from daq_app.rocking.analysis.families_table import LEADS, other_is_blamed
 from daq_app.rocking.analysis.own_body import OwnTrack, with_own_body
 from daq_app.rocking.analysis.preparation.instruments import Instruments
@@ -98,5 +100,6 @@ def _floor(instruments: Instruments) -> list[FamilyFinding]:
     start = rest.start + round(_SETTLED_S * record.rate_hz)
     if start >= rest.stop:
         return []
-    rms = shaking_of_floor(record.load(ids, start, rest.stop), record.rate_hz)
+    heights_m = np.array([record.rig.channel(name).position_m[2] for name in ids])
+    rms = shaking_of_floor(record.load(ids, start, rest.stop), heights_m, record.rate_hz)
     return [] if rms is None else [unfit_words.shaking_floor(rms)]
