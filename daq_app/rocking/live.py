@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from daq_app.config.rig import Rig
 from daq_app.config.scaling import Scaling
 from daq_app.rocking.estimators import RestitutionEstimate, estimate_all
-from daq_app.rocking.families.noise import slow_noise
+from daq_app.rocking.families.channels.noise import slow_noise
 from daq_app.rocking.geometry.kinematics import RotationGeometry
 from daq_app.rocking.live_families import LiveFamilies
 from daq_app.rocking.motion.phases import Phase, PhaseDetector, PhaseEvent, PhaseSettings

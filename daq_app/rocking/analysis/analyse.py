@@ -22,7 +22,7 @@ from daq_app.rocking.analysis.preparation.signals import Signals
 from daq_app.rocking.analysis.quality import quality_notes
 from daq_app.rocking.analysis.release_rotation import levels_apart, theta0_by_family
 from daq_app.rocking.analysis.residuals import residuals_after
-from daq_app.rocking.analysis.results import Bias, Series, TestAnalysis, Theory
+from daq_app.rocking.analysis.results import Bias, JointSummary, Series, TestAnalysis, Theory
 from daq_app.rocking.analysis.tracks import decay_series, estimates_of, follow_families
 from daq_app.rocking.analysis.wall_checks import pattern_of, wall_findings
 from daq_app.rocking.estimators import FEWEST_POINTS, RestitutionEstimate
@@ -78,10 +78,7 @@ def _analyse(
     onsets = _onsets(instruments.record, signals, track)
     fit = _fit(signals, track, estimates, instruments.gain_sigma) if options.fit else None
     theta0 = theta0_by_family(signals, track, instruments.gains, instruments.bent_at_rest_rad)
-    joint = None
-    if signals.joint is not None:
-        joint = summarise_joint(instruments.record, signals, track)
-        joint = replace(joint, suspects=(*_lvdts_left_out(instruments.findings), *joint.suspects))
+    joint = _joint(instruments, signals, track)
     bends = instruments.bending is not None
     # Wires and tiltmeters share the bending: that they agree speaks for neither.
     further = [] if bends else levels_apart(theta0)
@@ -126,10 +123,14 @@ def _analyse(
     return replace(analysis, notes=quality_notes(record, signals, times, track, analysis, onsets, findings))
 
 
-def _lvdts_left_out(findings: Sequence[FamilyFinding]) -> list[str]:
-    """LVDTs that the joint was found without, for they had been left out by name."""
-    singles = (f for f in findings if f.family == "LVDTs" and f.treatment == "left out")
-    return [name for finding in singles for name in finding.channels]
+def _joint(instruments: Instruments, signals: Signals, track: MotionTrack) -> JointSummary | None:
+    """The summary of the joint; LVDTs that it was found without, for they are named, are suspects as well."""
+    if signals.joint is None:
+        return None
+    joint = summarise_joint(instruments.record, signals, track)
+    named = [f for f in instruments.findings if f.family == "LVDTs" and f.treatment == "left out"]
+    left_out = [name for finding in named for name in finding.channels]
+    return replace(joint, suspects=(*left_out, *joint.suspects))
 
 
 def _for_this_wall(fit: MotionFit, findings: Sequence[FamilyFinding], by_speed: float) -> MotionFit:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.families.hum import Hum
+from daq_app.rocking.families.channels.hum import Hum
 from daq_app.rocking.record import TestRecord, rows_of
 
 Floats = NDArray[np.float64]

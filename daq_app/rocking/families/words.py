@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Final, Literal
 
 from daq_app.config.rig import Family
+from daq_app.rocking.families.channels.hum import MAINS_SHARE
 from daq_app.rocking.families.finding import FamilyFinding
-from daq_app.rocking.families.hum import MAINS_SHARE
 from daq_app.rocking.families.scales import factor_words
 from daq_app.rocking.families.wires.single_wires import SingleWires, WireKind
 

@@ -36,7 +36,7 @@ from daq_app.gap.rocking_model.tolerances.inspection import (
     STANDS_OUT,
     STEP_SD,
 )
-from daq_app.rocking.families.coarse_steps import coarse_step, resolution
+from daq_app.rocking.families.channels.coarse_steps import coarse_step, resolution
 from daq_app.rocking.geometry.noise import white_noise
 
 _FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer")

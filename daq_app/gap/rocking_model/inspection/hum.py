@@ -1,7 +1,8 @@
 """Mains hum of one channel: found at rest, followed over the record, and taken out of it.
 
-`daq_app.rocking.families.hum` looks for a line that all channels of a record share, whose size stays. This
-module follows what a single channel picks up, between impacts that have some of its frequency themselves.
+`daq_app.rocking.families.channels.hum` looks for a line that all channels of a record share, whose size
+stays. This module follows what a single channel picks up, between impacts that have some of its frequency
+themselves.
 """
 
 from __future__ import annotations

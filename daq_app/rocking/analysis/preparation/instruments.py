@@ -28,12 +28,12 @@ from daq_app.rocking.analysis.preparation.gains import FamilyGains, gains_of
 from daq_app.rocking.analysis.preparation.odd_lvdts import odd_lvdts
 from daq_app.rocking.analysis.preparation.odd_wire import compared_wires, odd_wire, wire_means
 from daq_app.rocking.analysis.preparation.reader import Reader, found_by_others, shows_test
-from daq_app.rocking.analysis.preparation.signals import Signals, TestTimes
+from daq_app.rocking.analysis.preparation.signals import Lead, Signals, TestTimes
 from daq_app.rocking.analysis.preparation.unfit_channels import unfit_channels
 from daq_app.rocking.families import unfit_words, words
+from daq_app.rocking.families.channels.hum import find_hum
+from daq_app.rocking.families.channels.noise import slow_noise
 from daq_app.rocking.families.finding import FamilyFinding
-from daq_app.rocking.families.hum import find_hum
-from daq_app.rocking.families.noise import slow_noise
 from daq_app.rocking.families.response import Response
 from daq_app.rocking.families.scales import wrong_scales
 from daq_app.rocking.families.shocks import ShockTiming
@@ -161,40 +161,24 @@ def _in_step(
     `comparable`: whether both families show the wall, so that one says something of the other. `in_steps`:
     wires that go in steps, and are left out once it is known whether they stick.
     """
-    lead = signals.lead
-    means = wire_means(signals, motion_samples(signals, times)) if comparable or lead == "wires" else None
+    motion = motion_samples(signals, times)
+    means = wire_means(signals, motion) if comparable or signals.lead == "wires" else None
     wires = compared_wires(signals, means)
-    changed = Corrections()
     bending = bending_of(signals, times, None) if comparable else None
     odd = odd_wire(signals, means, wires, bends=bending is not None)
-    left_out = in_steps
     if odd is not None and (odd.kind == "hysteresis" or not in_steps.intersection(odd.channels)):
         # A wire that jumps on and on goes in steps as well.
         findings = [f for f in findings if f.kind != "steps" or f.channels != odd.channels]
         findings.append(odd)
-        left_out = in_steps.union(odd.channels)
-    if comparable:
-        odd_ones = odd_lvdts(signals, motion_samples(signals, times))
-        findings += odd_ones
-        left_out = left_out.union(*(finding.channels for finding in odd_ones))
-    changed = replace(changed, left_out=left_out)
+        in_steps = in_steps.union(odd.channels)
+    odd_ones = odd_lvdts(signals, motion) if comparable else []
+    findings += odd_ones
+    left_out = in_steps.union(*(finding.channels for finding in odd_ones))
     response = follow(signals, times) if comparable else None
     shocks = shocks_of(record, signals, times)
-    if bending is not None:
-        # Delays and first orders are no answer to what the wall does between the two families.
-        lead = "lvdts" if lvdts_cover(signals, times) else "wires"
-        findings.append(words.bending(bending.frequency_hz, bending.rms_rad, left_out=lead == "lvdts"))
-    elif response is not None:
-        found, lead, earlier = timing(record, signals, times, response, shocks)
-        findings += found
-        changed = replace(changed, earlier_s=earlier)
-        # A family that is slow or late, even by less than is named, may leave more between the two than
-        # the ringing of a wall that bends.
-        bending = bending_of(signals, times, response)
-        if bending is not None:
-            blamed = any("LVDTs" in finding.family for finding in found)
-            lead = "wires" if blamed or not lvdts_cover(signals, times) else "lvdts"
-            findings.append(words.bending(bending.frequency_hz, bending.rms_rad, left_out=lead == "lvdts"))
+    found, lead, earlier, bending = _between_families(record, signals, times, response, shocks, bending)
+    findings += found
+    changed = Corrections(left_out=left_out, earlier_s=earlier)
     if changed.left_out or changed.earlier_s or lead != signals.lead:
         corrected = changed.applied(record)
         # Tiltmeters on a wall that bends took a zero that may be off, and confirm no hold by it.
@@ -216,6 +200,33 @@ def _in_step(
         record, _with_errors(signals, times), times, tuple(findings), response, shocks,
         gains_of(signals, times, wires), bending,
     )  # fmt: skip
+
+
+def _between_families(
+    record: TestRecord,
+    signals: Signals,
+    times: TestTimes,
+    response: Response | None,
+    shocks: ShockTiming | None,
+    bending: Bending | None,
+) -> tuple[list[FamilyFinding], Lead, dict[str, float], Bending | None]:
+    """Findings, the family that leads, by how much channels are moved earlier, and how the wall bends."""
+    if bending is not None:
+        # Delays and first orders are no answer to what the wall does between the two families.
+        lead: Lead = "lvdts" if lvdts_cover(signals, times) else "wires"
+        told = words.bending(bending.frequency_hz, bending.rms_rad, left_out=lead == "lvdts")
+        return [told], lead, {}, bending
+    if response is None:
+        return [], signals.lead, {}, None
+    found, lead, earlier = timing(record, signals, times, response, shocks)
+    # A family that is slow or late, even by less than is named, may leave more between the two than
+    # the ringing of a wall that bends.
+    bending = bending_of(signals, times, response)
+    if bending is not None:
+        blamed = any("LVDTs" in finding.family for finding in found)
+        lead = "wires" if blamed or not lvdts_cover(signals, times) else "lvdts"
+        found.append(words.bending(bending.frequency_hz, bending.rms_rad, left_out=lead == "lvdts"))
+    return found, lead, earlier, bending
 
 
 def _needs_reading(finding: FamilyFinding) -> bool:

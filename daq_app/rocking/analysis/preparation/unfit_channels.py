@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from daq_app.config.rig import Family
 from daq_app.rocking.analysis.preparation.crude_rotations import CrudeRotations
 from daq_app.rocking.families import unfit_words, words
+from daq_app.rocking.families.channels.readings import Readings, readings_of
 from daq_app.rocking.families.finding import FamilyFinding
-from daq_app.rocking.families.readings import Readings, readings_of
 from daq_app.rocking.geometry.kinematics import RotationGeometry
 from daq_app.rocking.record import TestRecord
 

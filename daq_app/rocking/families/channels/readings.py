@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.families.coarse_steps import coarse_step, resolution
+from daq_app.rocking.families.channels.coarse_steps import coarse_step, resolution
 
 Floats = NDArray[np.float64]
 

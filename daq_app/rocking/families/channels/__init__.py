@@ -1,0 +1,1 @@
+"""What the readings of single channels say of their electronics."""
