@@ -55,4 +55,6 @@ def test_first_command_records_a_whole_test_and_prints_r(repository: Path, tmp_p
 
 
 def test_second_command_is_the_one_that_runs_these_tests(repository: Path) -> None:
-    assert readme_command(repository, "tests") == ["pytest", "-n", "3", "--dist", "worksteal"]
+    suite = ["pytest", "-n", "3", "--dist", "worksteal", "-m", "not heavy"]
+    assert readme_command(repository, "tests") == suite
+    assert "${command/not heavy/heavy}" in (repository / ".ci" / "run").read_text(encoding="utf-8")
