@@ -18,12 +18,12 @@ from daq_app.rocking.estimators import RestitutionEstimate
 from daq_app.rocking.families import words
 from daq_app.rocking.families.block_checks import pattern_findings, survey_off
 from daq_app.rocking.families.body import body_of
+from daq_app.rocking.families.channels.compared_channels import ChannelMeans
+from daq_app.rocking.families.channels.hysteresis import sticking_wire
 from daq_app.rocking.families.levels import level_outlier
 from daq_app.rocking.families.response import DRIFT_RAD, LATE_S, SLOW_S, Response, compare
 from daq_app.rocking.families.shocks import LATE_SHOCKS_S, shock_timing
 from daq_app.rocking.families.verdict import compare_series, families_apart, methods_apart
-from daq_app.rocking.families.wires.hysteresis import sticking_wire
-from daq_app.rocking.families.wires.single_wires import WireMeans
 from daq_app.rocking.geometry.joint import BaseJoint
 from daq_app.rocking.geometry.kinematics import RotationGeometry
 from daq_app.rocking.motion.bending import find_bending
@@ -199,7 +199,7 @@ class LiveFamilies:
     def _stuck(self, wires: MotionTrack) -> tuple[str, ...]:
         """One wire that lags behind the others by a length, whatever the speed."""
         _, kept = self._between(wires.release.time_s - 0.3, wires.crossings_s[-1])
-        means = WireMeans.of(self._geometry.rotation_of_each(kept[self._wires]), self._rate)
+        means = ChannelMeans.of(self._geometry.rotation_of_each(kept[self._wires]), self._rate)
         if means is None:
             return ()
         found = sticking_wire(means.means_rad, self._geometry.lever_m, self._geometry.noise_m)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.rocking.analysis.bias import BiasSettings, method_bias
-from daq_app.rocking.analysis.families_table import families_of, other_is_blamed, verdict_of
+from daq_app.rocking.analysis.families_table import families_of, moves_otherwise, verdict_of
 from daq_app.rocking.analysis.half_cycles import half_cycles_of
 from daq_app.rocking.analysis.joint_summary import summarise_joint
 from daq_app.rocking.analysis.options import AnalysisOptions
@@ -69,7 +69,7 @@ def _analyse(
     options: AnalysisOptions,
 ) -> TestAnalysis:
     signals, times = instruments.signals, instruments.times
-    alone = other_is_blamed(instruments.findings, "wires" if signals.lead == "lvdts" else "lvdts")
+    alone = any(moves_otherwise(finding) for finding in instruments.findings)
     tracks = follow_families(signals, times, fuse=not alone)
     track = tracks.lead
     peaks = filtered_peaks(signals.time_s, lambda start, stop: velocity[start:stop], track.impacts_s)
@@ -130,7 +130,7 @@ def _joint(instruments: Instruments, signals: Signals, track: MotionTrack) -> Jo
     joint = summarise_joint(instruments.record, signals, track)
     named = [f for f in instruments.findings if f.family == "LVDTs" and f.treatment == "left out"]
     left_out = [name for finding in named for name in finding.channels]
-    return replace(joint, suspects=(*left_out, *joint.suspects))
+    return replace(joint, suspects=tuple(dict.fromkeys([*left_out, *joint.suspects])))
 
 
 def _for_this_wall(fit: MotionFit, findings: Sequence[FamilyFinding], by_speed: float) -> MotionFit:

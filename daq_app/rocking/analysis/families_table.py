@@ -32,7 +32,8 @@ from daq_app.rocking.theory.block import RigidBlock
 
 LEADS = {"wires": "wires", "lvdts": "LVDTs"}
 """Families that a motion can be read from: the reader's word by the key."""
-_FOLLOWS_BADLY = ("slow", "late", "drift", "bending", "steps", "still", "leaps", "motion")
+_ANOTHER_MOTION = ("slow", "late", "bending", "steps", "still", "leaps", "motion")
+_FOLLOWS_BADLY = (*_ANOTHER_MOTION, "drift")
 
 
 def families_of(
@@ -136,6 +137,16 @@ def verdict_of(
     crt = with_alpha_of_survey(crt, findings)
     verdict = judge(eav, crt, LEADS[lead], findings, disagreements)
     return verdict, tuple(findings)
+
+
+def moves_otherwise(finding: FamilyFinding) -> bool:
+    """Whether all wires or all LVDTs show another motion than the wall's, and nothing made it the same."""
+    return (
+        finding.kind in _ANOTHER_MOTION
+        and finding.family in LEADS.values()
+        and not finding.channels
+        and finding.treatment != "put in step"
+    )
 
 
 def other_is_blamed(findings: Sequence[FamilyFinding], other: str) -> bool:

@@ -11,7 +11,7 @@ from daq_app.rocking.means import block_means
 
 Floats = NDArray[np.float64]
 
-SHAKES_M_S2: Final = 0.02
+_SHAKES_M_S2: Final = 0.02
 """Common acceleration at rest, rms, from which a floor is said to shake: one of 0.035 moves r by up to 0.005.
 Raising it leaves such floors unsaid."""
 _MEAN_S: Final = 0.025
@@ -46,4 +46,4 @@ def shaking_of_floor(rest: Floats, heights_m: Floats, rate_hz: float) -> float |
     left = means - design @ line
     own = float(np.sqrt(np.sum(left**2) / (left.shape[1] * (heights_m.size - 2)) * np.sum(to_line[0] ** 2)))
     rms = float(np.std(line[0]))
-    return rms if rms > max(SHAKES_M_S2, _STANDS_OUT * own) else None
+    return rms if rms > max(_SHAKES_M_S2, _STANDS_OUT * own) else None

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from daq_app.rocking.families.channels.compared_channels import DeviationKind
 from daq_app.rocking.families.finding import FamilyFinding
-from daq_app.rocking.families.wires.single_wires import WireKind
 
 
 def coarse_steps(family: str, name: str, step_m: float) -> FamilyFinding:
@@ -36,7 +36,7 @@ def leaps(family: str, name: str, count: int) -> FamilyFinding:
     return FamilyFinding(family, (name,), "leaps", float(count), "1", "left out", "warning", text)
 
 
-def odd_lvdt(name: str, kind: WireKind, size: float) -> FamilyFinding:
+def odd_lvdt(name: str, kind: DeviationKind, size: float) -> FamilyFinding:
     """An LVDT that deviates from the others of its face; it is left out."""
     what, unit = {
         "gain": (f"shows {size:+.1%} of opening against", "1"),

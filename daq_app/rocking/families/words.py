@@ -6,10 +6,10 @@ from dataclasses import replace
 from typing import Final, Literal
 
 from daq_app.config.rig import Family
+from daq_app.rocking.families.channels.compared_channels import ComparedChannels, DeviationKind
 from daq_app.rocking.families.channels.hum import MAINS_SHARE
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.scales import factor_words
-from daq_app.rocking.families.wires.single_wires import SingleWires, WireKind
 
 FAMILY_NAMES: Final[dict[Family, str]] = {
     "wire": "wires",
@@ -67,7 +67,7 @@ def scale(family: str, factor: float) -> FamilyFinding:
     return FamilyFinding(family, (), kind, factor, "1", "put right", "warning", text)
 
 
-def single_wire(name: str, kind: WireKind, wires: SingleWires, place: int) -> FamilyFinding:
+def single_wire(name: str, kind: DeviationKind, wires: ComparedChannels, place: int) -> FamilyFinding:
     """A wire that deviates from the other wires; it is left out of the rotation."""
     if kind == "gain":
         size, unit = float(wires.gain[place]), "1"

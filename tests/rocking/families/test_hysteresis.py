@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from daq_app.config import load_rig
 from daq_app.rocking import AnalysisOptions, analyse_record
-from daq_app.rocking.families.wires.hysteresis import sticking_wire
+from daq_app.rocking.families.channels.hysteresis import sticking_wire
 from studies.restitution.faults import Fault
 from studies.restitution.laboratory import draw_test
 

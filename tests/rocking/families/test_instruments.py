@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from daq_app.rocking import AnalysisOptions, TestAnalysis, TestRecord, analyse_record
-from daq_app.rocking.families.wires.single_wires import SingleWires
+from daq_app.rocking.families.channels.compared_channels import ComparedChannels
 
 Floats = NDArray[np.float64]
 Change = Callable[[Floats, float], Floats]
@@ -115,7 +115,7 @@ def test_a_single_wire_that_deviates_is_left_out(made):
 def test_a_wire_is_named_for_a_gain_that_chance_makes_in_less_than_one_family_of_five_hundred(gain, named):
     """The first of these gains chance makes in four families of a thousand."""
     none = np.zeros(5)
-    wires = SingleWires(np.array([0.0015, -0.0015, 0.002, -0.002, gain]), none, none)
+    wires = ComparedChannels(np.array([0.0015, -0.0015, 0.002, -0.002, gain]), none, none)
 
     assert (wires.outlier() is not None) == named
 

@@ -18,14 +18,14 @@ from daq_app.rocking.record import TestRecord
 
 Floats = NDArray[np.float64]
 
-GAIN_SHARE: Final = 0.01
+_GAIN_SHARE: Final = 0.01
 """Gain of one family against the other that is named: three times what calibration leaves."""
 _COVERED: Final = 0.98
 """LVDTs take the wires' place where they know at least this share of the motion."""
 _BENT: Final = 2.0
-"""What is left between two families that were put in step, over their white noise, from which another than a
-delay is at work: slow noise and hum leave 0.9 to 1.8, a filter of 20 ms or a drum of 25 Hz 2.2 and more.
-Raising it takes r from wires that a filter bends."""
+"""What is left between two families that were put in step, over their white noise, from which something else
+than a delay is at work: slow noise and hum leave 0.9 to 1.8, a filter of 20 ms or a drum of 25 Hz leaves 2.2
+and more. Raising it takes r from wires that a filter bends."""
 _COMPARED_IMPACTS: Final = 12
 
 
@@ -64,6 +64,7 @@ def lvdts_cover(signals: Signals, times: TestTimes) -> bool:
 
 
 def shocks_of(record: TestRecord, signals: Signals, times: TestTimes) -> ShockTiming | None:
+    """When the accelerometers show the impacts, against when the rotation does."""
     ids = record.family("accelerometer")
 
     def read(start: int, stop: int) -> Floats:
@@ -113,7 +114,7 @@ def levels(signals: Signals, times: TestTimes, response: Response) -> list[Famil
     assert times.release_s is not None and signals.joint is not None
     drift = response.drift_rad_s * response.span_s
     apart = response.gain - 1.0
-    if abs(drift) <= DRIFT_RAD and abs(apart) <= GAIN_SHARE:
+    if abs(drift) <= DRIFT_RAD and abs(apart) <= _GAIN_SHARE:
         return []
     start, stop = np.searchsorted(signals.time_s, [times.release_s - 0.5, times.release_s - 0.02])
     hold = slice(int(start), int(stop))

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.rocking.analysis.preparation.signals import Signals, TestTimes
+from daq_app.rocking.families.channels.compared_channels import ComparedChannels
 from daq_app.rocking.families.gain_error import CALIBRATION_SHARE, gain_sigma_of_mean
-from daq_app.rocking.families.wires.single_wires import SingleWires
 from daq_app.rocking.geometry.joint import BaseJoint
 
 Floats = NDArray[np.float64]
@@ -47,7 +47,7 @@ def hold_samples(signals: Signals, release_s: float) -> slice:
     return slice(int(start), int(stop))
 
 
-def gains_of(signals: Signals, times: TestTimes, wires: SingleWires | None) -> FamilyGains:
+def gains_of(signals: Signals, times: TestTimes, wires: ComparedChannels | None) -> FamilyGains:
     """What the wires' motion and the levels of LVDTs and tiltmeters in the hold say of their gains."""
     assert times.release_s is not None
     hold = hold_samples(signals, times.release_s)

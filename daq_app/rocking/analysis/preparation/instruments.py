@@ -1,8 +1,9 @@
-"""Before the numbers: hum, signs and units, late, slow and deviating instruments are found and put right.
+"""Before the numbers: what instruments do wrong is found and put right, or left out.
 
-Three looks, each on what the last left: mains hum in every channel; signs and units of whole families, on the
-still parts; and, once the test is found, how families and single wires follow each other through the motion.
-What was found is said, with what was done about it. The recording itself is not changed.
+Each look is on what the last one left: mains hum in every channel; signs and units of whole families, on the
+still parts; the readings of single channels; and, once the test is found, how families and single channels
+follow each other through the motion. Where one family hides the test, the others find it. What was found is
+said, with what was done about it. The recording itself is not changed.
 """
 
 from __future__ import annotations

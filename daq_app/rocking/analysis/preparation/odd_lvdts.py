@@ -9,10 +9,15 @@ import numpy as np
 
 from daq_app.rocking.analysis.preparation.signals import Signals
 from daq_app.rocking.families import unfit_words
+from daq_app.rocking.families.channels.compared_channels import (
+    ChannelMeans,
+    ComparedChannels,
+    DeviationKind,
+    compare_channels,
+)
 from daq_app.rocking.families.finding import FamilyFinding
-from daq_app.rocking.families.wires.single_wires import SingleWires, WireKind, WireMeans, compare_wires
 
-_LEAST: Final[Mapping[WireKind, float]] = {"gain": 0.03, "late": 4e-3, "drift": 4e-4}
+_LEAST: Final[Mapping[DeviationKind, float]] = {"gain": 0.03, "late": 4e-3, "drift": 4e-4}
 """Deviation from the other LVDTs of the face that is named: a share, s, and rad of the rotation that one LVDT
 alone would show. Calibration and place leave 0.5 %; less moves r by nothing. Raising them lets one LVDT of
 many doubt the wall; lowering them names sound ones."""
@@ -39,21 +44,21 @@ def odd_lvdts(signals: Signals, motion: slice) -> list[FamilyFinding]:
         if len(rows) < _FEWEST:
             continue
         of_each = signals.openings_m[rows, motion] / rig.specimen.base_width_m
-        means = WireMeans.of(of_each, signals.record.rate_hz)
+        means = ChannelMeans.of(of_each, signals.record.rate_hz)
         if means is None:
             continue
         along_m = np.array([rig.channel(ids[row]).position_m[1] for row in rows])
-        odd = _odd(compare_wires(means, along_m / rig.specimen.base_width_m))
+        odd = _odd(compare_channels(means, along_m / rig.specimen.base_width_m))
         if odd is not None:
             place, kind, size = odd
             found.append(unfit_words.odd_lvdt(ids[rows[place]], kind, size))
     return found
 
 
-def _odd(compared: SingleWires) -> tuple[int, WireKind, float] | None:
+def _odd(compared: ComparedChannels) -> tuple[int, DeviationKind, float] | None:
     """Place, kind and size of the largest deviation beyond its limit; None where there is none."""
     shown = {"gain": compared.gain, "late": compared.lag_s, "drift": compared.drift_rad}
-    worst: tuple[float, tuple[int, WireKind, float]] | None = None
+    worst: tuple[float, tuple[int, DeviationKind, float]] | None = None
     for kind, least in _LEAST.items():
         apart = shown[kind] - np.median(shown[kind])
         place = int(np.argmax(np.abs(apart)))

@@ -4,27 +4,31 @@ from __future__ import annotations
 
 from daq_app.rocking.analysis.preparation.signals import Signals
 from daq_app.rocking.families import words
+from daq_app.rocking.families.channels.compared_channels import (
+    ChannelMeans,
+    ComparedChannels,
+    compare_channels,
+)
+from daq_app.rocking.families.channels.hysteresis import sticking_wire
 from daq_app.rocking.families.finding import FamilyFinding
-from daq_app.rocking.families.wires.hysteresis import sticking_wire
-from daq_app.rocking.families.wires.single_wires import SingleWires, WireMeans, compare_wires
 
 
-def wire_means(signals: Signals, motion: slice) -> WireMeans | None:
+def wire_means(signals: Signals, motion: slice) -> ChannelMeans | None:
     """What each wire shows during the samples of the motion; None where they are too few to judge one."""
     if len(signals.excluded_share) > 1:
         return None  # they are named already, and the rest is no judge
     of_each_wire = signals.geometry.wires.rotation_of_each(signals.wires_m[:, motion])
-    return WireMeans.of(of_each_wire, signals.record.rate_hz)
+    return ChannelMeans.of(of_each_wire, signals.record.rate_hz)
 
 
-def compared_wires(signals: Signals, means: WireMeans | None) -> SingleWires | None:
+def compared_wires(signals: Signals, means: ChannelMeans | None) -> ComparedChannels | None:
     """How each wire deviates from the others; None where none can tell."""
     wires = signals.geometry.wires
-    return None if means is None else compare_wires(means, wires.position_m[:, 1] / wires.lever_m)
+    return None if means is None else compare_channels(means, wires.position_m[:, 1] / wires.lever_m)
 
 
 def odd_wire(
-    signals: Signals, means: WireMeans | None, compared: SingleWires | None, *, bends: bool
+    signals: Signals, means: ChannelMeans | None, compared: ComparedChannels | None, *, bends: bool
 ) -> FamilyFinding | None:
     """The wire that is to be left out, and why. A wall that `bends` pulls wires of each height otherwise.
 

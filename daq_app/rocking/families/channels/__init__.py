@@ -1,1 +1,1 @@
-"""What the readings of single channels say of their electronics."""
+"""What single channels say: their readings by themselves, and each against the others of its family."""

@@ -64,7 +64,11 @@ class Readings:
 
 
 def readings_of(values: Floats, rate_hz: float, noise_si: float, range_si: tuple[float, float]) -> Readings:
-    """Readings (n,) of an LVDT or a wire, m; `noise_si`: the declared rms noise of one sample, m."""
+    """What the readings (n,) of an LVDT or a wire, m, show; NaN where there is none.
+
+    `noise_si`: the declared rms noise of one sample, m. `range_si`: its range, m, less the zero that the
+    readings are without.
+    """
     size = max(_EVERY, round(_BLOCK_S * rate_hz))
     second = np.abs(np.diff(values, 2))
     blocks = second[: second.size // size * size].reshape(-1, size)[:, ::_EVERY]

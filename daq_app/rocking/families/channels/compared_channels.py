@@ -1,4 +1,4 @@
-"""Each wire against the others: its gain, lag and drift, and how well the family's gain is known."""
+"""Each wire, or LVDT of a face, against the others: gain, lag, drift, and how well their gain is known."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from scipy.special import stdtr
 from daq_app.rocking.families.gain_error import gain_sigma_of_mean, single_gain_share
 
 Floats = NDArray[np.float64]
-WireKind = Literal["gain", "late", "drift"]
+DeviationKind = Literal["gain", "late", "drift"]
 
 _MEAN_S = 0.005
 _FEWEST = 100
@@ -28,20 +28,20 @@ _LEAST_DRIFT_RAD = 4e-4
 
 
 @dataclass(frozen=True, slots=True)
-class SingleWires:
-    """Deviations of each wire from the median of all; arrays (wires,)."""
+class ComparedChannels:
+    """Deviations of each channel from the median of all; arrays (channels,)."""
 
     gain: Floats
     lag_s: Floats
     drift_rad: Floats
     """Over the span looked at."""
 
-    def outlier(self) -> tuple[int, WireKind] | None:
-        """The wire that deviates most beyond its kind's limit, and the kind: gain, late or drift."""
+    def outlier(self) -> tuple[int, DeviationKind] | None:
+        """The wire of all that deviates most beyond its kind's limit, and the kind: gain, late or drift."""
         count = self.gain.size
         if count < 4:
             return None
-        candidates: list[tuple[float, int, WireKind]] = []
+        candidates: list[tuple[float, int, DeviationKind]] = []
         worst = int(np.argmax(np.abs(self.gain - np.median(self.gain))))
         others = np.delete(self.gain, worst)
         deviation = float(self.gain[worst] - others.mean())
@@ -49,7 +49,7 @@ class SingleWires:
         t = abs(deviation) / (spread * math.sqrt(1.0 + 1.0 / others.size))
         if 2.0 * count * float(stdtr(freedom, -t)) < _GAIN_CHANCE and abs(deviation) > _LEAST_GAIN:
             candidates.append((abs(deviation) / _LEAST_GAIN, worst, "gain"))
-        kinds: tuple[tuple[Floats, float, WireKind], ...] = (
+        kinds: tuple[tuple[Floats, float, DeviationKind], ...] = (
             (self.lag_s, _LEAST_LAG_S, "late"),
             (self.drift_rad, _LEAST_DRIFT_RAD, "drift"),
         )
@@ -70,16 +70,16 @@ class SingleWires:
 
 
 @dataclass(frozen=True, slots=True)
-class WireMeans:
-    """Each wire's own rotation as means of 5 ms."""
+class ChannelMeans:
+    """Each channel's own rotation as means of 5 ms."""
 
     means_rad: Floats
-    """(wires, n), where all are finite."""
+    """(channels, n), where all are finite."""
     step_s: float
 
     @classmethod
-    def of(cls, own_rad: Floats, rate_hz: float) -> WireMeans | None:
-        """From each wire's rotation (wires, n); None for two wires, or less than half a second."""
+    def of(cls, own_rad: Floats, rate_hz: float) -> ChannelMeans | None:
+        """From each channel's rotation (channels, n); None for two channels, or less than half a second."""
         size = max(1, round(_MEAN_S * rate_hz))
         groups = own_rad.shape[1] // size
         if groups < _FEWEST or own_rad.shape[0] < 3:
@@ -89,17 +89,17 @@ class WireMeans:
         return None if means.shape[1] < _FEWEST else cls(means, size / rate_hz)
 
 
-def compare_wires(wires: WireMeans, y_over_lever: Floats) -> SingleWires:
-    """Each wire's own rotation against the median of all, less what of a twist is out of step.
+def compare_channels(channels: ChannelMeans, y_over_lever: Floats) -> ComparedChannels:
+    """Each channel's own rotation against the median of all, less what of a twist is out of step.
 
-    `y_over_lever` (wires,) is how much of a twist each wire shows.
+    `y_over_lever` (channels,) is how much of a twist each channel shows.
     """
-    means = wires.means_rad
+    means = channels.means_rad
     middle = np.median(means, axis=0)
     apart = means - middle
     twisted = y_over_lever - y_over_lever.mean()
     time = np.linspace(-0.5, 0.5, middle.size)
-    speed = np.gradient(middle, wires.step_s)
+    speed = np.gradient(middle, channels.step_s)
     table = np.column_stack([middle, speed, time, np.ones(middle.size)])
     if float(twisted @ twisted) > 1e-6:
         # Only what of the twist is not in step with the rotation: the rest may be a gain.
@@ -107,4 +107,4 @@ def compare_wires(wires: WireMeans, y_over_lever: Floats) -> SingleWires:
         twist = twist - table @ np.linalg.lstsq(table, twist, rcond=None)[0]
         table = np.column_stack([table, twist])
     solution = np.linalg.lstsq(table, apart.T, rcond=None)[0]
-    return SingleWires(solution[0], -solution[1], solution[2])
+    return ComparedChannels(solution[0], -solution[1], solution[2])

@@ -1,1 +1,0 @@
-"""Each wire against the others: gain, lag, drift, and whether it sticks."""
