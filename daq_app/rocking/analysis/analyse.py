@@ -20,14 +20,14 @@ from daq_app.rocking.analysis.preparation.fusion import Fused
 from daq_app.rocking.analysis.preparation.instruments import Instruments, prepare
 from daq_app.rocking.analysis.preparation.signals import Signals
 from daq_app.rocking.analysis.quality import quality_notes
-from daq_app.rocking.analysis.release_rotation import levels_apart, theta0_by_family
+from daq_app.rocking.analysis.release_rotation import headline_of, levels_apart, theta0_by_family
 from daq_app.rocking.analysis.residuals import residuals_after
 from daq_app.rocking.analysis.results import Bias, JointSummary, Series, TestAnalysis, Theory
 from daq_app.rocking.analysis.tracks import decay_series, estimates_of, follow_families
 from daq_app.rocking.analysis.wall_checks import pattern_of, wall_findings
 from daq_app.rocking.estimators import FEWEST_POINTS, RestitutionEstimate
 from daq_app.rocking.families.block_checks import is_rigid_block, misfit_findings, scatter_findings
-from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.families.finding import FamilyFinding, families_left_out
 from daq_app.rocking.families.verdict import judge, with_change_by_speed, with_findings
 from daq_app.rocking.geometry.joint import JointMotion
 from daq_app.rocking.motion.filtered_peaks import filtered_peaks
@@ -77,11 +77,12 @@ def _analyse(
     estimates = estimates_of(series)
     onsets = _onsets(instruments.record, signals, track)
     fit = _fit(signals, track, estimates, instruments.gain_sigma) if options.fit else None
-    theta0 = theta0_by_family(signals, track, instruments.gains, instruments.bent_at_rest_rad)
+    unfit = families_left_out(instruments.findings, held_as_well=True)
+    theta0 = theta0_by_family(signals, track, instruments.gains, instruments.bent_at_rest_rad, unfit)
     joint = _joint(instruments, signals, track)
     bends = instruments.bending is not None
     # Wires and tiltmeters share the bending: that they agree speaks for neither.
-    further = [] if bends else levels_apart(theta0)
+    further = [] if bends else levels_apart(theta0, unfit)
     own = with_own_body(track, signals.time_s, signals.rotation_rad)
     pattern = pattern_of(instruments, tracks, own, further)
     by_speed = pattern.sigma_r_by_speed
@@ -91,7 +92,7 @@ def _analyse(
     verdict, findings = verdict_of(instruments, tracks, series, estimates, further, by_speed)
     estimates = _with_what_was_found(estimates, findings, by_speed)
     fit = None if fit is None else _for_this_wall(fit, findings, by_speed)
-    headline = theta0[signals.lead] if bends else theta0.get("tiltmeters", theta0["wires"])
+    headline = theta0[signals.lead] if bends else headline_of(theta0, signals.lead, unfit)
     speeds = impact_speeds(track, own, signals.time_s, signals.rotation_rad)
     bias = _bias(record, signals, track, estimates, velocity_filter, options)
     analysis = TestAnalysis(

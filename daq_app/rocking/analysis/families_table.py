@@ -14,7 +14,7 @@ from daq_app.rocking.analysis.tracks import FamilyTracks
 from daq_app.rocking.estimators import DecaySeries, RestitutionEstimate
 from daq_app.rocking.families import words
 from daq_app.rocking.families.body import body_of
-from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.families.finding import FamilyFinding, families_left_out
 from daq_app.rocking.families.verdict import (
     FamilyView,
     RVerdict,
@@ -56,7 +56,8 @@ def families_of(
             rows.append(_rotation_view(family, instruments, track, tracks.lead, eav, crt, family_theta0))
     if "tiltmeters" in theta0:
         value = theta0["tiltmeters"]
-        rows.append(FamilyView("tiltmeters", value.value, value.sigma, used=True))
+        used = "tiltmeters" not in families_left_out(findings)
+        rows.append(FamilyView("tiltmeters", value.value, value.sigma, used=used))
     if record.family("accelerometer"):
         heard = [(o, t) for o, t in zip(onsets, tracks.lead.impacts_s, strict=True) if o is not None]
         late = float(np.median([onset.time_s - time for onset, time in heard])) if heard else math.nan

@@ -8,8 +8,9 @@ import numpy as np
 
 from daq_app.config.rig import Family
 from daq_app.rocking.analysis.preparation.signals import Signals, TestTimes
+from daq_app.rocking.analysis.release_rotation import NAMES, fit_levels
 from daq_app.rocking.analysis.results import QualityNote, TestAnalysis
-from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.families.finding import FamilyFinding, families_left_out
 from daq_app.rocking.motion.swings import MotionTrack
 from daq_app.rocking.motion.transients import Onset
 from daq_app.rocking.record import TestRecord
@@ -183,9 +184,10 @@ def _course(times: TestTimes) -> list[QualityNote]:
 def _agreement(signals: Signals, analysis: TestAnalysis) -> list[QualityNote]:
     notes = []
     alpha = signals.settings.alpha_rad
-    values = {name: v.value for name, v in analysis.theta0_by_family.items() if name != "best"}
-    if "tiltmeters" not in values:
-        notes.append(_warn("no tiltmeter: θ0 is read from the wires"))
+    unfit = families_left_out(analysis.findings, held_as_well=True)
+    values = {name: v.value for name, v in fit_levels(analysis.theta0_by_family, unfit).items()}
+    if "tiltmeters" not in analysis.theta0_by_family:
+        notes.append(_warn(f"no tiltmeter: θ0 is read from the {NAMES[signals.lead]}"))
     spread = max(values.values()) - min(values.values())
     if spread > _THETA0_DISAGREEMENT * alpha:
         told = ", ".join(f"{name} {value * 1e3:.2f}" for name, value in values.items())

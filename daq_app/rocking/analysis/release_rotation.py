@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from typing import Final
 
 from daq_app.rocking.analysis.preparation.fusion import best_value
 from daq_app.rocking.analysis.preparation.gains import FamilyGains, hold_samples
@@ -13,15 +14,21 @@ from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.levels import level_outlier
 from daq_app.rocking.motion.swings import MotionTrack, steady_level
 
-_NAMES = {"tiltmeters": "tiltmeters", "wires": "wires", "lvdts": "LVDTs"}
+NAMES: Final = {"tiltmeters": "tiltmeters", "wires": "wires", "lvdts": "LVDTs"}
+"""The word for the reader by the key of `TestAnalysis.theta0_by_family`."""
 
 
 def theta0_by_family(
-    signals: Signals, track: MotionTrack, gains: FamilyGains, bent_rad: float = 0.0
+    signals: Signals,
+    track: MotionTrack,
+    gains: FamilyGains,
+    bent_rad: float = 0.0,
+    unfit: Collection[str] = (),
 ) -> dict[str, ValueWithSigma]:
     """θ0 over the last half second of the still hold (slow tiltmeters have settled), and the best.
 
-    `bent_rad`: what a wall that bends adds to the zeros of wires and tiltmeters.
+    `bent_rad`: what a wall that bends adds to the zeros of wires and tiltmeters. `unfit`: families, by the
+    word for the reader, that the best has no part of.
     """
     hold, rate = hold_samples(signals, track.held_until_s), signals.record.rate_hz
     zero = signals.settings.zero_sigma_rad
@@ -42,7 +49,7 @@ def theta0_by_family(
         if name != signals.lead and math.isfinite(value):
             own_zero = bent_zero if name == "wires" else zero
             theta0[name] = _level(value, math.hypot(noise, own_zero), gains.of(name))
-    theta0["best"] = best_value(theta0)
+    theta0["best"] = best_value(fit_levels(theta0, unfit))
     return theta0
 
 
@@ -51,7 +58,17 @@ def _level(value_rad: float, sigma_rad: float, gain_sigma: float) -> ValueWithSi
     return ValueWithSigma(value_rad, math.hypot(sigma_rad, gain_sigma * value_rad))
 
 
-def levels_apart(theta0: Mapping[str, ValueWithSigma]) -> list[FamilyFinding]:
+def fit_levels(theta0: Mapping[str, ValueWithSigma], unfit: Collection[str]) -> dict[str, ValueWithSigma]:
+    """θ0 of the single families that are fit to be used."""
+    return {name: value for name, value in theta0.items() if name in NAMES and NAMES[name] not in unfit}
+
+
+def headline_of(theta0: Mapping[str, ValueWithSigma], lead: str, unfit: Collection[str]) -> ValueWithSigma:
+    """θ0 of the test: that of the tiltmeters where they are fit, else that of the family that leads."""
+    return fit_levels(theta0, unfit).get("tiltmeters", theta0[lead])
+
+
+def levels_apart(theta0: Mapping[str, ValueWithSigma], unfit: Collection[str]) -> list[FamilyFinding]:
     """The family whose θ0 is off where the two others agree."""
-    finding = level_outlier({_NAMES[name]: value.value for name, value in theta0.items() if name in _NAMES})
+    finding = level_outlier({NAMES[name]: v.value for name, v in fit_levels(theta0, unfit).items()})
     return [] if finding is None else [finding]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 Family = Literal["wires", "LVDTs", "tiltmeters", "accelerometers", "survey", "wall", "floor"]
 Kind = Literal[
@@ -32,3 +33,18 @@ class FamilyFinding:
     severity: Literal["info", "warning"]
     text: str
     """A sentence for the reader of the result."""
+
+
+_NOT_THE_WALL: Final = frozenset({"steps", "still", "leaps", "motion"})
+"""Kinds of finding by which a whole family does not even show how far the wall is held from upright."""
+
+
+def families_left_out(findings: Iterable[FamilyFinding], *, held_as_well: bool = False) -> frozenset[str]:
+    """Whole families that are left out, by name; `held_as_well`: those that tell nothing of the held wall."""
+    return frozenset(
+        finding.family
+        for finding in findings
+        if finding.treatment == "left out"
+        and not finding.channels
+        and (not held_as_well or finding.kind in _NOT_THE_WALL)
+    )

@@ -50,12 +50,13 @@ def odd_lvdt(name: str, kind: DeviationKind, size: float) -> FamilyFinding:
     return FamilyFinding("LVDTs", (name,), kind, size, unit, "left out", "warning", text)
 
 
-def whole_family_unfit(channels: Sequence[FamilyFinding]) -> FamilyFinding:
-    """A family in which too many channels are unfit for any to be left out; nothing is done about it yet."""
+def whole_family_unfit(channels: Sequence[FamilyFinding], of: int) -> FamilyFinding:
+    """A family of `of` channels, too many of which are unfit for any to be left out; nothing is done yet."""
     kinds = [finding.kind for finding in channels]
     kind = max(dict.fromkeys(kinds), key=kinds.count)
     worst = max((finding for finding in channels if finding.kind == kind), key=lambda finding: finding.size)
-    names = ", ".join(name for finding in channels for name in finding.channels)
+    named = ", ".join(name for finding in channels for name in finding.channels)
+    names = named if len(channels) < of else f"all {of}"
     what = {
         "steps": f"read in steps of up to {worst.size * 1e3:.2g} mm",
         "still": f"stand still for up to {worst.size:.1f} s, without even their noise",

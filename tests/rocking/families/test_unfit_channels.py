@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from studies.restitution.walls import SimulatedEffect
 Floats = NDArray[np.float64]
 Change = Callable[[Floats, float], Floats]
 
+RIG = load_rig(Path(__file__).parents[3] / "configs" / "fr1.toml")
 TRUE_R = 0.895
 WIRES, LVDTS = ("WP-",), ("LV-",)
 OPTIONS = AnalysisOptions(bias_runs=0, fit=False, keep_series=False)
@@ -123,6 +125,12 @@ def test_what_is_not_fit_is_named_and_left_out_and_r_is_right(made, which, chang
     assert analysis.verdict.used == (("LVDTs",) if which == WIRES else ("wires",))
 
 
+def test_a_family_is_named_once_and_is_not_called_noisy_for_its_leaps(made):
+    analysis = analysed(made, LVDTS, in_steps(1e-3))
+    (named,) = analysis.findings
+    assert "all 24" in named.text and "nothing is compared with them" in named.text
+
+
 def test_noise_is_named_and_only_the_error_of_r_has_it(made):
     sound = analysed(made, WIRES, noisier(0.0))
     noisy = analysed(made, WIRES, noisier(2e-3))
@@ -142,20 +150,26 @@ def test_noise_is_named_and_only_the_error_of_r_has_it(made):
     ],
 )
 def test_a_test_that_one_family_hides_is_found_by_the_other_two(effect, parameters, blamed, used):
-    rig = load_rig(Path(__file__).parents[3] / "configs" / "fr1.toml")
-    test = SimulatedEffect(effect, parameters).test(rig, 78500)
-    analysis = analyse_record(test.record(), OPTIONS)
+    test = SimulatedEffect(effect, parameters).test(RIG, 78500)
+    analysis = analyse_record(test.record(), replace(OPTIONS, keep_series=True))
     assert analysis.found
-    assert (blamed, "motion") in {(finding.family, finding.kind) for finding in analysis.findings}
+    (named,) = (finding for finding in analysis.findings if finding.severity == "warning")
+    assert (named.family, named.kind, named.treatment) == (blamed, "motion", "left out")
     assert analysis.verdict.used == (used,)
     assert analysis.verdict.trust == "remarks"
     assert analysis.verdict.r == pytest.approx(test.truth["restitution"], abs=0.0015)
+    theta0 = test.truth["theta0_rad"]
+    assert analysis.theta0_rad == pytest.approx(theta0, rel=0.005)
+    assert analysis.theta0_by_family["best"].value == pytest.approx(theta0, rel=0.005)
+    assert not any("θ0" in note.text for note in analysis.notes)
+    assert not any(view.used for view in analysis.families if view.family == blamed)
+    best, rotation = analysis.series.best_rotation_rad, analysis.series.rotation_rad
+    assert np.abs(best - rotation).max() < 0.01 * abs(theta0)
 
 
 @pytest.mark.parametrize("amplitude", [0.1, 0.3])
 def test_a_floor_that_shakes_is_named_and_r_is_doubtful(amplitude):
-    rig = load_rig(Path(__file__).parents[3] / "configs" / "fr1.toml")
-    shaken = SimulatedEffect("ambient", {"amplitude": amplitude}).test(rig, 78500)
+    shaken = SimulatedEffect("ambient", {"amplitude": amplitude}).test(RIG, 78500)
     analysis = analyse_record(shaken.record(), OPTIONS)
     named = [finding for finding in analysis.findings if finding.family == "floor"]
     assert [finding.kind for finding in named] == ["vibration"]

@@ -22,6 +22,9 @@ _BY_CHANCE = 0.05
 """Chance below which values scatter more than their errors make them. Raising it makes the errors of sound
 tests too large."""
 
+_LEAST_RAD = 1e-7
+"""Noise that a rotation has at least, for its weight: readings in wide steps show none."""
+
 
 @dataclass(frozen=True, slots=True)
 class Fused:
@@ -45,6 +48,7 @@ def fuse(wires_rad: Floats, lvdts_rad: Floats, wire_noise_rad: float, lvdt_noise
         x, y = wires_rad[both], lvdts_rad[both]
         gain = float(((x - x.mean()) @ (y - y.mean())) / ((x - x.mean()) @ (x - x.mean())))
         offset = float(y.mean() - gain * x.mean())
+    wire_noise_rad, lvdt_noise_rad = (max(noise, _LEAST_RAD) for noise in (wire_noise_rad, lvdt_noise_rad))
     w, v = 1.0 / wire_noise_rad**2, 1.0 / lvdt_noise_rad**2
     rotation = np.where(
         both,

@@ -25,6 +25,7 @@ from daq_app.rocking.analysis.preparation.compared_families import (
     timing,
 )
 from daq_app.rocking.analysis.preparation.crude_rotations import CrudeRotations, crude_rotations
+from daq_app.rocking.analysis.preparation.fusion import fuse
 from daq_app.rocking.analysis.preparation.gains import FamilyGains, gains_of
 from daq_app.rocking.analysis.preparation.odd_lvdts import odd_lvdts
 from daq_app.rocking.analysis.preparation.odd_wire import compared_wires, odd_wire, wire_means
@@ -34,11 +35,12 @@ from daq_app.rocking.analysis.preparation.unfit_channels import unfit_channels
 from daq_app.rocking.families import unfit_words, words
 from daq_app.rocking.families.channels.hum import find_hum
 from daq_app.rocking.families.channels.noise import slow_noise
-from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.families.finding import FamilyFinding, families_left_out
 from daq_app.rocking.families.response import Response
 from daq_app.rocking.families.scales import wrong_scales
 from daq_app.rocking.families.shocks import ShockTiming
 from daq_app.rocking.families.treated import Corrections, held_in_memory, without_hum
+from daq_app.rocking.geometry.noise import white_noise
 from daq_app.rocking.motion.bending import Bending
 from daq_app.rocking.motion.swings import REST_ZERO_SIGMA_RAD
 from daq_app.rocking.record import TestRecord
@@ -198,7 +200,8 @@ def _in_step(
     if response is not None and bending is None:
         findings += levels(signals, times, response)
     return Instruments(
-        record, _with_errors(signals, times), times, tuple(findings), response, shocks,
+        record, _fused_without(_with_errors(signals, times), families_left_out(findings)), times,
+        tuple(findings), response, shocks,
         gains_of(signals, times, wires), bending,
     )  # fmt: skip
 
@@ -235,6 +238,18 @@ def _needs_reading(finding: FamilyFinding) -> bool:
     if finding.treatment == "left out":
         return finding.family == "wires"
     return finding.treatment == "put in step"
+
+
+def _fused_without(signals: Signals, left_out: frozenset[str]) -> Signals:
+    """The same whose best rotation has no part of a family that is left out."""
+    if signals.joint is None or not left_out & {"wires", "LVDTs"}:
+        return signals
+    wires, lvdts = (
+        np.full(rotation.size, np.nan) if name in left_out else rotation
+        for name, rotation in (("wires", signals.wire_rotation_rad), ("LVDTs", signals.joint.rotation_rad))
+    )
+    noises = (white_noise(rotation) for rotation in (signals.wire_rotation_rad, signals.joint.rotation_rad))
+    return replace(signals, fused=fuse(wires, lvdts, *noises))
 
 
 def _with_errors(signals: Signals, times: TestTimes) -> Signals:

@@ -159,7 +159,7 @@ def _combine(
         taken = np.array([[zeros.get(channel_id, 0.0)] for channel_id in lvdts])
         joint = replace(base, ranges_m=base.ranges_m - taken).motion(openings_m)
         lvdt_noise = white_noise(joint.rotation_rad)
-        fused = fuse(wire_rotation, joint.rotation_rad, max(wire_noise, 1e-7), max(lvdt_noise, 1e-7))
+        fused = fuse(wire_rotation, joint.rotation_rad, wire_noise, lvdt_noise)
     leads = lead == "lvdts" and joint is not None
     rotation = joint.rotation_rad if leads and joint is not None else wire_rotation
     # Readings with steps so wide that a held wall shows none: the noise that the rig file states is left.

@@ -75,10 +75,16 @@ def unfit_channels(record: TestRecord, rotations: CrudeRotations) -> UnfitChanne
         ]
         found = _unfit(words.FAMILY_NAMES[family], ids, seen, still)
         if len(found) > most * len(ids):
-            families.append(unfit_words.whole_family_unfit(found))
+            families.append(unfit_words.whole_family_unfit(found, len(ids)))
         else:
             left_out += found
-        noisy += _noisy(words.FAMILY_NAMES[family], ids, seen, declared)
+        unfit = {name for finding in found for name in finding.channels}
+        noises = {
+            name: readings.noise_si / noise
+            for name, readings, noise in zip(ids, seen, declared, strict=True)
+            if name not in unfit and noise > 0.0 and math.isfinite(readings.noise_si)
+        }
+        noisy += _noisy(words.FAMILY_NAMES[family], noises)
     return UnfitChannels(tuple(left_out), tuple(families), tuple(noisy))
 
 
@@ -126,18 +132,9 @@ def _unfit(
     return found
 
 
-def _noisy(
-    family: str, ids: Sequence[str], seen: Sequence[Readings], declared: Sequence[float]
-) -> list[FamilyFinding]:
-    """The whole family where half of it is noisy, else the single channels."""
-    ratios = np.array(
-        [r.noise_si / noise if noise > 0.0 else math.nan for r, noise in zip(seen, declared, strict=True)]
-    )
-    usual = float(np.median(ratios[np.isfinite(ratios)])) if np.isfinite(ratios).any() else 0.0
+def _noisy(family: str, times: Mapping[str, float]) -> list[FamilyFinding]:
+    """The family where half of it is noisy, else single channels; by id, how many times the rig file's noise."""
+    usual = float(np.median(list(times.values()))) if times else 0.0
     if usual > _NOISY:
         return [unfit_words.noisy(family, (), usual)]
-    return [
-        unfit_words.noisy(family, (name,), float(ratio))
-        for name, ratio in zip(ids, ratios, strict=True)
-        if ratio > _NOISY
-    ]
+    return [unfit_words.noisy(family, (name,), ratio) for name, ratio in times.items() if ratio > _NOISY]
