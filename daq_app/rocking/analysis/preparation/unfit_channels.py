@@ -133,7 +133,7 @@ def _unfit(
 
 
 def _noisy(family: str, times: Mapping[str, float]) -> list[FamilyFinding]:
-    """The family where half of it is noisy, else single channels; by id, how many times the rig file's noise."""
+    """The family where half of it is noisy, else single channels. `times`: noise over the rig file's."""
     usual = float(np.median(list(times.values()))) if times else 0.0
     if usual > _NOISY:
         return [unfit_words.noisy(family, (), usual)]
