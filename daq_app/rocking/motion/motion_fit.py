@@ -31,6 +31,10 @@ Floats = NDArray[np.float64]
 
 _SMALLEST_SHARE = 0.02
 """The motion is fitted until its peaks fall below this share of the first."""
+_MOST_IMPACTS = 100
+"""Impacts from the release on that are fitted at most: a decay with r = 0.98 is at its smallest share then. A
+wall that a shaking floor keeps rocking has hundreds, with a deviation for each. Raising it makes such a fit
+last minutes."""
 
 _POOR = 1.5
 """A fit that leaves more than this many times the noise may have ended in a minimum, not the least."""
@@ -248,7 +252,7 @@ def _least(
 def _span(peaks_rad: list[float], impacts: int) -> int:
     floor = _SMALLEST_SHARE * abs(peaks_rad[0])
     large = [n for n in range(1, min(len(peaks_rad), impacts)) if abs(peaks_rad[n]) >= floor]
-    return max(large, default=0)
+    return min(max(large, default=0), _MOST_IMPACTS)
 
 
 def _deviations(speeds_rad_s: list[float], count: int, log_r: float) -> Floats:

@@ -102,3 +102,36 @@ def test_noise_that_stays_correlated_counts_with_all_of_its_variance_for_slow_pa
     variance = motion_fit._long_run_variance(noise, no_parameter, no_parameter)
 
     assert variance == pytest.approx((1.0 + correlation) / (1.0 - correlation), rel=0.03)
+
+
+def test_a_wall_that_hardly_stops_is_fitted_by_its_first_hundred_impacts(rig):
+    """A shaking floor keeps a wall rocking for hundreds: a deviation for each makes a fit last minutes."""
+    specimen, r = rig.specimen, 0.99
+    motion = free_rocking(
+        0.3 * specimen.alpha0_rad,
+        np.full(160, r),
+        specimen.p_rad_s,
+        specimen.alpha0_rad,
+        release_s=RELEASE_S,
+        max_impacts=160,
+    )
+    time = np.arange(0.0, motion.impacts_s[-1] + 0.5, 1.0 / RATE_HZ)
+    rotation = np.where(time < RELEASE_S, 0.3 * specimen.alpha0_rad, motion.at(time)[0])
+    speeds = np.abs(motion.speeds_after_rad_s) / r
+    fit = fit_motion(
+        time,
+        rotation,
+        release_s=RELEASE_S,
+        theta0_rad=float(rotation[0]),
+        impacts_s=motion.impacts_s.tolist(),
+        peaks_rad=np.abs(motion.peaks_rad).tolist(),
+        speeds_rad_s=speeds[: motion.impacts_s.size].tolist(),
+        r=r,
+        scatter=3e-4,
+        noise_rad=NOISE_RAD,
+        p_rad_s=specimen.p_rad_s,
+        alpha_rad=specimen.alpha0_rad,
+    )
+    assert motion.impacts_s.size == 160
+    assert fit.impacts == 100
+    assert fit.r == pytest.approx(r, abs=1e-4)
