@@ -77,6 +77,8 @@ class Analyst(threading.Thread):
         self._sequence: Course | None = None
         self._unclosed = 0
         """Courses that are over and whose journal is not closed yet."""
+        self._unsaved = 0
+        """Closed journals whose run file is not made yet."""
         self._moves_on = False
         """Whether what the wall does still belongs to the course that was ended last."""
         self._fault = ""
@@ -138,8 +140,10 @@ class Analyst(threading.Thread):
             case SourceEnded():
                 self._on_source_ended(item)
             case Closed():
+                self._unsaved += 1
                 self._on_closed(item.end)
             case Saved():
+                self._unsaved -= 1
                 until_memory(partial(self._on_saved, item))  # somebody waits for it
             case Noted(event=event):
                 self._clock.take(event)
@@ -208,8 +212,8 @@ class Analyst(threading.Thread):
         self._around.post(end)
 
     def _on_saved(self, saved: Saved) -> None:
-        # The next test may be armed already: then its state is the one that matters.
-        if self._sequence is None:
+        # The next test may be armed already, or be over and about to be saved: its state is what matters.
+        if self._sequence is None and not self._unclosed and not self._unsaved:
             self.voice.run_path = saved.path
             self._go(State.SAVED if saved.ok else State.FAILED, saved.text)
 

@@ -82,13 +82,12 @@ def _analyse(
     joint = _joint(instruments, signals, track)
     bends = instruments.bending is not None
     # Wires and tiltmeters share the bending: that they agree speaks for neither.
-    further = [] if bends else levels_apart(theta0, unfit)
+    levels = [] if bends else levels_apart(theta0, unfit)
     own = with_own_body(track, signals.time_s, signals.rotation_rad)
-    pattern = pattern_of(instruments, tracks, own, further)
+    pattern = pattern_of(instruments, tracks, own, levels)
     by_speed = pattern.sigma_r_by_speed
-    further += wall_findings(instruments, tracks, joint, further, pattern)
-    others = [*instruments.findings, *further]
-    further += scatter_findings(estimates["eav"], estimates["crt"], others) + misfit_findings(fit, others)
+    of_wall = [*levels, *wall_findings(instruments, tracks, joint, levels, pattern)]
+    further = _with_what_is_left(instruments, of_wall, estimates, fit)
     verdict, findings = verdict_of(instruments, tracks, series, estimates, further, by_speed)
     estimates = _with_what_was_found(estimates, findings, by_speed)
     fit = None if fit is None else _for_this_wall(fit, findings, by_speed)
@@ -122,6 +121,18 @@ def _analyse(
         series=_series(signals, velocity) if options.keep_series else None,
     )
     return replace(analysis, notes=quality_notes(record, signals, times, track, analysis, onsets, findings))
+
+
+def _with_what_is_left(
+    instruments: Instruments,
+    found: Sequence[FamilyFinding],
+    estimates: Mapping[str, RestitutionEstimate],
+    fit: MotionFit | None,
+) -> list[FamilyFinding]:
+    """The findings, and what they explain of neither the scatter of impacts nor the fit's misfit."""
+    others = [*instruments.findings, *found]
+    scatter = scatter_findings(estimates["eav"], estimates["crt"], others)
+    return [*found, *scatter, *misfit_findings(fit, others)]
 
 
 def _joint(instruments: Instruments, signals: Signals, track: MotionTrack) -> JointSummary | None:

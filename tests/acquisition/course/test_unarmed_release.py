@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from daq_app.acquisition.closing.finalise_worker import ring_job
+from daq_app.acquisition.closing.finaliser import Finaliser, Finished
 from daq_app.acquisition.messages.items import Arrived
 from daq_app.acquisition.messages.published import Call, State
 from daq_app.acquisition.pipeline.ring import Ring, ring_sessions
@@ -87,14 +89,11 @@ def test_an_order_to_arm_just_after_the_release_takes_the_whole_of_it(live: Live
         assert {"released", "rocking", "at_rest"} <= {event.kind for event in run.events}
 
 
-def test_what_looked_like_a_release_and_had_no_impact_gives_way_to_the_next_test(
-    live: Lives, wall_test: Any
-) -> None:
-    """A rope that slips: the wall falls back a little and is held again, and nobody waits for its rest."""
+def armed_after_a_slip(lab: Any, wall_test: Any) -> Path:
+    """The journal of a test armed after the rope slipped: the wall fell back a little, and is held."""
     slips = wall_test.readings[:, : wall_test.release_sample + 1500]
     held = wall_test.readings[:, wall_test.release_sample - 4 * RATE_HZ : wall_test.release_sample]
     caught = np.tile(held - held.mean(axis=1, keepdims=True), 2) + slips[:, -1:]
-    lab = live()
     lab.driver._wall = type(wall_test)(
         np.hstack([slips, caught]), wall_test.release_sample, wall_test.rest_sample, wall_test.theta0_rad
     )
@@ -104,9 +103,44 @@ def test_what_looked_like_a_release_and_had_no_impact_gives_way_to_the_next_test
     lab.wait_for(lambda m: getattr(m, "first_sample", 0) >= wall_test.release_sample + 3 * RATE_HZ)
     reply = lab.ask("arm", test="FR1-L3-1")
     assert reply.ok, reply.text
+    return Path(str(reply.data["journal"]))
+
+
+def test_what_looked_like_a_release_and_had_no_impact_gives_way_to_the_next_test(
+    live: Lives, wall_test: Any
+) -> None:
+    lab = live()
+    folder = armed_after_a_slip(lab, wall_test).parent
     assert lab.wait_for_state(State.ARMED, State.HOLDING).test == "FR1-L3-1"
-    folder = Path(str(reply.data["journal"])).parent
     assert list(folder.glob("unarmed_*")), "what was recorded is kept"
+
+
+def test_saved_is_said_of_the_test_that_is_over_and_not_of_one_before_it(
+    live: Lives, wall_test: Any, finaliser: Finaliser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The run before is packed so slowly that the test is over first."""
+    slow = threading.Event()
+    submit = finaliser.submit
+
+    def submit_slowly(job: dict[str, str], then: Callable[[Finished], None]) -> Future[Finished]:
+        def told(finished: Finished) -> None:
+            assert slow.wait(60.0)
+            then(finished)
+
+        return submit(job, told)
+
+    monkeypatch.setattr(finaliser, "submit", submit_slowly)
+    lab = live()
+    journal = armed_after_a_slip(lab, wall_test)
+    lab.driver.let(wall_test.release_sample + 5 * RATE_HZ)
+    lab.wait_for(lambda m: getattr(m, "first_sample", 0) >= wall_test.release_sample + 4.5 * RATE_HZ)
+    assert lab.ask("stop").ok
+    lab.wait_for(lambda m: getattr(m, "state", None) is State.SAVING and m.test == "FR1-L3-1")
+    slow.set()
+    saved = lab.wait_for_state(State.SAVED, State.FAILED)
+    assert Path(saved.run_path).stem == journal.stem
+    before = [m for m in lab.heard if getattr(m, "kind", "") == "saved"]
+    assert any("unarmed" in event.data["run"] for event in before), "the one before is told as an event"
 
 
 def test_a_wall_that_was_never_held_still_is_recorded_and_ended_too(live: Lives, wall_test: Any) -> None:
