@@ -1,4 +1,4 @@
-"""The sentences about channels and families that are not fit to be used, and about the floor."""
+"""The sentences about channels and families that are not fit to be used, and about floor and base."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from daq_app.rocking.families.channels.compared_channels import DeviationKind
-from daq_app.rocking.families.finding import FamilyFinding
+from daq_app.rocking.families.finding import FamilyFinding, Treatment
 
 
 def coarse_steps(family: str, name: str, step_m: float) -> FamilyFinding:
@@ -104,3 +104,23 @@ def shaking_floor(rms_m_s2: float) -> FamilyFinding:
         "traffic, an actuator that runs on"
     )
     return FamilyFinding("floor", (), "vibration", rms_m_s2, "m/s²", "none", "warning", text)
+
+
+def slides(largest_m: float, *, left_out: bool) -> FamilyFinding:
+    """The base slides at impacts, and the wires with it."""
+    what = "r is taken from the LVDTs" if left_out else "r is off by it"
+    text = (
+        f"the wall slides on its base at its impacts, by up to {largest_m * 1e3:.1f} mm: all wires step, the "
+        f"LVDTs do not; {what}. Usual causes: a smooth or wet bed, too little friction"
+    )
+    treatment: Treatment = "left out" if left_out else "none"
+    return FamilyFinding("wires", (), "slide", largest_m, "m", treatment, "warning", text)
+
+
+def turns(largest_rad: float) -> FamilyFinding:
+    """The wall turns about the vertical at impacts."""
+    text = (
+        f"the wall turns about the vertical at its impacts, by up to {largest_rad * 1e3:.2f} mrad: wires "
+        "step apart, the LVDTs do not. Usual causes: a corner that strikes first, an uneven bed"
+    )
+    return FamilyFinding("wall", (), "turn", largest_rad, "rad", "none", "warning", text)

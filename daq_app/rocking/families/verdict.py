@@ -195,7 +195,7 @@ def _touches_r(finding: FamilyFinding) -> bool:
     """
     if finding.family in ("tiltmeters", "accelerometers"):
         return False
-    return finding.kind not in ("gain", "late", "scatter", "misfit", "alpha", "p", "noise")
+    return finding.kind not in ("gain", "late", "scatter", "misfit", "alpha", "p", "noise", "turn")
 
 
 def _share_of_r(finding: FamilyFinding, r: float) -> float:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.rocking.analysis.preparation.base import base_of
 from daq_app.rocking.analysis.preparation.compared_families import (
     bending_of,
     follow,
@@ -33,6 +34,7 @@ from daq_app.rocking.analysis.preparation.reader import Reader, found_by_others,
 from daq_app.rocking.analysis.preparation.signals import Lead, Signals, TestTimes
 from daq_app.rocking.analysis.preparation.unfit_channels import unfit_channels
 from daq_app.rocking.families import unfit_words, words
+from daq_app.rocking.families.base_steps import BaseSteps
 from daq_app.rocking.families.channels.hum import find_hum
 from daq_app.rocking.families.channels.noise import slow_noise
 from daq_app.rocking.families.finding import FamilyFinding, families_left_out
@@ -106,7 +108,7 @@ def prepare(record: TestRecord, *, from_rest: bool) -> Instruments:
         reader, signals, times = elsewhere.reader, elsewhere.signals, elsewhere.times
         findings.append(elsewhere.blamed)
         spoiled += [elsewhere.blamed] if signals.lead == "lvdts" else []
-    return _in_step(corrected, signals, times, findings, reader, comparable=not spoiled, in_steps=in_steps)
+    return _in_step(corrected, signals, times, findings, reader, spoiled=spoiled, in_steps=in_steps)
 
 
 # -- before the test is found ----------------------------------------------------------------------
@@ -156,30 +158,35 @@ def _in_step(
     findings: list[FamilyFinding],
     reader: Reader,
     *,
-    comparable: bool,
+    spoiled: Sequence[FamilyFinding],
     in_steps: frozenset[str],
 ) -> Instruments:
     """Single wires and the timing of families; read again where something had to be put right.
 
-    `comparable`: whether both families show the wall, so that one says something of the other. `in_steps`:
-    wires that go in steps, and are left out once it is known whether they stick.
+    `spoiled`: families that do not show the wall, so that one says nothing of the other. `in_steps`: wires
+    that go in steps, and are left out once it is known whether they stick.
     """
-    motion = motion_samples(signals, times)
-    means = wire_means(signals, motion) if comparable or signals.lead == "wires" else None
-    wires = compared_wires(signals, means)
+    comparable = not spoiled
     bending = bending_of(signals, times, None) if comparable else None
-    odd = odd_wire(signals, means, wires, bends=bending is not None)
-    if odd is not None and (odd.kind == "hysteresis" or not in_steps.intersection(odd.channels)):
-        # A wire that jumps on and on goes in steps as well.
-        findings = [f for f in findings if f.kind != "steps" or f.channels != odd.channels]
-        findings.append(odd)
-        in_steps = in_steps.union(odd.channels)
-    odd_ones = odd_lvdts(signals, motion) if comparable else []
-    findings += odd_ones
-    left_out = in_steps.union(*(finding.channels for finding in odd_ones))
     response = follow(signals, times) if comparable else None
+    base = _of_base(signals, times, response, bending, spoiled)
+    if base.slide_m > 0.0:
+        # Wires that step with the wall say nothing of the LVDTs, and nothing of each other.
+        findings, comparable, response = [f for f in findings if f not in spoiled], False, None
+    motion = motion_samples(signals, times)
+    told_apart = comparable or (signals.lead == "wires" and base.slide_m == 0.0)
+    means = wire_means(signals, motion) if told_apart else None
+    wires = compared_wires(signals, means)
+    odd = odd_wire(signals, means, wires, bends=bending is not None, turns=base.turn_rad > 0.0)
+    odd_ones = odd_lvdts(signals, motion) if comparable or base.slide_m > 0.0 else []
+    findings, left_out = _with_odd(findings, odd, odd_ones, in_steps)
     shocks = shocks_of(record, signals, times)
-    found, lead, earlier, bending = _between_families(record, signals, times, response, shocks, bending)
+    if base.slide_m > 0.0:
+        found, lead, earlier = _slide(signals, times, base)
+    else:
+        found, lead, earlier, bending = _between_families(record, signals, times, response, shocks, bending)
+    if base.turn_rad > 0.0:
+        found.append(unfit_words.turns(base.turn_rad))
     findings += found
     changed = Corrections(left_out=left_out, earlier_s=earlier)
     if changed.left_out or changed.earlier_s or lead != signals.lead:
@@ -204,6 +211,42 @@ def _in_step(
         tuple(findings), response, shocks,
         gains_of(signals, times, wires), bending,
     )  # fmt: skip
+
+
+def _with_odd(
+    findings: list[FamilyFinding],
+    wire: FamilyFinding | None,
+    lvdts: list[FamilyFinding],
+    in_steps: frozenset[str],
+) -> tuple[list[FamilyFinding], frozenset[str]]:
+    """The findings with those of single channels that are odd, and all channels that are left out now."""
+    if wire is not None and (wire.kind == "hysteresis" or not in_steps.intersection(wire.channels)):
+        # A wire that jumps on and on goes in steps as well.
+        findings = [f for f in findings if f.kind != "steps" or f.channels != wire.channels]
+        findings.append(wire)
+        in_steps = in_steps.union(wire.channels)
+    return findings + lvdts, in_steps.union(*(finding.channels for finding in lvdts))
+
+
+def _of_base(
+    signals: Signals,
+    times: TestTimes,
+    response: Response | None,
+    bending: Bending | None,
+    spoiled: Sequence[FamilyFinding],
+) -> BaseSteps:
+    """What the base does, where both families tell: wires that leap at impacts may do so with the wall."""
+    if bending is not None or any((f.family, f.kind) != ("wires", "leaps") for f in spoiled):
+        return BaseSteps(0.0, 0.0)
+    return base_of(signals, times, response, leaping=bool(spoiled))
+
+
+def _slide(
+    signals: Signals, times: TestTimes, base: BaseSteps
+) -> tuple[list[FamilyFinding], Lead, dict[str, float]]:
+    """What is said of a base that slides, the family that leads, and that nothing is moved in time."""
+    lead: Lead = "lvdts" if lvdts_cover(signals, times) else "wires"
+    return [unfit_words.slides(base.slide_m, left_out=lead == "lvdts")], lead, {}
 
 
 def _between_families(

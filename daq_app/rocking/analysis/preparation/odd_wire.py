@@ -28,11 +28,17 @@ def compared_wires(signals: Signals, means: ChannelMeans | None) -> ComparedChan
 
 
 def odd_wire(
-    signals: Signals, means: ChannelMeans | None, compared: ComparedChannels | None, *, bends: bool
+    signals: Signals,
+    means: ChannelMeans | None,
+    compared: ComparedChannels | None,
+    *,
+    bends: bool,
+    turns: bool,
 ) -> FamilyFinding | None:
-    """The wire that is to be left out, and why. A wall that `bends` pulls wires of each height otherwise.
+    """The wire that is to be left out, and why.
 
-    Sticking comes first, for it also looks like a delay.
+    A wall that `bends` pulls wires of each height otherwise, and one that `turns` about the vertical those
+    beside its middle. Sticking comes first, for it also looks like a delay.
     """
     wires = signals.geometry.wires
     if means is not None and not bends:
@@ -43,4 +49,6 @@ def odd_wire(
     if compared is None or outlier is None:
         return None
     place, kind = outlier
+    if turns and kind == "drift" and wires.position_m[place, 1] != 0.0:
+        return None
     return words.single_wire(wires.ids[place], kind, compared, place)

@@ -1,0 +1,175 @@
+"""What wires show at impacts that no rotation makes: the wall slides, or turns about the vertical.
+
+LVDTs under the wall show neither. Between what the wires read and what they should at the rotation of the
+LVDTs, a slide is a step that all wires share, a turn one that grows with their place along the wall.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc
+
+Floats = NDArray[np.float64]
+
+_SKIPPED_S: Final = 2e-3
+"""Time beside an impact that is not looked at: impacts last as long."""
+_WINDOW_S: Final = 10e-3
+"""Time before and after it whose means are compared: the wall turns by few mrad meanwhile, so that a gain of
+wires that is off by 1 % makes 0.06 mm. Raising it lets errors of the rotation in."""
+_NEAR_S: Final = 30e-3
+"""How far the LVDTs' crossing may lie from an impact by the wires: a slide of 20 mm s/rad makes 10 ms."""
+_FEWEST: Final = 5
+"""Impacts from which steps can be told from chance."""
+_CHANCE: Final = 1e-4
+"""Probability by which scatter alone makes such steps. Raising it names sound walls."""
+_LEAPING: Final = 0.9
+"""Share of the variance of steps that speed must explain where wires leap: of slides of 5 mm it is 0.99, of
+wires that freeze for moments 0.7. Lowering it takes a loose contact for a slide."""
+_SMALLEST_M: Final = 2e-4
+"""Largest step of a test that is named, at a wire: sensors that are 20 µs apart make 0.05 mm. Lowering it
+names what moves r by less than 0.0005."""
+
+
+@dataclass(frozen=True, slots=True)
+class BaseSteps:
+    """Steps at impacts; 0 where there are none that stand out."""
+
+    slide_m: float
+    """The largest along x, m."""
+    turn_rad: float
+    """The largest about the vertical, rad."""
+
+
+def base_steps(
+    time_s: Floats,
+    rotation_rad: Floats,
+    residual_m: Floats,
+    y_m: Floats,
+    impacts_s: Iterable[float],
+    *,
+    leaping: bool = False,
+) -> BaseSteps:
+    """Steps that grow with the speed of impacts.
+
+    `rotation_rad`: (n,) by the LVDTs at `time_s`; `residual_m`: (wires, n) displacement along x at each wire
+    that it does not explain; both NaN where they are not known. `y_m`: (wires,) places along the wall.
+    `impacts_s`: about when the impacts were. `leaping`: whether wires leap, with the wall or by themselves.
+    """
+    found = [_crossing(time_s, rotation_rad, residual_m, about_s) for about_s in impacts_s]
+    crossings = [crossing for crossing in found if crossing is not None]
+    if len(crossings) < _FEWEST:
+        return BaseSteps(0.0, 0.0)
+    turned = np.array([crossing.after_rad - crossing.before_rad for crossing in crossings])
+    by_gain = np.outer(turned, _gains(rotation_rad, residual_m, crossings))
+    steps = np.array([crossing.after_m - crossing.before_m for crossing in crossings]) - by_gain
+    wires = np.isfinite(steps).mean(axis=0) > 0.5
+    known = np.isfinite(steps[:, wires]).all(axis=1)
+    if np.count_nonzero(known) < _FEWEST or np.count_nonzero(wires) < 2:
+        return BaseSteps(0.0, 0.0)
+    places = y_m[wires]
+    reach = float(np.abs(places).max())
+    turns = bool(np.ptp(places) > 0.0)
+    design = np.column_stack([np.ones(places.size), places]) if turns else np.ones((places.size, 1))
+    parts = steps[known][:, wires] @ np.linalg.pinv(design).T
+    speeds = np.array([crossing.speed_rad_s for crossing in crossings])[known]
+    least = _LEAPING if leaping else 0.0
+    slide = _with_speed(parts[:, 0], speeds, _SMALLEST_M, least)
+    return BaseSteps(slide, _with_speed(parts[:, 1], speeds, _SMALLEST_M / reach, least) if turns else 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Crossing:
+    """An impact as the LVDTs show it: means over the windows before and after it."""
+
+    speed_rad_s: float
+    """Signed, before it."""
+    before_rad: float
+    after_rad: float
+    before_m: Floats
+    """(wires,) of the residual."""
+    after_m: Floats
+    first: int
+    """Samples where the window before it begins, and where the one after it ends."""
+    end: int
+
+
+def _crossing(time_s: Floats, rotation_rad: Floats, residual_m: Floats, about_s: float) -> _Crossing | None:
+    """The crossing of the LVDTs next to an impact; None where they do not show it."""
+    first, last = np.searchsorted(time_s, [about_s - _NEAR_S, about_s + _NEAR_S])
+    near = rotation_rad[first:last]
+    crossings = np.flatnonzero(np.signbit(near[1:]) != np.signbit(near[:-1]))
+    if not crossings.size:
+        return None
+    # Noise crosses more than once: the middle one counts.
+    impact_s = float(time_s[first + crossings[crossings.size // 2]])
+    early, middle, before, after, end = np.searchsorted(
+        time_s,
+        impact_s
+        + np.array(
+            [
+                -2.0 * _WINDOW_S - _SKIPPED_S,
+                -_WINDOW_S - _SKIPPED_S,
+                -_SKIPPED_S,
+                _SKIPPED_S,
+                _SKIPPED_S + _WINDOW_S,
+            ]
+        ),
+    )
+    if early == 0 or end == time_s.size:
+        return None
+    levels = [float(rotation_rad[part].mean()) for part in (slice(early, middle), slice(middle, before))]
+    if not np.isfinite(levels).all():
+        return None
+    return _Crossing(
+        speed_rad_s=(levels[1] - levels[0]) / _WINDOW_S,
+        before_rad=levels[1],
+        after_rad=float(rotation_rad[after:end].mean()),
+        before_m=residual_m[:, middle:before].mean(axis=1),
+        after_m=residual_m[:, after:end].mean(axis=1),
+        first=int(middle),
+        end=int(end),
+    )
+
+
+def _gains(rotation_rad: Floats, residual_m: Floats, crossings: Sequence[_Crossing]) -> Floats:
+    """(wires,) what the residual has of the rotation, m/rad: a gain that is off is no step.
+
+    A step stays from one impact to the next; what the middle of a half-cycle has beyond its ends is gain.
+    """
+    over, squares = np.zeros(residual_m.shape[0]), 0.0
+    for one, other in pairwise(crossings):
+        third = (other.first - one.end) // 3
+        if third <= 0:
+            continue
+        top = slice(one.end + third, other.first - third)
+        turned = float(rotation_rad[top].mean()) - 0.5 * (one.after_rad + other.before_rad)
+        shown = residual_m[:, top].mean(axis=1) - 0.5 * (one.after_m + other.before_m)
+        if math.isfinite(turned) and np.isfinite(shown).any():
+            over += np.nan_to_num(shown) * turned
+            squares += turned**2
+    return over / squares if squares > 0.0 else over
+
+
+def _with_speed(steps: Floats, speeds: Floats, smallest: float, least_share: float) -> float:
+    """The largest of the steps that a multiple of speed, with or without its sign, explains; 0 for chance.
+
+    `least_share`: of their variance that it must explain.
+    """
+    design = np.column_stack([speeds, np.abs(speeds)])
+    solution, _, rank, _ = np.linalg.lstsq(design, steps, rcond=None)
+    shown = design @ solution
+    largest = float(np.abs(shown).max())
+    freedom = steps.size - int(rank)
+    left = float(np.sum((steps - shown) ** 2)) / freedom
+    explained = float(np.sum(shown**2)) / float(np.sum(steps**2))
+    if largest < smallest or explained < least_share:
+        return 0.0
+    ratio = float(np.sum(shown**2)) / rank / left if left > 0.0 else math.inf
+    return largest if fdtrc(rank, freedom, ratio) < _CHANCE else 0.0
