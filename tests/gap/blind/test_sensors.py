@@ -99,6 +99,19 @@ def test_an_accelerometer_feels_height_times_angular_acceleration(rig: Rig) -> N
     assert row(rig, found, "AC-4")[falling] == pytest.approx(expected[falling], abs=1e-9)
 
 
+@pytest.mark.parametrize("name", ["lag", "filter_delay", "slow_response"])
+@pytest.mark.parametrize("tau_s", [0.0051, 0.0137])
+def test_a_late_sensor_is_late_by_what_its_label_says(rig: Rig, name: str, tau_s: float) -> None:
+    """Between a signal and itself later lies its whole change times the mean delay, whatever the response."""
+    _, plain = signals(world_with(rig))
+    _, late = signals(world_with(rig, effect(rig, name, value=tau_s)))
+    changed = np.flatnonzero(np.abs(late - plain).max(axis=1) > 1e-6)
+    assert changed.size
+    for k in changed:
+        area = (plain[k] - late[k]).sum() / RATE_HZ
+        assert area / (plain[k, -1] - plain[k, 0]) == pytest.approx(tau_s, abs=1e-6)
+
+
 @pytest.mark.parametrize("name", sorted(set(ENTRIES) - NO_ZERO - set(ELECTRONICS)))
 def test_an_effect_without_strength_changes_nothing(rig: Rig, name: str) -> None:
     _, plain = signals(world_with(rig))

@@ -68,12 +68,14 @@ def _slow(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
 
 
 def _filter_delay(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
-    """Linear-phase filter of length 2 τ: delay τ and a moving average (Hann)."""
-    length = round(2.0 * q["tau_s"] * bench.rate_hz) | 1
+    """Linear-phase filter of length 2 τ: a moving average (Hann), and what is missing to a delay of τ."""
+    length = max(int(2.0 * q["tau_s"] * bench.rate_hz) - 1, 0) | 1
     taps = np.hanning(length + 2)[1:-1]
     taps /= taps.sum()
     start = np.full(length - 1, signal[0])
-    return np.asarray(np.convolve(np.concatenate([start, signal]), taps, mode="valid"))
+    averaged = np.convolve(np.concatenate([start, signal]), taps, mode="valid")
+    missing_s = q["tau_s"] - (length - 1) / 2.0 / bench.rate_hz
+    return _delayed(averaged, {"tau_s": missing_s}, bench)
 
 
 def _saturation(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.signal import lfilter
+from scipy.signal import cont2discrete, lfilter
 
 from daq_app.config.rig import G_M_S2, Channel
 from daq_app.gap.blind.world.arrays import FloatArray
@@ -84,12 +84,12 @@ def tilt(channel: Channel, scene: Scene) -> FloatArray:
 
 
 def first_order(signal: FloatArray, constant_s: float, step_s: float) -> FloatArray:
-    """Exact first-order lag of a signal held between samples; starts settled."""
+    """Exact first-order lag of a signal that is straight between samples; starts settled."""
     if constant_s <= 0.0:
         return signal
-    keep = math.exp(-step_s / constant_s)
-    filtered: FloatArray = lfilter([1.0 - keep], [1.0, -keep], signal, zi=[keep * signal[0]])[0]
-    return filtered
+    numerator, denominator, _ = cont2discrete(([1.0], [constant_s, 1.0]), step_s, method="foh")
+    lag: FloatArray = lfilter(numerator[0], denominator, signal - signal[0])
+    return np.asarray(lag + signal[0])
 
 
 def _shocks(channel: Channel, scene: Scene, lever: float) -> FloatArray:
