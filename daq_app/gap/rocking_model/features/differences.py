@@ -103,9 +103,10 @@ def at_impacts(run: RockingRun, values: Mapping[str, float], key: str) -> float:
 def face_gain(values: Mapping[str, float], face: str) -> float:
     """Relative error of what one face of the joint reads.
 
-    An LVDT is scanned after another one of its own face, but for the first: what that leaves behind is gain.
+    LVDTs that stand further out read more of the same rotation. One is scanned after another of its own face,
+    but for the first: what that leaves behind is gain.
     """
-    return values[face] + values[CROSSTALK_SHARE]
+    return values[face] + values["faces"] + values[CROSSTALK_SHARE]
 
 
 def own_gain(run: RockingRun, values: Mapping[str, float]) -> float:

@@ -149,6 +149,13 @@ def _priors(survey: Survey) -> tuple[Parameter, ...]:
             )
             for name, where in faces
         ),
+        Parameter(
+            "faces",
+            0.0,
+            survey.half_base_tolerance_m / survey.half_base_m,
+            "1",
+            meaning="how much further apart the LVDTs stand than the survey says",
+        ),
         known(FACE_SKEW, SKEW_S, "s", "how much later the LVDTs at x > 0 are sampled than those at x < 0"),
         known("twist_follow", 2e-3, "1/m", "twist from LVDT calibrations"),
         known(
