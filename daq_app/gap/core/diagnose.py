@@ -89,7 +89,7 @@ class _Study(Hypotheses):
         forms = self.free_forms(best)
         ranked = with_other_forms(ranked, best, forms, self.library, self.policy.prior_other_form)
         classes = answers(ranked, self.library)
-        rest = remainder(self.experiment, self.library, null, fit, forms, self.policy)
+        rest = remainder(self.experiment, self.library, null, fit, forms, self._gains(best), self.policy)
         detection = self._detection()
         decision, following = decide(Evidence(self.library, classes, fit, rest, detection), self.policy)
         gap, alone = self._held_out(best)
@@ -120,6 +120,16 @@ class _Study(Hypotheses):
             next_measurement=following,
             limits=tuple(limits),
         )
+
+    def _gains(self, best: Hypothesis) -> dict[str, float]:
+        """What each effect of a hypothesis adds to the log evidence of the others, where they were fitted."""
+        without = {name: tuple(n for n in best if n != name) for name in best}
+        own = self.fits[best].log_evidence
+        return {
+            name: own - self.fits[others].log_evidence
+            for name, others in without.items()
+            if others in self.fits
+        }
 
     def _finished(self, hypothesis: Hypothesis) -> Fit:
         """The fit of a hypothesis with exact Jacobians."""

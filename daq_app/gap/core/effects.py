@@ -46,6 +46,8 @@ class Effect:
     """Whether the sign of that coefficient follows from the signs of `typical` and of the parameter."""
     part_of: str = ""
     """Effect of which this is one place: the same law on one channel of a family. They are no two causes."""
+    place: str = ""
+    """That channel, as the labels of its features have it."""
     null_value: Mapping[str, float] = field(default_factory=dict)
     """Parameter values at which the effect vanishes; 0 for each that is not listed."""
 

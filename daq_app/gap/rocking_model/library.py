@@ -187,6 +187,7 @@ def _sensor_effect(name: str, target: str, family: str, known: set[str]) -> Effe
         f"{spec.summary} ({target})",
         tuple(Confusion(other, spec.separated_by) for other in spec.confusable if other in known),
         part_of=f"{name}@{family}" if target != family else "",
+        place=target if target != family else "",
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,9 +81,13 @@ def remainder(
     null: Fit,
     best: Fit,
     forms: Sequence[FreeForm],
+    gains: Mapping[str, float],
     policy: Policy,
 ) -> Remainder:
-    """What `best` leaves of what `null` leaves, on the yardstick of the scatter of `best`."""
+    """What `best` leaves of what `null` leaves, on the yardstick of the scatter of `best`.
+
+    `gains`: what each effect of `best` adds to the log evidence of the others, as far as it is known.
+    """
     sizes = best.sizes.without_discrepancy()
     local = {key: u for key, u in null.known().items() if key[1] is not None}
     nominal = _size(_white(experiment, Problem(experiment, ()), local, sizes))
@@ -103,6 +107,8 @@ def remainder(
         other = policy.chance(gain, bar)
         rest = 1.0 - (1.0 - rest) * (1.0 - other)
         form = max(forms, key=lambda f: f.excess).family if other > policy.refused else ""
+    for name, gain in gains.items():
+        rest = 1.0 - (1.0 - rest) * (1.0 - _unknown_at(library[name].place, gain, groups, policy))
     together = sum(1 for name in best.effects if library[name].part_of)
     if together > policy.lone_instruments:
         rest = 1.0 - (1.0 - rest) * (1.0 - policy.common_cause)
@@ -120,6 +126,16 @@ def _unknown(share: float, nats: float, largest: float, policy: Policy) -> float
     matters = policy.chance(nats, policy.unknown_nats)
     gross = policy.chance(largest, policy.unknown_misfit)
     return 1.0 - (1.0 - counts * matters) * (1.0 - gross)
+
+
+def _unknown_at(place: str, gain: float, groups: Sequence[GroupRest], policy: Policy) -> float:
+    """Probability that one channel has something else than the effect that is named on it and gains so much.
+
+    Beside a strong cause elsewhere no remainder of one channel is a share of the whole that matters.
+    """
+    left = math.fsum(group.nats for group in groups if place and group.channel == place)
+    share = left / max(left + max(gain, 0.0), 1e-9)
+    return policy.chance(share, policy.unknown_share) * policy.chance(left, policy.unknown_nats)
 
 
 def _white(

@@ -82,6 +82,12 @@ def turn_shape(grid: Grid, impact: int) -> FloatArray:
     return shape
 
 
+def top_shape(grid: Grid, impact: int) -> FloatArray:
+    """The same from the middle of the half-cycle after that impact on, (m,), rad/s."""
+    middle_s = 0.5 * (grid.impact_s[impact] + grid.impact_s[impact + 1])
+    return np.where(grid.time_s > middle_s, abs(float(grid.approach[impact])), 0.0)
+
+
 def turning_shape(grid: Grid, *, alternating: bool) -> FloatArray:
     """What `turned_shape` is ahead of a wall that takes a while to turn at each impact, (m,), rad/s.
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from daq_app.gap.core import Options
+from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.coefficients import block_coefficients
 from daq_app.gap.rocking_model.features.differences import of_shapes
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
@@ -28,9 +29,13 @@ def plain() -> GapRun:
     return examine(run).run
 
 
-def _turns(run: GapRun) -> np.ndarray:
+def _turn_block(run: GapRun) -> Block:
     (block,) = [block for block in extract(run).blocks if block.family == "turn"]
-    return np.asarray(block.values)
+    return block
+
+
+def _turns(run: GapRun) -> np.ndarray:
+    return np.asarray(_turn_block(run).values)
 
 
 def _with(run: GapRun, wire: str, moved_m: np.ndarray) -> GapRun:
@@ -167,11 +172,31 @@ def test_a_wall_that_rings_slowly_about_the_vertical_is_no_turn_that_stays(
     told = block_coefficients(run, _usual(run) | values) - block_coefficients(run, _usual(run))
     first = sum(len(b.names) for b in run.blocks[: run.blocks.index(block)])
     told = told[first : first + len(block.names)]
-    sd = np.sqrt(np.diag(block.covariance))
-    assert np.max(np.abs(told) / sd) > 0.8
+    sd, quiet_sd = (np.sqrt(np.diag(b.covariance)) for b in (block, before))
+    assert np.max(np.abs(told) / quiet_sd) > 2.5, "taken for turns, they would count"
     np.testing.assert_array_less(np.abs(block.values - before.values - told), 0.2 * sd)
 
 
 def _usual(run: RockingRun) -> dict[str, float]:
     model = RockingModel(run.survey)
     return {p.name: p.mean for p in (*model.nuisance, *model.local_nuisance(run))}
+
+
+def _one_over_f(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Noise of rms one whose power goes with 1/f, (n,)."""
+    harmonics = np.arange(1, n // 2 + 1)
+    parts = rng.normal(size=harmonics.size) + 1j * rng.normal(size=harmonics.size)
+    noise = np.fft.irfft(np.concatenate([[0.0], parts / np.sqrt(harmonics)]), n)
+    return np.asarray(noise / noise.std())
+
+
+def test_turns_in_noise_with_a_spectrum_of_1_over_f_are_within_their_errors() -> None:
+    """White noise and a walk alone state half of what such noise makes of them."""
+    rng = np.random.default_rng(5)
+    squares = []
+    for run in simulate({}, (0.15, -0.25, 0.35, 0.40, -0.15, 0.25), seed=42):
+        for name in ("WP-1", "WP-2", "WP-3", "WP-4", "WP-5"):
+            run = _with(run, name, 4e-4 * _one_over_f(run.channels.shape[1], rng))
+        block = _turn_block(examine(run).run)
+        squares.append(np.mean(block.values**2 / np.diag(block.covariance)))
+    assert np.sqrt(np.mean(squares)) < 1.4

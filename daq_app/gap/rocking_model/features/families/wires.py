@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq_app.gap.core import Parameter
 from daq_app.gap.core.features import FloatArray
@@ -36,6 +37,7 @@ from daq_app.gap.rocking_model.features.shapes import (
     play_shape,
     side_of,
     slip_shape,
+    top_shape,
     turn_shape,
     turning_shape,
 )
@@ -53,6 +55,9 @@ from daq_app.gap.rocking_model.motion.rotation import (
 )
 from daq_app.gap.rocking_model.records import GapRun, Survey
 from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, OTHER_WIRES, PLAY_RAD
+
+Columns = dict[str, tuple[FloatArray, str]]
+"""Shapes of a regression, (m,) each, with the units of their coefficients."""
 
 _TURNS = 8
 """Impacts at which a turn about the vertical is looked for: those with most speed."""
@@ -149,9 +154,8 @@ def _turn_block(scene: Scene) -> Block | None:
     }
     turns = {f"impact {k + 1}": (turn_shape(grid, k), "s") for k in range(count)}
     pick = scene.rocking & grid.settled & (grid.time_s < grid.impact_s[count])
-    # A zero is no part of the shapes: least norm would give some of it to the turns, of which play is a sum.
-    columns = {name: (shape - shape[pick].mean(), unit) for name, (shape, unit) in (absorbed | turns).items()}
-    block = regress("turn", turned - turned[pick].mean(), columns, pick, tuple(absorbed))
+    columns = absorbed | turns
+    block = _regress_about_mean(turned, columns, pick, tuple(absorbed))
     sides = {name: "+" if grid.approach[k] > 0.0 else "−" for k, name in enumerate(turns)}
     labels = {name: ("turn", f"turn per speed at impacts to {side}") for name, side in sides.items()}
     if block is None:
@@ -159,7 +163,28 @@ def _turn_block(scene: Scene) -> Block | None:
     # Without one wire of a pair the turn hangs on a longer lever, and with it on what every wire steps by.
     lever = float(weights @ weights) / _TURN_LEVER_1_M**2
     steps = max(lever - 1.0, 0.0) * _TURN_SCATTER_S**2 * np.eye(count)
-    return replace(block, said=labels, covariance=block.covariance + steps)
+    tops = {f"top {k + 1}": (top_shape(grid, k), "s") for k in range(count)}
+    at_tops = _regress_about_mean(turned, columns | tops, pick, tuple(columns))
+    covariance = block.covariance * (1.0 if at_tops is None else _beyond_stated(at_tops))
+    return replace(block, said=labels, covariance=covariance + steps)
+
+
+def _regress_about_mean(
+    series: FloatArray, columns: Columns, pick: NDArray[np.bool_], absorbed: tuple[str, ...]
+) -> Block | None:
+    """The regression without zeros: least norm would give some to the turns, of which play is a sum."""
+    level = {name: (shape - shape[pick].mean(), unit) for name, (shape, unit) in columns.items()}
+    return regress("turn", series - series[pick].mean(), level, pick, absorbed)
+
+
+def _beyond_stated(at_tops: Block) -> float:
+    """Variance over the stated one of turns at the tops of half-cycles, where no wall turns; at least 1.
+
+    Noise with a spectrum of 1/f has more of it over a half-cycle than white noise and a walk say. The stated
+    variance counts as as many turns more: eight tell a variance to a half.
+    """
+    seen = float(np.mean(at_tops.values**2 / np.diag(at_tops.covariance)))
+    return max(1.0, 0.5 * (seen + 1.0))
 
 
 def _turning_design(y: FloatArray, z: FloatArray) -> FloatArray:
