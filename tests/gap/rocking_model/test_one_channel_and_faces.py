@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from daq_app.gap.rocking_model.records import GapRun
@@ -41,3 +42,17 @@ def test_an_lvdt_that_shows_a_wire_as_well_has_no_gain_even_beside_a_strong_caus
     assert result.rest.share < 0.3
     assert result.decision.verdict == "none_of_these"
     assert "LV-B02" in result.decision.sentence
+
+
+def test_a_wire_that_cannot_follow_is_something_unknown_even_beside_a_strong_cause() -> None:
+    """Its drum takes it up at 75 mm/s at most, which no effect of the library does."""
+    runs = runs_with({"bounce": {"tau": 0.008}})
+    for run in runs:
+        place = next(i for i, sensor in enumerate(run.sensors) if sensor.id == "WP-4")
+        readings = run.channels[place]
+        climb = 0.075 * np.arange(readings.size) / run.rate_hz
+        run.channels[place] = np.minimum.accumulate(readings - climb) + climb
+    result = diagnose_runs(runs)
+    assert result.rest.share < 0.3
+    assert result.decision.verdict == "none_of_these"
+    assert "WP-4" in result.decision.sentence

@@ -107,8 +107,11 @@ def remainder(
         other = policy.chance(gain, bar)
         rest = 1.0 - (1.0 - rest) * (1.0 - other)
         form = max(forms, key=lambda f: f.excess).family if other > policy.refused else ""
-    for name, gain in gains.items():
-        rest = 1.0 - (1.0 - rest) * (1.0 - _unknown_at(library[name].place, gain, groups, policy))
+    for place in sorted({effect.place for effect in library.values()} - {""}):
+        of_place = [name for name in best.effects if library[name].place == place]
+        if all(name in gains for name in of_place):
+            gained = math.fsum(gains[name] for name in of_place)
+            rest = 1.0 - (1.0 - rest) * (1.0 - _unknown_at(place, gained, groups, policy))
     together = sum(1 for name in best.effects if library[name].part_of)
     if together > policy.lone_instruments:
         rest = 1.0 - (1.0 - rest) * (1.0 - policy.common_cause)
@@ -129,11 +132,11 @@ def _unknown(share: float, nats: float, largest: float, policy: Policy) -> float
 
 
 def _unknown_at(place: str, gain: float, groups: Sequence[GroupRest], policy: Policy) -> float:
-    """Probability that one channel has something else than the effect that is named on it and gains so much.
+    """Probability that one channel has something else than what is named on it, which gains so much (nats).
 
     Beside a strong cause elsewhere no remainder of one channel is a share of the whole that matters.
     """
-    left = math.fsum(group.nats for group in groups if place and group.channel == place)
+    left = math.fsum(group.nats for group in groups if group.channel == place)
     share = left / max(left + max(gain, 0.0), 1e-9)
     return policy.chance(share, policy.unknown_share) * policy.chance(left, policy.unknown_nats)
 
