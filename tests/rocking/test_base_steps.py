@@ -101,3 +101,17 @@ def test_steps_without_a_relation_to_speed_are_none_of_the_base() -> None:
     assert (by_chance.slide_m, by_chance.turn_rad) == (0.0, 0.0)
     assert turning.slide_m == 0.0
     assert turning.turn_rad == pytest.approx(2e-3 * np.abs(at).max(), rel=0.02)
+
+
+@pytest.mark.parametrize("wire", ["WP-3", "WP-4"])
+def test_one_wire_whose_drum_swings_makes_no_wall_slide_or_turn(wire: str) -> None:
+    _, analysis = drawn({f"wire_inertia@{wire}": {"frequency": 15.0}})
+
+    assert not {"slide", "turn"} & {f.kind for f in analysis.findings}
+
+
+def test_one_lvdt_that_is_late_makes_no_wall_slide() -> None:
+    """It turns the rotation of the LVDTs at impacts, and wires seem to step."""
+    _, analysis = drawn({"filter_delay@LV-A03": {"tau": 0.005}})
+
+    assert warned(analysis) == [("LVDTs", "late")]

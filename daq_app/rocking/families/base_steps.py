@@ -27,6 +27,13 @@ _NEAR_S: Final = 30e-3
 """How far the LVDTs' crossing may lie from an impact by the wires: a slide of 20 mm s/rad makes 10 ms."""
 _FEWEST: Final = 5
 """Impacts from which steps can be told from chance."""
+_FEWEST_WIRES: Final = 3
+"""Wires from which most tell what the wall does: of two, either may be at fault."""
+_COEFFICIENTS: Final = 2
+"""Of speed, with its sign and without."""
+_BOTH_SIDES: Final = 0.3
+"""Turn that the wires of one side show over that of the other, from which it is the wall's: a wire at fault
+shows it alone. Lowering it takes a wire's fault for a turn."""
 _CHANCE: Final = 1e-4
 """Probability by which scatter alone makes such steps. Raising it names sound walls."""
 _LEAPING: Final = 0.9
@@ -47,6 +54,9 @@ class BaseSteps:
     """The largest about the vertical, rad."""
 
 
+NO_STEPS: Final = BaseSteps(0.0, 0.0)
+
+
 def base_steps(
     time_s: Floats,
     rotation_rad: Floats,
@@ -65,23 +75,36 @@ def base_steps(
     found = [_crossing(time_s, rotation_rad, residual_m, about_s) for about_s in impacts_s]
     crossings = [crossing for crossing in found if crossing is not None]
     if len(crossings) < _FEWEST:
-        return BaseSteps(0.0, 0.0)
+        return NO_STEPS
     turned = np.array([crossing.after_rad - crossing.before_rad for crossing in crossings])
     by_gain = np.outer(turned, _gains(rotation_rad, residual_m, crossings))
     steps = np.array([crossing.after_m - crossing.before_m for crossing in crossings]) - by_gain
     wires = np.isfinite(steps).mean(axis=0) > 0.5
     known = np.isfinite(steps[:, wires]).all(axis=1)
-    if np.count_nonzero(known) < _FEWEST or np.count_nonzero(wires) < 2:
-        return BaseSteps(0.0, 0.0)
-    places = y_m[wires]
-    reach = float(np.abs(places).max())
-    turns = bool(np.ptp(places) > 0.0)
-    design = np.column_stack([np.ones(places.size), places]) if turns else np.ones((places.size, 1))
-    parts = steps[known][:, wires] @ np.linalg.pinv(design).T
+    if np.count_nonzero(known) < _FEWEST or np.count_nonzero(wires) < _FEWEST_WIRES:
+        return NO_STEPS
+    steps, places = steps[known][:, wires], y_m[wires]
     speeds = np.array([crossing.speed_rad_s for crossing in crossings])[known]
     least = _LEAPING if leaping else 0.0
-    slide = _with_speed(parts[:, 0], speeds, _SMALLEST_M, least)
-    return BaseSteps(slide, _with_speed(parts[:, 1], speeds, _SMALLEST_M / reach, least) if turns else 0.0)
+    shared = np.median(steps, axis=1)
+    turns = _turns(steps - shared[:, None], places, speeds)
+    reach = float(np.abs(places).max())
+    turn = 0.0 if turns is None else _with_speed(turns, speeds, _SMALLEST_M / reach, least)
+    return BaseSteps(_with_speed(shared, speeds, _SMALLEST_M, least), turn)
+
+
+def _turns(apart: Floats, y_m: Floats, speeds: Floats) -> Floats | None:
+    """(impacts,) what wires beside the middle turn by, rad; None where only those of one side show it.
+
+    `apart`: (impacts, wires) steps beyond those that all share, m.
+    """
+    if not ((y_m > 0.0).any() and (y_m < 0.0).any()):
+        return None
+    sides = [np.mean(apart[:, side] / y_m[side], axis=1) for side in (y_m > 0.0, y_m < 0.0)]
+    one, other = (_explained(side, speeds) for side in sides)
+    if one @ other < _BOTH_SIDES * max(one @ one, other @ other):
+        return None
+    return np.mean(sides, axis=0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,14 +185,18 @@ def _with_speed(steps: Floats, speeds: Floats, smallest: float, least_share: flo
 
     `least_share`: of their variance that it must explain.
     """
-    design = np.column_stack([speeds, np.abs(speeds)])
-    solution, _, rank, _ = np.linalg.lstsq(design, steps, rcond=None)
-    shown = design @ solution
+    shown = _explained(steps, speeds)
     largest = float(np.abs(shown).max())
-    freedom = steps.size - int(rank)
+    freedom = steps.size - _COEFFICIENTS
     left = float(np.sum((steps - shown) ** 2)) / freedom
-    explained = float(np.sum(shown**2)) / float(np.sum(steps**2))
+    explained = float(np.sum(shown**2)) / max(float(np.sum(steps**2)), 1e-300)
     if largest < smallest or explained < least_share:
         return 0.0
-    ratio = float(np.sum(shown**2)) / rank / left if left > 0.0 else math.inf
-    return largest if fdtrc(rank, freedom, ratio) < _CHANCE else 0.0
+    ratio = float(np.sum(shown**2)) / _COEFFICIENTS / left if left > 0.0 else math.inf
+    return largest if fdtrc(_COEFFICIENTS, freedom, ratio) < _CHANCE else 0.0
+
+
+def _explained(steps: Floats, speeds: Floats) -> Floats:
+    """(impacts,) what of the steps goes with the speed, with its sign and without."""
+    design = np.column_stack([speeds, np.abs(speeds)])
+    return np.asarray(design @ np.linalg.lstsq(design, steps, rcond=None)[0])

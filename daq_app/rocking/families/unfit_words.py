@@ -107,11 +107,11 @@ def shaking_floor(rms_m_s2: float) -> FamilyFinding:
 
 
 def slides(largest_m: float, *, left_out: bool) -> FamilyFinding:
-    """The base slides at impacts, and the wires with it."""
+    """The wall slides on its base at impacts, or its base gives way, and the wires go with it."""
     what = "r is taken from the LVDTs" if left_out else "r is off by it"
     text = (
-        f"the wall slides on its base at its impacts, by up to {largest_m * 1e3:.1f} mm: all wires step, the "
-        f"LVDTs do not; {what}. Usual causes: a smooth or wet bed, too little friction"
+        f"at its impacts the wall slides on its base, or the base gives way, by up to {largest_m * 1e3:.1f} "
+        f"mm: all wires step, the LVDTs do not; {what}. Usual causes: a wet bed, a base that rocks too"
     )
     treatment: Treatment = "left out" if left_out else "none"
     return FamilyFinding("wires", (), "slide", largest_m, "m", treatment, "warning", text)

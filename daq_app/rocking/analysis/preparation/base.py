@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from daq_app.rocking.analysis.preparation.signals import Signals, TestTimes
-from daq_app.rocking.families.base_steps import BaseSteps, base_steps
+from daq_app.rocking.families.base_steps import NO_STEPS, BaseSteps, base_steps
 from daq_app.rocking.families.response import LATE_S, SLOW_S, Response
 
 
@@ -14,7 +14,7 @@ def base_of(signals: Signals, times: TestTimes, response: Response | None, *, le
     """
     late = response is not None and (abs(response.delay_s) > LATE_S or abs(response.response_s) > SLOW_S)
     if signals.joint is None or late:
-        return BaseSteps(0.0, 0.0)
+        return NO_STEPS
     wires, rotation = signals.geometry.wires, signals.joint.rotation_rad
     unexplained_m = signals.wires_m - wires.shortening(rotation)
     return base_steps(

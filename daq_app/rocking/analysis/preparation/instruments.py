@@ -34,7 +34,7 @@ from daq_app.rocking.analysis.preparation.reader import Reader, found_by_others,
 from daq_app.rocking.analysis.preparation.signals import Lead, Signals, TestTimes
 from daq_app.rocking.analysis.preparation.unfit_channels import unfit_channels
 from daq_app.rocking.families import unfit_words, words
-from daq_app.rocking.families.base_steps import BaseSteps
+from daq_app.rocking.families.base_steps import NO_STEPS, BaseSteps
 from daq_app.rocking.families.channels.hum import find_hum
 from daq_app.rocking.families.channels.noise import slow_noise
 from daq_app.rocking.families.finding import FamilyFinding, families_left_out
@@ -167,18 +167,21 @@ def _in_step(
     that go in steps, and are left out once it is known whether they stick.
     """
     comparable = not spoiled
+    motion = motion_samples(signals, times)
     bending = bending_of(signals, times, None) if comparable else None
     response = follow(signals, times) if comparable else None
-    base = _of_base(signals, times, response, bending, spoiled)
+    # Wires that leap may do so with the wall.
+    leap_at_most = all((f.family, f.kind) == ("wires", "leaps") for f in spoiled)
+    odd_ones = odd_lvdts(signals, motion) if leap_at_most else []
+    hidden = not leap_at_most or bending is not None or bool(odd_ones)
+    base = NO_STEPS if hidden else base_of(signals, times, response, leaping=bool(spoiled))
     if base.slide_m > 0.0:
         # Wires that step with the wall say nothing of the LVDTs, and nothing of each other.
         findings, comparable, response = [f for f in findings if f not in spoiled], False, None
-    motion = motion_samples(signals, times)
-    told_apart = comparable or (signals.lead == "wires" and base.slide_m == 0.0)
-    means = wire_means(signals, motion) if told_apart else None
+    told = comparable or (signals.lead == "wires" and not base.slide_m)
+    means = wire_means(signals, motion) if told else None
     wires = compared_wires(signals, means)
     odd = odd_wire(signals, means, wires, bends=bending is not None, turns=base.turn_rad > 0.0)
-    odd_ones = odd_lvdts(signals, motion) if comparable or base.slide_m > 0.0 else []
     findings, left_out = _with_odd(findings, odd, odd_ones, in_steps)
     shocks = shocks_of(record, signals, times)
     if base.slide_m > 0.0:
@@ -226,19 +229,6 @@ def _with_odd(
         findings.append(wire)
         in_steps = in_steps.union(wire.channels)
     return findings + lvdts, in_steps.union(*(finding.channels for finding in lvdts))
-
-
-def _of_base(
-    signals: Signals,
-    times: TestTimes,
-    response: Response | None,
-    bending: Bending | None,
-    spoiled: Sequence[FamilyFinding],
-) -> BaseSteps:
-    """What the base does, where both families tell: wires that leap at impacts may do so with the wall."""
-    if bending is not None or any((f.family, f.kind) != ("wires", "leaps") for f in spoiled):
-        return BaseSteps(0.0, 0.0)
-    return base_of(signals, times, response, leaping=bool(spoiled))
 
 
 def _slide(
