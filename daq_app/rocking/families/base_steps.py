@@ -104,7 +104,7 @@ def _turns(apart: Floats, y_m: Floats, speeds: Floats) -> Floats | None:
     one, other = (_explained(side, speeds) for side in sides)
     if one @ other < _BOTH_SIDES * max(one @ one, other @ other):
         return None
-    return np.mean(sides, axis=0)
+    return np.asarray(np.mean(sides, axis=0))
 
 
 @dataclass(frozen=True, slots=True)

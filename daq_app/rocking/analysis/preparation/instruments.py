@@ -184,10 +184,7 @@ def _in_step(
     odd = odd_wire(signals, means, wires, bends=bending is not None, turns=base.turn_rad > 0.0)
     findings, left_out = _with_odd(findings, odd, odd_ones, in_steps)
     shocks = shocks_of(record, signals, times)
-    if base.slide_m > 0.0:
-        found, lead, earlier = _slide(signals, times, base)
-    else:
-        found, lead, earlier, bending = _between_families(record, signals, times, response, shocks, bending)
+    found, lead, earlier, bending = _between_families(record, signals, times, response, shocks, bending, base)
     if base.turn_rad > 0.0:
         found.append(unfit_words.turns(base.turn_rad))
     findings += found
@@ -231,14 +228,6 @@ def _with_odd(
     return findings + lvdts, in_steps.union(*(finding.channels for finding in lvdts))
 
 
-def _slide(
-    signals: Signals, times: TestTimes, base: BaseSteps
-) -> tuple[list[FamilyFinding], Lead, dict[str, float]]:
-    """What is said of a base that slides, the family that leads, and that nothing is moved in time."""
-    lead: Lead = "lvdts" if lvdts_cover(signals, times) else "wires"
-    return [unfit_words.slides(base.slide_m, left_out=lead == "lvdts")], lead, {}
-
-
 def _between_families(
     record: TestRecord,
     signals: Signals,
@@ -246,11 +235,15 @@ def _between_families(
     response: Response | None,
     shocks: ShockTiming | None,
     bending: Bending | None,
+    base: BaseSteps,
 ) -> tuple[list[FamilyFinding], Lead, dict[str, float], Bending | None]:
     """Findings, the family that leads, by how much channels are moved earlier, and how the wall bends."""
-    if bending is not None:
-        # Delays and first orders are no answer to what the wall does between the two families.
+    # Delays and first orders are no answer to what the wall or its base does between the two families.
+    if base.slide_m > 0.0:
         lead: Lead = "lvdts" if lvdts_cover(signals, times) else "wires"
+        return [unfit_words.slides(base.slide_m, left_out=lead == "lvdts")], lead, {}, None
+    if bending is not None:
+        lead = "lvdts" if lvdts_cover(signals, times) else "wires"
         told = words.bending(bending.frequency_hz, bending.rms_rad, left_out=lead == "lvdts")
         return [told], lead, {}, bending
     if response is None:
