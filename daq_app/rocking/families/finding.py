@@ -36,7 +36,8 @@ class FamilyFinding:
 
 
 _NOT_THE_WALL: Final = frozenset({"steps", "still", "leaps", "motion", "slide"})
-"""Kinds of finding by which a whole family does not even show how far the wall is held from upright."""
+"""Kinds of finding by which a whole family does not even show how far the wall is held from upright; a slide
+moves a zero that is taken from the rest."""
 
 
 def families_left_out(findings: Iterable[FamilyFinding], *, held_as_well: bool = False) -> frozenset[str]:
