@@ -14,6 +14,7 @@ from functools import partial
 from typing import Final
 
 from daq_app.acquisition.course.clock_warnings import ClockWarnings, unplanned_rate
+from daq_app.acquisition.course.ended_runs import EndedRuns
 from daq_app.acquisition.course.live import LiveView
 from daq_app.acquisition.course.orders import Orders
 from daq_app.acquisition.course.preparation import Preparation, Surroundings
@@ -75,10 +76,7 @@ class Analyst(threading.Thread):
         self._live: LiveView | None = None
         self._sensors: SensorNews | None = None
         self._sequence: Course | None = None
-        self._unclosed = 0
-        """Courses that are over and whose journal is not closed yet."""
-        self._unsaved = 0
-        """Closed journals whose run file is not made yet."""
+        self._ended = EndedRuns()
         self._moves_on = False
         """Whether what the wall does still belongs to the course that was ended last."""
         self._fault = ""
@@ -140,10 +138,9 @@ class Analyst(threading.Thread):
             case SourceEnded():
                 self._on_source_ended(item)
             case Closed():
-                self._unsaved += 1
                 self._on_closed(item.end)
             case Saved():
-                self._unsaved -= 1
+                self._ended.save()
                 until_memory(partial(self._on_saved, item))  # somebody waits for it
             case Noted(event=event):
                 self._clock.take(event)
@@ -207,21 +204,19 @@ class Analyst(threading.Thread):
 
     def _finish(self, end: End) -> None:
         self._sequence = None
-        self._unclosed += 1
+        self._ended.end()
         self._moves_on = self._live is not None and self._live.released
         self._around.post(end)
 
     def _on_saved(self, saved: Saved) -> None:
         # The next test may be armed already, or be over and about to be saved: its state is what matters.
-        if self._sequence is None and not self._unclosed and not self._unsaved:
+        if self._sequence is None and self._ended.all_saved:
             self.voice.run_path = saved.path
             self._go(State.SAVED if saved.ok else State.FAILED, saved.text)
 
     def _on_closed(self, end: End) -> None:
         """A journal is closed; one that had to wait for a disk may be older than the course of now."""
-        if self._unclosed:
-            self._unclosed -= 1
-        else:
+        if not self._ended.close():
             self._sequence = None  # the recorder gave the run up
         if self._sequence is None:
             self._aborted = end.outcome == "aborted"
