@@ -119,8 +119,9 @@ class _Crossing:
     """(wires,) of the residual."""
     after_m: Floats
     first: int
-    """Samples where the window before it begins, and where the one after it ends."""
+    """Sample at which the window before it begins."""
     end: int
+    """Sample at which the window after it ends."""
 
 
 def _crossing(time_s: Floats, rotation_rad: Floats, residual_m: Floats, about_s: float) -> _Crossing | None:
@@ -132,19 +133,9 @@ def _crossing(time_s: Floats, rotation_rad: Floats, residual_m: Floats, about_s:
         return None
     # Noise crosses more than once: the middle one counts.
     impact_s = float(time_s[first + crossings[crossings.size // 2]])
-    early, middle, before, after, end = np.searchsorted(
-        time_s,
-        impact_s
-        + np.array(
-            [
-                -2.0 * _WINDOW_S - _SKIPPED_S,
-                -_WINDOW_S - _SKIPPED_S,
-                -_SKIPPED_S,
-                _SKIPPED_S,
-                _SKIPPED_S + _WINDOW_S,
-            ]
-        ),
-    )
+    near_s, far_s = _SKIPPED_S, _SKIPPED_S + _WINDOW_S
+    edges_s = impact_s + np.array([-far_s - _WINDOW_S, -far_s, -near_s, near_s, far_s])
+    early, middle, before, after, end = np.searchsorted(time_s, edges_s)
     if early == 0 or end == time_s.size:
         return None
     levels = [float(rotation_rad[part].mean()) for part in (slice(early, middle), slice(middle, before))]

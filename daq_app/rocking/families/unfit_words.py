@@ -111,7 +111,7 @@ def slides(largest_m: float, *, left_out: bool) -> FamilyFinding:
     what = "r is taken from the LVDTs" if left_out else "r is off by it"
     text = (
         f"at its impacts the wall slides on its base, or the base gives way, by up to {largest_m * 1e3:.1f} "
-        f"mm: all wires step, the LVDTs do not; {what}. Usual causes: a wet bed, a base that rocks too"
+        f"mm: the wires step together, the LVDTs do not; {what}. Usual causes: a wet bed, a base that rocks"
     )
     treatment: Treatment = "left out" if left_out else "none"
     return FamilyFinding("wires", (), "slide", largest_m, "m", treatment, "warning", text)

@@ -178,8 +178,8 @@ def _in_step(
     if base.slide_m > 0.0:
         # Wires that step with the wall say nothing of the LVDTs, and nothing of each other.
         findings, comparable, response = [f for f in findings if f not in spoiled], False, None
-    told = comparable or (signals.lead == "wires" and not base.slide_m)
-    means = wire_means(signals, motion) if told else None
+    wires_tell = comparable or (signals.lead == "wires" and not base.slide_m)
+    means = wire_means(signals, motion) if wires_tell else None
     wires = compared_wires(signals, means)
     odd = odd_wire(signals, means, wires, bends=bending is not None, turns=base.turn_rad > 0.0)
     findings, left_out = _with_odd(findings, odd, odd_ones, in_steps)

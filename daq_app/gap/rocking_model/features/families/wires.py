@@ -180,8 +180,8 @@ def _regress_about_mean(
 def _beyond_stated(at_tops: Block) -> float:
     """Variance over the stated one of turns at the tops of half-cycles, where no wall turns; at least 1.
 
-    Noise with a spectrum of 1/f has more of it over a half-cycle than white noise and a walk say. The stated
-    variance counts as as many turns more: eight tell a variance to a half.
+    Noise with a spectrum of 1/f varies more over a half-cycle than white noise and a walk do. The stated
+    variance has the weight of as many turns as are seen, for eight of them tell a variance to a half.
     """
     seen = float(np.mean(at_tops.values**2 / np.diag(at_tops.covariance)))
     return max(1.0, 0.5 * (seen + 1.0))
