@@ -1,7 +1,9 @@
 """What wires show at impacts that no rotation makes: the wall slides, or turns about the vertical.
 
 LVDTs under the wall show neither. Between what the wires read and what they should at the rotation of the
-LVDTs, a slide is a step that all wires share, a turn one that grows with their place along the wall.
+LVDTs, a slide is a step that all wires share, a turn one that grows with their place along the wall. Slides
+grow with the speed of impacts; a base that gives way steps by as much at every one, to the side that the
+wall falls to.
 """
 
 from __future__ import annotations
@@ -29,8 +31,10 @@ _FEWEST: Final = 5
 """Impacts from which steps can be told from chance."""
 _FEWEST_WIRES: Final = 3
 """Wires from which most tell what the wall does: of two, either may be at fault."""
-_COEFFICIENTS: Final = 2
-"""Of speed, with its sign and without."""
+_SLOWEST_RAD_S: Final = 5e-3
+"""Speed below which noise tells the side that a wall falls to."""
+_COEFFICIENTS: Final = 3
+"""Of speed, with its sign and without, and of the sign alone."""
 _BOTH_SIDES: Final = 0.3
 """Turn that the wires of one side show over that of the other, from which it is the wall's: a wire at fault
 shows it alone. Lowering it takes a wire's fault for a turn."""
@@ -66,7 +70,7 @@ def base_steps(
     *,
     leaping: bool = False,
 ) -> BaseSteps:
-    """Steps that grow with the speed of impacts.
+    """Steps that go with the speed of impacts, or with its sign.
 
     `rotation_rad`: (n,) by the LVDTs at `time_s`; `residual_m`: (wires, n) displacement along x at each wire
     that it does not explain; both NaN where they are not known. `y_m`: (wires,) places along the wall.
@@ -80,11 +84,11 @@ def base_steps(
     by_gain = np.outer(turned, _gains(rotation_rad, residual_m, crossings))
     steps = np.array([crossing.after_m - crossing.before_m for crossing in crossings]) - by_gain
     wires = np.isfinite(steps).mean(axis=0) > 0.5
-    known = np.isfinite(steps[:, wires]).all(axis=1)
+    speeds = np.array([crossing.speed_rad_s for crossing in crossings])
+    known = np.isfinite(steps[:, wires]).all(axis=1) & (np.abs(speeds) > _SLOWEST_RAD_S)
     if np.count_nonzero(known) < _FEWEST or np.count_nonzero(wires) < _FEWEST_WIRES:
         return NO_STEPS
-    steps, places = steps[known][:, wires], y_m[wires]
-    speeds = np.array([crossing.speed_rad_s for crossing in crossings])[known]
+    steps, places, speeds = steps[known][:, wires], y_m[wires], speeds[known]
     least = _LEAPING if leaping else 0.0
     shared = np.median(steps, axis=1)
     turns = _turns(steps - shared[:, None], places, speeds)
@@ -172,7 +176,7 @@ def _gains(rotation_rad: Floats, residual_m: Floats, crossings: Sequence[_Crossi
 
 
 def _with_speed(steps: Floats, speeds: Floats, smallest: float, least_share: float) -> float:
-    """The largest of the steps that a multiple of speed, with or without its sign, explains; 0 for chance.
+    """The largest of the steps that speed and its sign explain; 0 for chance.
 
     `least_share`: of their variance that it must explain.
     """
@@ -188,6 +192,6 @@ def _with_speed(steps: Floats, speeds: Floats, smallest: float, least_share: flo
 
 
 def _explained(steps: Floats, speeds: Floats) -> Floats:
-    """(impacts,) what of the steps goes with the speed, with its sign and without."""
-    design = np.column_stack([speeds, np.abs(speeds)])
+    """(impacts,) what of the steps goes with the speed, with its sign and without, and with the sign alone."""
+    design = np.column_stack([speeds, np.abs(speeds), np.sign(speeds)])
     return np.asarray(design @ np.linalg.lstsq(design, steps, rcond=None)[0])

@@ -22,7 +22,9 @@ _GAIN_CHANCE = 0.002
 than 0.0001: raising it names one in sound tests and spends what may be warned falsely on what r does not
 feel."""
 _LEAST_GAIN = 0.006
-_LEAST_LAG_S = 0.004
+_LEAST_LAG_S = 0.0015
+"""Ten times the lag of a sound channel; a drum that swings at 25 Hz is 2.5 ms late. Raising it leaves such a
+wire's ringing, which looks like hops of the wall, in r."""
 _LEAST_DRIFT_RAD = 4e-4
 """Over the record; a fifth of what a wall's sway does to one wire alone."""
 

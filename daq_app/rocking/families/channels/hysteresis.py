@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-_LEAST_WIDTH_M: Final = 2e-4
+_LEAST_WIDTH_M: Final = 1.5e-4
 """Width of a loop that is named. Of sound wires it has a standard deviation of 0.02 mm and reaches 0.11 mm; a
 wire that stays until it is pulled by 1 mm shows 0.3 to 0.7 mm, and moves r by up to 0.009. Raising it lets
 that pass."""
