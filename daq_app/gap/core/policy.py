@@ -18,7 +18,7 @@ class Policy:
 
     # Findings about instruments
     finding_in_noise: float = 1.0
-    """Size of a pick-up or of a reading step over the rms noise of one reading, from which it is material.
+    """Rms of a pick-up, or reading step, over the rms noise of one reading, from which it is material.
     Below it averaging over a half-cycle leaves nothing (assumed); raising it hides loud pick-up."""
 
     finding_shaking: float = 0.09

@@ -50,7 +50,8 @@ def _finding(key: str, findings: Sequence[RunFinding], runs: int) -> Finding:
     if kind == "saturation":
         # The finding is the inverse of the limit, so that no limit is 0 ± sd.
         size, sd, unit = 1.0 / size, sd / size**2, "m"
-    in_noise = size / findings[0].noise if kind in _IN_NOISE and findings[0].noise > 0.0 else math.nan
+    rms = size / math.sqrt(2.0) if kind == "hum" else size
+    in_noise = rms / findings[0].noise if kind in _IN_NOISE and findings[0].noise > 0.0 else math.nan
     limit = _LEAST.get(kind, 0.0)
     parameter = EFFECT_SIZES.get(kind, "")
     matters = POLICY.chance(in_noise if kind in _IN_NOISE else size, limit)

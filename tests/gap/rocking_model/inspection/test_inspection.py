@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -120,6 +121,16 @@ def test_a_channel_with_far_more_pick_up_than_its_family_stands_for_itself() -> 
     alone, all_of_them = (next(f for f in findings_of(runs) if f.name == n) for n in ("hum@WP-2", "hum@wire"))
     assert alone.material
     assert alone.in_noise > 2.0 * all_of_them.in_noise
+
+
+@pytest.mark.parametrize(("in_noise", "material"), [(1.25, False), (1.7, True)])
+def test_pick_up_is_material_from_where_its_rms_is_that_of_the_noise(in_noise: float, material: bool) -> None:
+    """The pick-up of an ordinary laboratory has an amplitude of up to one rms of the noise."""
+    (noise_m,) = {sensor.noise_si for sensor in simulate({}, LEVELS)[0].sensors if sensor.family == "wire"}
+    runs = _prepared({"hum@wire": {"amplitude": in_noise * noise_m}})
+    (finding,) = (f for f in findings_of(runs) if f.name == "hum@wire")
+    assert finding.material is material
+    assert finding.in_noise == pytest.approx(in_noise / math.sqrt(2.0), rel=0.1)
 
 
 def test_exchanged_plugs_are_put_back() -> None:
