@@ -21,6 +21,7 @@ _LEAST = {
     "quantisation": POLICY.finding_in_noise,
     "ringing": POLICY.finding_ringing,
     "shaking": POLICY.finding_shaking,
+    "ambient": POLICY.finding_shaking,
     "crossed": POLICY.finding_crossed,
 }
 """Size from which a condition that every laboratory has a little of is material; any other always is."""
@@ -98,6 +99,8 @@ def _words(kind: str, target: str, finding: RunFinding, size: float, unit: str) 
             return f"{who} goes no further than {amount}"
         case "polarity" | "swap" | "disagreement":
             return finding.observable
+        case "ambient":
+            return f"irregular vibration of the floor of {amount}, {finding.observable},"
         case "crossed":
             return f"{who} shows {100 * size:.2g} % of the rotation across its axis"
     return f"{finding.observable} of {amount} ({who})"
