@@ -39,7 +39,8 @@ from daq_app.gap.rocking_model.tolerances.inspection import (
 from daq_app.rocking.families.channels.coarse_steps import coarse_step, resolution
 from daq_app.rocking.geometry.noise import white_noise
 
-_FAMILIES: tuple[Family, ...] = ("lvdt", "wire", "accelerometer")
+_UNIT_OF: dict[Family, str] = {"lvdt": "m", "wire": "m", "accelerometer": "m/s²", "tiltmeter": "rad"}
+"""Unit of what each family shows; all of them are looked at."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +104,7 @@ def _frozen(values: FloatArray, rate_hz: float, step: float, limits: tuple[float
 
 
 def conditions_of(runs: Sequence[GapRun]) -> list[dict[str, Condition]]:
-    """Conditions of every LVDT, wire and accelerometer, by id, run by run."""
+    """Conditions of every channel, by id, run by run."""
     found = []
     for run in runs:
         still, shaken = still_samples(run), shaken_samples(run)
@@ -111,7 +112,7 @@ def conditions_of(runs: Sequence[GapRun]) -> list[dict[str, Condition]]:
             {
                 sensor.id: inspect_channel(run, i, still, shaken)
                 for i, sensor in enumerate(run.sensors)
-                if sensor.family in _FAMILIES and sensor.id not in run.excluded
+                if sensor.family in _UNIT_OF and sensor.id not in run.excluded
             }
         )
     return found
@@ -134,7 +135,7 @@ def findings_per_run(
 ) -> list[list[RunFinding]]:
     """Findings of all runs. Each condition carries the same key in every run: a channel, or its family."""
     findings: list[list[RunFinding]] = [[] for _ in runs]
-    for family in _FAMILIES:
+    for family, of_family in _UNIT_OF.items():
         ids = [s.id for s in runs[0].sensors if s.family == family and s.id in conditions[0]]
         rows = [[of_run[name] for name in ids] for of_run in conditions]
         if not ids:
@@ -147,7 +148,7 @@ def findings_per_run(
             if family == "accelerometer" and name not in ("hum", "spikes"):
                 continue
             cells = [[of_channel[name] for of_channel in row] for row in seen]
-            unit = _UNITS.get(name) or ("m/s²" if family == "accelerometer" else "m")
+            unit = _UNITS.get(name, of_family)
             rms = noise if name in ("hum", "quantisation") else math.nan
             for key, chosen in _attribute_condition(family, ids, cells):
                 for run_findings, row in zip(findings, cells, strict=True):

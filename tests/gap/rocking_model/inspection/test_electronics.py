@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
+from daq_app.gap.rocking_model.findings import findings_of
 from daq_app.gap.rocking_model.inspection.conditions import conditions_of, without_hum
 from daq_app.gap.rocking_model.inspection.hum import hum_of
 from daq_app.gap.rocking_model.study import prepare
@@ -29,6 +32,34 @@ def test_mains_beside_their_frequency_that_swell_are_taken_out(mains_hz: float) 
         cleaned = without_hum(run, conditions_of([run])[0]).channels
         left = np.sqrt(np.mean((cleaned[places] - sound[places]) ** 2, axis=1))
         assert np.max(left) < 0.05 * amplitude_m
+
+
+@pytest.mark.parametrize("target", ["tiltmeter", "TL-2X"])
+def test_pick_up_of_tiltmeters_is_found_taken_out_and_counts_over_their_noise(target: str) -> None:
+    sound = simulate({}, LEVELS)
+    (noise_rad,) = {sensor.noise_si for sensor in sound[0].sensors if sensor.family == "tiltmeter"}
+    runs = simulate({f"hum@{target}": {"amplitude": 5.0 * noise_rad}}, LEVELS)
+    for run, plain, conditions in zip(runs, sound, conditions_of(runs), strict=True):
+        left = without_hum(run, conditions).channels - plain.channels
+        assert np.sqrt(np.mean(left**2, axis=1)).max() < 0.3 * noise_rad
+    prepared, _ = prepare(runs)
+    assert conditions_found(prepared) == {f"hum@{target}"}
+    (finding,) = findings_of(prepared)
+    assert finding.material
+    assert finding.in_noise == pytest.approx(5.0 / math.sqrt(2.0), rel=0.1)
+    assert finding.size == pytest.approx(5.0 * noise_rad, rel=0.1)
+
+
+def test_a_tiltmeter_that_freezes_or_has_a_loose_contact_is_named_and_not_used() -> None:
+    runs = simulate({"dropout@TL-1X": {"share": 0.06, "duration": 0.05}}, LEVELS)
+    chance = np.random.default_rng(4)
+    for run in runs:
+        place, count = run.place("TL-2X"), run.channels.shape[1]
+        alone = chance.choice(count, count // 2000, replace=False)
+        run.channels[place, alone] += 100.0 * run.sensors[place].noise_si
+    prepared, _ = prepare(runs)
+    assert conditions_found(prepared) == {"dropout@TL-1X", "spikes@TL-2X"}
+    assert not any(block.family == "tiltmeter" for run in prepared for block in run.blocks)
 
 
 def test_steps_that_are_coarser_than_those_of_the_converter_are_no_frozen_readings() -> None:
