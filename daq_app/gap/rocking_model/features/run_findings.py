@@ -14,7 +14,6 @@ EFFECT_SIZES: dict[str, str] = {
     "saturation": "limit",
     "polarity": "on",
     "swap": "places",
-    "ambient": "amplitude",
 }
 """Effect behind a finding, and the parameter that is its size."""
 

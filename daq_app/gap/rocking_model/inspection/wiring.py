@@ -60,7 +60,8 @@ def mend(runs: list[GapRun]) -> tuple[list[GapRun], Wiring]:
     exchanged: list[tuple[str, str]] = []
     places = 0
     for group in _groups(runs[0], ids):
-        order, turn = _order_of_all([one.of(run, group) for run, one in zip(runs, seen, strict=True)])
+        shown = [one.of(run, group) for run, one in zip(runs, seen, strict=True)]
+        order, turn = _order_of_all(shown, _moves(runs[0], group))
         exchanged += [(group[i], group[j]) for i, j in enumerate(order) if i != j]
         places = max(places, turn)
     turned = [_turned(run, one) for run, one in zip(runs, seen, strict=True)]
@@ -124,30 +125,47 @@ def _slope(run: GapRun, name: str, measured: FloatArray, expected: FloatArray) -
 
 
 def _groups(run: GapRun, ids: list[str]) -> list[list[str]]:
-    """Channels that could be plugged into each other's terminals: one family, one axis."""
+    """Channels that could be plugged into each other's terminals: one family, one axis.
+
+    The two axes of a tiltmeter are two plugs of one instrument, of which one shows next to nothing.
+    """
     kinds: dict[tuple[str, str], list[str]] = {}
     for sensor in run.sensors:
         if sensor.id in ids:
-            kinds.setdefault((sensor.family, sensor.axis), []).append(sensor.id)
+            axis = "" if sensor.family == "tiltmeter" else sensor.axis
+            kinds.setdefault((sensor.family, axis), []).append(sensor.id)
     return list(kinds.values())
+
+
+def _moves(run: GapRun, group: list[str]) -> FloatArray:
+    """What each terminal (rows) must lose of its misfit to count as moved to each sensor (columns), (k, k).
+
+    Half as much where both are axes of one instrument, whose plugs lie beside each other.
+    """
+    positions = run.positions([run.place(name) for name in group])
+    same = np.all(positions[:, None] == positions[None, :], axis=2)
+    return EXCHANGE_EACH * np.where(same, 0.5, 1.0) * (1.0 - np.eye(len(group)))
 
 
 def _as_late_as(measured: FloatArray, expected: FloatArray) -> FloatArray:
     """What channels of one kind should show, (k, n), as late as they show it together.
 
-    Exchanged plugs move no corner in time: a family that is late is late at whatever terminal.
+    Exchanged plugs move no corner in time: a family that is late is late at whatever terminal. What is due
+    nothing may show what is due most.
     """
-    late = common_lateness(measured, expected, WORK_HZ)
+    due = np.ptp(expected, axis=1)
+    compared = np.where(due[:, None] > 0.0, expected, expected[np.argmax(due)])
+    late = common_lateness(measured, compared, WORK_HZ)
     at = np.arange(expected.shape[1])
     return np.array([np.interp(at - late, at, row) for row in expected])
 
 
-def _order_of_all(shown: list[tuple[FloatArray, FloatArray]]) -> tuple[list[int], int]:
+def _order_of_all(shown: list[tuple[FloatArray, FloatArray]], moves: FloatArray) -> tuple[list[int], int]:
     """The order of all runs together: a test with small rotations says little, and overrules no other.
 
     None where plugs are elsewhere in some test: there the order fits worse than none.
     """
-    order, turn = _order(_misfits(*(np.hstack(rows) for rows in zip(*shown, strict=True))))
+    order, turn = _order(_misfits(*(np.hstack(rows) for rows in zip(*shown, strict=True))), moves)
     at = np.arange(len(order))
     moved = at != order
     if not moved.any():
@@ -159,7 +177,7 @@ def _order_of_all(shown: list[tuple[FloatArray, FloatArray]]) -> tuple[list[int]
     return order, turn
 
 
-def _order(misfit: FloatArray) -> tuple[list[int], int]:
+def _order(misfit: FloatArray, moves: FloatArray) -> tuple[list[int], int]:
     """(which sensor each terminal shows, places turned round) from misfits of terminals (rows) as sensors.
 
     The order with the smallest misfit of all, if it makes sense of what makes no sense as it is. A channel
@@ -172,7 +190,7 @@ def _order(misfit: FloatArray) -> tuple[list[int], int]:
     if known.size < 2 or float(np.trace(table)) <= EXCHANGE_LEAST:
         return order, 0
     at = np.arange(known.size)
-    _, best = linear_sum_assignment(table + EXCHANGE_EACH * (1.0 - np.eye(known.size)))
+    _, best = linear_sum_assignment(table + moves[np.ix_(known, known)])
     # Those that stay where they are misfit before and after: they say nothing about the others' plugs.
     moved = at != best
     straight, after = float(table[at, at][moved].sum()), float(table[at, best][moved].sum())
@@ -189,12 +207,16 @@ def _order(misfit: FloatArray) -> tuple[list[int], int]:
 
 def _misfits(measured: FloatArray, expected: FloatArray) -> FloatArray:
     """Share of the power of each signal (rows) that what is expected of each sensor (columns), with a gain
-    within 15 % of 1, leaves unexplained; both (k, n)."""
+    within 15 % of 1, leaves unexplained; both (k, n).
+
+    What a sensor shows of which nothing is due counts as a share of the most that is due of any.
+    """
     power, due = np.sum(measured**2, axis=1)[:, None], np.sum(expected**2, axis=1)
     product = measured @ expected.T
     gain = np.clip(product / np.maximum(due, 1e-30), *EXCHANGE_GAINS)
     left = power - 2.0 * gain * product + gain**2 * due
-    return np.asarray(left / np.maximum(np.maximum(power, due), 1e-30))
+    most = np.where(due > 0.0, due, due.max())
+    return np.asarray(left / np.maximum(np.maximum(power, most), 1e-30))
 
 
 def _compare(run: GapRun) -> _Seen:
@@ -261,4 +283,6 @@ def _expected(
             return -acceleration * (x - half * np.sign(theta))
         case "tiltmeter" if sensor.axis == "x":
             return first_order(theta, sensor.time_constant_s, WORK_HZ)
+        case "tiltmeter":
+            return np.zeros_like(theta)  # a wall that rocks on its long edges does not turn about that axis
     return None
