@@ -51,7 +51,7 @@ def rotation_alone(run: RockingRun) -> RockingRun:
     n = len(run.places) + run.peaks.size
     old = run.features
     features = FeatureSet(old.values[:n], old.sd[:n], old.labels[:n], old.independent_fraction)
-    return replace(run, features=features, blocks=(), block_loadings=np.zeros((n, 0)), cache=RunCache())
+    return replace(run, features=features, blocks=(), fixed_loadings=np.zeros((n, 0)), cache=RunCache())
 
 
 def _unscattered(model: RockingModel) -> RockingModel:

@@ -25,6 +25,7 @@ _OTHER_WORDS: Final[dict[str, tuple[str, ...]]] = {
     "compliance": ("base_compliance", "rig_compliance"),
     "yaw": ("twist",),
     "ambient": ("ambient_vibration",),
+    "irregular_floor": ("ambient", "ambient_vibration"),
     "drift": ("offset_drift",),
     "clock": ("clock_rate",),
     "swap": ("channel_swap",),

@@ -23,6 +23,7 @@ from daq_app.gap.rocking_model.inspection.inspect_runs import (
     without_outlier_channels,
 )
 from daq_app.gap.rocking_model.library import rocking_library
+from daq_app.gap.rocking_model.prediction.floor_motion import on_its_floor
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun, check_consistent
 from daq_app.gap.rocking_model.tolerances.walls import EITHER, FAR_FROM_SURVEY
@@ -73,7 +74,7 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
     examined, channels, findings_of_all = without_outlier_channels(examined, findings, reference)
     for entry in examined:
         limits += entry.features.notes
-    whole = completed(examined, findings_of_all, channels, inspected.wiring)
+    whole = [on_its_floor(run) for run in completed(examined, findings_of_all, channels, inspected.wiring)]
     limits += [
         f"{name} disagrees with the other {family} channels; it is examined on its own."
         for name, family in channels.items()

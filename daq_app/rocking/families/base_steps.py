@@ -192,6 +192,6 @@ def _with_speed(steps: Floats, speeds: Floats, smallest: float, least_share: flo
 
 
 def _explained(steps: Floats, speeds: Floats) -> Floats:
-    """(impacts,) what of the steps goes with the speed, with its sign and without, and with the sign alone."""
+    """(impacts,) what of the steps goes with the speed, with its sign and without, and with its sign."""
     design = np.column_stack([speeds, np.abs(speeds), np.sign(speeds)])
     return np.asarray(design @ np.linalg.lstsq(design, steps, rcond=None)[0])

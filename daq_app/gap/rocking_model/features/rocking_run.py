@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from daq_app.gap.core import FeatureSet, Label
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
-from daq_app.gap.rocking_model.features.oscillations.vibration import Vibration
+from daq_app.gap.rocking_model.features.oscillations.vibration import FloorSpectrum, Vibration
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Wire
@@ -51,10 +51,12 @@ class RockingRun:
     """What such an error of all wires makes of the base, over the square of the rotation."""
     base_lever: float
     """What the base seems to move by, m per rad, for wires whose calibrations are each off by one."""
-    block_loadings: FloatArray
-    """(n, k): measurement covariance of the blocks as loadings."""
+    fixed_loadings: FloatArray
+    """(n, k): measurement covariance of the blocks as loadings, and what else is known to move features."""
     notes: tuple[str, ...] = ()
     vibration: Vibration | None = None
+    floor: FloorSpectrum | None = None
+    """How the floor vibrates irregularly in all runs; None for one that does not."""
     wires: tuple[Wire, ...] = ()
     """All wires whose geometry is known."""
     leaked: FloatArray = field(default_factory=lambda: np.zeros(0))
@@ -83,7 +85,11 @@ class RockingRun:
         first = len(self.places) + self.peaks.size
         loadings = _block_loadings(blocks, first, len(values))
         features = FeatureSet(np.array(values), np.array(sds), tuple(labels))
-        return replace(self, features=features, blocks=blocks, block_loadings=loadings, cache=RunCache())
+        return replace(self, features=features, blocks=blocks, fixed_loadings=loadings, cache=RunCache())
+
+    def with_loadings(self, columns: FloatArray) -> RockingRun:
+        """The run whose features move by `columns` (n, k) times draws of unit variance as well."""
+        return replace(self, fixed_loadings=np.hstack([self.fixed_loadings, columns]), cache=RunCache())
 
 
 def _block_loadings(blocks: tuple[Block, ...], first: int, n: int) -> FloatArray:

@@ -14,6 +14,7 @@ EFFECT_SIZES: dict[str, str] = {
     "saturation": "limit",
     "polarity": "on",
     "swap": "places",
+    "ambient": "amplitude",
 }
 """Effect behind a finding, and the parameter that is its size."""
 

@@ -6,6 +6,7 @@ findings of the run; what channels, ring-downs and the floor show becomes blocks
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,10 +15,11 @@ import numpy as np
 from daq_app.config.rig import Family
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.rocking_model.features.block import Block, scalar_block
+from daq_app.gap.rocking_model.features.oscillations.floor_spectrum import floor_spectrum
 from daq_app.gap.rocking_model.features.oscillations.floor_vibration import find_vibration, without_vibration
 from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal, ring_signals
 from daq_app.gap.rocking_model.features.oscillations.rings import Ring, ring_block, scan, with_repeatability
-from daq_app.gap.rocking_model.features.oscillations.vibration import Vibration
+from daq_app.gap.rocking_model.features.oscillations.vibration import FloorSpectrum, Vibration
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined, examine
 from daq_app.gap.rocking_model.features.run_findings import RunFinding, merged
@@ -220,16 +222,15 @@ def completed(
     _add_rings(blocks_by_run, examined, [turns for _, turns in signals], "turning", slow=True)
     vibrations = find_vibration([e.run for e in examined], grids, bending)
     examined = [_on_still_floor(e, v) for e, v in zip(examined, vibrations, strict=True)]
-    bursts = floor_bursts(
-        [e.run for e in examined],
-        [e.features.grid for e in examined],
-        examined[0].features.survey,
-        bending,
-    )
+    calm = [e.run for e in examined], [e.features.grid for e in examined]
+    floor = floor_spectrum(*calm, bending)
+    # A floor that vibrates irregularly is now louder, now less loud: its bursts are nothing else.
+    bursts = floor_bursts(*calm, examined[0].features.survey, bending) if floor is None else []
     runs = []
     known = with_quantisation_errors(examined, steps)
+    rows = merged(findings, bursts or _shaken(floor, len(examined)))
     for row, entry, vibration, seen, read in zip(
-        blocks_by_run, examined, vibrations, merged(findings, bursts), known, strict=True
+        blocks_by_run, examined, vibrations, rows, known, strict=True
     ):
         grid = entry.features.grid
         if vibration is not None:
@@ -241,9 +242,19 @@ def completed(
                 ("frequency", "Hz", vibration.frequency_hz, len(examined) * vibration.frequency_sd**2),
             )
             row.append(scalar_block("floor", entries, grid))
-        features = replace(read, vibration=vibration, wiring=wiring, findings=tuple(seen))
+        features = replace(read, vibration=vibration, wiring=wiring, findings=tuple(seen), floor=floor)
         runs.append(features.with_blocks(row))
     return runs
+
+
+def _shaken(floor: FloorSpectrum | None, runs: int) -> list[list[RunFinding]]:
+    """The finding of an irregular floor in every run, as the amplitude of a sinusoid of the same power."""
+    if floor is None:
+        return [[] for _ in range(runs)]
+    size, sd = (math.sqrt(2.0) * value for value in (floor.total_m_s2, floor.sd_m_s2))
+    # It is found from all runs at once: what is said in every run is known only once.
+    words = f"most at {floor.loudest_hz:.1f} Hz"
+    return [[RunFinding("ambient@floor", words, "m/s²", size, math.sqrt(runs) * sd)] for _ in range(runs)]
 
 
 def _on_still_floor(entry: Examined, vibration: Vibration | None) -> Examined:

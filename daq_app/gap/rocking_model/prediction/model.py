@@ -104,44 +104,43 @@ class RockingModel:
         count = len(run.places)
         last = count + run.peaks.size
         predicted[:count], predicted[count:last] = run.cache.part(
-            "swings", values, partial(self._swings, run)
+            "swings", values, partial(swing_features, run)
         )
         predicted[last:] = block_coefficients(run, values)
         loadings = run.cache.constant("loadings", partial(_loadings, run))
-        return Prediction(predicted, loadings, run.block_loadings)
+        return Prediction(predicted, loadings, run.fixed_loadings)
 
-    def _swings(self, run: RockingRun, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
-        """Times (T,) and log peaks (P,)."""
-        # r and what else acts at impacts only moves none of the half-cycles.
-        cycles = run.cache.part("half-cycles", values, partial(_half_cycles, run))
-        table, true = departed(run, values, cycles), cycles.true
-        count = cycles.levels.shape[1]
-        first = shooting.FIRST_CROSSING
-        speeds_out, speeds_in = table[:, shooting.SPEED_OUT], table[:, shooting.SPEED_IN]
-        pause = pause_at_impact(values, speeds_out)
-        # Crossings as times from their own peak: positive in the fall, negative in the rise.
-        crossings = table[:, first : first + 2 * count].copy()
-        crossings[:, count:] *= -1.0
-        begin, end, k = run.cache.constant("crossings", partial(_crossings_of, run))
-        times = crossings.take(end) - crossings.take(begin)
-        across = run.across
-        times[across] += table[k, shooting.FALL_S] + pause[k] + table[k + 1, shooting.RISE_S]
-        times = times + times_carry(run, values)
-        times = times / (1.0 + values.get("clock.error", 0.0)) + free_times(run, values)
-        if run.reference == "lvdt":
-            # Before an impact one face opens, after it the other.
-            times[across] += np.sign(true[k]) * values[FACE_SKEW]
-        k = run.peaks
-        before = k - 1
-        r = restitution_of(run, values, speeds_out[before], np.sign(true[before]), before)
-        excess = (
-            np.log(np.maximum(speeds_in[k], 1e-12))
-            - np.log(np.maximum(speeds_out[before], 1e-12))
-            - np.log(r)
-        )
-        slopes = run.cache.constant("slopes", partial(_slopes, run))
-        measured = np.log(np.abs(run.swings.peak_rad[k]))
-        return times, measured - excess / slopes
+
+def swing_features(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
+    """Predicted times (T,) and log peaks (P,) of the half-cycles of a run."""
+    # r and what else acts at impacts only moves none of the half-cycles.
+    cycles = run.cache.part("half-cycles", values, partial(_half_cycles, run))
+    table, true = departed(run, values, cycles), cycles.true
+    count = cycles.levels.shape[1]
+    first = shooting.FIRST_CROSSING
+    speeds_out, speeds_in = table[:, shooting.SPEED_OUT], table[:, shooting.SPEED_IN]
+    pause = pause_at_impact(values, speeds_out)
+    # Crossings as times from their own peak: positive in the fall, negative in the rise.
+    crossings = table[:, first : first + 2 * count].copy()
+    crossings[:, count:] *= -1.0
+    begin, end, k = run.cache.constant("crossings", partial(_crossings_of, run))
+    times = crossings.take(end) - crossings.take(begin)
+    across = run.across
+    times[across] += table[k, shooting.FALL_S] + pause[k] + table[k + 1, shooting.RISE_S]
+    times = times + times_carry(run, values)
+    times = times / (1.0 + values.get("clock.error", 0.0)) + free_times(run, values)
+    if run.reference == "lvdt":
+        # Before an impact one face opens, after it the other.
+        times[across] += np.sign(true[k]) * values[FACE_SKEW]
+    k = run.peaks
+    before = k - 1
+    r = restitution_of(run, values, speeds_out[before], np.sign(true[before]), before)
+    excess = (
+        np.log(np.maximum(speeds_in[k], 1e-12)) - np.log(np.maximum(speeds_out[before], 1e-12)) - np.log(r)
+    )
+    slopes = run.cache.constant("slopes", partial(_slopes, run))
+    measured = np.log(np.abs(run.swings.peak_rad[k]))
+    return times, measured - excess / slopes
 
 
 def _loadings(run: RockingRun) -> dict[str, FloatArray]:

@@ -98,6 +98,19 @@ Raising it hides weak bursts.
 BURST_SD = 0.1
 """Relative sd, 1, of the size of a burst (assumed). Raising it makes bursts less certain."""
 
+FLOOR_RMS_M_S2 = 0.02
+"""Irregular acceleration of the floor, m/s² rms, from which it counts in the errors of the motion.
+
+Sound laboratories show 0.005; one of 0.035 moves r by up to 0.005. Raising it takes what a weak one does to
+the motion for an effect.
+"""
+
+FLOOR_STANDS_OUT = 4.0
+"""The same, squared, over the standard error of its mean over the parts at rest.
+
+Lowering it takes a wall that rings on after its last impact for a floor.
+"""
+
 # -- effects ---------------------------------------------------------------------------------------
 NEGLIGIBLE = 0.5
 """Share of the weakest strength of an effect's range, 1, up to which sound walls and sensors have it.

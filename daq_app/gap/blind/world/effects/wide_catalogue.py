@@ -1,4 +1,4 @@
-"""What walls on real bases also do: ring slowly or fast, twist about a corner.
+"""What walls on real bases also do: ring slowly or fast, twist about a corner, stand on a floor that shakes.
 
 The laboratories beside `own` hide these too.
 """
@@ -18,14 +18,23 @@ _SLOW_RING: Final = replace(
     _RING, low=0.03, high=0.3, others=uniform(frequency_hz=(2.0, 7.0), zeta=(0.005, 0.05))
 )
 _CORNER_TWIST: Final = Entry("corner_twist", "contact", "turn_s", 3e-4, 6e-3, signed=True)
+_IRREGULAR_FLOOR: Final = Entry(
+    "irregular_floor",
+    "ambient",
+    "rms_m_s2",
+    0.05,
+    0.25,
+    others=uniform(low_hz=(1.5, 5.0), band_hz=(2.0, 6.0)),
+)
 
 WIDE_ENTRIES: Final[Mapping[str, Entry]] = {
     **ENTRIES,
     "flexible_wall": _FAST_RING,
     "slow_flexible_wall": _SLOW_RING,
     "corner_twist": _CORNER_TWIST,
+    "irregular_floor": _IRREGULAR_FLOOR,
 }
-WIDE_LIBRARY: Final = (*LIBRARY, "slow_flexible_wall", "corner_twist")
+WIDE_LIBRARY: Final = (*LIBRARY, "slow_flexible_wall", "corner_twist", "irregular_floor")
 
 WIDE_CONTACT_ENTRIES: Final[Mapping[str, Entry]] = {**CONTACT_ENTRIES, "corner_twist": _CORNER_TWIST}
 WIDE_CONTACT_LIBRARY: Final = (

@@ -17,6 +17,8 @@ Term = Callable[[float, float, float, int], float]
 """(time after release, θ, ω, side) → angular acceleration, rad/s²."""
 _FAR: Final = 50.0
 """Logarithm of a moment that no wall has."""
+_FLOOR_LINES: Final = 60
+"""Sinusoids of an irregular floor: over a test of ten seconds nobody tells so many from noise."""
 ImpactTerm = Callable[["Impact"], float]
 """Change of the restitution at an impact."""
 
@@ -191,7 +193,22 @@ def ground_acceleration(effects: Effects, release: Release) -> Callable[[np.ndar
             return q["amplitude_m_s2"] * swell * np.sin(2.0 * math.pi * q["frequency_hz"] * t + phase)
 
         return lorry
+    if "irregular_floor" in effects:
+        return _irregular(effects["irregular_floor"], rng)
     return None
+
+
+def _irregular(q: Parameters, rng: np.random.Generator) -> Callable[[np.ndarray], np.ndarray]:
+    """Traffic: sinusoids of every frequency of a band, each with a phase of its own."""
+    frequencies = rng.uniform(q["low_hz"], q["low_hz"] + q["band_hz"], _FLOOR_LINES)
+    phases = rng.uniform(0.0, 2.0 * math.pi, _FLOOR_LINES)
+    size = q["rms_m_s2"] * math.sqrt(2.0 / _FLOOR_LINES)
+
+    def floor(t: np.ndarray) -> np.ndarray:
+        angles = 2.0 * math.pi * np.multiply.outer(t, frequencies) + phases
+        return np.asarray(size * np.sin(angles).sum(axis=-1))
+
+    return floor
 
 
 def _shaken(m: Mechanics, effects: Effects, release: Release) -> None:
@@ -251,6 +268,7 @@ _ADD: dict[str, Callable[[Mechanics, Parameters, Release], None]] = {
     "rope_snag": _rope_snag,
     "ambient": lambda m, q, release: _shaken(m, {"ambient": q}, release),
     "passing_lorry": lambda m, q, release: _shaken(m, {"passing_lorry": q}, release),
+    "irregular_floor": lambda m, q, release: _shaken(m, {"irregular_floor": q}, release),
     "crushing": _crushing,
     "alpha_asymmetry": _alpha_asymmetry,
     "base_tilt": _set("tilt", "beta_rad"),

@@ -32,12 +32,17 @@ _SHORTEST, _ENOUGH = 60, 120
 
 
 @dataclass(frozen=True, slots=True)
-class _Quiet:
+class QuietRecord:
     """Accelerometer record of the held and the resting wall, with what explains it besides the floor."""
 
     time_s: FloatArray
     values: FloatArray
     basis: FloatArray
+
+    @property
+    def left(self) -> FloatArray:
+        """What nothing but the floor and noise explains, (n,)."""
+        return self.values - self.basis @ (self.basis.T @ self.values)
 
 
 def find_vibration(
@@ -65,9 +70,12 @@ def find_vibration(
 
 def _seen(
     runs: Sequence[GapRun], grids: Sequence[Grid], ring: Ring | None
-) -> tuple[list[_Quiet], list[_Quiet | None], FloatArray]:
+) -> tuple[list[QuietRecord], list[QuietRecord | None], FloatArray]:
     """(usable parts, parts of each run, gain of each frequency) without the ring-down of `ring`."""
-    data = [_quiet(run, grid, ring) for run, grid in zip(runs, grids, strict=True)]
+    data = [
+        quiet_record(run, grid, ring, run.steady_accelerometers("x"))
+        for run, grid in zip(runs, grids, strict=True)
+    ]
     usable = [d for d in data if d is not None]
     gains = [_gain(d, FREQUENCIES_HZ) for d in usable]
     return usable, data, np.sum(gains, axis=0) if gains else np.zeros(FREQUENCIES_HZ.size)
@@ -86,8 +94,11 @@ def without_vibration(run: GapRun, grid: Grid, found: Vibration) -> GapRun:
     return replace(run, channels=channels)
 
 
-def _quiet(run: GapRun, grid: Grid, ring: Ring | None) -> _Quiet | None:
-    chosen = run.steady_accelerometers("x")
+def quiet_record(run: GapRun, grid: Grid, ring: Ring | None, chosen: Sequence[int]) -> QuietRecord | None:
+    """The mean of the accelerometers `chosen` while the wall is held and rests; None for too short a time.
+
+    `ring` is the wall's own ring-down after impacts.
+    """
     if not chosen:
         return None
     measured = np.mean([gridded(run, i) for i in chosen], axis=0)
@@ -106,7 +117,7 @@ def _quiet(run: GapRun, grid: Grid, ring: Ring | None) -> _Quiet | None:
     columns = np.column_stack([held, resting, *sway, *own])[pick].astype(float)
     columns[:, 2:] /= np.abs(columns[:, 2:]).max(axis=0) + 1e-30
     basis, _ = np.linalg.qr(columns[:, np.any(columns != 0.0, axis=0)])
-    return _Quiet(grid.time_s[pick], measured[pick], basis)
+    return QuietRecord(grid.time_s[pick], measured[pick], basis)
 
 
 def _rings_on(grid: Grid, ring: Ring, resting: NDArray[np.bool_]) -> list[FloatArray]:
@@ -125,14 +136,14 @@ def _sway(rotation: FloatArray, part: NDArray[np.bool_], height: float) -> list[
     return list(shown)
 
 
-def _gain(data: _Quiet, frequencies: FloatArray) -> FloatArray:
+def _gain(data: QuietRecord, frequencies: FloatArray) -> FloatArray:
     """Gain in log likelihood of a sinusoid of each frequency."""
-    values = data.values - data.basis @ (data.basis.T @ data.values)
+    values = data.left
     return nats_explained(values, _fit(data, values, frequencies)[1], OSCILLATION_INDEPENDENT)
 
 
 def _fit(
-    data: _Quiet, values: FloatArray, frequencies: FloatArray
+    data: QuietRecord, values: FloatArray, frequencies: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Sine and cosine, (k, 2), explained power, (k,), inverse Gram matrix, (k, 2, 2), of k sinusoids."""
     angle = 2.0 * np.pi * frequencies[:, None] * data.time_s
@@ -144,8 +155,8 @@ def _fit(
     return sizes, np.sum(projected * sizes, axis=1), inverse
 
 
-def _share(data: _Quiet, frequency: float, frequency_sd: float, found: bool) -> Vibration:
-    values = data.values - data.basis @ (data.basis.T @ data.values)
+def _share(data: QuietRecord, frequency: float, frequency_sd: float, found: bool) -> Vibration:
+    values = data.left
     ((sine, cosine),), (explained,), (inverse,) = _fit(data, values, np.array([frequency]))
     left = max(float(values @ values) - float(explained), 0.0)
     fraction = max(independent_fraction(values), OSCILLATION_INDEPENDENT) if not found else 0.3

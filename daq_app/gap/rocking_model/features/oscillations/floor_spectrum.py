@@ -1,0 +1,81 @@
+"""How much the floor vibrates at every frequency, where it does so irregularly: traffic, machines, wind.
+
+All accelerometers have the floor in common and their noise each for itself. The cross-spectrum of two halves
+of them, while the wall is held and after it rests, is therefore that of the floor alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.oscillations.floor_vibration import QuietRecord, quiet_record
+from daq_app.gap.rocking_model.features.oscillations.rings import Ring
+from daq_app.gap.rocking_model.features.oscillations.vibration import FloorSpectrum
+from daq_app.gap.rocking_model.motion.motion_grid import Grid
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
+from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.tolerances.walls import FLOOR_RMS_M_S2, FLOOR_STANDS_OUT
+
+_BANDS_HZ = np.arange(0.5, 13.0, 0.5)
+"""Ends of the bands. Slower ones show in no part at rest; what is faster turns a wall by less than noise."""
+_PART = 200
+"""Samples of the grid in a part, 1 s: longer rests are cut."""
+_FEWEST_PARTS = 6
+"""Parts at rest from which their differences say how sure the mean is."""
+
+
+def floor_spectrum(runs: Sequence[GapRun], grids: Sequence[Grid], ring: Ring | None) -> FloorSpectrum | None:
+    """The floor of all runs together; None where it does not stand out of noise, or can hardly be felt.
+
+    `ring` is the wall's own ring-down after impacts.
+    """
+    parts = [part for run, grid in zip(runs, grids, strict=True) for part in _parts(run, grid, ring)]
+    if len(parts) < _FEWEST_PARTS:
+        return None
+    weights = np.array([samples for samples, _ in parts], dtype=float)
+    weights /= weights.sum()
+    powers = np.array([power for _, power in parts])
+    total = powers.sum(axis=1)
+    mean = float(weights @ total)
+    sd = float(np.sqrt(np.sum((weights * (total - mean)) ** 2)))
+    if mean < max(FLOOR_RMS_M_S2**2, FLOOR_STANDS_OUT * sd):
+        return None
+    bands = np.sqrt(np.maximum(weights @ powers, 0.0))
+    return FloorSpectrum(0.5 * (_BANDS_HZ[1:] + _BANDS_HZ[:-1]), bands, 0.5 * sd / float(np.sqrt(mean)))
+
+
+def _parts(run: GapRun, grid: Grid, ring: Ring | None) -> list[tuple[int, FloatArray]]:
+    """(samples, cross-power in every band, (m/s²)²) of each part at rest of a run."""
+    chosen = run.steady_accelerometers("x")
+    halves = [quiet_record(run, grid, ring, chosen[start::2]) for start in (0, 1)]
+    known = [half for half in halves if half is not None]
+    if len(known) < 2:
+        return []
+    one, other = (_pieces(half) for half in known)
+    return [(a.size, _cross_power(a, b)) for a, b in zip(one, other, strict=True)]
+
+
+def _pieces(record: QuietRecord) -> list[FloatArray]:
+    """The parts without a gap between them, cut to one or two seconds."""
+    gaps = np.flatnonzero(np.diff(record.time_s) > 1.5 / GRID_HZ) + 1
+    return [
+        piece
+        for whole in np.split(record.left, gaps)
+        for piece in np.array_split(whole, max(whole.size // _PART, 1))
+    ]
+
+
+def _cross_power(one: FloatArray, other: FloatArray) -> FloatArray:
+    """What two records (n,) have in common, as mean squares by bands."""
+    window = np.hanning(one.size)
+    window /= np.sqrt(np.mean(window**2))
+    a, b = (np.fft.rfft(values * window) for values in (one, other))
+    power = 2.0 * np.real(a * np.conj(b)) / one.size**2
+    frequency = np.fft.rfftfreq(one.size, 1.0 / GRID_HZ)
+    return np.array(
+        [power[(frequency >= low) & (frequency < high)].sum() for low, high in pairwise(_BANDS_HZ)]
+    )
