@@ -84,7 +84,7 @@ def _median_with_sd(findings: Sequence[RunFinding]) -> tuple[float, float]:
 
 def _words(kind: str, target: str, finding: RunFinding, size: float, unit: str) -> str:
     who = _FAMILY_WORDS.get(target, target)
-    shown, label = (1e3 * size, "mm") if unit == "m" else (size, unit)
+    shown, label = (1e3 * size, f"m{unit}") if unit in ("m", "rad") else (size, unit)
     amount = f"{shown:.3g} {label}"
     match kind:
         case "hum":

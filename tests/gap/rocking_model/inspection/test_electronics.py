@@ -48,6 +48,7 @@ def test_pick_up_of_tiltmeters_is_found_taken_out_and_counts_over_their_noise(ta
     assert finding.material
     assert finding.in_noise == pytest.approx(5.0 / math.sqrt(2.0), rel=0.1)
     assert finding.size == pytest.approx(5.0 * noise_rad, rel=0.1)
+    assert finding.words.startswith(f"mains hum of {1e3 * finding.size:.3g} mrad in ")
 
 
 def test_a_tiltmeter_that_freezes_or_has_a_loose_contact_is_named_and_not_used() -> None:
