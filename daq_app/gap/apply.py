@@ -22,8 +22,16 @@ from sim_hardware.dynamics.spec import find_effect
 from sim_hardware.sensors.effects import SENSOR_EFFECTS
 
 _MAX_BYTES: Final = 2**26
-FORMS_ONLY = {("compliance", "fall"), ("ambient", "shift")}
-"""Parameters that the simulator has not: of a form that it knows only one of, or read from a run itself."""
+FORMS_ONLY: Final = {
+    ("compliance", "fall"),
+    ("ambient", "shift"),
+    ("flexible_wall", "forced"),
+    ("flexible_wall", "recoil"),
+    ("initial_velocity", "own"),
+}
+"""Parameters that the simulator has not: of a form that it knows only one of, or of a run by itself."""
+_MEASURED_ONLY: Final = "ambient@floor"
+"""A floor that vibrates irregularly: the simulator's is a sinusoid."""
 
 
 class _Value(BaseModel):
@@ -86,7 +94,7 @@ def effects_found(result: Mapping[str, Any]) -> dict[str, dict[str, float]]:
     effects: dict[str, dict[str, float]] = {}
     for estimate in checked.effect_parameters:
         name, _, parameter = estimate.name.rpartition(".")
-        if (name, parameter) in FORMS_ONLY:
+        if (name, parameter) in FORMS_ONLY or name == _MEASURED_ONLY:
             continue
         if name == "polarity" or name.startswith("swap"):
             effects |= _wired(name, checked)

@@ -11,7 +11,9 @@ from typer.testing import CliRunner
 
 from daq_app.cli.app import build_app
 from daq_app.config import load_rig
+from daq_app.gap.apply import effects_found
 from daq_app.gap.core.result import FORMAT_VERSION
+from daq_app.gap.rocking_model.library import rocking_library
 from tests.support.simulated_wall import RIG
 
 
@@ -40,6 +42,21 @@ def _apply(folder: Path, content: str, *more: str, rig: Path = RIG) -> tuple[int
 def _parameters(**values: Any) -> list[dict[str, Any]]:
     wall = {"alpha": 0.21, "p": 2.19, "r": 0.9, "half_base": 0.3255} | values
     return [{"name": name, "value": value} for name, value in wall.items() if value is not None]
+
+
+def test_whatever_the_library_names_can_be_switched_on() -> None:
+    """Parameters of the form of an effect that the simulator has not are left out, and stop nothing."""
+    library = rocking_library({})
+    for name in library:
+        if library[name].kind != "effect":
+            continue
+        entries = [{"name": f"{name}.{p.name}", "value": p.value(0.0)} for p in library[name].parameters]
+        assert name in effects_found(_result(effect_parameters=entries))
+
+
+def test_a_floor_that_vibrates_irregularly_is_left_out_of_what_is_switched_on() -> None:
+    entries = [{"name": "viscous.zeta", "value": 0.006}, {"name": "ambient@floor.amplitude", "value": 0.2}]
+    assert effects_found(_result(effect_parameters=entries)) == {"viscous": {"zeta": 0.006}}
 
 
 @pytest.mark.parametrize(

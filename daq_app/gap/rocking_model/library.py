@@ -127,6 +127,7 @@ _FORMS = {
     # An impact kicks a wall at its base, or stops a wall whose own inertia goes on bending it.
     "flexible_wall": (
         Parameter("forced", 0.5, 0.4, "1", 0.0, 1.0, meaning="share of its own inertia in its bending"),
+        Parameter("recoil", 0.0, 0.5, "1", 0.0, 1.5, meaning="turn of the base against it, over its tilt"),
     ),
     # On and on, back and forth, or at one edge alone.
     "corner_twist": (

@@ -18,7 +18,12 @@ from numpy.polynomial import Polynomial
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.differences import at_impacts
 from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE
-from daq_app.gap.rocking_model.features.oscillations.ring_response import bent_form, bent_share, bent_wall
+from daq_app.gap.rocking_model.features.oscillations.ring_response import (
+    bent_form,
+    bent_share,
+    bent_wall,
+    recoil,
+)
 from daq_app.gap.rocking_model.features.response import delay
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import play_shape, slip_shape
@@ -111,6 +116,9 @@ def _swinging(
 
 
 def _forms(run: RockingRun, values: Mapping[str, float]) -> Iterator[tuple[float, _Carried]]:
+    share = bent_share(run, of_base=False) if run.reference == "wire" else 0.0
+    for form, size in bent_wall(run, values).items():
+        yield size * (share + recoil(run, values)), _carried(run, form)
     if run.reference != "wire":
         return
     if play := values["wire_play"]:
@@ -121,8 +129,6 @@ def _forms(run: RockingRun, values: Mapping[str, float]) -> Iterator[tuple[float
         yield slip / run.wire_height_m, _carried(run, "slip")
     for form, size in turns(run, values).items():
         yield size * turn_share(run, of_base=False), _carried(run, form)
-    for form, size in bent_wall(run, values).items():
-        yield size * bent_share(run, of_base=False), _carried(run, form)
 
 
 def _carried(run: RockingRun, form: str) -> _Carried:

@@ -13,9 +13,14 @@ from daq_app.gap.blind.world.effects.catalogue import ENTRIES, LIBRARY, Entry, u
 from daq_app.gap.blind.world.effects.contact_catalogue import CONTACT_ENTRIES, CONTACT_LIBRARY
 
 _RING: Final = ENTRIES["flexible_wall"]
-_FAST_RING: Final = replace(_RING, others=uniform(frequency_hz=(7.0, 42.0), zeta=(0.005, 0.05)))
+_FAST_RING: Final = replace(
+    _RING, others=uniform(frequency_hz=(7.0, 42.0), zeta=(0.005, 0.05), recoil=(0.0, 0.2))
+)
 _SLOW_RING: Final = replace(
-    _RING, low=0.03, high=0.3, others=uniform(frequency_hz=(2.0, 7.0), zeta=(0.005, 0.05))
+    _RING,
+    low=0.03,
+    high=0.3,
+    others=uniform(frequency_hz=(2.0, 7.0), zeta=(0.005, 0.05), recoil=(0.0, 0.2)),
 )
 _CORNER_TWIST: Final = Entry("corner_twist", "contact", "turn_s", 3e-4, 6e-3, signed=True)
 _IRREGULAR_FLOOR: Final = Entry(

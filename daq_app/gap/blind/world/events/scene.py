@@ -64,13 +64,15 @@ def stage(mechanics: Mechanics, motion: Followed, effects: Effects, time_s: Floa
     zero = np.zeros_like(theta)
     yaw, yaw_dd = _ringing(effects.get("yaw"), time_s, times, jumps, mechanics.wall.length / 2.0)
     bend, bend_dd = _ringing(effects.get("flexible_wall"), time_s, times, jumps, mechanics.wall.height)
+    # A wall that is free to turn recoils against its own bending.
+    recoil = -effects.get("flexible_wall", {}).get("recoil", 0.0) / mechanics.wall.height
     ground = ground_acceleration(effects, motion.release)
     return Scene(
         time_s=time_s,
-        theta=theta,
+        theta=theta + recoil * bend,
         omega=omega,
-        theta_dd=theta_dd,
-        lean=theta + _base_rotation(mechanics, theta, sign, time_s),
+        theta_dd=theta_dd + recoil * bend_dd,
+        lean=theta + recoil * bend + _base_rotation(mechanics, theta, sign, time_s),
         pivot_x=np.broadcast_to(pivot_x * (1.0 - worn), theta.shape),
         lift=np.broadcast_to(lift, theta.shape),
         slip=_slip(mechanics, motion, time_s),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +25,7 @@ def _ring_coefficients(
     The impacts are where the reference shows them, as late as it is.
     """
     coefficients = [0.0j] * len(block.shares)
-    motion = _kicked(ring, values)
+    motion = _kicked(run, ring, values)
     if not any(motion):
         return coefficients
     frequency, zeta, _ = ring.ring
@@ -49,30 +50,46 @@ def _forced(values: Mapping[str, float]) -> float:
     return values.get("flexible_wall.forced", 0.0)
 
 
-Motion = tuple[float, float, float]
-"""Sizes of a ring-down by bending, by yaw and by twist."""
+class _Motion(NamedTuple):
+    """Sizes of a ring-down by what moves."""
+
+    bend: float = 0.0
+    base: float = 0.0
+    """Rotation of the base against the bending."""
+    yaw: float = 0.0
+    twist: float = 0.0
 
 
-def _rung(ring: Block, values: Mapping[str, float]) -> Motion:
+def recoil(run: RockingRun, values: Mapping[str, float]) -> float:
+    """Rotation of the base, rad, while the top bends by 1 m.
+
+    A wall that is free to turn about its edge keeps its angular momentum: what its upper part turns one way,
+    all of it turns the other way (a pinned-free beam, Blevins 1979).
+    """
+    return -values.get("flexible_wall.recoil", 0.0) / run.survey.height_m
+
+
+def _rung(run: RockingRun, ring: Block, values: Mapping[str, float]) -> _Motion:
     """How far the wall rings, as means over the intervals of the grid show it."""
     frequency, _, rate = ring.ring
     mean = float(np.sinc(frequency / rate))
     if ring.kind == "bending":
-        return mean * values.get("flexible_wall.gain", 0.0), 0.0, 0.0
+        bend = mean * values.get("flexible_wall.gain", 0.0)
+        return _Motion(bend=bend, base=recoil(run, values) * bend)
     mean /= 2.0 * np.pi * frequency
-    return 0.0, mean * values.get("yaw.kick", 0.0), mean * values.get("twist.kick", 0.0)
+    return _Motion(yaw=mean * values.get("yaw.kick", 0.0), twist=mean * values.get("twist.kick", 0.0))
 
 
-def _kicked(ring: Block, values: Mapping[str, float]) -> Motion:
+def _kicked(run: RockingRun, ring: Block, values: Mapping[str, float]) -> _Motion:
     """The sine in it: inertia bends a wall against the jump of its speed."""
-    bend, yaw, twist = _rung(ring, values)
-    return bend * (1.0 - 2.0 * _forced(values)), yaw, twist
+    motion, share = _rung(run, ring, values), 1.0 - 2.0 * _forced(values)
+    return motion._replace(bend=share * motion.bend, base=share * motion.base)
 
 
-def _size(shares: Shares, motion: Motion) -> float:
+def _size(shares: Shares, motion: _Motion) -> float:
     """Size of a motion in a signal of these shares."""
-    bend, yaw, twist = motion
-    return shares.bend * bend + shares.yaw * yaw + shares.twist * twist
+    turns = shares.yaw * motion.yaw + shares.twist * motion.twist
+    return shares.bend * motion.bend + shares.rotation * motion.base + turns
 
 
 def _put(
@@ -98,7 +115,7 @@ def _of_the_other(run: RockingRun, block: Block, values: Mapping[str, float]) ->
     """
     coefficients = np.zeros(len(block.names))
     other = next((b for b in run.blocks if b.ring[0] and b.kind != block.kind), None)
-    motion = (0.0, 0.0, 0.0) if other is None else _kicked(other, values)
+    motion = _Motion() if other is None else _kicked(run, other, values)
     if other is None or not any(abs(_size(shares, motion)) > _EVEN for shares in block.shares):
         return coefficients
     frequency, zeta, _ = other.ring
@@ -167,7 +184,7 @@ def _forced_ring(run: RockingRun, block: Block, values: Mapping[str, float]) -> 
     coefficients = np.zeros(len(block.names))
     if not (forced := _forced(values)):
         return coefficients
-    motion = _rung(block, values)
+    motion = _rung(run, block, values)
     for k, (name, shares) in enumerate(zip(block.names, block.shares, strict=False)):
         family = _family(name)
         columns = run.cache.constant(
