@@ -35,6 +35,11 @@ class Policy:
     """Share of the rotation across an instrument's axis from which it is material: a mount that is turned by
     6°, three sd of what a rough laboratory has (assumed); raising it hides crosstalk."""
 
+    finding_unlike: float = 0.1
+    """Share of the acceleration that a tiltmeter feels, or of what it shows that is no rotation, from which
+    it is material: three times what is looked at, ten times what sound ones have in development laboratories;
+    raising it hides tiltmeters that are no measure of rotation."""
+
     # The model's own discrepancy
     usual_discrepancy: float = 1.0
     """Scale of the half-Cauchy prior of a group's discrepancy, in nominal sd (Gelman, Bayesian Analysis 1,

@@ -23,6 +23,8 @@ _LEAST = {
     "shaking": POLICY.finding_shaking,
     "ambient": POLICY.finding_shaking,
     "crossed": POLICY.finding_crossed,
+    "acceleration": POLICY.finding_unlike,
+    "unlike": POLICY.finding_unlike,
 }
 """Size from which a condition that every laboratory has a little of is material; any other always is."""
 _FAMILY_WORDS = {
@@ -103,4 +105,8 @@ def _words(kind: str, target: str, finding: RunFinding, size: float, unit: str) 
             return f"irregular vibration of the floor of {amount}, {finding.observable},"
         case "crossed":
             return f"{who} shows {100 * size:.2g} % of the rotation across its axis"
+        case "acceleration":
+            return f"{who} feels {100 * size:.2g} % of the horizontal acceleration"
+        case "unlike":
+            return f"{100 * size:.2g} % of what {who} shows is no response to the rotation"
     return f"{finding.observable} of {amount} ({who})"

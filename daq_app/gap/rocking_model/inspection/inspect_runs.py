@@ -31,6 +31,7 @@ from daq_app.gap.rocking_model.inspection.play import plays
 from daq_app.gap.rocking_model.inspection.quantisation import with_quantisation_errors
 from daq_app.gap.rocking_model.inspection.saturation import saturated
 from daq_app.gap.rocking_model.inspection.second_axis import second_axis
+from daq_app.gap.rocking_model.inspection.tilt_response import unlike_rotation
 from daq_app.gap.rocking_model.inspection.vertical import odd_vertical, vertical_block
 from daq_app.gap.rocking_model.inspection.wiring import mend
 from daq_app.gap.rocking_model.records import GapRun, Wiring
@@ -156,10 +157,13 @@ def without_outlier_channels(
         )
         for family, names in outliers.several.items()
     ]
+    odd, tilted = unlike_rotation(again)
+    again = _examined_without(again, odd, reference)
     final = [e.run for e in again], [e.features.grid for e in again]
     rows = merged(
         findings,
         [disagreements] * len(again),
+        tilted,
         second_axis(*final),
         lone_rings(*final, outliers.ids),
         plays(*final, outliers.ids, _steps(findings)),

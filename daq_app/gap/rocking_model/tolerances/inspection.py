@@ -290,5 +290,25 @@ Raising it hides crosstalk of the instrument below it.
 MOUNT_SD = 0.01
 """Sd of that share, 1, for an instrument that is mounted with care (assumed)."""
 
+TILT_UNLIKE = 0.03
+"""Rms of what a response of first order leaves over all that a tiltmeter shows, 1, from which it is odd.
+
+Sound ones leave 0.011 at most in development laboratories, where a time constant is free. Raising it hides
+tiltmeters that feel a few hundredths of the acceleration.
+"""
+
+TILT_UNLIKE_SD = 0.01
+"""Sd of that share, 1: what a sound one leaves."""
+
+FEELS_SHARE = 0.5
+"""Share of what remains of an odd tiltmeter, 1, that may remain beside the acceleration for it to be felt.
+
+Raising it says of other faults that they are felt acceleration.
+"""
+
+FEELS_SD = 0.01
+"""Sd of the share of the acceleration, 1, that a sound tiltmeter feels: 0.009 at most in development
+laboratories."""
+
 COUNT_SD = 0.05
 """Sd of a count of channels, 1: far below one, so that one channel is significant."""
