@@ -57,13 +57,15 @@ def _channel(rig: Rig, entry: Mapping[str, Any]) -> Channel:
 
 
 def _truth(label: Mapping[str, Any], run: Mapping[str, Any]) -> dict[str, Any]:
-    """`r_factor` is the share of the upper bound of a block on the points that the wall turns about."""
+    """The label's `r`, or `r_factor`: the share of the upper bound of a block on the points that the wall
+    turns about.
+    """
     body = label["true_body"]
     block = RigidBlock(body["m"] * STANDARD_GRAVITY_M_S2, body["R"], body["IO"], body["alpha"])
     inset = sum(effect["params"].get("inset", 0.0) for effect in label["effects"])
     pivoted = block.with_pivots_inside(inset)
     return {
-        "restitution": run["r_factor"] * pivoted.r_max,
+        "restitution": label["r"] if "r" in label else run["r_factor"] * pivoted.r_max,
         "theta0_rad": run["theta0"],
         "alpha_rad": pivoted.alpha0_rad,
         "p_rad_s": pivoted.p_rad_s,
