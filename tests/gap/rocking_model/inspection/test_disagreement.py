@@ -59,6 +59,20 @@ def test_two_channels_of_one_family_that_disagree_are_examined_one_by_one(factor
         assert block.values[block.names.index("gain")] == pytest.approx(factor - 1.0, abs=5e-3)
 
 
+@pytest.mark.parametrize("name", ["LV-A06", "LV-A01"])
+def test_an_lvdt_into_which_a_wire_leaks_is_examined_on_its_own(name: str) -> None:
+    """What leaks goes with the rotation: as much as of a mount that is 10 mm off along the thickness."""
+    runs = simulate({}, LEVEL)
+    for run in runs:
+        wire = run.place("WP-4")
+        run.channels[run.place(name)] += 0.01 / run.sensors[wire].position_m[2] * run.channels[wire]
+    prepared, _ = prepare(runs)
+    assert found_channels(prepared) == {name: "lvdt"}
+    assert conditions_found(prepared) == set()
+    (block,) = (b for b in prepared[0].blocks if b.family == name)
+    assert block.values[block.names.index("what remains")] > 1.0, "it is no gain alone"
+
+
 def test_a_second_axis_that_follows_the_rotation_is_marked() -> None:
     runs = simulate({}, LEVEL)
     place = {sensor.id: i for i, sensor in enumerate(runs[0].sensors)}
