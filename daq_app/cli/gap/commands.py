@@ -234,7 +234,8 @@ def _print(result: Diagnosis) -> None:
         console.print(f"Cause ({cause.probability:.2f}{closes}): {words}", markup=False)
     for finding in result.findings:
         weight = "material" if finding.material else "ordinary"
-        console.print(f"Instrument ({weight}): {finding.words}", markup=False)
+        what = "Instrument" if finding.family == "sensor" else "Surroundings"
+        console.print(f"{what} ({weight}): {finding.words}", markup=False)
     console.print(f"What remains: {result.rest.words}.", markup=False)
     console.print(f"Next: {result.next_measurement}", markup=False)
     for limit in result.limits:

@@ -62,7 +62,7 @@ def _finding(key: str, findings: Sequence[RunFinding], runs: int) -> Finding:
     return Finding(
         name=key,
         words=_words(kind, target, findings[0], size, unit) + f" in {where}",
-        family="sensor",
+        family="ambient" if target == "floor" else "sensor",
         probability=1.0 - chance,
         size=size,
         low=max(size - NORMAL_95 * sd, 0.0),

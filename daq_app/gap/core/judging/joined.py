@@ -1,4 +1,4 @@
-"""The answer as a whole: causes and what was measured directly about instruments."""
+"""The answer as a whole: causes and what was measured directly, most of it about instruments."""
 
 from __future__ import annotations
 
@@ -22,14 +22,13 @@ def with_findings(result: Diagnosis, findings: Sequence[Finding], policy: Policy
         return result
     known = 1.0 - unknown(findings)
     joining = material(findings)
-    names = tuple(finding.name for finding in joining)
     sizes = tuple(
         Estimate(f"{f.name}.{f.parameter}", f.size, f.low, f.high, f.unit, 0.0, 0.0, f.words) for f in joining
     )
     return replace(
         result,
-        which=tuple(_joined(entry, names, known) for entry in result.which),
-        set95=tuple(_joined(entry, names) for entry in result.set95),
+        which=tuple(_joined(entry, joining, known) for entry in result.which),
+        set95=tuple(_joined(entry, joining) for entry in result.set95),
         decision=_decision(result.decision, findings, policy),
         rest=replace(result.rest, unknown=1.0 - known * (1.0 - result.rest.unknown)),
         effect_parameters=(*result.effect_parameters, *sizes),
@@ -37,12 +36,13 @@ def with_findings(result: Diagnosis, findings: Sequence[Finding], policy: Policy
     )
 
 
-def _joined(entry: Ranked, names: tuple[str, ...], known: float = 1.0) -> Ranked:
+def _joined(entry: Ranked, findings: Sequence[Finding], known: float = 1.0) -> Ranked:
     entry = replace(entry, probability=known * entry.probability)
-    if not names:
+    if not findings:
         return entry
     families = [family for family in entry.family.split(" + ") if family != "none"]
-    family = " + ".join(dict.fromkeys([*families, "sensor"]))
+    family = " + ".join(dict.fromkeys([*families, *(finding.family for finding in findings)]))
+    names = [finding.name for finding in findings]
     return replace(entry, effects=tuple(sorted((*entry.effects, *names))), family=family)
 
 
@@ -62,9 +62,10 @@ def _decision(decision: Decision, findings: Sequence[Finding], policy: Policy) -
     sentence = f"Measured directly: {words}. {decision.sentence}"
     if decision.verdict in _NO_CAUSE:
         sure = min(finding.probability for finding in joining)
-        return Decision(verdict_of(len(names)), names, "sensor", sentence, sure)
+        family = _joined(Ranked((), "none", 0.0, 0.0), joining).family
+        return Decision(verdict_of(len(names)), names, family, sentence, sure)
     effects = tuple(sorted((*decision.effects, *names)))
     verdict = verdict_of(len(effects)) if decision.verdict in NAMING else decision.verdict
-    family = _joined(Ranked(decision.effects, decision.family, 0.0, 0.0), names).family
+    family = _joined(Ranked(decision.effects, decision.family, 0.0, 0.0), joining).family
     others = tuple(tuple(sorted((*other, *names))) for other in decision.alternatives)
     return Decision(verdict, effects, family, sentence, decision.confidence, others)

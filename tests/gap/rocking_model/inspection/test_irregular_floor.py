@@ -39,7 +39,7 @@ def test_its_size_is_that_of_the_floor(shaken: tuple[list[RockingRun], dict[str,
     (finding,) = [f for f in findings_of(runs) if f.name == "ambient@floor"]
 
     assert finding.size == pytest.approx(np.sqrt(2.0) * floor["rms_m_s2"], rel=0.2)
-    assert finding.material
+    assert finding.material and finding.family == "ambient"
     assert "irregular vibration of the floor" in finding.words
     assert not any(f.name == "shaking@floor" for f in findings_of(runs))
 
