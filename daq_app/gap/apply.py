@@ -30,8 +30,8 @@ FORMS_ONLY: Final = {
     ("initial_velocity", "own"),
 }
 """Parameters that the simulator has not: of a form that it knows only one of, or of a run by itself."""
-_MEASURED_ONLY: Final = "ambient@floor"
-"""A floor that vibrates irregularly: the simulator's is a sinusoid."""
+_MEASURED_ONLY: Final = ("ambient@floor", "acceleration@")
+"""A floor that vibrates irregularly, where the simulator's is a sinusoid; tiltmeters that feel acceleration."""
 
 
 class _Value(BaseModel):
@@ -94,7 +94,7 @@ def effects_found(result: Mapping[str, Any]) -> dict[str, dict[str, float]]:
     effects: dict[str, dict[str, float]] = {}
     for estimate in checked.effect_parameters:
         name, _, parameter = estimate.name.rpartition(".")
-        if (name, parameter) in FORMS_ONLY or name == _MEASURED_ONLY:
+        if (name, parameter) in FORMS_ONLY or name.startswith(_MEASURED_ONLY):
             continue
         if name == "polarity" or name.startswith("swap"):
             effects |= _wired(name, checked)

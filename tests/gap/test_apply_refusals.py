@@ -54,8 +54,9 @@ def test_whatever_the_library_names_can_be_switched_on() -> None:
         assert name in effects_found(_result(effect_parameters=entries))
 
 
-def test_a_floor_that_vibrates_irregularly_is_left_out_of_what_is_switched_on() -> None:
-    entries = [{"name": "viscous.zeta", "value": 0.006}, {"name": "ambient@floor.amplitude", "value": 0.2}]
+@pytest.mark.parametrize("measured", ["ambient@floor.amplitude", "acceleration@TL-1X.share"])
+def test_what_is_only_measured_is_left_out_of_what_is_switched_on(measured: str) -> None:
+    entries = [{"name": "viscous.zeta", "value": 0.006}, {"name": measured, "value": 0.2}]
     assert effects_found(_result(effect_parameters=entries)) == {"viscous": {"zeta": 0.006}}
 
 

@@ -106,7 +106,7 @@ def _words(kind: str, target: str, finding: RunFinding, size: float, unit: str) 
         case "crossed":
             return f"{who} shows {100 * size:.2g} % of the rotation across its axis"
         case "acceleration":
-            return f"{who} feels {100 * size:.2g} % of the horizontal acceleration"
+            return f"{who} feels {100 * size:.0f} % of the horizontal acceleration"
         case "unlike":
             return f"{100 * size:.2g} % of what {who} shows is no response to the rotation"
     return f"{finding.observable} of {amount} ({who})"

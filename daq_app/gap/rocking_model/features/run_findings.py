@@ -15,8 +15,9 @@ EFFECT_SIZES: dict[str, str] = {
     "polarity": "on",
     "swap": "places",
     "ambient": "amplitude",
+    "acceleration": "share",
 }
-"""Effect behind a finding, and the parameter that is its size."""
+"""What is known of an instrument or the floor and out of the families, and the parameter that is its size."""
 
 
 @dataclass(frozen=True, slots=True)
