@@ -31,7 +31,7 @@ FORMS_ONLY: Final = {
 }
 """Parameters that the simulator has not: of a form that it knows only one of, or of a run by itself."""
 _MEASURED_ONLY: Final = ("ambient@floor", "acceleration@")
-"""A floor that vibrates irregularly, where the simulator's is a sinusoid; tiltmeters that feel acceleration."""
+"""A floor that vibrates irregularly (the simulator's is a sinusoid); tiltmeters that feel acceleration."""
 
 
 class _Value(BaseModel):
