@@ -212,12 +212,22 @@ MOTION_EFFECTS: Final[tuple[EffectSpec, ...]] = (
     EffectSpec(
         "sliding",
         "contact",
-        "the base slips at each impact",
+        "the base slips to and fro at impacts",
         "Δx = c θ̇⁻",
         "sliding block",
         (Parameter("c", "m s/rad", 2e-4, 0.02, "slip per approach speed", index=par.SLIDE),),
         ("drift",),
         "wires step together, LVDTs do not",
+    ),
+    EffectSpec(
+        "sliding_on",
+        "contact",
+        "the base slips to one side at impacts, on and on",
+        "Δx = c |θ̇⁻|",
+        "sliding block on a floor that favours one way",
+        (Parameter("c", "m s/rad", -0.02, 0.02, "slip towards +x per approach speed", index=par.SLIDE_ON),),
+        ("drift", "sliding"),
+        "wires step together at impacts, LVDTs do not; before and after they are still",
     ),
     EffectSpec(
         "corner_twist",

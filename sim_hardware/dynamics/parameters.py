@@ -72,7 +72,8 @@ RELEASE_EVEN: Final = 45  # 0: the holding force dies away as exp(−t/τ); 1: i
 TURN: Final = 46  # rad per (rad/s): turn about the vertical that stays after an impact
 TURN_ALTERNATION: Final = 47  # rad: 0 turns on and on, ±π/2 back and forth, ±π/4 on one side alone
 UNEVEN_IMPACT: Final = 48  # 1: unequal levers make r of the two sides differ as at a plastic impact; 0: not
-N_PARAMETERS: Final = 49
+SLIDE_ON: Final = 49  # m per (rad/s): base slip at an impact towards +x, from either side
+N_PARAMETERS: Final = 50
 
 ODD_IN_TIME: Final = (ZETA, COULOMB, QUADRATIC, AMBIENT_HZ)
 """Parameters that change their sign where time runs backwards: losses become gains."""

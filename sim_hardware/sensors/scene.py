@@ -77,7 +77,7 @@ class Scene:
         rows[:, la.EV_INTENSITY] = np.abs(motion.velocity_before_rad_s)
         rows[:, la.EV_JUMP] = motion.velocity_after_rad_s - motion.velocity_before_rad_s
         before = motion.velocity_before_rad_s
-        rows[:, la.EV_SLIP] = motion.vector[par.SLIDE] * before
+        rows[:, la.EV_SLIP] = motion.vector[par.SLIDE] * before + motion.vector[par.SLIDE_ON] * np.abs(before)
         alternation = motion.vector[par.TURN_ALTERNATION]
         turning = math.cos(alternation) * np.abs(before) + math.sin(alternation) * before
         rows[:, la.EV_TURN] = motion.vector[par.TURN] * turning

@@ -37,6 +37,7 @@ CASES: dict[str, Effects] = {
     "dwell": {"dwell": {"tau": 0.003}},
     "bounce": {"bounce": {"tau": 0.004}},
     "sliding": {"sliding": {"c": 0.004}},
+    "sliding_on": {"sliding_on": {"c": 0.001}},
     "flexible_wall": {"flexible_wall": {"gain": 0.003, "frequency": 16.0, "zeta": 0.025}},
     "compliance": {"compliance": {"phi": 1e-3}},
     "yaw": {"yaw": {"kick": 0.03, "frequency": 5.0, "zeta": 0.03}},

@@ -24,6 +24,7 @@ _OTHER_WORDS: Final[dict[str, tuple[str, ...]]] = {
     "flexible_wall": ("flexible_mode",),
     "compliance": ("base_compliance", "rig_compliance"),
     "yaw": ("twist",),
+    "sliding": ("sliding_on",),
     "ambient": ("ambient_vibration",),
     "irregular_floor": ("ambient", "ambient_vibration"),
     "drift": ("offset_drift",),

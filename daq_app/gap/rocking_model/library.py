@@ -86,6 +86,7 @@ _WEAKEST_SIGNED = {
     "gain": 0.01,
     "wire_anchor": 0.03,
     "corner_twist": 3e-4,
+    "sliding_on": 2e-4,
 }
 """Where the design's ranges begin for strengths of either sign, which the simulator's do not say. A mass off
 centre begins where it turns gravity as a tilt of 0.2 mrad does, the slope of r at a tenth of its range."""
@@ -128,6 +129,12 @@ _FORMS = {
     "flexible_wall": (
         Parameter("forced", 0.5, 0.4, "1", 0.0, 1.0, meaning="share of its own inertia in its bending"),
         Parameter("recoil", 0.0, 0.5, "1", 0.0, 1.5, meaning="turn of the base against it, over its tilt"),
+    ),
+    # In one test further than in another.
+    "sliding_on": (
+        Parameter(
+            "own", 0.0, 0.4, "1", meaning="what each test's slips differ by", per_run=True, starts=(0.0,)
+        ),
     ),
     # On and on, back and forth, or at one edge alone.
     "corner_twist": (

@@ -172,6 +172,15 @@ def test_structure_effects_show_where_they_should(rig: Rig) -> None:
     np.testing.assert_allclose(np.abs(step[early]), abs(first), rtol=0.02)
     assert np.array_equal(sliding["LV-A01"], plain["LV-A01"])
 
+    one_way = quantities(rig, {"sliding_on": {"c": -0.02}})
+    truth = wall_with(rig).truth()
+    so_far = zip(truth["impact_time_s"], truth["velocity_before_rad_s"], strict=True)
+    slid = -0.02 * sum(abs(speed) for at, speed in so_far if at < clock_s[-1])
+    for channel in rig.of_family("wire"):
+        stays = (one_way[channel.id] - plain[channel.id])[-100:]
+        np.testing.assert_allclose(stays, slid, rtol=0.02)
+    assert np.array_equal(one_way["LV-A01"], plain["LV-A01"])
+
     turning = quantities(rig, {"corner_twist": {"c": 2e-3, "alternation": math.pi / 4}})
     truth = wall_with(rig).truth()
     so_far = zip(truth["impact_time_s"], truth["velocity_before_rad_s"], strict=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.impact_steps import stepped, turns
 from daq_app.gap.rocking_model.features.oscillations.ring_response import (
     bent_form,
     bent_wall,
@@ -17,7 +18,6 @@ from daq_app.gap.rocking_model.features.oscillations.ring_response import (
 )
 from daq_app.gap.rocking_model.features.response import effects_on, responded
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.features.turns import turned, turns
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, TAIL_S, Wire, coarse, straight_line
 from daq_app.gap.rocking_model.records import Sensor
 
@@ -87,7 +87,7 @@ def _form_of_one(run: RockingRun, wire: Wire, form: str) -> FloatArray:
     if form in ("yaw.kick", "twist.kick"):
         wave = turning_wave(run)
     elif form.startswith("corner_twist"):
-        wave = turned(run, form)
+        wave = stepped(run, form)
     else:
         wave = bent_form(run, form)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 
@@ -11,13 +10,11 @@ import numpy as np
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE
+from daq_app.gap.rocking_model.features.impact_steps import slides, stepped
 from daq_app.gap.rocking_model.features.response import effects_on, responded, slow_response
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.features.shapes import moment_shape, side_of, slip_shape
+from daq_app.gap.rocking_model.features.shapes import Term, moment_shape, side_of
 from daq_app.gap.rocking_model.motion.rotation import anchors_turn
-
-Term = tuple[float, str, Callable[[], FloatArray]]
-"""Size of a shape, its name, and how it is made, (m,) on the grid."""
 
 
 def family_difference(run: RockingRun, family: str, values: Mapping[str, float]) -> FloatArray | None:
@@ -33,10 +30,10 @@ def _family_difference(run: RockingRun, family: str, values: Mapping[str, float]
     if family != run.reference:
         of_reference = family_difference(run, run.reference, values)
         shown = shown if of_reference is None else shown - of_reference
-    if family == "wire" and family != run.reference and "sliding.c" in values:
+    if family == "wire" and family != run.reference:
         # A slip is a step to whatever the wires answer with.
-        slips = run.cache.constant("slips", lambda: slip_shape(run.grid) / run.wire_height_m)
-        shown = shown + at_impacts(run, values, "sliding.c") * slips
+        for form, size in slides(run, values).items():
+            shown = shown + size / run.wire_height_m * stepped(run, form)
     total = _added(run, family, values, shown)
     if total is None or family != run.reference:
         return total
@@ -85,19 +82,6 @@ def difference_of(run: RockingRun, first: str, second: str, values: Mapping[str,
     if a is None:
         return None if b is None else -b
     return a if b is None else a - b
-
-
-def at_impacts(run: RockingRun, values: Mapping[str, float], key: str) -> float:
-    """What an effect does for each rad/s of an impact's approach speed, in the speeds of the survey's wall.
-
-    The grid has these. A block falls from a small rotation φ with ω² = 2 p² φ sin α, so that another p and α
-    make all impacts faster by nearly the same share.
-    """
-    if not (strength := values.get(key, 0.0)):
-        return 0.0
-    survey = run.survey
-    faster = math.sin(values["alpha"]) / math.sin(survey.alpha_rad)
-    return strength * values["p"] / survey.p_rad_s * math.sqrt(faster)
 
 
 def face_gain(values: Mapping[str, float], face: str) -> float:

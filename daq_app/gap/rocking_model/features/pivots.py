@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
-from daq_app.gap.rocking_model.features.differences import Term, of_shapes
+from daq_app.gap.rocking_model.features.differences import of_shapes
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.features.shapes import side_of
+from daq_app.gap.rocking_model.features.shapes import Term, side_of
 from daq_app.gap.rocking_model.motion.rotation import pivots_off
 
 _MIDDLE_OF_WEAR = 100.0

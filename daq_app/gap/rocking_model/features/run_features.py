@@ -24,6 +24,7 @@ from daq_app.gap.rocking_model.motion.rotation import (
     mean_rotation,
     sample_noise,
     straight_line,
+    wire_height,
     wires_of,
 )
 from daq_app.gap.rocking_model.records import GapRun, Survey
@@ -168,7 +169,7 @@ def _wire_heights(run: GapRun) -> tuple[float, float, float, float]:
         return 1.0, 1.0, 0.0, 0.0
     at_base = straight_line(z)[0]
     return (
-        float(np.sum(z**2) / np.sum(z)),
+        wire_height(run),
         float(np.sum(z**3) / np.sum(z**2)),
         float(at_base @ z**2),
         float(np.linalg.norm(at_base * z)),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
@@ -9,6 +11,8 @@ from daq_app.gap.rocking_model.motion.motion_grid import SETTLING_S, Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 from daq_app.gap.rocking_model.tolerances.sensors import PLAY_RAD
 
+Term = tuple[float, str, Callable[[], FloatArray]]
+"""Size of a shape, its name, and how it is made, (m,) on the grid."""
 UPRIGHT_RAD = 1e-4
 """Rotation over which the reaction goes from one edge to the other."""
 
@@ -36,15 +40,6 @@ def moment_shape(theta: FloatArray, alpha: float) -> FloatArray:
     return shape
 
 
-def slip_shape(grid: Grid) -> FloatArray:
-    """Sum of the signed approach speeds of the impacts so far, less its last value (the zero is at rest).
-
-    The mean over each interval of the grid: in that of an impact only a part of it is after the slip.
-    """
-    shape: FloatArray = _after(grid) @ grid.approach - float(np.sum(grid.approach))
-    return shape
-
-
 def with_play(values: FloatArray, plays: FloatArray) -> FloatArray:
     """What is read of values (m,) through each of some plays (k,) in their unit, (k, m).
 
@@ -69,8 +64,12 @@ def play_shape(theta: FloatArray) -> FloatArray:
     return shape
 
 
-def turned_shape(grid: Grid, *, alternating: bool) -> FloatArray:
-    """Sum of the approach speeds of the impacts so far, less its last value; with their signs or without."""
+def stepped_shape(grid: Grid, *, alternating: bool) -> FloatArray:
+    """Sum of the approach speeds of the impacts so far, with their signs or without, less its last value.
+
+    The zero is at rest. The mean over each interval of the grid: in that of an impact only a part of it is
+    after the step.
+    """
     speeds = grid.approach if alternating else np.abs(grid.approach)
     shape: FloatArray = _after(grid) @ speeds - float(np.sum(speeds))
     return shape
@@ -89,7 +88,7 @@ def top_shape(grid: Grid, impact: int) -> FloatArray:
 
 
 def turning_shape(grid: Grid, *, alternating: bool) -> FloatArray:
-    """What `turned_shape` is ahead of a wall that takes a while to turn at each impact, (m,), rad/s.
+    """What `stepped_shape` is ahead of a wall that takes a while to turn at each impact, (m,), rad/s.
 
     It slides about its corner for some hundredths of a second: with a time constant of `SETTLING_S` here.
     """

@@ -286,6 +286,12 @@ def mean_rotation(run: GapRun) -> FloatArray | None:
     return np.average(rows, axis=0, weights=run.positions(chosen)[:, 2] ** 2) if chosen else None
 
 
+def wire_height(run: GapRun) -> float:
+    """Height, m, at which a displacement of all wires looks like one rotation; 1 without any."""
+    z = run.positions(run.indices("wire"))[:, 2]
+    return float(np.sum(z**2) / np.sum(z)) if z.size else 1.0
+
+
 def _rotation_of_wire(run: GapRun, index: int) -> FloatArray | None:
     """θ, (n,), of a wire that reads; None where no rotation explains what it reads."""
     sensor, raw = run.sensors[index], run.aligned(index)

@@ -19,7 +19,7 @@ from sim_hardware.dynamics.effects import MOTION_EFFECTS
 TOLERANCE = 1e-10
 """Local error of the integrator, relative to the half-cycle: times good to nanoseconds."""
 _OF_IMPACTS = (par.R_SLOPE, par.R_SLOPE_SPEED, par.R_ASYMMETRY, par.CRUSH_R, par.UNEVEN_IMPACT)
-_BESIDE = ("flexible_wall", "yaw", "twist", "sliding", "corner_twist")
+_BESIDE = ("flexible_wall", "yaw", "twist", "sliding", "sliding_on", "corner_twist")
 """Effects that do not move the rotation of the joint."""
 _INDEX = {
     f"{spec.name}.{p.name}": p.index

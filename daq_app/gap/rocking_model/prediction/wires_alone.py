@@ -16,8 +16,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.differences import at_impacts
 from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE
+from daq_app.gap.rocking_model.features.impact_steps import slides, stepped, turns
 from daq_app.gap.rocking_model.features.oscillations.ring_response import (
     bent_form,
     bent_share,
@@ -26,8 +26,8 @@ from daq_app.gap.rocking_model.features.oscillations.ring_response import (
 )
 from daq_app.gap.rocking_model.features.response import delay
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.features.shapes import play_shape, slip_shape
-from daq_app.gap.rocking_model.features.turns import turn_share, turned, turns
+from daq_app.gap.rocking_model.features.shapes import play_shape
+from daq_app.gap.rocking_model.features.turns import turn_share
 from daq_app.gap.rocking_model.motion.swings import TOP_DEGREE
 
 
@@ -125,8 +125,8 @@ def _forms(run: RockingRun, values: Mapping[str, float]) -> Iterator[tuple[float
         yield play, _carried(run, "play")
     if share := values.get(CROSSTALK_SHARE, 0.0):
         yield share, _carried(run, "crosstalk")
-    if slip := at_impacts(run, values, "sliding.c"):
-        yield slip / run.wire_height_m, _carried(run, "slip")
+    for form, size in slides(run, values).items():
+        yield size / run.wire_height_m, _carried(run, form)
     for form, size in turns(run, values).items():
         yield size * turn_share(run, of_base=False), _carried(run, form)
 
@@ -142,10 +142,8 @@ def _work_out(run: RockingRun, form: str) -> _Carried:
             series = run.leaked
         case "play":
             series = play_shape(grid.theta)
-        case "slip":
-            series = slip_shape(grid)
-        case "corner_twist.on" | "corner_twist.back":
-            series = turned(run, form)
+        case "sliding.on" | "sliding.back" | "corner_twist.on" | "corner_twist.back":
+            series = stepped(run, form)
         case _:
             series = bent_form(run, form)
     crossings = np.hstack([swings.fall_s, swings.rise_s])

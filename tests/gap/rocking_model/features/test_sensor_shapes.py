@@ -10,7 +10,7 @@ import pytest
 from daq_app.gap.rocking_model.features.response import bessel
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import examine, extract
-from daq_app.gap.rocking_model.features.shapes import UPRIGHT_RAD, moment_shape, side_of, slip_shape
+from daq_app.gap.rocking_model.features.shapes import UPRIGHT_RAD, moment_shape, side_of, stepped_shape
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, coarse, pivots_off, wires_of
 from daq_app.rocking.geometry.wires import wire_shortening
@@ -88,7 +88,7 @@ def test_a_slip_within_an_interval_counts_for_the_part_of_it_that_follows() -> N
         jumps=empty,
         approach=speeds,
     )
-    assert np.abs(slip_shape(grid) - coarse(slipped, RATE_HZ)).max() < 0.02
+    assert np.abs(stepped_shape(grid, alternating=True) - coarse(slipped, RATE_HZ)).max() < 0.02
 
 
 def test_a_filter_of_no_delay_shows_where_more_would_lead() -> None:

@@ -9,11 +9,12 @@ import pytest
 
 from daq_app.gap.core import Options
 from daq_app.gap.rocking_model.features.block import Block
-from daq_app.gap.rocking_model.features.coefficients import block_coefficients
+from daq_app.gap.rocking_model.features.coefficients import block_coefficients, repeatability
 from daq_app.gap.rocking_model.features.differences import of_shapes
+from daq_app.gap.rocking_model.features.impact_steps import step_terms, turns
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import examine, extract
-from daq_app.gap.rocking_model.features.turns import turn_share, turn_terms
+from daq_app.gap.rocking_model.features.turns import turn_share
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare
@@ -70,9 +71,9 @@ def test_a_wall_that_takes_a_while_to_turn_turns_as_far(plain: GapRun, settling_
     seen = extract(plain)
     (block,) = [block for block in seen.blocks if block.family == "turn"]
     at_once, slowly = (_turns(_turning_at_one_edge(plain, constant_s)) for constant_s in (1e-4, settling_s))
-    of_size = of_shapes(seen, block, turn_terms(seen, _usual(seen) | {"corner_twist.c": TURN_S}))
+    of_size = of_shapes(seen, block, step_terms(seen, turns(seen, _usual(seen) | {"corner_twist.c": TURN_S})))
     alternating = _usual(seen) | {"corner_twist.c": TURN_S, "corner_twist.alternation": np.pi / 2.0}
-    forms = np.column_stack([of_size, of_shapes(seen, block, turn_terms(seen, alternating))])
+    forms = np.column_stack([of_size, of_shapes(seen, block, step_terms(seen, turns(seen, alternating)))])
     strength = np.linalg.lstsq(forms, slowly - at_once, rcond=None)[0]
     assert np.max(np.abs(strength)) < 0.02
 
@@ -103,7 +104,7 @@ def test_a_simulated_wall_that_turns_about_its_corners_is_predicted(alternation:
     seen = extract(run)
     (block,) = [block for block in seen.blocks if block.family == "turn"]
     values = _usual(seen) | {f"corner_twist.{key}": value for key, value in given.items()}
-    told = of_shapes(seen, block, turn_terms(seen, values))
+    told = of_shapes(seen, block, step_terms(seen, turns(seen, values)))
     assert np.max(np.abs(told)) > 0.3 * TURN_S
     np.testing.assert_allclose(block.values, told, atol=0.03 * TURN_S)
 
@@ -115,11 +116,11 @@ def test_impacts_are_as_fast_as_those_of_the_wall_and_not_of_the_survey() -> Non
     seen = extract(replace(run, survey=believed))
     (block,) = [block for block in seen.blocks if block.family == "turn"]
     wall = {"alpha": true.alpha_rad, "p": true.p_rad_s, "corner_twist.c": TURN_S}
-    told = of_shapes(seen, block, turn_terms(seen, wall))
+    told = of_shapes(seen, block, step_terms(seen, turns(seen, wall)))
     np.testing.assert_allclose(block.values, told, atol=0.03 * TURN_S)
 
 
-@pytest.mark.parametrize(("family", "coefficient"), [("wire", "drift"), ("base", "slip per speed")])
+@pytest.mark.parametrize(("family", "coefficient"), [("slide", "slip 1"), ("base", "slip per speed")])
 def test_a_turn_that_wires_of_one_end_take_for_something_else_is_predicted(
     plain: GapRun, family: str, coefficient: str
 ) -> None:
@@ -128,12 +129,15 @@ def test_a_turn_that_wires_of_one_end_take_for_something_else_is_predicted(
     before, after = (next(b for b in run.blocks if b.family == family) for run in (still, turning))
     values = _usual(turning) | {f"corner_twist.{key}": value for key, value in given.items()}
     told = of_shapes(
-        turning, after, turn_terms(turning, values, turn_share(turning, of_base=family == "base"))
+        turning,
+        after,
+        step_terms(turning, turns(turning, values), turn_share(turning, of_base=family == "base")),
     )
-    sd = np.sqrt(np.diag(after.covariance))
+    sd, still_sd = (np.sqrt(np.diag(block.covariance)) for block in (after, before))
     where = after.names.index(coefficient)
-    assert abs(told[where]) > 3.0 * sd[where]
-    np.testing.assert_array_less(np.abs(after.values - before.values - told), 0.6 * sd)
+    assert abs(told[where]) > 3.0 * still_sd[where]
+    repeats = [repeatability(after, i) for i in range(sd.size)]
+    np.testing.assert_array_less(np.abs(after.values - before.values - told), 0.6 * np.hypot(sd, repeats))
 
 
 def _of_one_end(run: GapRun) -> RockingRun:

@@ -13,11 +13,12 @@ from daq_app.gap.core import Parameter
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.parameters import known
 from daq_app.gap.rocking_model.features.block import Block, regress
-from daq_app.gap.rocking_model.features.differences import Term, family_difference, of_shapes
+from daq_app.gap.rocking_model.features.differences import family_difference, of_shapes
 from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size
 from daq_app.gap.rocking_model.features.pivots import pivots
 from daq_app.gap.rocking_model.features.response import bessel, first_order
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.shapes import Term
 from daq_app.gap.rocking_model.motion.late_joint import in_step
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Rotation, coarse

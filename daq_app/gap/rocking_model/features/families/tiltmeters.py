@@ -14,7 +14,6 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.parameters import known
 from daq_app.gap.rocking_model.features.block import Block, regress
 from daq_app.gap.rocking_model.features.differences import (
-    Term,
     base_rotation,
     difference_of,
     face_gain,
@@ -29,6 +28,7 @@ from daq_app.gap.rocking_model.features.family import (
 )
 from daq_app.gap.rocking_model.features.response import slow_response
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.shapes import Term
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.records import Survey

@@ -15,14 +15,13 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.parameters import known
 from daq_app.gap.rocking_model.features.block import Block, regress
 from daq_app.gap.rocking_model.features.differences import (
-    Term,
-    at_impacts,
     base_rotation,
     difference_of,
     face_gain,
     of_shapes,
 )
 from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size, with_crosstalk
+from daq_app.gap.rocking_model.features.impact_steps import slides, step_terms, turns
 from daq_app.gap.rocking_model.features.oscillations.ring_response import (
     bent_form,
     bent_share,
@@ -33,15 +32,16 @@ from daq_app.gap.rocking_model.features.oscillations.ring_response import (
 from daq_app.gap.rocking_model.features.pivots import travel
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import (
+    Term,
     moment_shape,
     play_shape,
     side_of,
-    slip_shape,
+    stepped_shape,
     top_shape,
     turn_shape,
     turning_shape,
 )
-from daq_app.gap.rocking_model.features.turns import turn_share, turn_terms
+from daq_app.gap.rocking_model.features.turns import turn_share
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import (
@@ -52,13 +52,28 @@ from daq_app.gap.rocking_model.motion.rotation import (
     mean_rotation,
     straight_line,
     wall_rotation,
+    wire_height,
 )
 from daq_app.gap.rocking_model.records import GapRun, Survey
+from daq_app.gap.rocking_model.tolerances.motion import AROUND_TEST_S
 from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, OTHER_WIRES, PLAY_RAD
 
 Columns = dict[str, tuple[FloatArray, str]]
 """Shapes of a regression, (m,) each, with the units of their coefficients."""
 
+_FEWEST_WIRES = 4
+"""Wires from which their scatter tells what their mean is off by."""
+_ON = "slip per speed to one side"
+_PARTS = 3
+"""Parts of a test, over each of which steps of all wires at impacts are added up: a slide goes on through all
+of them, and slips are uneven, which averages out over several impacts."""
+_BENDING = 2.0
+"""What a bending with z² moves the mean of wires over a wall's height by, over what it moves them apart."""
+_FEWEST_IMPACTS = 4 * _PARTS
+"""Impacts from which each part has some to either side."""
+_SLIP_SCATTER = 2e-4
+"""What these repeat by, m s/rad: 0.2 mm over a part in which the impacts' speeds add up to 1 rad/s. LVDTs
+whose zeros walk by 0.03 mm seem to move all wires by 0.1 mm. Raising it hides slides."""
 _TURNS = 8
 """Impacts at which a turn about the vertical is looked for: those with most speed."""
 _TURN_SCATTER_S = 1e-4
@@ -76,11 +91,85 @@ def _wire_block(scene: Scene) -> Block | None:
         coarse(joint.theta, run.rate_hz) if reference == "wire" else grid.theta
     )
     columns = rotation_columns(grid, run.survey.alpha_rad)
-    block = regress("wire", compared, columns, scene.in_range & grid.settled, ("zero",))
+    block = regress("wire", compared, columns, scene.in_range & grid.settled, ("zero", "drift"))
     if block is not None and len(wall_rotation(run)[1]) < len(run.indices("wire")):
         # Other wires than in the other runs: their mean has another calibration.
         block.covariance[block.names.index("gain"), block.names.index("gain")] += OTHER_WIRES**2
     return with_crosstalk(block, leaked_turn(run))
+
+
+def _slide_block(scene: Scene) -> Block | None:
+    """Drift that all wires share beside the rotation of the LVDTs, and what their steps at impacts add up to.
+
+    Over the whole record: while the wall is held and after it rests a drift goes on, and steps do not. Every
+    impact has its own step, for no base slides evenly. The shapes of the wires' rotation are fitted and
+    dropped.
+    """
+    run, joint, grid = scene.run, scene.joint, scene.grid
+    theta, count = mean_rotation(run), grid.impact_s.size
+    if theta is None or count <= _FEWEST_IMPACTS:
+        return None
+    lvdts = coarse(joint.theta, run.rate_hz)
+    shapes, height_m = rotation_columns(grid, run.survey.alpha_rad), wire_height(run)
+    steps = {f"impact {k + 1}": (turn_shape(grid, k) / height_m, "m s/rad") for k in range(count)}
+    # From the last impact that is told from others on, smaller ones follow: what they add up to is one step.
+    followed = (grid.time_s > grid.impact_s[-1]) & (grid.time_s < grid.rest_s + AROUND_TEST_S)
+    absorbed = (*(name for name in shapes if name != "drift"), f"impact {count}")
+    pick = grid.valid & grid.settled & ~followed
+    block = regress("slide", coarse(theta, run.rate_hz) - lvdts, shapes | steps, pick, absorbed)
+    if block is None:
+        return None
+    summed = _summed(grid.approach[:-1])
+    names = ("drift", *(f"slip {part + 1}" for part in range(_PARTS)))
+    block = replace(
+        block,
+        names=names,
+        units=("rad/s", *["m s/rad"] * _PARTS),
+        values=summed @ block.values,
+        covariance=summed @ block.covariance @ summed.T,
+        projection=summed @ block.projection,
+        said={name: ("wire", _ON if name != "drift" else name) for name in names},
+    )
+    return with_crosstalk(replace(block, covariance=_as_wires_agree(block, scene, lvdts)), leaked_turn(run))
+
+
+def _summed(approach: FloatArray) -> FloatArray:
+    """Weights, (1 + parts, 1 + k), of the drift and of steps per speed at k impacts of these speeds, rad/s.
+
+    The drift, and the mean slip per speed over as many parts of the test, in which the wall comes down by the
+    same sum of speeds. The weights are those next to the speeds in which steps to and fro cancel, whether
+    they go with the speed or not: bases that give way, wires with play or sides make such.
+    """
+    speeds, sides = np.abs(approach), np.sign(approach)
+    part = np.minimum((np.cumsum(speeds) - 0.5 * speeds) / speeds.sum() * _PARTS, _PARTS - 1).astype(int)
+    summed = np.zeros((1 + _PARTS, 1 + speeds.size))
+    summed[0, 0] = 1.0
+    for k in range(_PARTS):
+        inside = part == k
+        shares = speeds[inside] / speeds[inside].sum()
+        rules = np.array([np.ones(shares.size), sides[inside], sides[inside] / speeds[inside]])
+        wanted = np.array([1.0, 0.0, 0.0])
+        summed[1 + k, 1:][inside] = shares + np.linalg.pinv(rules) @ (wanted - rules @ shares)
+    return summed
+
+
+def _as_wires_agree(block: Block, scene: Scene, theta: FloatArray) -> FloatArray:
+    """Covariance of the coefficients, (k, k), as single wires have them about their mean.
+
+    Each wire's zero walks by itself. A base that slides unevenly is a walk as well, which all wires share.
+    `theta`: rotation of the LVDTs, (m,), rad.
+    """
+    run = scene.run
+    _, chosen = wall_rotation(run)
+    if len(chosen) < _FEWEST_WIRES:
+        return block.covariance
+    weights = run.positions(chosen)[:, 2] / run.positions(chosen)[:, 2].sum()
+    each = _beyond_rigid(run, theta, chosen)[:, block.pick] @ block.projection.T / wire_height(run)
+    apart = each - weights @ each
+    scatter = (weights * apart.T) @ apart / (1.0 - float(weights @ weights))
+    # A wall that bends moves the mean of its wires further than it moves them apart, however many there are.
+    # Few wires tell correlations badly: half of each is kept.
+    return np.asarray(_BENDING**2 * 0.5 * (scatter + np.diag(np.diag(scatter))))
 
 
 def leaked_turn(run: GapRun) -> FloatArray:
@@ -90,9 +179,9 @@ def leaked_turn(run: GapRun) -> FloatArray:
     return np.asarray(heights @ crosstalk(run, chosen) / (heights @ heights))
 
 
-def _beyond_rigid(run: GapRun, grid: Grid, chosen: Sequence[int]) -> FloatArray:
-    """What wires show beyond those of a rigid wall on still edges, (k, m), m."""
-    ideal = [Wire(run.sensors[i], run.survey.half_base_m).shortening(grid.theta) for i in chosen]
+def _beyond_rigid(run: GapRun, theta: FloatArray, chosen: Sequence[int]) -> FloatArray:
+    """What wires show beyond those of a rigid wall at `theta`, (m,), rad, on still edges: (k, m), m."""
+    ideal = [Wire(run.sensors[i], run.survey.half_base_m).shortening(theta) for i in chosen]
     return np.array([gridded(run, i) for i in chosen]) - np.array(ideal)
 
 
@@ -116,10 +205,10 @@ def _translation_block(scene: Scene) -> Block | None:
     if len(set(np.round(heights, 2))) < 2 or len(chosen) < len(run.indices("wire")):
         return None  # what the base seems to do hangs on the calibration of each wire
     at_base = straight_line(heights)[0]
-    moved = at_base @ _beyond_rigid(run, grid, chosen)
+    moved = at_base @ _beyond_rigid(run, grid.theta, chosen)
     columns = {
         "zero": (np.ones_like(grid.theta), "m"),
-        "slip per speed": (slip_shape(grid), "m s/rad"),
+        "slip per speed": (stepped_shape(grid, alternating=True), "m s/rad"),
         "follows rotation": (grid.theta, "m/rad"),
         "drift": (grid.time_s, "m/s"),
     }
@@ -141,7 +230,7 @@ def _turn_block(scene: Scene) -> Block | None:
     if len(chosen) < len(run.indices("wire")) or np.linalg.matrix_rank(design) < 3 or len(chosen) < 4:
         return None
     weights = -np.linalg.pinv(design)[2]
-    turned = weights @ _beyond_rigid(run, grid, chosen)
+    turned = weights @ _beyond_rigid(run, grid.theta, chosen)
     theta, count = grid.theta, min(_TURNS, grid.impact_s.size - 1)
     absorbed = {
         "gain": (theta, "1"),
@@ -200,7 +289,7 @@ def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) ->
         (-face_gain(values, "face_b"), "negative", lambda: np.minimum(theta, 0.0)),
         (values["wire_even"], "even", lambda: theta**2),
         (values["wire_play"], "play", lambda: play_shape(theta)),
-        (at_impacts(run, values, "sliding.c") / run.wire_height_m, "slip", partial(slip_shape, run.grid)),
+        *step_terms(run, slides(run, values), 1.0 / run.wire_height_m),
         *_moved_apart(run, values, of_base=False),
     )
     coefficients = of_shapes(run, block, shapes)
@@ -214,14 +303,14 @@ def _moved_apart(run: RockingRun, values: Mapping[str, float], of_base: bool) ->
     bent = bent_share(run, of_base=of_base)
     for form, size in bent_wall(run, values).items():
         yield size * bent, form, partial(bent_form, run, form)
-    yield from turn_terms(run, values, turn_share(run, of_base=of_base))
+    yield from step_terms(run, turns(run, values), turn_share(run, of_base=of_base))
 
 
 def _predict_base(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     theta = run.grid.theta
     shapes: tuple[Term, ...] = (
         (values["base_follow"] * run.base_lever, "theta", lambda: theta),
-        (at_impacts(run, values, "sliding.c"), "slip", partial(slip_shape, run.grid)),
+        *step_terms(run, slides(run, values)),
         (values.get("wire_cosine@wire.kappa", 0.0) * run.base_bend_m2, "square", lambda: theta**2),
         *_moved_apart(run, values, of_base=True),
     )
@@ -235,7 +324,7 @@ def _predict_turn(run: RockingRun, block: Block, values: Mapping[str, float]) ->
     """Turns that stay, and what a wall that rings about the vertical or twists shows beside them."""
     kicks = kicks_that_turn(run, values).items()
     rung = ((kick, key, partial(_rung, run, key)) for key, kick in kicks)
-    return of_shapes(run, block, (*turn_terms(run, values), *rung))
+    return of_shapes(run, block, (*step_terms(run, turns(run, values)), *rung))
 
 
 def _rung(run: RockingRun, key: str) -> FloatArray:
@@ -249,6 +338,7 @@ def _rung(run: RockingRun, key: str) -> FloatArray:
 
 def _observe(scene: Scene) -> Iterator[Block | None]:
     yield _wire_block(scene)
+    yield _slide_block(scene)
     yield _translation_block(scene)
     yield _turn_block(scene)
 
@@ -264,13 +354,14 @@ def _priors(survey: Survey) -> tuple[Parameter, ...]:
 
 FAMILY = SensorFamily(
     _observe,
-    {"wire": _predict_wire, "base": _predict_base, "turn": _predict_turn},
+    {"wire": _predict_wire, "slide": _predict_wire, "base": _predict_base, "turn": _predict_turn},
     {
         ("wire", "gain"): Size(1e-4),
         ("wire", "lag"): Size(2e-5, 2e-4, "s"),
         ("wire", "even harmonic"): Size(3e-3),
         ("wire", "step with moment"): Size(3e-6, 4e-6, "rad"),
-        ("wire", "drift"): Size(2e-6, 5e-6, "rad/s"),
+        ("slide", "drift"): Size(5e-6, 5e-6, "rad/s"),
+        **{("slide", f"slip {part + 1}"): Size(_SLIP_SCATTER, 1e-4, "m s/rad") for part in range(_PARTS)},
         ("base", "slip per speed"): Size(5e-5, 1e-4, "m s/rad"),
         ("base", "follows rotation"): Size(3e-4),
         **{("turn", f"impact {k + 1}"): Size(_TURN_SCATTER_S) for k in range(_TURNS)},
