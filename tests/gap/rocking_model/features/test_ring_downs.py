@@ -7,7 +7,9 @@ import pytest
 from scipy.signal import butter, lsim, sosfiltfilt
 
 from daq_app.gap.core.fitting.fit import fit
-from daq_app.gap.rocking_model.features.block import Block
+from daq_app.gap.rocking_model.features.block import Block, Shares
+from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal
+from daq_app.gap.rocking_model.features.oscillations.rings import Ring, ring_block, scan
 from daq_app.gap.rocking_model.motion.rotation import joint_rotation
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import model_and_library, prepare
@@ -72,3 +74,13 @@ def test_a_wall_that_its_own_inertia_bends_is_a_wall_that_rings() -> None:
     assert values["flexible_wall.frequency"] == pytest.approx(4.6, rel=0.03)
     assert values["flexible_wall.gain"] * 2.0 * np.pi * 4.6 == pytest.approx(1.5, rel=0.3)
     assert values["flexible_wall.forced"] > 0.6
+
+
+@pytest.mark.parametrize("slow", [True, False])
+def test_a_signal_of_which_impacts_leave_nothing_says_nothing(slow: bool) -> None:
+    """Late accelerometers on a wall that stays on its joint at every impact have no clean sample."""
+    grid = prepare(simulate({}, (0.25, -0.35)))[0][0].grid
+    nothing = np.zeros(grid.time_s.size, dtype=bool)
+    signal = Signal("accelerometer", grid.theta, nothing, Shares(yaw=1.0))
+    assert ring_block("turning", grid, [signal], Ring(5.0, 0.02, 10.0, 0.1, 0.1), slow=slow) is None
+    assert scan([grid], [[signal]], slow=slow) is None

@@ -105,8 +105,13 @@ def forced_column(grid: Grid, frequency_hz: float, zeta: float, *, accelerations
 
 
 def cleaner(grid: Grid, pick: NDArray[np.bool_], slow: bool) -> _Bases:
-    """Bases to be removed from a signal: smooth curves between impacts, or the rotation for slow turns."""
+    """Bases to be removed from a signal: smooth curves between impacts, or the rotation for slow turns.
+
+    None for a signal of which nothing is picked: where every impact lasts, little lies between them.
+    """
     places = np.flatnonzero(pick)
+    if not places.size:
+        return []
     if slow:
         t = grid.time_s[places]
         columns = np.column_stack(
