@@ -37,7 +37,7 @@ from daq_app.gap.rocking_model.inspection.wiring import mend
 from daq_app.gap.rocking_model.records import GapRun, Wiring
 from daq_app.gap.rocking_model.tolerances.inspection import COUNT_SD
 from daq_app.gap.rocking_model.tolerances.sensors import LATE_S
-from daq_app.gap.rocking_model.tolerances.walls import MIDDLE_OF_IMPACT_S
+from daq_app.gap.rocking_model.tolerances.walls import MIDDLE_OF_IMPACT_S, RINGING_GAIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,9 +246,15 @@ def completed(
                 ("frequency", "Hz", vibration.frequency_hz, len(examined) * vibration.frequency_sd**2),
             )
             row.append(scalar_block("floor", entries, grid))
-        features = replace(read, vibration=vibration, wiring=wiring, findings=tuple(seen), floor=floor)
+        # All wires of a wall that rings move together at impacts, and say nothing of slides.
+        told = read.without_block("slide") if _rings(bending, len(examined)) else read
+        features = replace(told, vibration=vibration, wiring=wiring, findings=tuple(seen), floor=floor)
         runs.append(features.with_blocks(row))
     return runs
+
+
+def _rings(bending: Ring | None, runs: int) -> bool:
+    return bending is not None and bending.decays and bending.gain > RINGING_GAIN * runs
 
 
 def _shaken(floor: FloorSpectrum | None, runs: int) -> list[list[RunFinding]]:

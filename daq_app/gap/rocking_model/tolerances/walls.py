@@ -82,6 +82,12 @@ It is no free scatter, which would grow until an effect that nobody named hides 
 weak bending and turning.
 """
 
+RINGING_GAIN = 50.0
+"""Gain in ln likelihood per run, 1, from which a wall rings so that wires tell no slide of its base.
+
+Walls that ring have 400 and more, sound ones 11 at most. Raising it takes a ring for a slide.
+"""
+
 # -- floor -----------------------------------------------------------------------------------------
 FLOOR_GAIN = 6.0
 """Gain in ln likelihood per run, 1, below which there is no vibration of the floor to speak of.
