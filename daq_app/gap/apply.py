@@ -28,6 +28,7 @@ FORMS_ONLY: Final = {
     ("flexible_wall", "forced"),
     ("flexible_wall", "recoil"),
     ("initial_velocity", "own"),
+    ("sliding_on", "own"),
 }
 """Parameters that the simulator has not: of a form that it knows only one of, or of a run by itself."""
 _MEASURED_ONLY: Final = ("ambient@floor", "acceleration@")

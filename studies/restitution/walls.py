@@ -99,6 +99,7 @@ WALLS = (
     *(SimulatedEffect("eccentric_mass", {"e": size}) for size in (0.002, 0.007)),
     *(SimulatedEffect("cubic", {"kappa": size}) for size in (0.1, 0.3)),
     *(SimulatedEffect("sliding", {"c": size}) for size in (0.002, 0.02)),
+    *(SimulatedEffect("sliding_on", {"c": size}) for size in (0.002, 0.01)),
     *(SimulatedEffect("corner_twist", {"c": size}) for size in (0.002, 0.006)),
     *(SimulatedEffect("yaw", {"kick": size}) for size in (0.01, 0.05)),
     *(SimulatedEffect("initial_velocity", {"omega": size}) for size in (0.01, 0.03)),
