@@ -2,7 +2,7 @@
 and how they settle after impacts.
 
 The motion is read from them where the LVDTs are late or go in steps, and then every peak and every crossing
-carries it.
+carries it. Those of LVDTs carry the recoil of a wall that rings.
 """
 
 from __future__ import annotations
