@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -26,3 +27,14 @@ def simulate(
 ) -> list[GapRun]:
     """One run per level with calibration errors of 0.2 % besides `effects`."""
     return campaign(short_rig(), short_rig(), effects, seed, levels, post_rest_s=1.0)
+
+
+def declared_slow(runs: list[GapRun], time_constant_s: float) -> list[GapRun]:
+    """The same recordings, whose tiltmeters the rig file gives another time constant."""
+    made = []
+    for run in runs:
+        sensors = (
+            replace(s, time_constant_s=time_constant_s) if s.family == "tiltmeter" else s for s in run.sensors
+        )
+        made.append(replace(run, sensors=tuple(sensors)))
+    return made

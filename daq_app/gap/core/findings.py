@@ -1,4 +1,4 @@
-"""Findings: what is measured directly about an instrument, before any model is fitted.
+"""Findings: what is measured directly about an instrument or the floor, before any model is fitted.
 
 A finding is taken out of the data by whoever measured it, so it never competes with a cause for a place
 in a hypothesis; any number can be there at once. Material findings join the answer; the others are listed.
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is wrong, or merely ordinary, about an instrument."""
+    """One thing that is wrong, or merely ordinary, about an instrument or the floor."""
 
     name: str
     """``hum@LV-A03``: what it is and of which channel or family."""
@@ -32,15 +32,15 @@ class Finding:
     material: bool
     """Whether it belongs into the answer; an ordinary one is listed only."""
     parameter: str = ""
-    """Name of its size in the library's words; empty where no effect of the library does the same."""
+    """Name of its size; empty where it is not known what does this."""
     in_noise: float = math.nan
     """Size over the rms noise of one reading of its family; NaN where that has no meaning."""
     unknown: float = 0.0
-    """Probability that it is something that matters and that no effect of the library does."""
+    """Probability that it matters and that nobody knows what does it."""
 
     @property
     def explained(self) -> bool:
-        """Whether the library has an effect that does the same."""
+        """Whether it is known what does this."""
         return bool(self.parameter)
 
 
@@ -50,5 +50,5 @@ def material(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 
 
 def unknown(findings: Sequence[Finding]) -> float:
-    """Probability that any finding is something that matters and that no effect of the library does."""
+    """Probability that any finding matters without it being known what does it."""
     return 1.0 - math.prod(1.0 - finding.unknown for finding in findings)

@@ -12,6 +12,7 @@ import numpy as np
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import Term, stepped_shape
+from daq_app.gap.rocking_model.motion.rotation import shown_by_wires
 
 _ALTERNATING: Final = {"on": False, "back": True}
 """Form of the steps → whether they change sign with the side that the wall comes from."""
@@ -58,3 +59,13 @@ def step_terms(run: RockingRun, steps: Mapping[str, float], share: float = 1.0) 
     """A share of steps, by their forms."""
     for form, size in steps.items():
         yield share * size, form, partial(stepped, run, form)
+
+
+def turn_share(run: RockingRun, *, of_base: bool) -> float:
+    """What a turn of 1 rad makes of the wires' mean rotation (weights z²), rad, or of the base, m."""
+
+    def share() -> float:
+        y = np.array([wire.sensor.position_m[1] for wire in run.wires])
+        return -shown_by_wires(run.wires, y, of_base=of_base)
+
+    return run.cache.constant(("turn share", of_base), share)

@@ -17,7 +17,7 @@ EFFECT_SIZES: dict[str, str] = {
     "ambient": "amplitude",
     "acceleration": "share",
 }
-"""What is known of an instrument or the floor and out of the families, and the parameter that is its size."""
+"""Findings of which it is known what does them, and the parameter that is the size."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class RunFinding:
     """One condition of one channel or family in one run: 0 ± sd on a healthy one."""
 
     key: str
-    """``hum@LV-A03``: the effect that explains it; or a plain word that no effect explains."""
+    """``hum@LV-A03``: what it is, and who has it."""
     observable: str
     unit: str
     value: float

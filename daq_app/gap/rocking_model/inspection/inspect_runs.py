@@ -15,6 +15,7 @@ import numpy as np
 from daq_app.config.rig import Family
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.rocking_model.features.block import Block, scalar_block
+from daq_app.gap.rocking_model.features.families.wires import SLIDE, STEADY
 from daq_app.gap.rocking_model.features.oscillations.floor_spectrum import floor_spectrum
 from daq_app.gap.rocking_model.features.oscillations.floor_vibration import find_vibration, without_vibration
 from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal, ring_signals
@@ -229,10 +230,14 @@ def completed(
     calm = [e.run for e in examined], [e.features.grid for e in examined]
     floor = floor_spectrum(*calm, bending)
     # A floor that vibrates irregularly is now louder, now less loud: its bursts are nothing else.
-    bursts = floor_bursts(*calm, examined[0].features.survey, bending) if floor is None else []
+    shaken = (
+        floor_bursts(*calm, examined[0].features.survey, bending)
+        if floor is None
+        else [[_irregular(floor, len(examined))] for _ in examined]
+    )
     runs = []
     known = with_quantisation_errors(examined, steps)
-    rows = merged(findings, bursts or _shaken(floor, len(examined)))
+    rows = merged(findings, shaken)
     for row, entry, vibration, seen, read in zip(
         blocks_by_run, examined, vibrations, rows, known, strict=True
     ):
@@ -246,25 +251,32 @@ def completed(
                 ("frequency", "Hz", vibration.frequency_hz, len(examined) * vibration.frequency_sd**2),
             )
             row.append(scalar_block("floor", entries, grid))
-        # All wires of a wall that rings move together at impacts, and say nothing of slides.
-        told = read.without_block("slide") if _rings(bending, len(examined)) else read
+        told = _with_one_drift(read, rings=_rings(bending, len(examined)))
         features = replace(told, vibration=vibration, wiring=wiring, findings=tuple(seen), floor=floor)
         runs.append(features.with_blocks(row))
     return runs
 
 
+def _with_one_drift(run: RockingRun, *, rings: bool) -> RockingRun:
+    """The run with the drift of its wires beside their steps at impacts, where these can be told.
+
+    All wires of a wall that rings move together at impacts, and say nothing of slides.
+    """
+    slides = not rings and any(block.family == SLIDE for block in run.blocks)
+    return run.without_block(STEADY if slides else SLIDE)
+
+
 def _rings(bending: Ring | None, runs: int) -> bool:
+    """Whether the wall rings far beyond what sound ones show."""
     return bending is not None and bending.decays and bending.gain > RINGING_GAIN * runs
 
 
-def _shaken(floor: FloorSpectrum | None, runs: int) -> list[list[RunFinding]]:
-    """The finding of an irregular floor in every run, as the amplitude of a sinusoid of the same power."""
-    if floor is None:
-        return [[] for _ in range(runs)]
+def _irregular(floor: FloorSpectrum, runs: int) -> RunFinding:
+    """The finding of an irregular floor in one of the runs: amplitude of a sinusoid of the same power."""
     size, sd = (math.sqrt(2.0) * value for value in (floor.total_m_s2, floor.sd_m_s2))
     # It is found from all runs at once: what is said in every run is known only once.
     words = f"most at {floor.loudest_hz:.1f} Hz"
-    return [[RunFinding("ambient@floor", words, "m/s²", size, math.sqrt(runs) * sd)] for _ in range(runs)]
+    return RunFinding("ambient@floor", words, "m/s²", size, math.sqrt(runs) * sd)
 
 
 def _on_still_floor(entry: Examined, vibration: Vibration | None) -> Examined:

@@ -11,7 +11,7 @@ from daq_app.gap.core import Options
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.run_features import examine, extract
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.study import diagnose_runs
+from daq_app.gap.rocking_model.study import diagnose_runs, prepare
 from tests.support.simulated_wall import simulate
 
 LEVELS = (0.2, -0.28, 0.36, -0.24)
@@ -96,6 +96,22 @@ def test_a_wall_that_slides_to_one_side_by_uneven_steps_is_said_to(plain: tuple[
     assert (found.decision.verdict, found.decision.effects) == ("effect", ("sliding_on",))
     size = next(p for p in found.effect_parameters if p.name == "sliding_on.c")
     assert size.value == pytest.approx(SLIP_S_M, rel=0.3)
+
+
+@pytest.mark.parametrize("rings", [False, True])
+def test_wires_tell_their_drift_once_and_no_slide_of_a_wall_that_rings(rings: bool) -> None:
+    effects = {"drift@wire": {"rate": 5e-4}}
+    if rings:
+        effects["flexible_wall"] = {"gain": 0.02, "frequency": 5.0, "zeta": 0.01}
+    for run in prepare(simulate(effects, LEVELS[:2]))[0]:
+        families = [block.family for block in run.blocks]
+        assert families.count("steady") == rings and families.count("slide") == (not rings)
+        (drift,) = [
+            value
+            for value, label in zip(run.features.values, run.features.labels, strict=True)
+            if (label.channel, label.observable) == ("wire", "drift")
+        ]
+        assert drift == pytest.approx(5e-4 / run.wire_height_m, rel=0.3)
 
 
 def test_a_drift_of_all_wires_is_said_to_be_one(plain: tuple[GapRun, ...]) -> None:

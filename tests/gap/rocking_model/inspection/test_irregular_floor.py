@@ -11,8 +11,11 @@ import pytest
 from daq_app.gap.blind.making.make import Order, make_case
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.findings import findings_of
+from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 from daq_app.gap.rocking_model.records import load_run
 from daq_app.gap.rocking_model.study import diagnose_prepared, model_and_library, prepare
+from daq_app.gap.rocking_model.tolerances.motion import KNOCK_S
+from tests.support.simulated_wall import simulate
 
 RIG = Path(__file__).parents[4] / "configs" / "fr1.toml"
 SEED = 12
@@ -61,3 +64,17 @@ def test_a_quiet_floor_changes_nothing(tmp_path: Path) -> None:
     runs, _ = _case(tmp_path, "nothing")
 
     assert not any(f.name == "ambient@floor" for f in findings_of(runs))
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_two_knocks_with_next_to_nothing_between_them_are_no_floor() -> None:
+    """A part of a sample or two tells no frequency, and must not spoil what the other parts tell."""
+    runs = simulate({}, (0.25, -0.35, 0.3))
+    for run in runs:
+        step = round(run.rate_hz / GRID_HZ)
+        apart = (round(KNOCK_S * GRID_HZ) + 1) * step
+        first = (run.channels.shape[1] // step - 100) * step - apart
+        chosen = run.indices("accelerometer")
+        for at in (first, first + apart):
+            run.channels[chosen, at : at + step // 2] += 5.0
+    assert all(run.floor is None for run in prepare(runs)[0])

@@ -15,7 +15,7 @@ from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, coarse, mean_rota
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare
 from tests.support.gap.conditions import conditions_found
-from tests.support.simulated_wall import simulate
+from tests.support.simulated_wall import declared_slow, simulate
 
 LEVELS = (0.25, -0.35)
 RIG_S = 0.3
@@ -88,14 +88,5 @@ def test_sound_tiltmeters_of_any_time_constant_are_not_blamed(
     effect: dict[str, dict[str, float]], declared_s: float
 ) -> None:
     """A family that is slow or late makes them look odd against its rotation, and not against the other."""
-    runs = [
-        replace(
-            run,
-            sensors=tuple(
-                replace(s, time_constant_s=declared_s) if s.family == "tiltmeter" else s for s in run.sensors
-            ),
-        )
-        for run in simulate(effect, LEVELS)
-    ]
-    prepared, _ = prepare(runs)
+    prepared, _ = prepare(declared_slow(simulate(effect, LEVELS), declared_s))
     assert not [key for key in conditions_found(prepared) if key.startswith(("acceleration", "unlike"))]

@@ -13,7 +13,7 @@ from daq_app.gap.rocking_model.inspection.wiring import mend
 from daq_app.gap.rocking_model.records import GapRun, Wiring
 from daq_app.gap.rocking_model.study import prepare
 from tests.support.gap.conditions import conditions_found
-from tests.support.simulated_wall import simulate
+from tests.support.simulated_wall import declared_slow, simulate
 
 LEVELS = (0.25, -0.35)
 INSTRUMENT = {"TL-1X": "TL-1Y", "TL-2X": "TL-2Y"}
@@ -44,16 +44,7 @@ def test_exchanged_axes_are_put_back_whatever_the_time_constant(
     pairs: dict[str, str], declared_s: float
 ) -> None:
     sound = simulate({"lag@wire": {"tau": 4e-3}}, LEVELS)
-    runs = [
-        replace(
-            run,
-            sensors=tuple(
-                replace(s, time_constant_s=declared_s) if s.family == "tiltmeter" else s for s in run.sensors
-            ),
-        )
-        for run in _exchanged(sound, pairs)
-    ]
-    mended, wiring = mend(runs)
+    mended, wiring = mend(declared_slow(_exchanged(sound, pairs), declared_s))
     assert dict(wiring.exchanged) == pairs | {b: a for a, b in pairs.items()}
     assert wiring.reversed_ids == ()
     for run, plain in zip(mended, sound, strict=True):

@@ -21,7 +21,7 @@ from daq_app.gap.rocking_model.features.differences import (
     of_shapes,
 )
 from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size, with_crosstalk
-from daq_app.gap.rocking_model.features.impact_steps import slides, step_terms, turns
+from daq_app.gap.rocking_model.features.impact_steps import slides, step_terms, turn_share, turns
 from daq_app.gap.rocking_model.features.oscillations.ring_response import (
     bent_form,
     bent_share,
@@ -41,7 +41,6 @@ from daq_app.gap.rocking_model.features.shapes import (
     turn_shape,
     turning_shape,
 )
-from daq_app.gap.rocking_model.features.turns import turn_share
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import (
@@ -61,6 +60,8 @@ from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, OTHER_WIRE
 Columns = dict[str, tuple[FloatArray, str]]
 """Shapes of a regression, (m,) each, with the units of their coefficients."""
 
+SLIDE, STEADY = "slide", "steady"
+"""Blocks of which a run keeps one: drift of the wires beside steps at impacts, and as if there were none."""
 _FEWEST_WIRES = 4
 """Wires from which their scatter tells what their mean is off by."""
 _ON = "slip per speed to one side"
@@ -82,7 +83,8 @@ _TURN_LEVER_1_M = math.sqrt(2.0)
 """… whose turn is this many times, 1/m, what one of them steps by."""
 
 
-def _wire_block(scene: Scene) -> Block | None:
+def _rotation_block(scene: Scene, family: str, absorbed: tuple[str, ...]) -> Block | None:
+    """How the wires' rotation differs from that of the other family; the shapes `absorbed` are dropped."""
     run, joint, grid, reference = scene.run, scene.joint, scene.grid, scene.reference
     theta = mean_rotation(run)
     if theta is None:
@@ -91,8 +93,10 @@ def _wire_block(scene: Scene) -> Block | None:
         coarse(joint.theta, run.rate_hz) if reference == "wire" else grid.theta
     )
     columns = rotation_columns(grid, run.survey.alpha_rad)
-    block = regress("wire", compared, columns, scene.in_range & grid.settled, ("zero", "drift"))
-    if block is not None and len(wall_rotation(run)[1]) < len(run.indices("wire")):
+    block = regress(family, compared, columns, scene.in_range & grid.settled, ("zero", *absorbed))
+    if block is None:
+        return None
+    if "gain" in block.names and len(wall_rotation(run)[1]) < len(run.indices("wire")):
         # Other wires than in the other runs: their mean has another calibration.
         block.covariance[block.names.index("gain"), block.names.index("gain")] += OTHER_WIRES**2
     return with_crosstalk(block, leaked_turn(run))
@@ -116,7 +120,7 @@ def _slide_block(scene: Scene) -> Block | None:
     followed = (grid.time_s > grid.impact_s[-1]) & (grid.time_s < grid.rest_s + AROUND_TEST_S)
     absorbed = (*(name for name in shapes if name != "drift"), f"impact {count}")
     pick = grid.valid & grid.settled & ~followed
-    block = regress("slide", coarse(theta, run.rate_hz) - lvdts, shapes | steps, pick, absorbed)
+    block = regress(SLIDE, coarse(theta, run.rate_hz) - lvdts, shapes | steps, pick, absorbed)
     if block is None:
         return None
     summed = _summed(grid.approach[:-1])
@@ -337,7 +341,9 @@ def _rung(run: RockingRun, key: str) -> FloatArray:
 
 
 def _observe(scene: Scene) -> Iterator[Block | None]:
-    yield _wire_block(scene)
+    yield _rotation_block(scene, "wire", ("drift",))
+    steady = _rotation_block(scene, STEADY, ("gain", "lag", "even harmonic", "step with moment"))
+    yield None if steady is None else replace(steady, said={"drift": ("wire", "drift")})
     yield _slide_block(scene)
     yield _translation_block(scene)
     yield _turn_block(scene)
@@ -354,14 +360,21 @@ def _priors(survey: Survey) -> tuple[Parameter, ...]:
 
 FAMILY = SensorFamily(
     _observe,
-    {"wire": _predict_wire, "slide": _predict_wire, "base": _predict_base, "turn": _predict_turn},
+    {
+        "wire": _predict_wire,
+        STEADY: _predict_wire,
+        SLIDE: _predict_wire,
+        "base": _predict_base,
+        "turn": _predict_turn,
+    },
     {
         ("wire", "gain"): Size(1e-4),
         ("wire", "lag"): Size(2e-5, 2e-4, "s"),
         ("wire", "even harmonic"): Size(3e-3),
         ("wire", "step with moment"): Size(3e-6, 4e-6, "rad"),
-        ("slide", "drift"): Size(5e-6, 5e-6, "rad/s"),
-        **{("slide", f"slip {part + 1}"): Size(_SLIP_SCATTER, 1e-4, "m s/rad") for part in range(_PARTS)},
+        (STEADY, "drift"): Size(2e-6, 5e-6, "rad/s"),
+        (SLIDE, "drift"): Size(5e-6, 5e-6, "rad/s"),
+        **{(SLIDE, f"slip {part + 1}"): Size(_SLIP_SCATTER, 1e-4, "m s/rad") for part in range(_PARTS)},
         ("base", "slip per speed"): Size(5e-5, 1e-4, "m s/rad"),
         ("base", "follows rotation"): Size(3e-4),
         **{("turn", f"impact {k + 1}"): Size(_TURN_SCATTER_S) for k in range(_TURNS)},

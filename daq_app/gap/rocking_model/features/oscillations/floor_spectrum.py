@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.oscillations.floor_vibration import QuietRecord, quiet_record
+from daq_app.gap.rocking_model.features.oscillations.floor_vibration import quiet_record
 from daq_app.gap.rocking_model.features.oscillations.rings import Ring
 from daq_app.gap.rocking_model.features.oscillations.vibration import FloorSpectrum
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
@@ -24,6 +25,8 @@ _BANDS_HZ = np.arange(0.5, 13.0, 0.5)
 """Ends of the bands. Slower ones show in no part at rest; what is faster turns a wall by less than noise."""
 _PART = 200
 """Samples of the grid in a part, 1 s: longer rests are cut."""
+_SHORTEST = 100
+"""Samples of a part that is used: a shorter one tells no frequency."""
 _FEWEST_PARTS = 6
 """Parts at rest from which their differences say how sure the mean is."""
 
@@ -50,21 +53,20 @@ def floor_spectrum(runs: Sequence[GapRun], grids: Sequence[Grid], ring: Ring | N
 
 def _parts(run: GapRun, grid: Grid, ring: Ring | None) -> list[tuple[int, FloatArray]]:
     """(samples, cross-power in every band, (m/s²)²) of each part at rest of a run."""
-    chosen = run.steady_accelerometers("x")
-    halves = [quiet_record(run, grid, ring, chosen[start::2]) for start in (0, 1)]
-    known = [half for half in halves if half is not None]
-    if len(known) < 2:
+    record = quiet_record(run, grid, ring)
+    if record is None or len(record.each) < 2:
         return []
-    one, other = (_pieces(half) for half in known)
-    return [(a.size, _cross_power(a, b)) for a, b in zip(one, other, strict=True)]
-
-
-def _pieces(record: QuietRecord) -> list[FloatArray]:
-    """The parts without a gap between them, cut to one or two seconds."""
     gaps = np.flatnonzero(np.diff(record.time_s) > 1.5 / GRID_HZ) + 1
+    one, other = (_pieces(record.each[start::2].mean(axis=0), gaps) for start in (0, 1))
+    pairs = zip(one, other, strict=True)
+    return [(a.size, _cross_power(a, b)) for a, b in pairs if a.size >= _SHORTEST]
+
+
+def _pieces(values: FloatArray, gaps: NDArray[np.intp]) -> list[FloatArray]:
+    """What lies between gaps, cut to one or two seconds."""
     return [
         piece
-        for whole in np.split(record.left, gaps)
+        for whole in np.split(values, gaps)
         for piece in np.array_split(whole, max(whole.size // _PART, 1))
     ]
 

@@ -33,16 +33,18 @@ _SHORTEST, _ENOUGH = 60, 120
 
 @dataclass(frozen=True, slots=True)
 class QuietRecord:
-    """Accelerometer record of the held and the resting wall, with what explains it besides the floor."""
+    """What accelerometers show of the floor while the wall is held and after it rests."""
 
     time_s: FloatArray
-    values: FloatArray
+    each: FloatArray
+    """(k, n) what nothing but the floor and noise explains, of every accelerometer."""
     basis: FloatArray
+    """(n, b) orthonormal: what explains the rest."""
 
     @property
     def left(self) -> FloatArray:
-        """What nothing but the floor and noise explains, (n,)."""
-        return self.values - self.basis @ (self.basis.T @ self.values)
+        """(n,) the mean of all accelerometers."""
+        return np.asarray(self.each.mean(axis=0))
 
 
 def find_vibration(
@@ -72,10 +74,7 @@ def _seen(
     runs: Sequence[GapRun], grids: Sequence[Grid], ring: Ring | None
 ) -> tuple[list[QuietRecord], list[QuietRecord | None], FloatArray]:
     """(usable parts, parts of each run, gain of each frequency) without the ring-down of `ring`."""
-    data = [
-        quiet_record(run, grid, ring, run.steady_accelerometers("x"))
-        for run, grid in zip(runs, grids, strict=True)
-    ]
+    data = [quiet_record(run, grid, ring) for run, grid in zip(runs, grids, strict=True)]
     usable = [d for d in data if d is not None]
     gains = [_gain(d, FREQUENCIES_HZ) for d in usable]
     return usable, data, np.sum(gains, axis=0) if gains else np.zeros(FREQUENCIES_HZ.size)
@@ -94,14 +93,14 @@ def without_vibration(run: GapRun, grid: Grid, found: Vibration) -> GapRun:
     return replace(run, channels=channels)
 
 
-def quiet_record(run: GapRun, grid: Grid, ring: Ring | None, chosen: Sequence[int]) -> QuietRecord | None:
-    """The mean of the accelerometers `chosen` while the wall is held and rests; None for too short a time.
+def quiet_record(run: GapRun, grid: Grid, ring: Ring | None) -> QuietRecord | None:
+    """The accelerometers along x while the wall is held and rests; None for too short a time.
 
     `ring` is the wall's own ring-down after impacts.
     """
+    chosen = run.steady_accelerometers("x")
     if not chosen:
         return None
-    measured = np.mean([gridded(run, i) for i in chosen], axis=0)
     height = float(run.positions(chosen)[:, 2].mean())
     calm = quiet(run, grid)
     held, resting = calm & (grid.time_s < -_MARGINS_S[0]), calm & (grid.time_s > grid.rest_s + _MARGINS_S[1])
@@ -117,7 +116,8 @@ def quiet_record(run: GapRun, grid: Grid, ring: Ring | None, chosen: Sequence[in
     columns = np.column_stack([held, resting, *sway, *own])[pick].astype(float)
     columns[:, 2:] /= np.abs(columns[:, 2:]).max(axis=0) + 1e-30
     basis, _ = np.linalg.qr(columns[:, np.any(columns != 0.0, axis=0)])
-    return QuietRecord(grid.time_s[pick], measured[pick], basis)
+    measured = np.array([gridded(run, i)[pick] for i in chosen])
+    return QuietRecord(grid.time_s[pick], measured - (measured @ basis) @ basis.T, basis)
 
 
 def _rings_on(grid: Grid, ring: Ring, resting: NDArray[np.bool_]) -> list[FloatArray]:
