@@ -68,11 +68,11 @@ def test_a_quiet_floor_changes_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_two_knocks_with_next_to_nothing_between_them_are_no_floor() -> None:
-    """A part of a sample or two tells no frequency, and must not spoil what the other parts tell."""
+    """A part of two samples tells no frequency, and must not spoil what the other parts tell."""
     runs = simulate({}, (0.25, -0.35, 0.3))
     for run in runs:
         step = round(run.rate_hz / GRID_HZ)
-        apart = (round(KNOCK_S * GRID_HZ) + 1) * step
+        apart = (round(KNOCK_S * GRID_HZ) + 2) * step
         first = (run.channels.shape[1] // step - 100) * step - apart
         chosen = run.indices("accelerometer")
         for at in (first, first + apart):
