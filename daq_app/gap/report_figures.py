@@ -89,6 +89,7 @@ def draw_closure(axes: Axes, result: Diagnosis) -> None:
     axes.bar(place + 0.2, [result.gap.per_level[k][1] for k in levels], 0.38, color=AFTER, label="with it")
     axes.axhline(result.gap.floor, color="k", lw=0.8, ls=":", label="floor")
     axes.set_xticks(place, levels)
+    axes.set_ylim(top=1.35 * axes.get_ylim()[1])  # room for the legend above the bars
     axes.set_ylabel("gap over noise and scatter", fontsize=7)
     axes.tick_params(labelsize=7)
     axes.legend(fontsize=6.5, frameon=False)
