@@ -55,6 +55,7 @@ _PHRASES: Final = {
     "twist": "the wall twists about its vertical at {frequency|Hz}",
     "yaw": "the wall yaws at {frequency|Hz} after impacts",
     "residual_cable": "a cable still pulls on the release side, with {k|} of the restoring stiffness",
+    "taut_cable": "a cable stays taut while the wall rocks, with {k|} of the restoring stiffness",
     "initial_velocity": "the wall was let go with {omega|mrad/s}",
     "slow_release": "the release is slow: the force falls over {tau|ms}",
     "ambient": "the floor shakes with {amplitude|m/s²} at {frequency|Hz}",

@@ -317,6 +317,22 @@ MOTION_EFFECTS: Final[tuple[EffectSpec, ...]] = (
         "one side only, also where no sensor is near its range",
     ),
     EffectSpec(
+        "taut_cable",
+        "release",
+        "a cable pulls to one side while the wall stands upright",
+        "θ̈ ∋ k p² (θs − θ) while it is taut: below θs > 0, beyond θs < 0",
+        "preloaded cable",
+        (
+            Parameter("k", "1", 0.005, 0.2, "stiffness relative to W R", index=par.STAY, minimum=0.0),
+            Parameter("loose", "rad", -0.15, 0.15, "rotation at which it is slack", 0.05, par.STAY_LOOSE),
+            Parameter(
+                "release", "rad", -0.15, 0.15, "added to that on the release side", 0.0, par.STAY_RELEASE
+            ),
+        ),
+        ("base_tilt", "eccentric_mass"),
+        "the period at large rotations: a cable is a spring as well, and leans on one side alone",
+    ),
+    EffectSpec(
         "initial_velocity",
         "release",
         "the wall is moving when it is let go",

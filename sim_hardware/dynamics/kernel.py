@@ -130,7 +130,9 @@ def _first_kink(
     The step turns back at `x_turn` and `q_turn`; it is looked through on either side of that.
     """
     x_end, on_kink = 1.0, -1.0
-    for at in (c[terms.C_WINKLER], c[terms.C_SLACK] if c[terms.C_CABLE] > 0.0 else 0.0):
+    slack = c[terms.C_SLACK] if c[terms.C_CABLE] > 0.0 else 0.0
+    loose = c[terms.C_STAY_LOOSE] if c[terms.C_STAY] > 0.0 else 0.0
+    for at in (c[terms.C_WINKLER], slack, loose):
         for leg in range(2):
             low, high = (0.0, x_turn) if leg == 0 else (x_turn, 1.0)
             q_low, q_high = (q, q_turn) if leg == 0 else (q_turn, q1)

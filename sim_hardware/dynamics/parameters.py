@@ -73,7 +73,11 @@ TURN: Final = 46  # rad per (rad/s): turn about the vertical that stays after an
 TURN_ALTERNATION: Final = 47  # rad: 0 turns on and on, ±π/2 back and forth, ±π/4 on one side alone
 UNEVEN_IMPACT: Final = 48  # 1: unequal levers make r of the two sides differ as at a plastic impact; 0: not
 SLIDE_ON: Final = 49  # m per (rad/s): base slip at an impact towards +x, from either side
-N_PARAMETERS: Final = 50
+# a cable that is taut while the wall stands upright
+STAY: Final = 50  # stiffness relative to p²
+STAY_LOOSE: Final = 51  # rad: rotation at which it hangs loose, which has the sign of its pull
+STAY_RELEASE: Final = 52  # rad: what is added to that towards the side of the release
+N_PARAMETERS: Final = 53
 
 ODD_IN_TIME: Final = (ZETA, COULOMB, QUADRATIC, AMBIENT_HZ)
 """Parameters that change their sign where time runs backwards: losses become gains."""

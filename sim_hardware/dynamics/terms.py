@@ -45,7 +45,10 @@ C_OPEN: Final = 23  # 1 beyond θc of the compliant joint
 C_TAUT: Final = 24  # 1 beyond θs of the residual cable
 C_HOLD_EVEN: Final = 25
 C_HOLD_START: Final = 26  # time since the release, in units of 1/C_HOLD_RATE, at t = 0
-N_COEFFICIENTS: Final = 27
+C_STAY: Final = 27
+C_STAY_LOOSE: Final = 28  # rotation at which the stay hangs loose; negative: it pulls to the other side
+C_STAY_TAUT: Final = 29  # 1 while the stay pulls
+N_COEFFICIENTS: Final = 30
 _HOLDS: Final = 1e-6  # share of a holding force below which it is gone
 
 _GAUSS_X: Final = (0.0469100770306680, 0.2307653449471585, 0.5, 0.7692346550528415, 0.9530899229693320)
@@ -84,6 +87,8 @@ def setup(
     c[C_CUBIC] = vector[par.CUBIC] * p * p / (alpha * alpha)
     c[C_CABLE] = vector[par.CABLE] * p * p if side == release_side else 0.0
     c[C_SLACK] = vector[par.CABLE_SLACK]
+    c[C_STAY] = vector[par.STAY] * p * p
+    c[C_STAY_LOOSE] = side * (vector[par.STAY_LOOSE] + release_side * vector[par.STAY_RELEASE])
     c[C_HOLD] = 0.0
     c[C_HOLD_RATE] = 0.0
     c[C_HOLD_EVEN] = 0.0
@@ -97,7 +102,7 @@ def setup(
     c[C_GYRATION] = gyration
     plain = c[C_WINKLER] == 0.0 and c[C_EDGE] == 0.0 and c[C_AMBIENT] == 0.0 and c[C_CABLE] == 0.0
     plain = plain and c[C_VISCOUS] == 0.0 and c[C_COULOMB] == 0.0 and c[C_QUADRATIC] == 0.0
-    c[C_PLAIN] = 1.0 if plain and c[C_CUBIC] == 0.0 else 0.0
+    c[C_PLAIN] = 1.0 if plain and c[C_CUBIC] == 0.0 and c[C_STAY] == 0.0 else 0.0
 
 
 @part
@@ -109,6 +114,8 @@ def set_region(c: NDArray[np.float64], q: float, rising: bool) -> None:
     c[C_RISING] = 1.0 if rising else -1.0
     c[C_OPEN] = 1.0 if q > c[C_WINKLER] or (rising and q == c[C_WINKLER]) else 0.0
     c[C_TAUT] = 1.0 if q > c[C_SLACK] or (rising and q == c[C_SLACK]) else 0.0
+    slack = c[C_STAY_LOOSE]
+    c[C_STAY_TAUT] = 1.0 if slack < 0.0 or q < slack or (not rising and q == slack) else 0.0
 
 
 @part
@@ -160,6 +167,8 @@ def acceleration(q: float, v: float, t: float, c: NDArray[np.float64]) -> float:
     a -= c[C_CUBIC] * q * q * q
     if c[C_CABLE] > 0.0 and c[C_TAUT] > 0.0:
         a -= c[C_CABLE] * (q - c[C_SLACK])
+    if c[C_STAY] > 0.0 and c[C_STAY_TAUT] > 0.0:
+        a -= c[C_STAY] * (q - c[C_STAY_LOOSE])
     if c[C_AMBIENT] != 0.0:
         forcing = math.sin(c[C_AMBIENT_W] * t + c[C_AMBIENT_PHASE])
         a += c[C_AMBIENT] * forcing * math.cos(c[C_ALPHA] - q)

@@ -43,6 +43,7 @@ CASES: dict[str, Effects] = {
     "yaw": {"yaw": {"kick": 0.03, "frequency": 5.0, "zeta": 0.03}},
     "twist": {"twist": {"kick": 0.02, "frequency": 6.0, "zeta": 0.04}},
     "residual_cable": {"residual_cable": {"k": 0.04, "slack": 0.02}},
+    "taut_cable": {"taut_cable": {"k": 0.05, "loose": 0.05}},
     "initial_velocity": {"initial_velocity": {"omega": 0.012}},
     "slow_release": {"slow_release": {"tau": 0.04}},
     "ambient": {"ambient": {"amplitude": 0.06, "frequency": 2.3}},

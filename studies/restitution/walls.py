@@ -92,6 +92,7 @@ WALLS = (
     ),
     *(SimulatedEffect("twist", {"kick": size}) for size in (0.01, 0.05)),
     *(SimulatedEffect("residual_cable", {"k": size}) for size in (0.01, 0.05)),
+    *(SimulatedEffect("taut_cable", {"k": size, "loose": 0.05}) for size in (0.01, 0.05)),
     *(SimulatedEffect("slow_release", {"tau": size}) for size in (0.02, 0.1)),
     *(SimulatedEffect("crushing", {"loss": size}) for size in (0.01, 0.03)),
     *(SimulatedEffect("quadratic_drag", {"c": size}) for size in (0.02, 0.1)),

@@ -48,6 +48,7 @@ COMPARABLE: Final[dict[str, str]] = {
     "dwell": "tau",
     "bounce": "tau",
     "residual_cable": "k",
+    "taut_cable": "k",
     "slow_release": "tau",
     "ambient": "amplitude",
     "gain": "error",

@@ -52,7 +52,15 @@ _ONE_CHANNEL: dict[str, tuple[str, ...]] = {
     "wire": (*_OF_ALL, "wire_cosine", "wire_anchor", "wire_inertia"),
     "accelerometer": ("gain", "drift"),
 }
-_INERTIA_STARTS = {"frequency": (8.0, 14.0, 24.0), "zeta": (0.1, 0.3)}
+_STARTS = {
+    ("wire_inertia", "frequency"): (8.0, 14.0, 24.0),
+    ("wire_inertia", "zeta"): (0.1, 0.3),
+    # On a fixed side, or on that of the release.
+    ("taut_cable", "k"): (0.05,),
+    ("taut_cable", "loose"): (-0.04, 0.04),
+    ("taut_cable", "release"): (-0.08, 0.0, 0.08),
+}
+"""Values from which a fit starts where one to either side of the prior's centre will not do."""
 SMALLEST = {("residual_cable", "slack"): 4e-3}
 """Lower end of a range that the simulator lets begin at zero."""
 _RANGES = {
@@ -102,16 +110,18 @@ def _smallest(spec: EffectSpec, parameter: SpecParameter) -> float:
 
 def _parameter(spec: EffectSpec, parameter: SpecParameter) -> Parameter:
     """The prior of one of the simulator's parameters: its range is about two prior sd."""
-    per_run = (spec.name, parameter.name) in _PER_RUN
-    if (spec.name, parameter.name) in _LOGARITHMIC:
-        low = max(parameter.low, SMALLEST.get((spec.name, parameter.name), 1e-6))
-        ends = _RANGES.get((spec.name, parameter.name), ())
-        prior = between(parameter.name, *(ends or (low, parameter.high)), parameter.unit, parameter.text)
-        return replace(prior, per_run=per_run)
-    reach = _WIDER.get((spec.name, parameter.name), parameter.high)
-    of_sign = signed if parameter.low < 0 else positive
-    prior = of_sign(parameter.name, reach, parameter.unit, parameter.text, per_run=per_run)
-    return prior if per_run else replace(prior, smallest=_smallest(spec, parameter))
+    key = (spec.name, parameter.name)
+    if logarithmic := key in _LOGARITHMIC:
+        low = max(parameter.low, SMALLEST.get(key, 1e-6))
+        ends = _RANGES.get(key, (low, parameter.high))
+        prior = between(parameter.name, *ends, parameter.unit, parameter.text)
+    else:
+        of_sign = signed if parameter.low < 0 else positive
+        prior = of_sign(parameter.name, _WIDER.get(key, parameter.high), parameter.unit, parameter.text)
+    prior = replace(prior, starts=_STARTS.get(key, prior.starts))
+    if key in _PER_RUN:
+        return replace(prior, per_run=True)
+    return prior if logarithmic else replace(prior, smallest=_smallest(spec, parameter))
 
 
 _PLASTIC = Parameter(
@@ -184,8 +194,6 @@ def _sensor_effect(name: str, target: str, family: str, known: set[str]) -> Effe
     if name == "drift":
         unit = {"tiltmeter": "rad/s", "accelerometer": "m/s³"}.get(family, "m/s")
         parameters = (signed("rate", _DRIFT_REACH[family], unit, "drift of the zero"),)
-    elif name == "wire_inertia":
-        parameters = tuple(replace(p, starts=_INERTIA_STARTS[p.name]) for p in parameters)
     return Effect(
         f"{name}@{target}",
         "sensor",

@@ -66,6 +66,22 @@ def test_both_sides_mirror(wall: Wall) -> None:
     assert [i.time for i in right.impacts] == pytest.approx([i.time for i in left.impacts], abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("side", "moved", "towards"), [(-0.4, 0.2, -1.0), (0.3, 0.9, 1.0), (-0.4, 0.9, -1.0)]
+)
+def test_a_taut_cable_works_until_it_hangs_loose(
+    wall: Wall, side: float, moved: float, towards: float
+) -> None:
+    k, reach = 0.05, 0.04
+    cable = {"k": k, "reach_rad": reach, "side": side, "moved": moved}
+    for theta0 in (THETA0, -THETA0):
+        plain, held = go(wall, theta0=theta0), go(wall, {"taut_cable": cable}, theta0)
+        pull = towards * (math.copysign(1.0, theta0) if moved > 0.5 else 1.0)
+        loose = max(reach - pull * theta0, 0.0)
+        gained = (held.impacts[0].before ** 2 - plain.impacts[0].before ** 2) / 2.0
+        assert gained == pytest.approx(k * wall.p**2 * (loose**2 - reach**2) / 2.0, rel=1e-5)
+
+
 def test_coulomb_takes_level_times_path(wall: Wall) -> None:
     mu = 0.01
     plain, rubbed = go(wall), go(wall, {"coulomb": {"mu": mu}})

@@ -51,6 +51,22 @@ def test_an_effect_beats_its_rivals_and_its_strength_is_found(
     assert abs(strength - middle) < 1.5 * half + 0.02 * strength
 
 
+@pytest.mark.parametrize(
+    "where", [{"loose": 0.05}, {"loose": 0.0, "release": 0.05}], ids=["one side", "release side"]
+)
+def test_a_cable_that_pulls_all_the_time_is_no_tilted_base(where: dict[str, float]) -> None:
+    """It leans on one side alone where it is fixed, and on the side of each release where it is moved."""
+    result = diagnose_runs(
+        simulate({"taut_cable": {"k": 0.06, **where}}, LEVELS),
+        only=("taut_cable", "base_tilt", "alpha_asymmetry", "residual_cable", "initial_velocity"),
+    )
+    assert result.decision.effects == ("taut_cable",)
+    sizes = {p.name.partition(".")[2]: (p.low, p.high) for p in result.effect_parameters}
+    for name, true in ({"k": 0.06, "release": 0.0} | where).items():
+        low, high = sizes[name]
+        assert abs(true - 0.5 * (low + high)) < 0.75 * (high - low), name
+
+
 @pytest.mark.heavy
 @pytest.mark.timeout(900)
 def test_whole_diagnosis_of_a_viscous_wall() -> None:

@@ -267,6 +267,23 @@ def test_release_effects() -> None:
         agrees(simulated({"slow_release": {"tau": tau, "even": even}}), held, 2e-7 if even else 1e-8)
 
 
+@pytest.mark.parametrize(
+    ("loose", "release", "pull"),
+    [
+        (0.05, 0.0, lambda q: max(0.05 - q, 0.0)),
+        (0.02, 0.0, lambda q: max(0.02 - q, 0.0)),
+        (-0.015, 0.0, lambda q: -max(q + 0.015, 0.0)),
+        # Released to −x, where the cable is attached as well: it pulls there.
+        (0.0, 0.05, lambda q: -max(q + 0.05, 0.0)),
+        (0.01, -0.02, lambda q: max(0.03 - q, 0.0)),
+    ],
+)
+def test_a_taut_cable(loose: float, release: float, pull: Callable[[float], float]) -> None:
+    k = 0.08
+    held = simulated({"taut_cable": {"k": k, "loose": loose, "release": release}}, -THETA0)
+    agrees(held, reference(lambda t, q, w: gravity(q) + k * P2 * pull(q), theta0=-THETA0), 2e-7)
+
+
 def test_a_vibrating_floor() -> None:
     amplitude, f, phase = 0.3, 2.3, 0.7
 

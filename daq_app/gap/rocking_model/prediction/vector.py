@@ -28,7 +28,11 @@ _INDEX = {
     if p.index >= 0 and p.index not in _OF_IMPACTS and spec.name not in _BESIDE
 }
 _DEFAULTS = {
-    spec.name: [(p.index, p.default) for p in spec.parameters if p.default is not None and p.index >= 0]
+    spec.name: [
+        (f"{spec.name}.{p.name}", p.index, p.default)
+        for p in spec.parameters
+        if p.default is not None and p.index >= 0
+    ]
     for spec in MOTION_EFFECTS
 }
 PROBE_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45)
@@ -55,9 +59,9 @@ def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> FloatArray:
         value = values.get(key)
         if value is None:
             continue
-        for other, default in _DEFAULTS[key.rpartition(".")[0]]:
-            if vector[other] == 0.0:
-                vector[other] = default
+        for other, place, default in _DEFAULTS[key.rpartition(".")[0]]:
+            if other not in values:
+                vector[place] = default
         vector[index] = value
     vector[par.OMEGA0] += values["omega0"] + values.get("initial_velocity.own", 0.0)
     vector[par.COULOMB] += values.get("loss_power.mu", 0.0)

@@ -1,4 +1,4 @@
-"""What walls on real bases also do: ring slowly or fast, twist about a corner, stand on a floor that shakes.
+"""What walls on real bases also do: ring, twist about a corner, hang on a cable, stand on shaken floors.
 
 The laboratories beside `own` hide these too.
 """
@@ -23,6 +23,14 @@ _SLOW_RING: Final = replace(
     others=uniform(frequency_hz=(2.0, 7.0), zeta=(0.005, 0.05), recoil=(0.0, 0.2)),
 )
 _CORNER_TWIST: Final = Entry("corner_twist", "contact", "turn_s", 3e-4, 6e-3, signed=True)
+_TAUT_CABLE: Final = Entry(
+    "taut_cable",
+    "release",
+    "k",
+    0.01,
+    0.15,
+    others=uniform(reach_rad=(0.02, 0.1), side=(-1.0, 1.0), moved=(0.0, 1.0)),
+)
 _IRREGULAR_FLOOR: Final = Entry(
     "irregular_floor",
     "ambient",
@@ -37,9 +45,10 @@ WIDE_ENTRIES: Final[Mapping[str, Entry]] = {
     "flexible_wall": _FAST_RING,
     "slow_flexible_wall": _SLOW_RING,
     "corner_twist": _CORNER_TWIST,
+    "taut_cable": _TAUT_CABLE,
     "irregular_floor": _IRREGULAR_FLOOR,
 }
-WIDE_LIBRARY: Final = (*LIBRARY, "slow_flexible_wall", "corner_twist", "irregular_floor")
+WIDE_LIBRARY: Final = (*LIBRARY, "slow_flexible_wall", "corner_twist", "taut_cable", "irregular_floor")
 
 WIDE_CONTACT_ENTRIES: Final[Mapping[str, Entry]] = {**CONTACT_ENTRIES, "corner_twist": _CORNER_TWIST}
 WIDE_CONTACT_LIBRARY: Final = (

@@ -166,6 +166,15 @@ def _residual_cable(m: Mechanics, q: Parameters, release: Release) -> None:
     m.terms.append(pull)
 
 
+def _taut_cable(m: Mechanics, q: Parameters, release: Release) -> None:
+    """A cable under tension at upright, on one side of the rig or on the side of each release."""
+    towards = math.copysign(1.0, q["side"])
+    if q["moved"] > 0.5:
+        towards *= math.copysign(1.0, release.theta0)
+    stiffness, reach = q["k"] * m.wall.p**2, q["reach_rad"]
+    m.terms.append(lambda t, theta, omega, side: towards * stiffness * max(0.0, reach - towards * theta))
+
+
 def _rope_snag(m: Mechanics, q: Parameters, release: Release) -> None:
     """Outside: a rope catches once, for a tenth of a second."""
     start, length, strength = q["at_s"], 0.1, q["strength"] * m.wall.p**2 * m.wall.alpha
@@ -265,6 +274,7 @@ _ADD: dict[str, Callable[[Mechanics, Parameters, Release], None]] = {
     "one_sided_drag": _one_sided_drag,
     "hysteretic_joint": _hysteretic_joint,
     "residual_cable": _residual_cable,
+    "taut_cable": _taut_cable,
     "rope_snag": _rope_snag,
     "ambient": lambda m, q, release: _shaken(m, {"ambient": q}, release),
     "passing_lorry": lambda m, q, release: _shaken(m, {"passing_lorry": q}, release),
