@@ -25,6 +25,8 @@ _OTHER_WORDS: Final[dict[str, tuple[str, ...]]] = {
     "compliance": ("base_compliance", "rig_compliance"),
     "yaw": ("twist",),
     "sliding": ("sliding_on",),
+    "slippery_base": ("sliding",),
+    "slippery_edge": ("sliding",),
     "ambient": ("ambient_vibration",),
     "irregular_floor": ("ambient", "ambient_vibration"),
     "drift": ("offset_drift",),

@@ -40,6 +40,11 @@ class Policy:
     it is material: three times what is looked at, ten times what sound ones have in development laboratories;
     raising it hides tiltmeters that are no measure of rotation."""
 
+    finding_slip: float = 2e-4
+    """Slip of a base between two impacts, m, or turn, rad, from which it is material: where it stops, at the
+    next impact, a slip of 0.2 mm in 0.3 s takes as much of the speed as r scatters by; raising it hides slips
+    that change r."""
+
     # The model's own discrepancy
     usual_discrepancy: float = 1.0
     """Scale of the half-Cauchy prior of a group's discrepancy, in nominal sd (Gelman, Bayesian Analysis 1,

@@ -22,11 +22,15 @@ _LEAST = {
     "ringing": POLICY.finding_ringing,
     "shaking": POLICY.finding_shaking,
     "ambient": POLICY.finding_shaking,
+    "sliding": POLICY.finding_slip,
+    "corner_twist": POLICY.finding_slip,
     "crossed": POLICY.finding_crossed,
     "acceleration": POLICY.finding_unlike,
     "unlike": POLICY.finding_unlike,
 }
 """Size from which a condition that every laboratory has a little of is material; any other always is."""
+_FAMILIES = {"floor": "ambient", "base": "contact"}
+"""Families of what is no instrument's."""
 _FAMILY_WORDS = {
     "lvdt": "the LVDTs",
     "wire": "the wires",
@@ -62,7 +66,7 @@ def _finding(key: str, findings: Sequence[RunFinding], runs: int) -> Finding:
     return Finding(
         name=key,
         words=_words(kind, target, findings[0], size, unit) + f" in {where}",
-        family="ambient" if target == "floor" else "sensor",
+        family=_FAMILIES.get(target, "sensor"),
         probability=1.0 - chance,
         size=size,
         low=max(size - NORMAL_95 * sd, 0.0),
@@ -98,11 +102,16 @@ def _words(kind: str, target: str, finding: RunFinding, size: float, unit: str) 
         case "spikes":
             return f"{size:.2g} lone samples a second in {who}"
         case "saturation":
-            return f"{who} goes no further than {amount}"
+            goes = "go" if target in _FAMILY_WORDS else "goes"
+            return f"{who} {goes} no further than {amount}"
         case "polarity" | "swap" | "disagreement":
             return finding.observable
         case "ambient":
             return f"irregular vibration of the floor of {amount}, {finding.observable},"
+        case "sliding":
+            return f"{finding.observable} lets the base slip by {amount} between impacts"
+        case "corner_twist":
+            return f"{finding.observable} lets one end slip: the base turns by {amount} between impacts"
         case "crossed":
             return f"{who} shows {100 * size:.2g} % of the rotation across its axis"
         case "acceleration":

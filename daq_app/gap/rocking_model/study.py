@@ -25,6 +25,7 @@ from daq_app.gap.rocking_model.inspection.inspect_runs import (
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.prediction.floor_motion import on_its_floor
 from daq_app.gap.rocking_model.prediction.model import RockingModel
+from daq_app.gap.rocking_model.prediction.slipping import on_its_base
 from daq_app.gap.rocking_model.records import GapRun, check_consistent
 from daq_app.gap.rocking_model.tolerances.walls import EITHER, FAR_FROM_SURVEY
 from daq_app.workers import warm_up
@@ -74,7 +75,8 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
     examined, channels, findings_of_all = without_outlier_channels(examined, findings, reference)
     for entry in examined:
         limits += entry.features.notes
-    whole = [on_its_floor(run) for run in completed(examined, findings_of_all, channels, inspected.wiring)]
+    runs_of_all = completed(examined, findings_of_all, channels, inspected.wiring)
+    whole = [on_its_base(on_its_floor(run)) for run in runs_of_all]
     limits += [
         f"{name} disagrees with the other {family} channels; it is examined on its own."
         for name, family in channels.items()

@@ -9,7 +9,6 @@ import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
-from daq_app.gap.rocking_model.features.impact_steps import stepped, turns
 from daq_app.gap.rocking_model.features.oscillations.ring_response import (
     bent_form,
     bent_wall,
@@ -18,6 +17,7 @@ from daq_app.gap.rocking_model.features.oscillations.ring_response import (
 )
 from daq_app.gap.rocking_model.features.response import effects_on, responded
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.slips.impact_steps import stepped, turns
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, TAIL_S, Wire, coarse, straight_line
 from daq_app.gap.rocking_model.records import Sensor
 

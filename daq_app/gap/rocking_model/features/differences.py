@@ -10,10 +10,10 @@ import numpy as np
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE
-from daq_app.gap.rocking_model.features.impact_steps import slides, stepped
 from daq_app.gap.rocking_model.features.response import effects_on, responded, slow_response
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import Term, moment_shape, side_of
+from daq_app.gap.rocking_model.features.slips.impact_steps import slides, stepped
 from daq_app.gap.rocking_model.motion.rotation import anchors_turn
 
 

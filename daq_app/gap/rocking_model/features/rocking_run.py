@@ -13,6 +13,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.oscillations.vibration import FloorSpectrum, Vibration
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
+from daq_app.gap.rocking_model.features.slips.base_slip import BaseSlip
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Wire
 from daq_app.gap.rocking_model.motion.swings import Swings
@@ -57,6 +58,8 @@ class RockingRun:
     vibration: Vibration | None = None
     floor: FloorSpectrum | None = None
     """How the floor vibrates irregularly in all runs; None for one that does not."""
+    slip: BaseSlip | None = None
+    """How the base slips between impacts in all runs; None for one that does not."""
     wires: tuple[Wire, ...] = ()
     """All wires whose geometry is known."""
     leaked: FloatArray = field(default_factory=lambda: np.zeros(0))

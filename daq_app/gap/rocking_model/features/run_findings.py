@@ -16,6 +16,8 @@ EFFECT_SIZES: dict[str, str] = {
     "swap": "places",
     "ambient": "amplitude",
     "acceleration": "share",
+    "sliding": "slip",
+    "corner_twist": "turn",
 }
 """Findings of which it is known what does them, and the parameter that is the size."""
 

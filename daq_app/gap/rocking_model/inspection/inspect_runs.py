@@ -24,6 +24,7 @@ from daq_app.gap.rocking_model.features.oscillations.vibration import FloorSpect
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined, examine
 from daq_app.gap.rocking_model.features.run_findings import RunFinding, merged
+from daq_app.gap.rocking_model.features.slips.base_slip import find_slip, slip_findings
 from daq_app.gap.rocking_model.inspection.channel_faults import channel_block, find_outlier_channels
 from daq_app.gap.rocking_model.inspection.conditions import conditions_of, findings_per_run, without_hum
 from daq_app.gap.rocking_model.inspection.floor_bursts import floor_bursts
@@ -235,9 +236,10 @@ def completed(
         if floor is None
         else [[_irregular(floor, len(examined))] for _ in examined]
     )
+    slip = find_slip(*calm)
     runs = []
     known = with_quantisation_errors(examined, steps)
-    rows = merged(findings, shaken)
+    rows = merged(findings, shaken, [slip_findings(slip, len(examined))] * len(examined))
     for row, entry, vibration, seen, read in zip(
         blocks_by_run, examined, vibrations, rows, known, strict=True
     ):
@@ -252,7 +254,9 @@ def completed(
             )
             row.append(scalar_block("floor", entries, grid))
         told = _with_one_drift(read, rings=_rings(bending, len(examined)))
-        features = replace(told, vibration=vibration, wiring=wiring, findings=tuple(seen), floor=floor)
+        features = replace(
+            told, vibration=vibration, wiring=wiring, findings=tuple(seen), floor=floor, slip=slip
+        )
         runs.append(features.with_blocks(row))
     return runs
 

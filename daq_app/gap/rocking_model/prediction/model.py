@@ -116,29 +116,23 @@ def swing_features(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
     # r and what else acts at impacts only moves none of the half-cycles.
     cycles = run.cache.part("half-cycles", values, partial(_half_cycles, run))
     table, true = departed(run, values, cycles), cycles.true
-    count = cycles.levels.shape[1]
-    first = shooting.FIRST_CROSSING
     speeds_out, speeds_in = table[:, shooting.SPEED_OUT], table[:, shooting.SPEED_IN]
     pause = pause_at_impact(values, speeds_out)
-    # Crossings as times from their own peak: positive in the fall, negative in the rise.
-    crossings = table[:, first : first + 2 * count].copy()
-    crossings[:, count:] *= -1.0
-    begin, end, k = run.cache.constant("crossings", partial(_crossings_of, run))
-    times = crossings.take(end) - crossings.take(begin)
     across = run.across
-    times[across] += table[k, shooting.FALL_S] + pause[k] + table[k + 1, shooting.RISE_S]
+    times = half_cycle_times(run, table)
+    times[across] += pause[run.places[across, 0]]
     times = times + times_carry(run, values)
     times = times / (1.0 + values.get("clock.error", 0.0)) + free_times(run, values)
     if run.reference == "lvdt":
         # Before an impact one face opens, after it the other.
-        times[across] += np.sign(true[k]) * values[FACE_SKEW]
+        times[across] += np.sign(true[run.places[across, 0]]) * values[FACE_SKEW]
     k = run.peaks
     before = k - 1
     r = restitution_of(run, values, speeds_out[before], np.sign(true[before]), before)
     excess = (
         np.log(np.maximum(speeds_in[k], 1e-12)) - np.log(np.maximum(speeds_out[before], 1e-12)) - np.log(r)
     )
-    slopes = run.cache.constant("slopes", partial(_slopes, run))
+    slopes = peak_slopes(run)
     measured = np.log(np.abs(run.swings.peak_rad[k]))
     return times, measured - excess / slopes
 
@@ -147,11 +141,23 @@ def _loadings(run: RockingRun) -> dict[str, FloatArray]:
     """What each scatter does to the features, (n,) each: no parameter changes it."""
     r, times, releases, sensors = (np.zeros(len(run.features)) for _ in range(4))
     count, last = len(run.places), len(run.places) + run.peaks.size
-    r[count:last] = 1.0 / _slopes(run)
+    r[count:last] = 1.0 / peak_slopes(run)
     times[:count] = 1.0
     releases[:count] = (run.places[:, 0] == 0) & (run.places[:, 2] == 0)
     sensors[last:] = np.concatenate([np.zeros(0), *units(run)])
     return {SCATTER_R: r, SCATTER_TIME: times, SCATTER_RELEASE: releases, SCATTER_SENSOR: sensors}
+
+
+def half_cycle_times(run: RockingRun, table: FloatArray) -> FloatArray:
+    """Time features, (T,), s, of half-cycles in a table (n, 5 + 2F), without what happens at impacts."""
+    count = (table.shape[1] - shooting.FIRST_CROSSING) // 2
+    # Crossings as times from their own peak: positive in the fall, negative in the rise.
+    crossings = table[:, shooting.FIRST_CROSSING :].copy()
+    crossings[:, count:] *= -1.0
+    begin, end, k = run.cache.constant("crossings", partial(_crossings_of, run))
+    times: FloatArray = crossings.take(end) - crossings.take(begin)
+    times[run.across] += table[k, shooting.FALL_S] + table[k + 1, shooting.RISE_S]
+    return times
 
 
 def _crossings_of(run: RockingRun) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
@@ -162,12 +168,16 @@ def _crossings_of(run: RockingRun) -> tuple[NDArray[np.intp], NDArray[np.intp], 
     return first * width + a, second * width + b, first[run.across]
 
 
-def _slopes(run: RockingRun) -> FloatArray:
+def peak_slopes(run: RockingRun) -> FloatArray:
     """d ln speed / d ln peak of the peaks after impacts, (P,), of the block of the survey.
 
     The same under every hypothesis: a slope that grew with α would make what r scatters by look smaller, and
     pull α and the pivots with it.
     """
+    return run.cache.constant("slopes", partial(_slopes, run))
+
+
+def _slopes(run: RockingRun) -> FloatArray:
     alpha, size = run.survey.alpha_rad, np.abs(run.swings.peak_rad[run.peaks])
     fallen = np.cos(np.maximum(alpha - size, 0.0)) - np.cos(alpha)
     slopes: FloatArray = 0.5 * size * np.sin(np.maximum(alpha - size, 0.01)) / fallen

@@ -17,7 +17,6 @@ from numpy.polynomial import Polynomial
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE
-from daq_app.gap.rocking_model.features.impact_steps import slides, stepped, turn_share, turns
 from daq_app.gap.rocking_model.features.oscillations.ring_response import (
     bent_form,
     bent_share,
@@ -27,6 +26,7 @@ from daq_app.gap.rocking_model.features.oscillations.ring_response import (
 from daq_app.gap.rocking_model.features.response import delay
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import play_shape
+from daq_app.gap.rocking_model.features.slips.impact_steps import slides, stepped, turn_share, turns
 from daq_app.gap.rocking_model.motion.swings import TOP_DEGREE
 
 

@@ -11,9 +11,9 @@ from daq_app.gap.core import Options
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.coefficients import block_coefficients, repeatability
 from daq_app.gap.rocking_model.features.differences import of_shapes
-from daq_app.gap.rocking_model.features.impact_steps import step_terms, turn_share, turns
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import examine, extract
+from daq_app.gap.rocking_model.features.slips.impact_steps import step_terms, turn_share, turns
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare

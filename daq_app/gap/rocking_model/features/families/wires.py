@@ -21,7 +21,6 @@ from daq_app.gap.rocking_model.features.differences import (
     of_shapes,
 )
 from daq_app.gap.rocking_model.features.family import Scene, SensorFamily, Size, with_crosstalk
-from daq_app.gap.rocking_model.features.impact_steps import slides, step_terms, turn_share, turns
 from daq_app.gap.rocking_model.features.oscillations.ring_response import (
     bent_form,
     bent_share,
@@ -41,6 +40,7 @@ from daq_app.gap.rocking_model.features.shapes import (
     turn_shape,
     turning_shape,
 )
+from daq_app.gap.rocking_model.features.slips.impact_steps import slides, step_terms, turn_share, turns
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import (

@@ -1,0 +1,91 @@
+"""What a base that slips does to the motion: measured, and as uncertain as a friction law is.
+
+In the frame of a slipping edge the block is one whose floor moves (Housner 1963): θ̈ = −p² (sin(α − θ) +
+ẍ/g cos(α − θ)). Between impacts that makes half-cycles shorter, and at impacts, where the slip stops, slower.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from daq_app.config.rig import G_M_S2
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.slips.base_slip import BaseSlip
+from daq_app.gap.rocking_model.features.slips.friction import Slips, slips_below
+from daq_app.gap.rocking_model.prediction.model import half_cycle_times, peak_slopes
+from sim_hardware.dynamics import shooting
+
+
+def on_its_base(run: RockingRun) -> RockingRun:
+    """The run with what its slipping base does to the motion in the errors of its features."""
+    return run if run.slip is None else run.with_loadings(slip_loadings(run, run.slip))
+
+
+def slip_loadings(run: RockingRun, slip: BaseSlip) -> FloatArray:
+    """What the base moves the features of a run by, (n, 2): between impacts, and at impacts.
+
+    Each for a draw of unit variance. The slip is measured, and what it does is known to a factor.
+    """
+    peaks = np.abs(run.swings.peak_rad)
+    slips = slips_below(slip.below_rad, peaks, run.survey)
+    along = np.where(run.swings.peak_rad < 0.0, slip.along[0], slip.along[1])
+    table = _moved(run, slips, along)
+    alpha, p = run.survey.alpha_rad, run.survey.p_rad_s
+    speeds = p * np.sqrt(2.0 * (np.cos(alpha - peaks) - math.cos(alpha)))
+    k = run.peaks
+    slopes = peak_slopes(run)
+    count, last = len(run.places), len(run.places) + k.size
+    columns = np.zeros((len(run.features), 2))
+    columns[:count, 0] = half_cycle_times(run, table)
+    faster = table[k, shooting.SPEED_IN] / speeds[k] - table[k - 1, shooting.SPEED_OUT] / speeds[k - 1]
+    columns[count:last, 0] = -faster / slopes
+    stopped = p**2 / G_M_S2 * math.cos(alpha) * (along * slips.end)[k - 1]
+    columns[count:last, 1] = -stopped / speeds[k] / slopes
+    return columns
+
+
+def _moved(run: RockingRun, slips: Slips, along: FloatArray) -> FloatArray:
+    """What slips add to the table of half-cycles, (n, 5 + 2F), to first order, for peaks as measured.
+
+    `along` (n,): accelerations of each half-cycle's edge, m/s² per rad.
+    """
+    survey, count = run.survey, run.swings.levels.shape[1]
+    forced = -(survey.p_rad_s**2) / G_M_S2 * math.cos(survey.alpha_rad) * along * slips.acceleration
+    middle = slips.time_s.shape[0] // 2
+    table = np.zeros((along.size, shooting.FIRST_CROSSING + 2 * count))
+    falls = _pushed(run, slips.time_s[middle:], forced[middle:])
+    # From the peak backwards the rise is a fall in which the slip comes in the other order.
+    rises = _pushed(run, -slips.time_s[middle::-1], forced[middle::-1])
+    ways = ((falls, shooting.FALL_S, shooting.SPEED_OUT), (rises, shooting.RISE_S, shooting.SPEED_IN))
+    for place, ((later_s, faster), time, speed) in enumerate(ways):
+        first = shooting.FIRST_CROSSING + place * count
+        table[:, first : first + count], table[:, time] = later_s[:, :-1], later_s[:, -1]
+        table[:, speed] = faster
+    return table
+
+
+def _pushed(run: RockingRun, time_s: FloatArray, forced: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """How much later the levels and upright are passed, (n, F + 1), s, and how much faster upright, (n,).
+
+    By the deviation δ̈ = p² δ + forced that begins at the peak; `time_s` and `forced` (steps, n).
+    """
+    alpha, p = run.survey.alpha_rad, run.survey.p_rad_s
+    peaks = np.abs(run.swings.peak_rad)
+    levels = np.column_stack([run.swings.levels, np.zeros(peaks.size)])
+    at_s = np.arccosh((alpha - levels) / (alpha - peaks)[:, None]) / p
+    steps = np.diff(time_s, axis=0)
+
+    def integral(weighted: FloatArray) -> FloatArray:
+        parts = 0.5 * (weighted[1:] + weighted[:-1]) * steps
+        summed = np.vstack([np.zeros(peaks.size), np.cumsum(parts, axis=0)])
+        rows = zip(at_s, time_s.T, summed.T, strict=True)
+        return np.array([np.interp(at, time, values) for at, time, values in rows])
+
+    cosine, sine = integral(forced * np.cosh(p * time_s)), integral(forced * np.sinh(p * time_s))
+    off = (np.sinh(p * at_s) * cosine - np.cosh(p * at_s) * sine) / p
+    rate = np.cosh(p * at_s) * cosine - np.sinh(p * at_s) * sine
+    later_s: FloatArray = off / ((alpha - peaks)[:, None] * p * np.sinh(p * at_s))
+    return later_s, p**2 * alpha * later_s[:, -1] - rate[:, -1]

@@ -1,0 +1,136 @@
+"""A base whose friction does not hold it: found between impacts, and its part in the motion known."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from daq_app.config.rig import G_M_S2
+from daq_app.gap.blind.making.make import Order, make_case
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.slips.base_slip import BaseSlip
+from daq_app.gap.rocking_model.features.slips.friction import push, slips_below
+from daq_app.gap.rocking_model.findings import findings_of
+from daq_app.gap.rocking_model.prediction.slipping import slip_loadings
+from daq_app.gap.rocking_model.records import load_run
+from daq_app.gap.rocking_model.study import diagnose_prepared, model_and_library, prepare
+from tests.support.gap.simulated_campaign import simulate
+
+RIG = Path(__file__).parents[4] / "configs" / "fr1.toml"
+SEED = 71
+
+
+@pytest.fixture(scope="module")
+def slippery(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[RockingRun], float]:
+    """Runs of a wall that a contact engine moves, and the friction of its base."""
+    pytest.importorskip("mujoco", reason="the extra 'contact' is not installed")
+    folder = tmp_path_factory.mktemp("slippery")
+    text = RIG.read_text(encoding="utf-8")
+    order = Order(SEED, folder / "out", folder / "kept", (text,), 3, None, "contact", "", "slippery_base")
+    name = make_case(order, 0)
+    label = json.loads(json.loads((folder / "kept" / f"{name}.json").read_text(encoding="utf-8"))["label"])
+    runs, _ = prepare([load_run(file) for file in sorted((folder / "out" / name).glob("*.h5"))])
+    share = label["effects"][0]["parameters"]["friction_share"]
+    alpha = runs[0].survey.alpha_rad
+    r = 1.0 - 1.5 * math.sin(alpha) ** 2  # of a plastic impact of a slender block (Housner 1963)
+    return runs, share * (1.0 - r) / ((1.0 + r) * math.tan(alpha))
+
+
+def test_its_friction_is_that_of_the_base(slippery: tuple[list[RockingRun], float]) -> None:
+    runs, friction = slippery
+    (finding,) = [f for f in findings_of(runs) if f.name == "sliding@base"]
+
+    assert runs[0].slip is not None
+    assert runs[0].slip.friction == pytest.approx(friction, rel=0.04)
+    assert np.all(runs[0].slip.along > 0.0)
+    assert finding.material and finding.family == "contact"
+    assert "lets the base slip" in finding.words
+
+
+def test_what_it_does_to_the_motion_is_in_the_errors(slippery: tuple[list[RockingRun], float]) -> None:
+    """Without that the answer is something unknown, or a cause that is not there."""
+    runs, _ = slippery
+    model, library = model_and_library(runs)
+    some = library.without(
+        *(name for name in library if name not in ("viscous", "coulomb", "restitution_slope"))
+    )
+    result = diagnose_prepared(model, runs, some)
+    assert result.decision.effects == ("sliding@base",)
+    assert result.rest.unknown < 0.2
+
+    held = [replace(run, slip=None, findings=(), fixed_loadings=run.fixed_loadings[:, :-2]) for run in runs]
+    without = diagnose_prepared(model, held, some)
+    assert without.rest.unknown > 0.9 or without.decision.effects
+
+
+def test_sound_walls_and_walls_that_turn_or_ring_show_none() -> None:
+    ringing = {"yaw": {"kick": 0.03, "frequency": 5.0, "zeta": 0.03}}
+    for effect in ({}, ringing, {"corner_twist": {"c": 0.004}}):
+        runs, _ = prepare(simulate(effect, 5, levels=(0.3, -0.4)))
+        assert runs[0].slip is None, effect
+
+
+def _run() -> RockingRun:
+    (run,), _ = prepare(simulate({}, 5, levels=(0.3,)))
+    return run
+
+
+def test_slips_are_those_of_the_equation_of_motion() -> None:
+    """By the law of friction beside the linear block, step by step, in one half-cycle."""
+    survey = _run().survey
+    alpha, p = survey.alpha_rad, survey.p_rad_s
+    below = 0.012
+    for peak in (0.006, 0.03):
+        half_s = math.acosh(alpha / (alpha - peak)) / p
+        time_s = np.linspace(-half_s, half_s, 40_001)
+        pushed = below - alpha + (alpha - peak) * np.cosh(p * time_s)
+        speed = slip = 0.0
+        for value in pushed[:-1]:
+            speed = max(speed + value * (time_s[1] - time_s[0]), 0.0)
+            slip += speed * (time_s[1] - time_s[0])
+        found = slips_below(below, np.array([peak]), survey)
+        assert found.slip[0] == pytest.approx(slip, rel=0.02)
+        assert found.end[0] == pytest.approx(speed, rel=0.02)
+    assert push(below, survey) < push(0.0, survey)
+
+
+def test_a_slip_moves_half_cycles_as_a_moving_floor_does() -> None:
+    """Falls of the block on an edge that slips, by SciPy, against the loading's first order."""
+    run = _run()
+    survey = run.survey
+    alpha, p = survey.alpha_rad, survey.p_rad_s
+    below, along = 0.02, 10.0
+
+    def crossing(peak: float, level: float, size: float) -> float:
+        def rates(_: float, state: FloatArray) -> list[float]:
+            left = alpha - state[0]
+            floor = size * max(below - state[0], 0.0) / G_M_S2
+            return [state[1], -(p**2) * (math.sin(left) + floor * math.cos(left))]
+
+        def passed(_: float, state: FloatArray) -> float:
+            return float(state[0] - level)
+
+        passed.terminal = True  # type: ignore[attr-defined]
+        found = solve_ivp(rates, (0.0, 3.0), [peak, 0.0], events=passed, rtol=1e-10, atol=1e-13)
+        return float(found.t_events[0][0])
+
+    slip = BaseSlip(below, 0.15, np.array([along, along]), np.zeros(2), 1e-3, 1e-5, 0.0, 1e-5)
+    columns = slip_loadings(run, slip)
+    count = run.swings.levels.shape[1]
+    seen = 0
+    for row, (ka, a, kb, b) in enumerate(run.places.tolist()):
+        peak = abs(float(run.swings.peak_rad[ka]))
+        if ka != kb or max(a, b) >= count or ka == 0 or peak > below:
+            continue
+        ends = [float(run.swings.levels[ka, place]) for place in (a, b)]
+        added = [crossing(peak, level, along) - crossing(peak, level, 0.0) for level in ends]
+        assert columns[row, 0] == pytest.approx(added[1] - added[0], rel=0.1, abs=2e-6)
+        seen += 1
+    assert seen > 4
