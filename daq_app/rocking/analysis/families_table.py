@@ -32,7 +32,7 @@ from daq_app.rocking.theory.block import RigidBlock
 
 LEADS = {"wires": "wires", "lvdts": "LVDTs"}
 """Families that a motion can be read from: the reader's word by the key."""
-_ANOTHER_MOTION = ("slow", "late", "bending", "steps", "still", "leaps", "motion", "slide")
+_ANOTHER_MOTION = ("slow", "late", "bending", "steps", "still", "leaps", "motion", "slide", "slip")
 _FOLLOWS_BADLY = (*_ANOTHER_MOTION, "drift")
 
 

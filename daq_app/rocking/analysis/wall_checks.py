@@ -32,6 +32,8 @@ from daq_app.rocking.theory.block import RigidBlock
 
 _MADE_BY_A_DRIFT: Final = ("side", "duration", "pause", "hop")
 """A zero that moves makes leans to one side longer and faster than those to the other."""
+_MADE_BY_SLIPS: Final = ("loss", "pause", "hop", "duration")
+"""An edge that slips between impacts makes half-cycles shorter, and slow impacts lose more speed."""
 
 _SETTLED_S: Final = 0.5
 """Time after the last impact in which a wall's own ringing dies away."""
@@ -79,6 +81,8 @@ def wall_findings(
         found += weaker_hop(pattern)
     if any(f.kind == "drift" and f.treatment == "none" and LEADS[lead] in f.family for f in findings):
         found = [finding for finding in found if finding.kind not in _MADE_BY_A_DRIFT]
+    if any(f.kind == "slip" for f in findings):
+        found = [finding for finding in found if finding.kind not in _MADE_BY_SLIPS]
     found += alpha_findings(bodies[LEADS[lead]], tracks.lead)
     if is_rigid_block([*findings, *found]):
         found += p_findings(bodies[LEADS[lead]], tracks.lead.settings.p_rad_s)

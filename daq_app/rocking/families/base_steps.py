@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from daq_app.rocking.families.base_slip import HalfCycleSlips
+
 Floats = NDArray[np.float64]
 
 _SKIPPED_S: Final = 2e-3
@@ -76,8 +78,7 @@ def base_steps(
     that it does not explain; both NaN where they are not known. `y_m`: (wires,) places along the wall.
     `impacts_s`: about when the impacts were. `leaping`: whether wires leap, with the wall or by themselves.
     """
-    found = [_crossing(time_s, rotation_rad, residual_m, about_s) for about_s in impacts_s]
-    crossings = [crossing for crossing in found if crossing is not None]
+    crossings = _crossings(time_s, rotation_rad, residual_m, impacts_s)
     if len(crossings) < _FEWEST:
         return NO_STEPS
     turned = np.array([crossing.after_rad - crossing.before_rad for crossing in crossings])
@@ -95,6 +96,40 @@ def base_steps(
     reach = float(np.abs(places).max())
     turn = 0.0 if turns is None else _with_speed(turns, speeds, _SMALLEST_M / reach, least)
     return BaseSteps(_with_speed(shared, speeds, _SMALLEST_M, least), turn)
+
+
+def between_impacts(
+    time_s: Floats, rotation_rad: Floats, residual_m: Floats, y_m: Floats, impacts_s: Iterable[float]
+) -> HalfCycleSlips | None:
+    """How far all wires move between two impacts, and how far they turn; None where they do not tell.
+
+    The arguments are those of `base_steps`.
+    """
+    crossings = _crossings(time_s, rotation_rad, residual_m, impacts_s)
+    known = np.isfinite(residual_m).mean(axis=1) > 0.5
+    if len(crossings) < _FEWEST or np.count_nonzero(known) < _FEWEST_WIRES:
+        return None
+    gains, places = _gains(rotation_rad, residual_m, crossings)[known], y_m[known]
+    rows = []
+    for one, other in pairwise(crossings):
+        inside = rotation_rad[one.end : other.first]
+        moved = (other.before_m - one.after_m)[known] - gains * (other.before_rad - one.after_rad)
+        if not (inside.size and np.isfinite(inside).all() and np.isfinite(moved).all()):
+            continue
+        shared = float(np.median(moved))
+        apart = [(moved[side] - shared) / places[side] for side in (places > 0.0, places < 0.0)]
+        turn = float(np.mean([np.mean(side) for side in apart])) if all(side.size for side in apart) else 0.0
+        outwards = math.copysign(1.0, one.speed_rad_s)
+        peak, speed = float(np.abs(inside).max()), abs(one.speed_rad_s)
+        rows.append((outwards, peak, speed, outwards * shared, outwards * turn))
+    return HalfCycleSlips(*np.array(rows).T) if rows else None
+
+
+def _crossings(
+    time_s: Floats, rotation_rad: Floats, residual_m: Floats, impacts_s: Iterable[float]
+) -> list[_Crossing]:
+    found = (_crossing(time_s, rotation_rad, residual_m, about_s) for about_s in impacts_s)
+    return [crossing for crossing in found if crossing is not None]
 
 
 def _turns(apart: Floats, y_m: Floats, speeds: Floats) -> Floats | None:

@@ -10,7 +10,7 @@ Family = Literal["wires", "LVDTs", "tiltmeters", "accelerometers", "survey", "wa
 Kind = Literal[
     "slow", "late", "gain", "zero", "hum", "reversed", "unit", "drift", "motion",
     "speed", "side", "loss", "pause", "hop", "duration", "scatter", "release",
-    "misfit", "pivot", "bending", "alpha", "p", "slide", "turn",
+    "misfit", "pivot", "bending", "alpha", "p", "slide", "slip", "turn",
     "hysteresis", "steps", "still", "leaps", "noise", "vibration",
 ]  # fmt: skip
 Treatment = Literal["none", "left out", "put in step", "put right", "removed"]
@@ -35,7 +35,7 @@ class FamilyFinding:
     """A sentence for the reader of the result."""
 
 
-_NOT_THE_WALL: Final = frozenset({"steps", "still", "leaps", "motion", "slide"})
+_NOT_THE_WALL: Final = frozenset({"steps", "still", "leaps", "motion", "slide", "slip"})
 """Kinds of finding by which a whole family does not even show how far the wall is held from upright; a slide
 moves a zero that is taken from the rest."""
 

@@ -117,6 +117,18 @@ def slides(largest_m: float, *, left_out: bool) -> FamilyFinding:
     return FamilyFinding("wires", (), "slide", largest_m, "m", treatment, "warning", text)
 
 
+def slips(largest_m: float, friction: float, *, left_out: bool) -> FamilyFinding:
+    """Friction does not hold the base of a wall that is nearly upright, and the wires go with it."""
+    what = "r is taken from the LVDTs" if left_out else "r is off by it"
+    text = (
+        f"friction of {friction:.2f} does not hold the base: it slips by {largest_m * 1e3:.1f} mm between "
+        f"impacts, while the wall is nearly upright, and slow impacts lose more speed by it; {what}. Usual "
+        "causes: a wet or dusty bed, a corner without contact"
+    )
+    treatment: Treatment = "left out" if left_out else "none"
+    return FamilyFinding("wires", (), "slip", largest_m, "m", treatment, "warning", text)
+
+
 def turns(largest_rad: float) -> FamilyFinding:
     """The wall turns about the vertical at impacts."""
     text = (

@@ -13,12 +13,12 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.oscillations.vibration import FloorSpectrum, Vibration
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
-from daq_app.gap.rocking_model.features.slips.base_slip import BaseSlip
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Wire
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import Survey, Wiring
 from daq_app.gap.rocking_model.run_cache import RunCache
+from daq_app.rocking.families.base_slip import BaseSlip
 
 _SMALLEST_LOADING = 1e-3
 

@@ -24,7 +24,7 @@ from daq_app.gap.rocking_model.features.oscillations.vibration import FloorSpect
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined, examine
 from daq_app.gap.rocking_model.features.run_findings import RunFinding, merged
-from daq_app.gap.rocking_model.features.slips.base_slip import find_slip, slip_findings
+from daq_app.gap.rocking_model.features.slips.base_slip import slip_findings, slip_of
 from daq_app.gap.rocking_model.inspection.channel_faults import channel_block, find_outlier_channels
 from daq_app.gap.rocking_model.inspection.conditions import conditions_of, findings_per_run, without_hum
 from daq_app.gap.rocking_model.inspection.floor_bursts import floor_bursts
@@ -236,7 +236,7 @@ def completed(
         if floor is None
         else [[_irregular(floor, len(examined))] for _ in examined]
     )
-    slip = find_slip(*calm)
+    slip = slip_of(*calm)
     runs = []
     known = with_quantisation_errors(examined, steps)
     rows = merged(findings, shaken, [slip_findings(slip, len(examined))] * len(examined))

@@ -13,9 +13,9 @@ import numpy as np
 from daq_app.config.rig import G_M_S2
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.features.slips.base_slip import BaseSlip
-from daq_app.gap.rocking_model.features.slips.friction import Slips, slips_below
 from daq_app.gap.rocking_model.prediction.model import half_cycle_times, peak_slopes
+from daq_app.rocking.families.base_slip import BaseSlip
+from daq_app.rocking.theory.friction import Slips, slips_below
 from sim_hardware.dynamics import shooting
 
 
@@ -30,7 +30,7 @@ def slip_loadings(run: RockingRun, slip: BaseSlip) -> FloatArray:
     Each for a draw of unit variance. The slip is measured, and what it does is known to a factor.
     """
     peaks = np.abs(run.swings.peak_rad)
-    slips = slips_below(slip.below_rad, peaks, run.survey)
+    slips = slips_below(slip.below_rad, peaks, run.survey.alpha_rad, run.survey.p_rad_s)
     along = np.where(run.swings.peak_rad < 0.0, slip.along[0], slip.along[1])
     table = _moved(run, slips, along)
     alpha, p = run.survey.alpha_rad, run.survey.p_rad_s

@@ -48,25 +48,6 @@ SHARP_S = 8e-3
 Prompt ones reach 6 ms, those behind a filter of 20 ms 17. Raising it reads the form of a filter for a delay.
 """
 
-# -- slips -----------------------------------------------------------------------------------------
-SLIP_SURE_SD = 10.0
-"""Standard errors from none, 1, from which a base slips between impacts.
-
-Sound laboratories reach 4, walls on springs 7. Raising it hides slips.
-"""
-
-SLIP_EXPLAINED = 0.5
-"""Share of what half-cycles differ by, 1, that the law of friction explains where a base slips.
-
-Slips explain 0.9, what rings or springs back 0.3. Raising it hides slips under noise.
-"""
-
-TURNS_ABOUT_M = 3.0
-"""Distance, m, within which the place lies that a base turns about where its friction fails at one end.
-
-Longer than walls are (assumed). Raising it says of bases that slip along their whole length that they turn.
-"""
-
 # -- oscillations ----------------------------------------------------------------------------------
 OSCILLATION_INDEPENDENT = 0.05
 """Least share of independent samples, 1, in what a ring-down or a vibration of the floor leaves (assumed).

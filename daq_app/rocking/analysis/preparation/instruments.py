@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.analysis.preparation.base import base_of
+from daq_app.rocking.analysis.preparation.base import STILL, Base, base_of
 from daq_app.rocking.analysis.preparation.compared_families import (
     bending_of,
     follow,
@@ -34,7 +34,6 @@ from daq_app.rocking.analysis.preparation.reader import Reader, found_by_others,
 from daq_app.rocking.analysis.preparation.signals import Lead, Signals, TestTimes
 from daq_app.rocking.analysis.preparation.unfit_channels import unfit_channels
 from daq_app.rocking.families import unfit_words, words
-from daq_app.rocking.families.base_steps import NO_STEPS, BaseSteps
 from daq_app.rocking.families.channels.hum import find_hum
 from daq_app.rocking.families.channels.noise import slow_noise
 from daq_app.rocking.families.finding import FamilyFinding, families_left_out
@@ -174,19 +173,21 @@ def _in_step(
     leap_at_most = all((f.family, f.kind) == ("wires", "leaps") for f in spoiled)
     odd_ones = odd_lvdts(signals, motion) if leap_at_most else []
     hidden = not leap_at_most or bending is not None or bool(odd_ones)
-    base = NO_STEPS if hidden else base_of(signals, times, response, leaping=bool(spoiled))
-    if base.slide_m > 0.0:
+    base = STILL
+    if not hidden:
+        base = base_of(signals, times, response, record.rig.specimen, leaping=bool(spoiled))
+    if base.moves:
         # Wires that step with the wall say nothing of the LVDTs, and nothing of each other.
         findings, comparable, response = [f for f in findings if f not in spoiled], False, None
-    wires_tell = comparable or (signals.lead == "wires" and not base.slide_m)
+    wires_tell = comparable or (signals.lead == "wires" and not base.moves)
     means = wire_means(signals, motion) if wires_tell else None
     wires = compared_wires(signals, means)
-    odd = odd_wire(signals, means, wires, bends=bending is not None, turns=base.turn_rad > 0.0)
+    odd = odd_wire(signals, means, wires, bends=bending is not None, turns=base.steps.turn_rad > 0.0)
     findings, left_out = _with_odd(findings, odd, odd_ones, in_steps)
     shocks = shocks_of(record, signals, times)
     found, lead, earlier, bending = _between_families(record, signals, times, response, shocks, bending, base)
-    if base.turn_rad > 0.0:
-        found.append(unfit_words.turns(base.turn_rad))
+    if base.steps.turn_rad > 0.0:
+        found.append(unfit_words.turns(base.steps.turn_rad))
     findings += found
     changed = Corrections(left_out=left_out, earlier_s=earlier)
     if changed.left_out or changed.earlier_s or lead != signals.lead:
@@ -235,13 +236,18 @@ def _between_families(
     response: Response | None,
     shocks: ShockTiming | None,
     bending: Bending | None,
-    base: BaseSteps,
+    base: Base,
 ) -> tuple[list[FamilyFinding], Lead, dict[str, float], Bending | None]:
     """Findings, the family that leads, by how much channels are moved earlier, and how the wall bends."""
     # Delays and first orders are no answer to what the wall or its base does between the two families.
-    if base.slide_m > 0.0:
+    if base.moves:
         lead: Lead = "lvdts" if lvdts_cover(signals, times) else "wires"
-        return [unfit_words.slides(base.slide_m, left_out=lead == "lvdts")], lead, {}, None
+        left_out = lead == "lvdts"
+        if base.slip is not None:
+            told = unfit_words.slips(base.slip.slip_m, base.slip.friction, left_out=left_out)
+        else:
+            told = unfit_words.slides(base.steps.slide_m, left_out=left_out)
+        return [told], lead, {}, None
     if bending is not None:
         lead = "lvdts" if lvdts_cover(signals, times) else "wires"
         told = words.bending(bending.frequency_hz, bending.rms_rad, left_out=lead == "lvdts")

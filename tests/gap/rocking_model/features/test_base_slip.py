@@ -15,12 +15,12 @@ from daq_app.config.rig import G_M_S2
 from daq_app.gap.blind.making.make import Order, make_case
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.features.slips.base_slip import BaseSlip
-from daq_app.gap.rocking_model.features.slips.friction import push, slips_below
 from daq_app.gap.rocking_model.findings import findings_of
 from daq_app.gap.rocking_model.prediction.slipping import slip_loadings
 from daq_app.gap.rocking_model.records import load_run
 from daq_app.gap.rocking_model.study import diagnose_prepared, model_and_library, prepare
+from daq_app.rocking.families.base_slip import BaseSlip
+from daq_app.rocking.theory.friction import push, slips_below
 from tests.support.gap.simulated_campaign import simulate
 
 RIG = Path(__file__).parents[4] / "configs" / "fr1.toml"
@@ -95,10 +95,10 @@ def test_slips_are_those_of_the_equation_of_motion() -> None:
         for value in pushed[:-1]:
             speed = max(speed + value * (time_s[1] - time_s[0]), 0.0)
             slip += speed * (time_s[1] - time_s[0])
-        found = slips_below(below, np.array([peak]), survey)
+        found = slips_below(below, np.array([peak]), alpha, p)
         assert found.slip[0] == pytest.approx(slip, rel=0.02)
         assert found.end[0] == pytest.approx(speed, rel=0.02)
-    assert push(below, survey) < push(0.0, survey)
+    assert push(below, alpha, p, 1.5) < push(0.0, alpha, p, 1.5)
 
 
 def test_a_slip_moves_half_cycles_as_a_moving_floor_does() -> None:

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq_app.config.rig import G_M_S2
-from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.records import Survey
+
+Floats = NDArray[np.float64]
 
 _STEPS: Final = 120
 """Steps of a half-cycle: the slip is good to a per cent."""
@@ -24,30 +25,29 @@ _STEPS: Final = 120
 class Slips:
     """Slips of half-cycles, (k,), of a base that accelerates by 1 m/s² for each rad below the rotation."""
 
-    time_s: FloatArray
+    time_s: Floats
     """(steps + 1, k), from the peak."""
-    acceleration: FloatArray
+    acceleration: Floats
     """(steps + 1, k), outwards, rad."""
-    end: FloatArray
+    end: Floats
     """Speed at the impact that ends the half-cycle, rad s."""
-    slip: FloatArray
+    slip: Floats
     """Between the two impacts, rad s²."""
 
 
-def push(rotation_rad: float, survey: Survey) -> float:
-    """Force along the floor over that against it, 1, by which the survey's block is held at a rotation."""
-    left = survey.alpha_rad - rotation_rad
-    r0 = survey.half_base_m / math.sin(survey.alpha_rad)
-    return survey.p_rad_s**2 * r0 / G_M_S2 * math.sin(left) * math.cos(left)
+def push(rotation_rad: float, alpha_rad: float, p_rad_s: float, r0_m: float) -> float:
+    """Force along the floor over that against it, 1, by which a block is held at a rotation."""
+    left = alpha_rad - rotation_rad
+    return p_rad_s**2 * r0_m / G_M_S2 * math.sin(left) * math.cos(left)
 
 
-def slips_below(rotation_rad: float, peaks_rad: FloatArray, survey: Survey) -> Slips:
+def slips_below(rotation_rad: float, peaks_rad: Floats, alpha_rad: float, p_rad_s: float) -> Slips:
     """Slips of half-cycles with these peaks (k,), by an edge that slips below a rotation.
 
-    The wall is the survey's block, to first order about upright (Housner 1963), and the slip does not act
+    The motion is that of a block, to first order about upright (Housner 1963), and the slip does not act
     back on it. The edge is at rest after an impact.
     """
-    alpha, p = survey.alpha_rad, survey.p_rad_s
+    alpha, p = alpha_rad, p_rad_s
     peaks = np.minimum(peaks_rad, 0.95 * alpha)
     half_s = np.arccosh(alpha / (alpha - peaks)) / p
     time_s = np.linspace(-1.0, 1.0, _STEPS + 1)[:, None] * half_s
