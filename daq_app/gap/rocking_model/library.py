@@ -81,6 +81,9 @@ _WIDER = {
 """Reach of strengths that have no usual size: how hard an impact kicks depends on its very form, and how far
 the wall bends goes with one over its frequency. A filter may be as late as any other sensor: with a shorter
 reach it would be the likelier answer for short delays, whose form the runs do not show."""
+_FURTHEST = {("dwell", "tau"): 0.3}
+"""Ends of strengths beyond six times their reach. A wall that stays on its joint for longer than its fit may
+say leaves the rest of that to the sample clock."""
 _DRIFT_REACH = {"lvdt": 1e-3, "wire": 2e-3, "tiltmeter": 1e-3, "accelerometer": 1e-2}
 
 
@@ -118,7 +121,7 @@ def _parameter(spec: EffectSpec, parameter: SpecParameter) -> Parameter:
     else:
         of_sign = signed if parameter.low < 0 else positive
         prior = of_sign(parameter.name, _WIDER.get(key, parameter.high), parameter.unit, parameter.text)
-    prior = replace(prior, starts=_STARTS.get(key, prior.starts))
+    prior = replace(prior, starts=_STARTS.get(key, prior.starts), high=_FURTHEST.get(key, prior.high))
     if key in _PER_RUN:
         return replace(prior, per_run=True)
     return prior if logarithmic else replace(prior, smallest=_smallest(spec, parameter))

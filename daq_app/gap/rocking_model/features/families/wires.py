@@ -258,7 +258,9 @@ def _turn_block(scene: Scene) -> Block | None:
     steps = max(lever - 1.0, 0.0) * _TURN_SCATTER_S**2 * np.eye(count)
     tops = {f"top {k + 1}": (top_shape(grid, k), "s") for k in range(count)}
     at_tops = _regress_about_mean(turned, columns | tops, pick, tuple(columns))
-    covariance = block.covariance * (1.0 if at_tops is None else _beyond_stated(at_tops))
+    covariance = block.covariance
+    if at_tops is not None and at_tops.values.size:
+        covariance = covariance * _beyond_stated(at_tops)
     return replace(block, said=labels, covariance=covariance + steps)
 
 
