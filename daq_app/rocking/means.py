@@ -16,6 +16,16 @@ def row_means(values: Floats) -> Floats:
     return np.asarray(np.add.reduce(values, axis=-1) / values.shape[-1])
 
 
+def means_over(values: Floats, size: int) -> Floats:
+    """(…, n // size) means of `size` samples each over the last axis of (…, n), what is left over left out.
+
+    To the last digit as `ndarray.mean` gives them; `block_means` costs less.
+    """
+    count = values.shape[-1] // size
+    blocks = values[..., : count * size].reshape(*values.shape[:-1], count, size)
+    return np.asarray(blocks.mean(axis=-1))
+
+
 def block_means(rows: Floats, size: int) -> Floats:
     """(k, n // size) means over blocks of `size` samples of rows (k, n), what is left over left out."""
     count = rows.shape[1] // size

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from daq_app.rocking.analysis.preparation.signals import Signals
 from daq_app.rocking.analysis.results import JointSummary, ValueWithSigma
 from daq_app.rocking.geometry.joint import JointMotion
+from daq_app.rocking.means import means_over
 from daq_app.rocking.motion.swings import MotionTrack
 from daq_app.rocking.record import TestRecord
 from daq_app.rocking.theory.block import RigidBlock
@@ -93,10 +94,6 @@ def _pivot(joint: JointMotion, moving: slice, side: int) -> ValueWithSigma | Non
 
 def _largest(twist: Floats, rate_hz: float) -> float:
     """Largest |twist| of 10 ms means: noise alone does not count."""
-    size = max(1, round(0.01 * rate_hz))
-    groups = twist.size // size
-    if groups == 0:
-        return math.nan
-    means = twist[: groups * size].reshape(groups, size).mean(axis=1)
+    means = means_over(twist, max(1, round(0.01 * rate_hz)))
     means = means[np.isfinite(means)]
     return float(means[np.argmax(np.abs(means))]) if means.size else math.nan

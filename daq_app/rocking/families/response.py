@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
-from daq_app.rocking.means import mean_of
+from daq_app.rocking.means import mean_of, means_over
 
 Floats = NDArray[np.float64]
 
@@ -65,12 +65,9 @@ def compare(time_s: Floats, reference_rad: Floats, follower_rad: Floats) -> Resp
     """Response of `follower_rad` (n,) to `reference_rad` (n,) on one time base; None with too few samples."""
     rate = (time_s.size - 1) / (time_s[-1] - time_s[0]) if time_s.size > 1 else 0.0
     size = max(1, round(rate / _RATE_HZ))
-    groups = time_s.size // size
-    if groups < _FEWEST:
+    x, y = (means_over(values, size) for values in (reference_rad, follower_rad))
+    if x.size < _FEWEST:
         return None
-    x, y = (
-        values[: groups * size].reshape(groups, size).mean(axis=1) for values in (reference_rad, follower_rad)
-    )
     step = size / rate
     pair, turned = _Pair(x, y, step), _Pair(y, x, step)
     if min(pair.known, turned.known) < _FEWEST or np.nanstd(x) < 1e-4 or np.nanstd(y) < 1e-4:
@@ -98,7 +95,7 @@ def compare(time_s: Floats, reference_rad: Floats, follower_rad: Floats) -> Resp
         ),
     ]
     turned_rms = solved_turned.rms / abs(solved_turned.gain)
-    span = groups * step
+    span = x.size * step
     _, delay, response = min(candidates)
     if response < 0.0:
         # The reference is the slower one: the other way round the fit is better.

@@ -13,6 +13,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.rocking.means import means_over
+
 Floats = NDArray[np.float64]
 
 _STEP_S = 0.05
@@ -75,10 +77,8 @@ def factor_words(factor: float) -> str:
 
 
 def _means(rotation: Floats, rate_hz: float) -> Floats:
-    size = max(1, round(_STEP_S * rate_hz))
-    groups = rotation.size // size
-    steps = rotation[: groups * size].reshape(groups, size).mean(axis=1)
-    count = min(round(_MEAN_S / _STEP_S), max(groups, 1))
+    steps = means_over(rotation, max(1, round(_STEP_S * rate_hz)))
+    count = min(round(_MEAN_S / _STEP_S), max(steps.size, 1))
     return np.asarray(np.lib.stride_tricks.sliding_window_view(steps, count).mean(axis=1))
 
 

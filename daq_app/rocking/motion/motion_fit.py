@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 from scipy.special import stdtrit
 
+from daq_app.rocking.means import means_over
 from daq_app.rocking.motion.motion_model import (
     ALPHA_PRIOR,
     FIXED,
@@ -270,9 +271,7 @@ def _points(
     """Averages over 8 ms and their noise."""
     low, high = np.searchsorted(time_s, [start_s, stop_s])
     size = max(1, round(POINT_S * (time_s.size - 1) / (time_s[-1] - time_s[0])))
-    groups = int(high - low) // size
-    t = time_s[low : low + groups * size].reshape(groups, size).mean(axis=1)
-    y = rotation_rad[low : low + groups * size].reshape(groups, size).mean(axis=1)
+    t, y = means_over(time_s[low:high], size), means_over(rotation_rad[low:high], size)
     good = np.isfinite(y)
     return t[good], y[good], noise_rad / math.sqrt(size)
 

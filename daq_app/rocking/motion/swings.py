@@ -17,6 +17,7 @@ from daq_app.rocking.estimators import (
     eav_series,
     estimate_all,
 )
+from daq_app.rocking.means import means_over
 from daq_app.rocking.motion.arcs import Arc, fit_arcs
 from daq_app.rocking.motion.release import Release, locate_release
 
@@ -89,9 +90,7 @@ class MotionTrack:
         `time_s`, `rotation_rad` (n,) reach from before the release to the first impact.
         """
         size = max(1, round(0.005 * settings.rate_hz))
-        count = time_s.size // size
-        t = time_s[: count * size].reshape(count, size).mean(axis=1)
-        y = rotation_rad[: count * size].reshape(count, size).mean(axis=1)
+        t, y = means_over(time_s, size), means_over(rotation_rad, size)
         inside = (t > release_s - 0.5) & (y * math.copysign(1.0, hold_rad) > 0.03 * abs(hold_rad))
         release = locate_release(t[inside], y[inside], hold_rad, settings.p_rad_s, settings.alpha_rad)
         if release is None or abs(release.time_s - release_s) > 0.3:
@@ -276,8 +275,7 @@ def _end_of_hold(time_s: Floats, rotation_rad: Floats, release_s: float, rate_hz
 
 def _means(signal: Floats, size: int) -> Floats:
     """Means of `size` samples each, up to the last sample."""
-    count = signal.size // size
-    return np.asarray(signal[signal.size - count * size :].reshape(count, size).mean(axis=1))
+    return means_over(signal[signal.size % size :], size)
 
 
 def hold_level(

@@ -88,8 +88,7 @@ def _signals(run: GapRun, family: Family, chosen: Sequence[int]) -> FloatArray:
     if family == "accelerometer":
         return smoothed(run, chosen)
     if family == "wire":
-        rows = [coarse(row, run.rate_hz) for row in wall_rotation(run)[0]]
-        return run.positions(chosen)[:, 2:] * np.array(rows)
+        return run.positions(chosen)[:, 2:] * coarse(wall_rotation(run)[0], run.rate_hz)
     return np.array([gridded(run, i) for i in chosen])
 
 

@@ -91,7 +91,7 @@ def still_samples(run: GapRun) -> Mask:
     if not places:
         return np.zeros(count, dtype=np.bool_)
     apart = round(_MOVES_WITHIN_S * GRID_HZ)
-    shown = np.array([coarse(run.channels[i], run.rate_hz) for i in places])
+    shown = coarse(run.channels[places], run.rate_hz)
     moved = np.abs(shown[:, apart:] - shown[:, :-apart]) / (np.ptp(shown, axis=1)[:, None] + 1e-15)
     moves = np.pad(np.median(moved, axis=0) > STILL, (apart // 2, apart - apart // 2))
     moves = maximum_filter1d(moves, 2 * round(_AROUND_MOTION_S * GRID_HZ) + 1)

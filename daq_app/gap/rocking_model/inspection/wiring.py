@@ -28,6 +28,7 @@ from daq_app.gap.rocking_model.tolerances.inspection import (
     REVERSED_BELOW,
     WITHIN_RANGE,
 )
+from daq_app.rocking.means import means_over
 
 WORK_HZ = 100.0
 LOW_PASS_HZ = 12.0
@@ -224,7 +225,7 @@ def _compare(run: GapRun) -> _Seen:
     step = max(round(run.rate_hz / WORK_HZ), 1)
     low_pass = butter(3, LOW_PASS_HZ, fs=WORK_HZ, output="sos")
     reading = np.flatnonzero(np.isfinite(run.channels).all(axis=1)).tolist()
-    thinned = np.array([_thin(zeroed(run, i), step) for i in reading])
+    thinned = np.array([means_over(zeroed(run, i), step) for i in reading])
     smooth = dict(zip(reading, sosfiltfilt(low_pass, thinned), strict=True)) if reading else {}
     theta = _median_rotation(run, smooth)
     if theta is None:
@@ -246,11 +247,6 @@ def _compare(run: GapRun) -> _Seen:
 def _away_from_impacts(sensor: Sensor) -> bool:
     """An accelerometer along z shows more of an impact than of all rocking between impacts."""
     return sensor.family == "accelerometer" and sensor.axis == "z"
-
-
-def _thin(values: FloatArray, step: int) -> FloatArray:
-    m = values.size // step
-    return np.asarray(values[: m * step].reshape(m, step).mean(axis=1), dtype=float)
 
 
 def _median_rotation(run: GapRun, smooth: dict[int, FloatArray]) -> FloatArray | None:

@@ -16,6 +16,7 @@ from daq_app.gap.rocking_model.tolerances.sensors import FEWEST_LVDTS, LVDT_MISF
 from daq_app.rocking.geometry.joint import BaseJoint, at_range_end
 from daq_app.rocking.geometry.noise import timing_noise
 from daq_app.rocking.geometry.wires import wire_rotation, wire_shortening
+from daq_app.rocking.means import means_over
 
 GRID_HZ = 200.0
 FINER_HZ = 1000.0
@@ -63,11 +64,8 @@ def zeroed(run: GapRun, index: int) -> FloatArray:
 
 
 def coarse(values: FloatArray, rate_hz: float) -> FloatArray:
-    """Averages over the grid's intervals; shape (n,) → (m,)."""
-    step = round(rate_hz / GRID_HZ)
-    m = values.size // step
-    means: FloatArray = values[: m * step].reshape(m, step).mean(axis=1)
-    return means
+    """Averages over the grid's intervals; shape (…, n) → (…, m)."""
+    return means_over(values, round(rate_hz / GRID_HZ))
 
 
 def finer_step(rate_hz: float) -> int:

@@ -7,6 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.rocking.means import means_over
+
 Floats = NDArray[np.float64]
 
 _MEAN_S = 0.025
@@ -21,10 +23,9 @@ def slow_noise(signal: Floats, rate_hz: float) -> float:
     counts, so that a wall that still rocks through a third of it does no harm. NaN for less than 0.3 s.
     """
     size = max(1, round(_MEAN_S * rate_hz))
-    groups = signal.size // size
-    if groups < _FEWEST_MEANS:
+    means = means_over(signal, size)
+    if means.size < _FEWEST_MEANS:
         return math.nan
-    means = signal[: groups * size].reshape(groups, size).mean(axis=1)
     second = np.diff(means, 2)
     second = second[np.isfinite(second)]
     if second.size < _FEWEST_MEANS - 2:

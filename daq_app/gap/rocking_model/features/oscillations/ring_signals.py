@@ -53,7 +53,7 @@ def ring_signals(
     rows, wires = wall_rotation(run)
     if len(rows) >= 3:
         _, y, z = run.positions(wires).T
-        beyond = z[:, None] * (np.array([coarse(row, run.rate_hz) for row in rows]) - grid.theta)
+        beyond = z[:, None] * (coarse(rows, run.rate_hz) - grid.theta)
         pick = _between_late(grid, beyond, z)
         for signals, shape in shapes(y, z):
             weights = shape / (shape @ shape)
