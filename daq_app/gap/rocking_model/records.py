@@ -176,8 +176,7 @@ class GapRun:
         whole, share = divmod(-offset * self.rate_hz, 1.0)
         place = np.arange(values.size) + int(whole)
         before, after = values.take(place, mode="clip"), values.take(place + 1, mode="clip")
-        shifted: FloatArray = before + share * (after - before)
-        return shifted
+        return before + share * (after - before)
 
 
 @dataclass(frozen=True, slots=True)

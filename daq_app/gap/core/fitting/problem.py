@@ -141,8 +141,7 @@ class Problem:
     def start(self, known: Mapping[tuple[str, int | None], float]) -> FloatArray:
         """A starting vector: `known` unit coordinates by (key, run), else 0, inside the bounds."""
         u = np.array([known.get((q.key, q.run), self._null(q)) for q in self.unknowns], dtype=float)
-        inside: FloatArray = np.clip(u, self.low, self.high)
-        return inside
+        return np.asarray(np.clip(u, self.low, self.high))
 
     def _null(self, unknown: Unknown) -> float:
         effect = next((e for e in self.effects if e.name == unknown.effect), None)

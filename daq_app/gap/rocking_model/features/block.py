@@ -89,8 +89,7 @@ class Block:
 
     def coefficients(self, series: FloatArray) -> FloatArray:
         """Coefficients, (k,), that the regression makes of a difference on the whole grid, (m,)."""
-        coefficients: FloatArray = self.projection @ series[self.pick]
-        return coefficients
+        return self.projection @ series[self.pick]
 
 
 def regress(

@@ -96,7 +96,7 @@ def shape_columns(beside: Others) -> FloatArray:
     """The shapes in which a channel may differ at the samples used, (n, k + 1); the last is its zero."""
     e = beside.expected
     rate = np.gradient(e, 1.0 / GRID_HZ)
-    columns: FloatArray = np.column_stack(
+    return np.column_stack(
         [
             e,
             -rate,
@@ -106,7 +106,6 @@ def shape_columns(beside: Others) -> FloatArray:
             np.ones_like(e),
         ]
     )[beside.pick]
-    return columns
 
 
 def deviation(beside: Others) -> Deviation:

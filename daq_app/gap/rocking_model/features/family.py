@@ -75,8 +75,7 @@ class Scene:
         middle = float(np.median(grid.raw[before])) if before.any() else 0.0
         held = self.calm & (np.abs(grid.raw - middle) < HELD_STILL * abs(middle))
         mean_error = 3.0 * self.swings.held.sway_speed_sd / max(float(held.sum()) / GRID_HZ, 0.05)
-        still: NDArray[np.bool_] = held & (mean_error < SWAY_SHARE * GRAVITY_M_S2 * abs(middle))
-        return still
+        return held & (mean_error < SWAY_SHARE * GRAVITY_M_S2 * abs(middle))
 
 
 def with_crosstalk(block: Block | None, added: FloatArray) -> Block | None:

@@ -74,5 +74,4 @@ def nats_explained(values: FloatArray, explained: FloatArray, at_least: float) -
     """
     share = np.clip(explained / max(float(values @ values), 1e-300), 0.0, _ALL)
     fraction = max(independent_fraction(values), at_least)
-    gains: FloatArray = -0.5 * fraction * values.size * np.log1p(-share)
-    return gains
+    return -0.5 * fraction * values.size * np.log1p(-share)

@@ -52,8 +52,7 @@ def turned_by(run: RockingRun, values: Mapping[str, float], theta: FloatArray, n
 def _on_springs(values: Mapping[str, float], theta: FloatArray) -> FloatArray:
     """How much further out, m, a wall on springs turns than on edges, at rotations of any shape, rad."""
     theta_c = values["winkler.theta_c"]
-    further: FloatArray = -2.0 * values["half_base"] * np.sqrt(theta_c / np.maximum(np.abs(theta), theta_c))
-    return further
+    return -2.0 * values["half_base"] * np.sqrt(theta_c / np.maximum(np.abs(theta), theta_c))
 
 
 def travel(run: RockingRun, block: Block, values: Mapping[str, float], of_base: bool) -> FloatArray:

@@ -21,8 +21,7 @@ def first_order(values: FloatArray, time_constant_s: float, rate_hz: float = GRI
     b0 = 1.0 - (1.0 - a) * time_constant_s * rate_hz
     b1 = (1.0 - a) * time_constant_s * rate_hz - a
     state = np.array([values[0] - b0 * values[0]])
-    response: FloatArray = lfilter([b0, b1], [1.0, -a], values, zi=state)[0]
-    return response
+    return np.asarray(lfilter([b0, b1], [1.0, -a], values, zi=state)[0])
 
 
 def slow_response(values: FloatArray, time_constants_s: FloatArray) -> FloatArray:
@@ -47,8 +46,7 @@ def resonator(values: FloatArray, natural: float, zeta: float, rate_hz: float = 
     A bilinear transform would be off in delay by a fifth where the response is as quick as the grid.
     """
     numerator, denominator = _discrete(float(natural), float(zeta), rate_hz)
-    response: FloatArray = lfilter(numerator, denominator, values - values[0]) + values[0]
-    return response
+    return np.asarray(lfilter(numerator, denominator, values - values[0]) + values[0])
 
 
 @lru_cache(maxsize=64)

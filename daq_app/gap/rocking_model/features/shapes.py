@@ -27,17 +27,14 @@ def side_of(theta: FloatArray) -> FloatArray:
 
     def integral(rotation: FloatArray) -> FloatArray:
         size = np.abs(rotation) / UPRIGHT_RAD
-        integral_rad: FloatArray = size + np.log1p(np.exp(-2.0 * size))
-        return integral_rad
+        return size + np.log1p(np.exp(-2.0 * size))
 
-    mean: FloatArray = 0.5 * UPRIGHT_RAD / half * (integral(theta + half) - integral(theta - half))
-    return mean
+    return 0.5 * UPRIGHT_RAD / half * (integral(theta + half) - integral(theta - half))
 
 
 def moment_shape(theta: FloatArray, alpha: float) -> FloatArray:
     """Overturning moment, (m,), over its largest value: sgn θ · sin(α − |θ|)/sin α, rounded at upright."""
-    shape: FloatArray = side_of(theta) * np.sin(alpha - np.abs(theta)) / np.sin(alpha)
-    return shape
+    return np.asarray(side_of(theta) * np.sin(alpha - np.abs(theta)) / np.sin(alpha))
 
 
 def with_play(values: FloatArray, plays: FloatArray) -> FloatArray:
@@ -54,14 +51,12 @@ def with_play(values: FloatArray, plays: FloatArray) -> FloatArray:
         ends = [np.clip(side[:, :-span], low[:, span:], high[:, span:]) for side in (low, high)]
         low[:, span:], high[:, span:] = ends
         span *= 2
-    shown: FloatArray = np.clip(values[0], low, high)
-    return shown
+    return np.asarray(np.clip(values[0], low, high))
 
 
 def play_shape(theta: FloatArray) -> FloatArray:
     """What a small play adds to a reading of the rotation, (m,), over that play: −½ … ½."""
-    shape: FloatArray = (with_play(theta, np.array([PLAY_RAD]))[0] - theta) / PLAY_RAD
-    return shape
+    return np.asarray((with_play(theta, np.array([PLAY_RAD]))[0] - theta) / PLAY_RAD)
 
 
 def stepped_shape(grid: Grid, *, alternating: bool) -> FloatArray:
@@ -71,14 +66,12 @@ def stepped_shape(grid: Grid, *, alternating: bool) -> FloatArray:
     after the step.
     """
     speeds = grid.approach if alternating else np.abs(grid.approach)
-    shape: FloatArray = _after(grid) @ speeds - float(np.sum(speeds))
-    return shape
+    return _after(grid) @ speeds - float(np.sum(speeds))
 
 
 def turn_shape(grid: Grid, impact: int) -> FloatArray:
     """The approach speed of one impact, rad/s, without sign, from that impact on, (m,); 0 before."""
-    shape: FloatArray = _after(grid)[:, impact] * abs(float(grid.approach[impact]))
-    return shape
+    return _after(grid)[:, impact] * abs(float(grid.approach[impact]))
 
 
 def top_shape(grid: Grid, impact: int) -> FloatArray:
@@ -100,5 +93,4 @@ def turning_shape(grid: Grid, *, alternating: bool) -> FloatArray:
 
 def _after(grid: Grid) -> FloatArray:
     """Share of each interval of the grid that is after each impact, (m, n)."""
-    after: FloatArray = np.clip((grid.time_s[:, None] - grid.impact_s[None, :]) * GRID_HZ + 0.5, 0.0, 1.0)
-    return after
+    return np.clip((grid.time_s[:, None] - grid.impact_s[None, :]) * GRID_HZ + 0.5, 0.0, 1.0)

@@ -124,8 +124,7 @@ def _below_mains(rate_hz: float, mains_hz: float) -> tuple[FloatArray, float]:
 @lru_cache(maxsize=4)
 def _mains_phasor(count: int, rate_hz: float, mains_hz: float) -> NDArray[np.complex128]:
     """exp(−2πi f t) of the mains frequency, shape (count,)."""
-    turning: NDArray[np.complex128] = np.exp(-2j * np.pi * mains_hz * np.arange(count) / rate_hz)
-    return turning
+    return np.asarray(np.exp(-2j * np.pi * mains_hz * np.arange(count) / rate_hz))
 
 
 @lru_cache(maxsize=4)

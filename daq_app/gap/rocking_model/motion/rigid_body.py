@@ -17,8 +17,7 @@ from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Sensor
 
 def lever_arm(sensor: Sensor, grid: Grid, half_base_m: float) -> FloatArray:
     """Distance of a place from the edge that carries the wall, along x, (m,), m."""
-    arm: FloatArray = sensor.position_m[0] - half_base_m * np.sign(grid.theta)
-    return arm
+    return sensor.position_m[0] - half_base_m * np.sign(grid.theta)
 
 
 def across_axes(run: GapRun, grid: Grid, places: Sequence[int]) -> FloatArray:

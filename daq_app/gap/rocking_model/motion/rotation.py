@@ -91,8 +91,7 @@ def sooner(values: FloatArray, samples: int) -> FloatArray:
     """A record (n,) as if it came `samples` sooner; its ends are held."""
     if not samples:
         return values
-    moved: FloatArray = values[np.clip(np.arange(values.size) + samples, 0, values.size - 1)]
-    return moved
+    return values[np.clip(np.arange(values.size) + samples, 0, values.size - 1)]
 
 
 def sample_noise(values: FloatArray, rate_hz: float) -> float:
@@ -170,15 +169,13 @@ def rotation_of_faces(
 
 def straight_line(heights: FloatArray) -> FloatArray:
     """Weights, (2, k), of readings at these heights, (k,), m: value at the foot and slope of their line."""
-    weights: FloatArray = np.linalg.pinv(np.column_stack([np.ones_like(heights), heights]))
-    return weights
+    return np.linalg.pinv(np.column_stack([np.ones_like(heights), heights]))
 
 
 def pseudo_inverse(design: FloatArray) -> FloatArray:
     """That of shapes of whatever sizes and units, (n, k): coefficients = (k, n) @ samples (n,)."""
     scale = np.sqrt(np.mean(design**2, axis=0)) + 1e-300
-    inverse: FloatArray = np.linalg.pinv(design / scale, rcond=1e-8) / scale[:, None]
-    return inverse
+    return np.asarray(np.linalg.pinv(design / scale, rcond=1e-8) / scale[:, None])
 
 
 @dataclass(frozen=True, slots=True)

@@ -91,8 +91,7 @@ def _uneven_loss(run: RockingRun, values: Mapping[str, float], cycles: HalfCycle
     true = cycles.true
     zeta = growth * np.log(np.abs(true) / (_MIDDLE * run.survey.alpha_rad)) + side * np.sign(true)
     damped_more, damped_less = (_moved(run, cycles, par.ZETA, step) for step in (_ZETA_STEP, -_ZETA_STEP))
-    added: FloatArray = zeta[:, None] * (damped_more - damped_less) / (2.0 * _ZETA_STEP)
-    return added
+    return zeta[:, None] * (damped_more - damped_less) / (2.0 * _ZETA_STEP)
 
 
 def _uneven_edges(run: RockingRun, values: Mapping[str, float], cycles: HalfCycles) -> FloatArray | float:
@@ -101,8 +100,7 @@ def _uneven_edges(run: RockingRun, values: Mapping[str, float], cycles: HalfCycl
     if radius == 0.0:
         return 0.0
     rolling = _moved(run, cycles, par.EDGE_RADIUS, _RADIUS_STEP_M) - cycles.table
-    added: FloatArray = np.sign(cycles.true)[:, None] * rolling * (radius / _RADIUS_STEP_M)
-    return added
+    return np.sign(cycles.true)[:, None] * rolling * (radius / _RADIUS_STEP_M)
 
 
 def _unsteady_wear(run: RockingRun, values: Mapping[str, float], cycles: HalfCycles) -> FloatArray | float:
@@ -115,8 +113,7 @@ def _unsteady_wear(run: RockingRun, values: Mapping[str, float], cycles: HalfCyc
         return 0.0
     impacts = run.impacts_before + np.arange(len(cycles.true))
     steady = (_moved(run, cycles, par.CRUSH_ALPHA, _LOSS_STEP) - cycles.table) / _LOSS_STEP
-    added: FloatArray = loss * wear_growth(impacts)[:, None] * steady
-    return added
+    return loss * wear_growth(impacts)[:, None] * steady
 
 
 def _moved(run: RockingRun, cycles: HalfCycles, index: int, step: float) -> FloatArray:

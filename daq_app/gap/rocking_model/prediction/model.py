@@ -180,8 +180,7 @@ def peak_slopes(run: RockingRun) -> FloatArray:
 def _slopes(run: RockingRun) -> FloatArray:
     alpha, size = run.survey.alpha_rad, np.abs(run.swings.peak_rad[run.peaks])
     fallen = np.cos(np.maximum(alpha - size, 0.0)) - np.cos(alpha)
-    slopes: FloatArray = 0.5 * size * np.sin(np.maximum(alpha - size, 0.01)) / fallen
-    return slopes
+    return np.asarray(0.5 * size * np.sin(np.maximum(alpha - size, 0.01)) / fallen)
 
 
 def _half_cycles(run: RockingRun, values: Mapping[str, float]) -> HalfCycles:

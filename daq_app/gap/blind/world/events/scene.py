@@ -97,8 +97,7 @@ def _base_rotation(
     arms = np.array([mechanics.joint.arm(float(q), 1) for q in grid])
     demand = mechanics.base_softness * sign * np.interp(np.abs(theta), grid, arms)
     keep = math.exp(-(time_s[1] - time_s[0]) / _SETTLE_S)
-    settled: FloatArray = lfilter([1.0 - keep], [1.0, -keep], demand, zi=[keep * demand[0]])[0]
-    return settled
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], demand, zi=[keep * demand[0]])[0])
 
 
 def _slip(mechanics: Mechanics, motion: Followed, time_s: FloatArray) -> FloatArray:

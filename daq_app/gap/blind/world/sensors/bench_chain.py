@@ -78,8 +78,7 @@ def _first_order(forgets: float, n: int, rng: np.random.Generator) -> FloatArray
     """First-order process of unit variance, stationary from its first sample."""
     keep = 1.0 - forgets
     driven = math.sqrt(1.0 - keep * keep) * rng.standard_normal(n)
-    filtered: FloatArray = lfilter([1.0], [1.0, -keep], driven, zi=[keep * rng.standard_normal()])[0]
-    return filtered
+    return np.asarray(lfilter([1.0], [1.0, -keep], driven, zi=[keep * rng.standard_normal()])[0])
 
 
 def _mains(time_s: FloatArray, frequency_hz: float, phase: float) -> FloatArray:

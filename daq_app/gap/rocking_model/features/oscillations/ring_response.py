@@ -198,10 +198,7 @@ def _forced_columns(run: RockingRun, block: Block, family: str) -> FloatArray:
     """What all coefficients make of the forced ring of unit size as a family shows it, (k,)."""
     frequency, zeta, _ = block.ring
     accelerations = family == "accelerometer"
-    columns: FloatArray = block.projection @ forced_column(
-        run.grid, frequency, zeta, accelerations=accelerations
-    )
-    return columns
+    return block.projection @ forced_column(run.grid, frequency, zeta, accelerations=accelerations)
 
 
 def turning(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:

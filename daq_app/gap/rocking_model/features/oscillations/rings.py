@@ -86,8 +86,7 @@ def ring_waves(grid: Grid, frequencies_hz: FloatArray, zetas: FloatArray) -> Com
     since[last == 0] = 0
     interval = float(grid.time_s[1] - grid.time_s[0])
     powers = np.exp(interval * np.arange(since.max() + 1)[:, None] * rates)
-    waves: ComplexArray = states[last] * powers[since]
-    return waves
+    return np.asarray(states[last] * powers[since])
 
 
 def forced_column(grid: Grid, frequency_hz: float, zeta: float, *, accelerations: bool) -> FloatArray:
