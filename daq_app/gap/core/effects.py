@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from daq_app.gap.core.parameters import Parameter
@@ -48,8 +48,6 @@ class Effect:
     """Effect of which this is one place: the same law on one channel of a family. They are no two causes."""
     place: str = ""
     """That channel, as the labels of its features have it."""
-    null_value: Mapping[str, float] = field(default_factory=dict)
-    """Parameter values at which the effect vanishes; 0 for each that is not listed."""
 
     @property
     def shared(self) -> tuple[Parameter, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -140,12 +139,11 @@ class Problem:
 
     def start(self, known: Mapping[tuple[str, int | None], float]) -> FloatArray:
         """A starting vector: `known` unit coordinates by (key, run), else 0, inside the bounds."""
-        u = np.array([known.get((q.key, q.run), self._null(q)) for q in self.unknowns], dtype=float)
+        u = np.array([known.get((q.key, q.run), _nothing(q)) for q in self.unknowns], dtype=float)
         return np.asarray(np.clip(u, self.low, self.high))
 
-    def _null(self, unknown: Unknown) -> float:
-        effect = next((e for e in self.effects if e.name == unknown.effect), None)
-        if effect is None or unknown.parameter.scale == "log":
-            return 0.0
-        null = effect.null_value.get(unknown.parameter.name, 0.0)
-        return unknown.parameter.unit_coordinate(null) if math.isfinite(null) else 0.0
+
+def _nothing(unknown: Unknown) -> float:
+    """Unit coordinate of a value of 0, at which an effect is none; of what has no such value, the centre."""
+    has_none = bool(unknown.effect) and unknown.parameter.scale == "linear"
+    return unknown.parameter.unit_coordinate(0.0) if has_none else 0.0
