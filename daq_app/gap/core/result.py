@@ -32,6 +32,8 @@ Verdict = Literal[
 
 NAMING: Final[tuple[Verdict, ...]] = ("effect", "pair", "several")
 """Verdicts that name one, two, or more things that are missing."""
+NO_CAUSE: Final[tuple[Verdict, ...]] = ("nothing_missing", "parameters", "below_detection")
+"""Verdicts that name none, as nothing that is missing shows."""
 
 
 class CannotDiagnose(Exception):

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import norm
 
+from daq_app.config.wording import FAMILY_WORDS
 from daq_app.gap.core.findings import Finding
 from daq_app.gap.core.parameters import NORMAL_95
 from daq_app.gap.core.policy import POLICY
@@ -31,12 +32,6 @@ _LEAST = {
 """Size from which a condition that every laboratory has a little of is material; any other always is."""
 _FAMILIES = {"floor": "ambient", "base": "contact"}
 """Families of what is no instrument's."""
-_FAMILY_WORDS = {
-    "lvdt": "the LVDTs",
-    "wire": "the wires",
-    "accelerometer": "the accelerometers",
-    "tiltmeter": "the tiltmeters",
-}
 
 
 def findings_of(runs: Sequence[RockingRun]) -> tuple[Finding, ...]:
@@ -89,7 +84,7 @@ def _median_with_sd(findings: Sequence[RunFinding]) -> tuple[float, float]:
 
 
 def _words(kind: str, target: str, finding: RunFinding, size: float, unit: str) -> str:
-    who = _FAMILY_WORDS.get(target, target)
+    who = FAMILY_WORDS.get(target, target)
     shown, label = (1e3 * size, f"m{unit}") if unit in ("m", "rad") else (size, unit)
     amount = f"{shown:.3g} {label}"
     match kind:
@@ -102,7 +97,7 @@ def _words(kind: str, target: str, finding: RunFinding, size: float, unit: str) 
         case "spikes":
             return f"{size:.2g} lone samples a second in {who}"
         case "saturation":
-            goes = "go" if target in _FAMILY_WORDS else "goes"
+            goes = "go" if target in FAMILY_WORDS else "goes"
             return f"{who} {goes} no further than {amount}"
         case "polarity" | "swap" | "disagreement":
             return finding.observable

@@ -6,23 +6,12 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 from daq_app.gap.blind.names import COMPARABLE, base_name, class_of, comparable, families_of
 from daq_app.gap.blind.running.runner import Outcome
+from daq_app.gap.core.result import NAMING, NO_CAUSE, Verdict
 
-DECISIONS: Final = (
-    "effect",
-    "pair",
-    "several",
-    "parameters",
-    "nothing_missing",
-    "cannot_tell",
-    "none_of_these",
-    "below_detection",
-)
-_BLAMING: Final = ("effect", "pair", "several")
-_NO_CAUSE: Final = ("nothing_missing", "parameters", "below_detection")
 _CLEARLY_VISIBLE: Final = 4.0
 """Standard deviations from which an effect must be found."""
 
@@ -78,7 +67,7 @@ class Judged:
 
     @property
     def blames(self) -> bool:
-        return self.decision in _BLAMING
+        return self.decision in NAMING
 
     @property
     def exact(self) -> bool:
@@ -90,7 +79,7 @@ class Judged:
         """Whether the decision as a whole was right, for the confusion matrix of decisions."""
         match self.category:
             case "null":
-                return self.decision in _NO_CAUSE
+                return self.decision in NO_CAUSE
             case "outside" if not self.known:
                 return self.decision == "none_of_these"
             case _:
@@ -163,11 +152,11 @@ def _decision(result: dict[str, Any], which: Sequence[Hypothesis], measured: boo
     if not result:
         return "failed"
     decision = str(result.get("decision", ""))
-    if decision not in DECISIONS:
+    if decision not in get_args(Verdict):
         return "failed"
-    if decision in _BLAMING and not measured and which and not _first(which)[0].effects:
+    if decision in NAMING and not measured and which and not _first(which)[0].effects:
         return "nothing_missing"
-    if measured and decision in (*_NO_CAUSE, "none_of_these") and which and not _first(which)[0].effects:
+    if measured and decision in (*NO_CAUSE, "none_of_these") and which and not _first(which)[0].effects:
         return "effect"
     return decision
 
@@ -186,7 +175,7 @@ def _answer(
 ) -> tuple[tuple[str, ...], str, float]:
     """(effects named, family named, claimed probability of the first hypothesis)."""
     first, claimed = _first(which) if which else (Hypothesis((), "", 0.0), 0.0)
-    if decision in _BLAMING:
+    if decision in NAMING:
         return first.effects, first.family, claimed
     detail = result.get("decision_detail") or {}
     return (), str(detail.get("family") or ""), claimed

@@ -8,9 +8,7 @@ from dataclasses import replace
 from daq_app.gap.core.findings import Finding, material, unknown
 from daq_app.gap.core.judging.evidence import Ranked
 from daq_app.gap.core.policy import POLICY, Policy
-from daq_app.gap.core.result import NAMING, Decision, Diagnosis, Estimate, Verdict, verdict_of
-
-_NO_CAUSE: tuple[Verdict, ...] = ("nothing_missing", "parameters", "below_detection")
+from daq_app.gap.core.result import NAMING, NO_CAUSE, Decision, Diagnosis, Estimate, verdict_of
 
 
 def with_findings(result: Diagnosis, findings: Sequence[Finding], policy: Policy = POLICY) -> Diagnosis:
@@ -60,7 +58,7 @@ def _decision(decision: Decision, findings: Sequence[Finding], policy: Policy) -
     names = tuple(finding.name for finding in joining)
     words = "; ".join(finding.words for finding in joining)
     sentence = f"Measured directly: {words}. {decision.sentence}"
-    if decision.verdict in _NO_CAUSE:
+    if decision.verdict in NO_CAUSE:
         sure = min(finding.probability for finding in joining)
         family = _joined(Ranked((), "none", 0.0, 0.0), joining).family
         return Decision(verdict_of(len(names)), names, family, sentence, sure)
