@@ -36,28 +36,28 @@ _MEASURED_ONLY: Final = ("ambient@floor", "acceleration@", "sliding@base", "corn
 base that slips between impacts (the simulator's does at impacts)."""
 
 
-class _Value(BaseModel):
-    """A named number of a result."""
+class _Part(BaseModel):
+    """Part of a result; what it has besides is ignored."""
 
     model_config = ConfigDict(frozen=True)
+
+
+class _Value(_Part):
+    """A named number of a result."""
 
     name: Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]+$")]
     value: Annotated[float, Field(allow_inf_nan=False)]
 
 
-class _Wiring(BaseModel):
+class _Wiring(_Part):
     """Channels whose plugs are reversed or in each other's places."""
-
-    model_config = ConfigDict(frozen=True)
 
     reversed: tuple[str, ...] = ()
     exchanged: dict[str, str] = Field(default_factory=dict)
 
 
-class _Result(BaseModel):
+class _Result(_Part):
     """The part of a diagnosis that can be switched on in a simulated wall."""
-
-    model_config = ConfigDict(frozen=True, extra="ignore")
 
     decision: str
     effect_parameters: tuple[_Value, ...]
@@ -66,10 +66,8 @@ class _Result(BaseModel):
     notes: dict[str, Any] = Field(default_factory=dict)
 
 
-class _Wall(BaseModel):
+class _Wall(_Part):
     """Fitted parameters of the wall, SI."""
-
-    model_config = ConfigDict(frozen=True, extra="ignore")
 
     alpha: Annotated[float, Field(gt=0.0, lt=math.pi / 2)]
     p: Annotated[float, Field(gt=0.0)]
