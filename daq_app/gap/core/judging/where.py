@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from daq_app.gap.core.features import FloatArray, Run
+from daq_app.gap.core.features import FloatArray, Label, Run
 from daq_app.gap.core.policy import Policy
 
 
@@ -55,16 +55,13 @@ def gap_map(
     Take the scales from the best hypothesis: those of a hypothesis that misfits have grown to
     swallow the misfit.
     """
-    rows: dict[tuple[str, str, str, str, str], list[_Row]] = {}
+    rows: dict[tuple[str, ...], list[_Row]] = {}
     for index, (run, residual, scale) in enumerate(zip(runs, residuals, scales, strict=True)):
         for k, label in enumerate(run.features.labels):
             key = (label.channel, label.phase, label.observable, label.band, label.unit)
-            rows.setdefault(key, []).append(
-                _Row(
-                    run.level, index, residual[k], run.features.sd[k], scale[k], label.amplitude, label.order
-                )
-            )
-    cells = sorted((_cell(key, values) for key, values in rows.items()), key=lambda c: -c.in_noise)
+            row = _Row(run.level, index, residual[k], run.features.sd[k], scale[k], label)
+            rows.setdefault(key, []).append(row)
+    cells = sorted(map(_cell, rows.values()), key=lambda c: -c.in_noise)
     return GapMap(tuple(cells), _sentence(cells, policy))
 
 
@@ -75,26 +72,24 @@ class _Row:
     residual: float
     sd: float
     scale: float
-    amplitude: float
-    order: float
+    label: Label
 
 
-def _cell(key: tuple[str, str, str, str, str], rows: Sequence[_Row]) -> Cell:
-    residual = np.array([r.residual for r in rows])
-    channel, phase, observable, band, unit = key
+def _cell(rows: Sequence[_Row]) -> Cell:
+    residual, label = np.array([r.residual for r in rows]), rows[0].label
     return Cell(
-        channel,
-        phase,
-        observable,
-        band,
-        unit,
+        label.channel,
+        label.phase,
+        label.observable,
+        label.band,
+        label.unit,
         len(rows),
         rms=float(np.sqrt(np.mean(residual**2))),
         in_noise=float(np.sqrt(np.mean((residual / np.array([r.scale for r in rows])) ** 2))),
         in_sensor_noise=float(np.sqrt(np.mean((residual / np.array([r.sd for r in rows])) ** 2))),
         repeatable=_repeatable(rows),
-        grows_with_amplitude=_rank_correlation(np.abs(residual), np.abs([r.amplitude for r in rows])),
-        grows_with_time=_rank_correlation(np.abs(residual), np.array([r.order for r in rows])),
+        grows_with_amplitude=_rank_correlation(np.abs(residual), np.abs([r.label.amplitude for r in rows])),
+        grows_with_time=_rank_correlation(np.abs(residual), np.array([r.label.order for r in rows])),
     )
 
 
