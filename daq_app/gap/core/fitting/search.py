@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.core.fitting.likelihood import LOG_2PI, Sizes
+from daq_app.gap.core.fitting.likelihood import Sizes, log_density
 from daq_app.gap.core.fitting.linear import Linear, relaxed
 from daq_app.gap.core.fitting.problem import Columns, Problem
 from daq_app.gap.core.model import Prediction
@@ -43,9 +43,7 @@ class Search:
             if not np.all(np.isfinite(residual)):
                 return math.inf
             covariance = self.sizes.covariance(self.problem.experiment, i, prediction)
-            white = covariance.whiten(residual)
-            square = float(white @ white) + covariance.log_det + residual.size * LOG_2PI
-            total += 0.5 * run.features.independent_fraction * square
+            total -= run.features.independent_fraction * log_density(residual, covariance)
         return total if math.isfinite(total) else math.inf
 
     @property
