@@ -54,7 +54,6 @@ def decide(evidence: Evidence, policy: Policy) -> tuple[Decision, str]:
     weakest = min(best.effects, key=lambda name: strength(evidence.fit, library[name]))
     sd = strength(evidence.fit, library[weakest])
     null = next((a.probability for a in evidence.answers if not a.effects), 0.0)
-    others = tuple(r.effects for r in best.alternatives[1:])
     members = credible_set(evidence.answers, policy.set_content)
     unseen = any(not a.effects for a in members) or best.probability >= policy.name_probability
     if sd < policy.detected_sd and null > policy.null_excluded and unseen:
@@ -62,15 +61,20 @@ def decide(evidence: Evidence, policy: Policy) -> tuple[Decision, str]:
             f"{words} fits best, but at {sd:.1f} posterior sd it is below detection (nothing missing: "
             f"{100 * null:.0f} %){_would_need(evidence, weakest)}."
         )
-        advice = f"Repeat at the highest level: {weakest} needs a stronger signal."
-        return Decision("below_detection", best.effects, best.first.family, sentence, sure, others), advice
+        return _below_detection(best, weakest, sentence, sure)
     if best.probability >= policy.name_probability or len(members) == 1:
         sentence = f"{words} ({best.first.family}) explains the gap, probability {sure:.3f}"
         sentence += f"; {rest.words}." if rest.share > policy.cause_closes else "."
         verdict = verdict_of(len(best.effects))
-        decision = Decision(verdict, best.effects, best.first.family, sentence, sure, others)
+        decision = Decision(verdict, best.effects, best.first.family, sentence, sure, best.others)
         return decision, _check_advice(library, best)
     return _cannot_tell(library, members)
+
+
+def _below_detection(answer: Answer, weakest: str, sentence: str, probability: float) -> tuple[Decision, str]:
+    advice = f"Repeat at the highest level: {weakest} needs a stronger signal."
+    family = answer.first.family
+    return Decision("below_detection", answer.effects, family, sentence, probability, answer.others), advice
 
 
 def _would_need(evidence: Evidence, effect: str) -> str:
@@ -122,10 +126,7 @@ def _null(evidence: Evidence, policy: Policy) -> tuple[Decision, str]:
             f"{describe(weak, evidence.library)} (probability {weak.probability:.2f}) is below detection"
             f"{_would_need(evidence, weak.effects[0])}."
         )
-        advice = f"Repeat at the highest level: {weak.effects[0]} needs a stronger signal."
-        others = tuple(r.effects for r in weak.alternatives[1:])
-        family = weak.first.family
-        return Decision("below_detection", weak.effects, family, sentence, probability, others), advice
+        return _below_detection(weak, weak.effects[0], sentence, probability)
     if evidence.rest.nominal > policy.parameters_gap * max(evidence.rest.after, 1.0):
         words = (
             "No effect is missing: other parameter values close the gap "
@@ -160,5 +161,4 @@ def _cannot_tell(library: Library, members: Sequence[Answer]) -> tuple[Decision,
         advice = "Repeat over more levels; the held-out score of each hypothesis is in the report."
     words = "Cannot tell " + " from ".join(names[:4]) + f": {advice.rstrip('.')}."
     total = sum(m.probability for m in members)
-    others = tuple(r.effects for r in members[0].alternatives[1:])
-    return Decision("cannot_tell", members[0].effects, family, words, total, others), advice
+    return Decision("cannot_tell", members[0].effects, family, words, total, members[0].others), advice

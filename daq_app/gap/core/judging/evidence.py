@@ -108,6 +108,11 @@ class Answer:
         return self.first.effects
 
     @property
+    def others(self) -> tuple[tuple[str, ...], ...]:
+        """Effects of the alternatives beside the first."""
+        return tuple(r.effects for r in self.alternatives[1:])
+
+    @property
     def probability(self) -> float:
         """Probability of the whole class: which of its forms it is, no recording can say."""
         return math.fsum(r.probability for r in self.alternatives)
