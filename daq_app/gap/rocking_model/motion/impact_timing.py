@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray, robust_sd
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
-from daq_app.gap.rocking_model.motion.parabola import vertex
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, gridded
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 from daq_app.gap.rocking_model.tolerances.walls import ALONE, IMPACT_FORM_S, SHARP_S
+from daq_app.rocking.geometry.parabola import vertex
 
 MOST = 14
 """Impacts used: the first ones are the loudest."""

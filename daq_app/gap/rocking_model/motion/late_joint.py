@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.motion_grid import MASK_S, Grid
-from daq_app.gap.rocking_model.motion.parabola import vertex
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Rotation, coarse, sooner
 from daq_app.gap.rocking_model.tolerances.sensors import MOST_LATE_S
+from daq_app.rocking.geometry.parabola import vertex
 
 
 @dataclass(frozen=True, slots=True)

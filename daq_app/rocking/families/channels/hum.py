@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.rocking.geometry.parabola import vertex
 from daq_app.rocking.means import block_means
 
 Floats = NDArray[np.float64]
@@ -109,12 +110,6 @@ def _clearest(windowed: Floats, length: int, rate_hz: float) -> tuple[float, flo
         around[inside] = False
         top = int(inside[np.argmax(power[inside])])
         clearness = float(np.sqrt(power[top] / max(float(np.median(power[around])), 1e-300)))
-        lines.append((clearness, (first + top + _vertex(power, top)) * rate_hz / length))
+        _, beyond, _ = vertex(np.log(power[top - 1 : top + 2] + 1e-300), 1)
+        lines.append((clearness, (first + top + beyond) * rate_hz / length))
     return max(lines)
-
-
-def _vertex(power: Floats, top: int) -> float:
-    """How far the maximum lies beyond `top`, by a parabola through the logarithms of three neighbours."""
-    left, middle, right = np.log(power[top - 1 : top + 2] + 1e-300)
-    bend = left - 2.0 * middle + right
-    return 0.5 * float((left - right) / bend) if bend else 0.0

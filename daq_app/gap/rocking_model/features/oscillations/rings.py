@@ -20,7 +20,6 @@ from daq_app.gap.rocking_model.features.noise import nats_explained
 from daq_app.gap.rocking_model.features.oscillations.ring_signals import Signal
 from daq_app.gap.rocking_model.features.response import resonator
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
-from daq_app.gap.rocking_model.motion.parabola import vertex
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 from daq_app.gap.rocking_model.tolerances.walls import (
     OSCILLATION_INDEPENDENT,
@@ -30,6 +29,7 @@ from daq_app.gap.rocking_model.tolerances.walls import (
     VAGUE_DAMPING,
     VAGUE_FREQUENCY,
 )
+from daq_app.rocking.geometry.parabola import vertex
 
 ComplexArray = NDArray[np.complex128]
 _Bases = list[tuple[NDArray[np.intp], FloatArray]]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from daq_app.gap.core.features import FloatArray
+import numpy as np
+from numpy.typing import NDArray
 
 
-def vertex(values: FloatArray, at: int) -> tuple[int, float, float]:
+def vertex(values: NDArray[np.float64], at: int) -> tuple[int, float, float]:
     """(sample, shift from it in samples, second difference) of the parabola through a sample near `at`.
 
     `values`: (n,), three at least. The parabola goes through a sample and both its neighbours; the first and
