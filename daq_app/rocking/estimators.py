@@ -100,20 +100,13 @@ class DecaySeries:
     none."""
 
 
-def eav(
-    speeds_rad_s: Sequence[float], sigmas_rad_s: Sequence[float], *, method: str = "EAV"
-) -> RestitutionEstimate:
+def eav_series(
+    speeds_rad_s: Sequence[float] | Floats, sigmas_rad_s: Sequence[float] | Floats, *, method: str = "EAV"
+) -> DecaySeries:
     """EAV (4.4): speeds at impacts 1, 2, …, pairs two impacts apart (same side).
 
     Signs are ignored. Speeds that are not finite, or known worse than 15 %, make no pair.
     """
-    return estimate_all([eav_series(speeds_rad_s, sigmas_rad_s, method=method)])[0]
-
-
-def eav_series(
-    speeds_rad_s: Sequence[float] | Floats, sigmas_rad_s: Sequence[float] | Floats, *, method: str = "EAV"
-) -> DecaySeries:
-    """The speeds of `eav` before their slope is found."""
     speeds, sigmas = np.abs(np.asarray(speeds_rad_s)), np.asarray(sigmas_rad_s)
     usable = _usable(speeds, sigmas)
     log, relative = np.log(np.where(usable, speeds, 1.0)), np.where(usable, sigmas / speeds, 0.0)
@@ -129,23 +122,6 @@ def eav_series(
     return DecaySeries(method, tuple(points), log, relative**2, usable, levels)
 
 
-def crt(
-    peaks_rad: Sequence[float],
-    sigmas_rad: Sequence[float],
-    alpha_rad: float,
-    *,
-    exact: bool = False,
-    method: str = "CRT",
-) -> RestitutionEstimate:
-    """CRT (4.5): peaks_rad[0] is the release, peaks_rad[n] the peak that follows impact n.
-
-    `exact` uses the nonlinear potential 1 − cos(α − |θ|) in place of the paper's (α − |θ|)²/2; the
-    caller names the method accordingly. A peak whose sigma is NaN is not used; points begin at the first
-    that is.
-    """
-    return estimate_all([crt_series(peaks_rad, sigmas_rad, alpha_rad, exact=exact, method=method)])[0]
-
-
 def crt_series(
     peaks_rad: Sequence[float],
     sigmas_rad: Sequence[float],
@@ -154,7 +130,12 @@ def crt_series(
     exact: bool = False,
     method: str = "CRT",
 ) -> DecaySeries:
-    """The energies of `crt` before their slope is found."""
+    """CRT (4.5): peaks_rad[0] is the release, peaks_rad[n] the peak that follows impact n.
+
+    `exact` uses the nonlinear potential 1 − cos(α − |θ|) in place of the paper's (α − |θ|)²/2; the
+    caller names the method accordingly. A peak whose sigma is NaN is not used; points begin at the first
+    that is.
+    """
     peaks, sigmas = np.abs(np.asarray(peaks_rad)), np.asarray(sigmas_rad)
     inside = np.isfinite(peaks) & (peaks > 0.0) & (peaks < alpha_rad)
     safe = np.where(inside, peaks, alpha_rad / 2.0)

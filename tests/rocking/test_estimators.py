@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from daq_app.rocking.estimators import crt, eav
+from daq_app.rocking.estimators import crt_series, eav_series, estimate_all
 from daq_app.rocking.families.body import body_of_half_cycles
-from daq_app.rocking.motion.arcs import fit_arc
+from daq_app.rocking.motion.arcs import fit_arcs
 from daq_app.rocking.motion.motion_fit import fit_motion
 from daq_app.rocking.motion.motion_model import FIXED, MotionModel
 from daq_app.rocking.motion.swings import MotionSettings, MotionTrack
@@ -20,6 +20,14 @@ from daq_app.rocking.theory.housner import exact_quarter_period, free_rocking
 
 P, ALPHA, RATE = 2.2, 0.215, 4000.0
 SETTINGS = MotionSettings(RATE, P, ALPHA)
+
+
+def eav(speeds_rad_s, sigmas_rad_s):
+    return estimate_all([eav_series(speeds_rad_s, sigmas_rad_s)])[0]
+
+
+def crt(peaks_rad, sigmas_rad, alpha_rad):
+    return estimate_all([crt_series(peaks_rad, sigmas_rad, alpha_rad)])[0]
 
 
 def rock(phi, r, noise=0.0, seed=0, p=P, side=1, smallest=3e-4):
@@ -62,8 +70,8 @@ def test_errors_of_arcs_are_as_claimed():
         _, time, rotation = rock(0.35, 0.9, noise=6e-5, seed=seed)
         for n in (4, 9, 14):
             start, stop = motion.impacts_s[n - 1 : n + 1]
-            arc = fit_arc(
-                time, rotation, start, stop, index=n, p_rad_s=P, alpha_rad=ALPHA, zero_sigma_rad=0.0
+            (arc,) = fit_arcs(
+                time, rotation, [start, stop], first_index=n, p_rad_s=P, alpha_rad=ALPHA, zero_sigma_rad=0.0
             )
             normalised += [
                 (abs(arc.speed_end_rad_s) - motion.speeds_before_rad_s[n]) / arc.sigma_speed_end_rad_s,
@@ -88,9 +96,8 @@ def test_a_wrong_zero_moves_impacts_by_turns_and_by_the_stated_error():
 
 def test_too_little_to_fit_is_none_not_nonsense():
     time = np.arange(100) / RATE
-    assert fit_arc(time, np.full(100, np.nan), 0.0, 0.02, index=1, p_rad_s=P, alpha_rad=ALPHA) is None
-    assert fit_arc(time, np.ones(100), 0.0, 0.02, index=1, p_rad_s=P, alpha_rad=ALPHA) is None
-    assert fit_arc(time, np.ones(100), 0.0, 0.005, index=1, p_rad_s=P, alpha_rad=ALPHA) is None
+    for rotation, end in ((np.full(100, np.nan), 0.02), (np.ones(100), 0.02), (np.ones(100), 0.005)):
+        assert fit_arcs(time, rotation, [0.0, end], first_index=1, p_rad_s=P, alpha_rad=ALPHA) == [None]
 
 
 @pytest.mark.parametrize("r", [0.82, 0.9, 0.95])
@@ -105,10 +112,11 @@ def test_both_estimators_meet_the_requirement_with_worse_sensors(r, phi, toleran
 
 def test_linear_and_exact_crt_differ_as_the_theory_says():
     track = follow(*rock(0.35, 0.9))
-    assert track.crt_exact().r == pytest.approx(0.9, abs=1e-5)
+    (exact,) = estimate_all([track.crt_exact_series()])
+    assert exact.r == pytest.approx(0.9, abs=1e-5)
     # E_nl / E_lin ≈ 1 − (1−φ)² α²/12: (4.5) comes out high by about a ten-thousandth here.
     assert 2e-5 < track.crt().r - 0.9 < 3e-4
-    assert "exact" in track.crt_exact().method
+    assert "exact" in exact.method
 
 
 def test_points_are_named_by_the_impact_that_completed_them():

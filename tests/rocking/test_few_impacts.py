@@ -9,7 +9,7 @@ import pytest
 
 from daq_app.config import load_rig
 from daq_app.rocking import AnalysisOptions, analyse_record
-from daq_app.rocking.estimators import eav, eav_series
+from daq_app.rocking.estimators import eav_series, estimate_all
 from daq_app.rocking.families.verdict import compare_series
 from studies.restitution.laboratory import draw_test
 from studies.restitution.live import live_estimates
@@ -27,7 +27,8 @@ def test_intervals_from_fewer_than_four_points_hold_the_scatter_that_walls_have(
     for _ in range(tests):
         ratios = 0.9 * np.exp(rng.normal(0.0, rng.uniform(0.001, 0.006), impacts - 1))
         speeds = 0.35 * np.cumprod(np.concatenate(([1.0], ratios)))
-        low, high = eav(speeds.tolist(), [sigma] * impacts).interval95()
+        (estimate,) = estimate_all([eav_series(speeds, [sigma] * impacts)])
+        low, high = estimate.interval95()
         held += low <= 0.9 <= high
     assert 0.92 * tests <= held <= 0.98 * tests
 

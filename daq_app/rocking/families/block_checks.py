@@ -214,7 +214,7 @@ def survey_off(body: BodyEstimate | None, track: MotionTrack) -> SurveyOff | Non
     off_rad = abs(body.alpha_rad - survey_rad)
     if not off_rad > max(_ALPHA_SHARE * survey_rad, _ALPHA_SIGMAS * body.sigma_alpha_rad):
         return None
-    series = [track.crt_exact_series(), track.crt_exact_series(alpha_rad=body.alpha_rad)]
+    series = [track.crt_exact_series(), track.crt_exact_series(body.alpha_rad)]
     by_survey, by_motion = (estimate.r for estimate in estimate_all(series))
     if by_survey is None or by_motion is None or abs(by_survey - by_motion) <= _CRT_TOLD:
         return None

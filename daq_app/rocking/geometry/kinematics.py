@@ -131,17 +131,13 @@ class RotationGeometry:
     _weights: dict[tuple[bool, ...], Floats] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
-    def from_rig(cls, rig: Rig, *, pivot_inset_m: float = 0.0, frame_samples: int = 20) -> RotationGeometry:
-        """Geometry of a rig. `pivot_inset_m` moves both pivots inwards (semi-rigid joint, 2.3).
-
-        Raises `ValueError` where the rig has no wires or a wire without anchor.
-        """
+    def from_rig(cls, rig: Rig, *, frame_samples: int = 20) -> RotationGeometry:
+        """Geometry of a rig. Raises `ValueError` where it has no wires or a wire without anchor."""
         wires = rig.of_family("wire")
         if not wires:
             raise ValueError("the rig has no wire potentiometers: rotation cannot be computed")
-        half = rig.specimen.base_width_m / 2.0 - pivot_inset_m
         return cls(
-            wires=WireGeometry.of(wires, half),
+            wires=WireGeometry.of(wires, rig.specimen.base_width_m / 2.0),
             tilt_ids=tuple(c.id for c in rig.of_family("tiltmeter") if c.axis == "x"),
             frame_samples=frame_samples,
         )

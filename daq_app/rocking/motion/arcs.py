@@ -70,34 +70,6 @@ class Arc:
         return self.end_s - self.start_s
 
 
-def fit_arc(
-    time_s: Floats,
-    rotation_rad: Floats,
-    start_s: float,
-    end_s: float,
-    *,
-    index: int,
-    p_rad_s: float,
-    alpha_rad: float,
-    zero_sigma_rad: float = 2e-5,
-) -> Arc | None:
-    """Fit the half-cycle between two zero crossings (for `index` 0 between release and crossing).
-
-    `time_s`, `rotation_rad` (n,) must cover it; NaN samples are left out. `zero_sigma_rad` is what
-    the zero of the rotation may be wrong by: it moves the crossings. None where too little is left
-    to fit, or where the fit has no zero crossing or peak where it should.
-    """
-    return fit_arcs(
-        time_s,
-        rotation_rad,
-        [start_s, end_s],
-        first_index=index,
-        p_rad_s=p_rad_s,
-        alpha_rad=alpha_rad,
-        zero_sigma_rad=zero_sigma_rad,
-    )[0]
-
-
 def fit_arcs(
     time_s: Floats,
     rotation_rad: Floats,
@@ -109,8 +81,12 @@ def fit_arcs(
     zero_sigma_rad: float = 2e-5,
     slow_noise_rad: float = 0.0,
 ) -> list[Arc | None]:
-    """Fit consecutive half-cycles, as `fit_arc` each: `bounds_s` (arcs + 1,) are where they start and end.
+    """Fit consecutive half-cycles between zero crossings (that of index 0 between release and crossing).
 
+    `bounds_s` (arcs + 1,) are where they start and end. `time_s`, `rotation_rad` (n,) must cover them; NaN
+    samples are left out. `zero_sigma_rad` is what the zero of the rotation may be wrong by: it moves the
+    crossings. None where too little is left to fit, or where the fit has no zero crossing or peak where it
+    should.
     `slow_noise_rad`: rms of one sample of the white noise whose long means scatter as the recording's do.
     """
     bounds = np.asarray(bounds_s, dtype=np.float64)

@@ -205,10 +205,6 @@ class MotionTrack:
         """CRT (4.5), the paper's linearised energy."""
         return estimate_all([self.crt_series()])[0]
 
-    def crt_exact(self) -> RestitutionEstimate:
-        """CRT with the exact potential of the nonlinear equation."""
-        return estimate_all([self.crt_exact_series()])[0]
-
     def eav_series(self, method: str = "EAV") -> DecaySeries:
         """What `eav` is found from: many series are estimated together at the cost of one."""
         return eav_series(self.speeds_before_rad_s, self.sigma_speeds_in_decay, method=method)
@@ -217,11 +213,9 @@ class MotionTrack:
         """What `crt` is found from."""
         return crt_series(self.peaks_rad, self._sigmas_in_decay, self.settings.alpha_rad, method=method)
 
-    def crt_exact_series(
-        self, method: str = "CRT exact potential", *, alpha_rad: float | None = None
-    ) -> DecaySeries:
-        """What `crt_exact` is found from; with another α than the survey's where one is given."""
-        alpha = self.settings.alpha_rad if alpha_rad is None else alpha_rad
+    def crt_exact_series(self, alpha_rad: float | None = None) -> DecaySeries:
+        """CRT with the exact potential of the nonlinear equation; `alpha_rad`: where not the survey's."""
+        alpha, method = alpha_rad or self.settings.alpha_rad, "CRT exact potential"
         return crt_series(self.peaks_rad, self._sigmas_in_decay, alpha, exact=True, method=method)
 
     @property

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from daq_app.rocking import VelocityFilter, VelocityStream, free_rocking
-from daq_app.rocking.estimators import eav
+from daq_app.rocking.estimators import eav_series, estimate_all
 from daq_app.rocking.motion.filtered_peaks import corrected_peaks, filtered_peaks
 
 P, ALPHA, RATE = 2.2, 0.215, 4000.0
@@ -71,8 +71,8 @@ def test_loss_of_the_peak_is_known_and_corrected(r):
     np.testing.assert_allclose(predicted, loss, atol=4e-3)
     assert loss[-1] < loss[0] < 0.985  # it is a loss worth knowing, and it grows
     zero = np.zeros(true.size)
-    raw = eav(peaks[large], zero)
-    corrected = eav(corrected_peaks(peaks, FILTER, P, ALPHA)[large], zero)
+    of_peaks = (peaks, corrected_peaks(peaks, FILTER, P, ALPHA))
+    raw, corrected = (estimate_all([eav_series(values[large], zero)])[0] for values in of_peaks)
     assert raw.plain_mean < r - 0.001
     assert corrected.r == pytest.approx(r, abs=1e-3)
 
