@@ -30,7 +30,6 @@ from scipy.special import ndtri, stdtr
 from daq_app.rocking.motion.swings import MotionTrack
 
 Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 _USABLE_SIGMA: Final = 0.05
 """ln-ratios of single impacts or half-cycles known worse than this are not used."""

@@ -18,9 +18,6 @@ from daq_app.runfile import TestPlan
 PULLED: Final = 0.03
 """|θ|/α from which a wall counts as pulled: a zeroed wall leans by less than a hundredth of α."""
 _MOVING: Final = frozenset({State.RELEASED, State.ROCKING})
-_BEFORE_RELEASE: Final = frozenset(
-    {State.PREVIEWING, State.ARMED, State.HOLDING, State.SAVED, State.SAVING, State.FAILED}
-)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,14 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq_app.rocking.analysis.preparation.signals import Signals, TestTimes
 from daq_app.rocking.families.channels.compared_channels import ComparedChannels
 from daq_app.rocking.families.gain_error import CALIBRATION_SHARE, gain_sigma_of_mean
 from daq_app.rocking.geometry.joint import BaseJoint
-
-Floats = NDArray[np.float64]
 
 _DATUM_SHARE = 0.0005
 """Standard uncertainty of the wires' gain from the datum of their heights, common to all: 1 mm of 2 m,
