@@ -57,8 +57,20 @@ AUXILIARY: Final[Mapping[str, Auxiliary]] = {
 }
 """Auxiliary families, and those among the diagnosed that began so, by name; their order is that of lists and
 plots."""
+FAMILY_NAMES: Final[dict[Family, str]] = {
+    "wire": "wires",
+    "lvdt": "LVDTs",
+    "accelerometer": "accelerometers",
+    "tiltmeter": "tiltmeters",
+}
+"""Of all that are looked at for the motion of the wall."""
 
 
 def is_auxiliary(family: str) -> bool:
     """Whether rocking analysis and diagnosis leave a family out."""
     return family in AUXILIARY and not AUXILIARY[family].diagnosed
+
+
+def in_a_sentence(target: str) -> str:
+    """``lvdt`` → ``the LVDTs``; a channel by its name."""
+    return next((f"the {name}" for family, name in FAMILY_NAMES.items() if family == target), target)

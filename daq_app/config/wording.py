@@ -11,14 +11,6 @@ _MINUS: Final = re.compile(r"(?<![\w\-)])-(?=\.?\d|[xyz]\b)")
 METHOD_MARKS: Final = {"EAV": "o", "CRT": "s", "fit": "D"}
 """Mark of each method for r in every figure, as matplotlib and pyqtgraph both spell circle and square."""
 
-FAMILY_WORDS: Final = {
-    "lvdt": "the LVDTs",
-    "wire": "the wires",
-    "accelerometer": "the accelerometers",
-    "tiltmeter": "the tiltmeters",
-}
-"""A family of sensors in a sentence."""
-
 
 def plus_minus(error: float | None, decimals: int = 4) -> str:
     """A standard error behind its value: ``± 0.0021``; what rounds to nothing is ``± < 0.0001``.

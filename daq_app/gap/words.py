@@ -7,7 +7,8 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-from daq_app.config.wording import FAMILY_WORDS, signed
+from daq_app.config.families import in_a_sentence
+from daq_app.config.wording import signed
 
 _UNITS: Final = {
     "mm": 1e3,
@@ -85,7 +86,7 @@ def cause_in_words(effect: str, estimates: Mapping[str, Interval], otherwise: st
     phrase = _PHRASES.get(base)
     if phrase is None:
         return otherwise or effect.replace("_", " ")
-    phrase = phrase.replace("{target}", FAMILY_WORDS.get(target, target) or "a channel")
+    phrase = phrase.replace("{target}", in_a_sentence(target) or "a channel")
     for parameter, unit in re.findall(r"\{(\w+)\|([^}]*)\}", phrase):
         estimate = estimates.get(f"{effect}.{parameter}", estimates.get(parameter))
         size = "an unknown amount" if estimate is None else with_interval(*estimate, unit)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import norm
 
-from daq_app.config.wording import FAMILY_WORDS
+from daq_app.config.families import FAMILY_NAMES, in_a_sentence
 from daq_app.gap.core.findings import Finding
 from daq_app.gap.core.parameters import NORMAL_95
 from daq_app.gap.core.policy import POLICY
@@ -84,7 +84,7 @@ def _median_with_sd(findings: Sequence[RunFinding]) -> tuple[float, float]:
 
 
 def _words(kind: str, target: str, finding: RunFinding, size: float, unit: str) -> str:
-    who = FAMILY_WORDS.get(target, target)
+    who = in_a_sentence(target)
     shown, label = (1e3 * size, f"m{unit}") if unit in ("m", "rad") else (size, unit)
     amount = f"{shown:.3g} {label}"
     match kind:
@@ -97,7 +97,7 @@ def _words(kind: str, target: str, finding: RunFinding, size: float, unit: str) 
         case "spikes":
             return f"{size:.2g} lone samples a second in {who}"
         case "saturation":
-            goes = "go" if target in FAMILY_WORDS else "goes"
+            goes = "go" if target in FAMILY_NAMES else "goes"
             return f"{who} {goes} no further than {amount}"
         case "polarity" | "swap" | "disagreement":
             return finding.observable

@@ -5,18 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final, Literal
 
-from daq_app.config.rig import Family
+from daq_app.config.families import FAMILY_NAMES, Family
 from daq_app.rocking.families.channels.compared_channels import ComparedChannels, DeviationKind
 from daq_app.rocking.families.channels.hum import MAINS_SHARE
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.scales import factor_words
 
-FAMILY_NAMES: Final[dict[Family, str]] = {
-    "wire": "wires",
-    "lvdt": "LVDTs",
-    "accelerometer": "accelerometers",
-    "tiltmeter": "tiltmeters",
-}
 _IN_UNIT: Final[dict[str, tuple[float, str]]] = {
     "m": (1e3, "mm"),
     "rad": (1e3, "mrad"),

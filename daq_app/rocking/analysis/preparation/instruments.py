@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from daq_app.config.families import FAMILY_NAMES
 from daq_app.rocking.analysis.preparation.base import STILL, Base, base_of
 from daq_app.rocking.analysis.preparation.compared_families import (
     bending_of,
@@ -45,8 +45,6 @@ from daq_app.rocking.geometry.noise import white_noise
 from daq_app.rocking.motion.bending import Bending
 from daq_app.rocking.motion.swings import REST_ZERO_SIGMA_RAD
 from daq_app.rocking.record import TestRecord
-
-Floats = NDArray[np.float64]
 
 _NOTABLE_HUM_NOISES = 1.5
 """Hum above this many times a channel's noise is a warning; below it is taken out and remarked. Ordinary
@@ -122,7 +120,7 @@ def _without_hum(
     if hum is None:
         return record, []
     findings = []
-    for family, name in words.FAMILY_NAMES.items():
+    for family, name in FAMILY_NAMES.items():
         rows = [k for k, channel_id in enumerate(ids) if record.rig.channel(channel_id).family == family]
         rows = [k for k in rows if hum.amplitude[k]]
         if rows:

@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.config.rig import Family
+from daq_app.config.families import FAMILY_NAMES, Family
 from daq_app.rocking.analysis.preparation.crude_rotations import CrudeRotations
-from daq_app.rocking.families import unfit_words, words
+from daq_app.rocking.families import unfit_words
 from daq_app.rocking.families.channels.readings import Readings, readings_of
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.geometry.kinematics import RotationGeometry
@@ -73,7 +73,7 @@ def unfit_channels(record: TestRecord, rotations: CrudeRotations) -> UnfitChanne
         still = [
             _missed_s(readings, levers[name], rotations) for name, readings in zip(ids, seen, strict=True)
         ]
-        found = _unfit(words.FAMILY_NAMES[family], ids, seen, still)
+        found = _unfit(FAMILY_NAMES[family], ids, seen, still)
         if len(found) > most * len(ids):
             families.append(unfit_words.whole_family_unfit(found, len(ids)))
         else:
@@ -84,7 +84,7 @@ def unfit_channels(record: TestRecord, rotations: CrudeRotations) -> UnfitChanne
             for name, readings, noise in zip(ids, seen, declared, strict=True)
             if name not in unfit and noise > 0.0 and math.isfinite(readings.noise_si)
         }
-        noisy += _noisy(words.FAMILY_NAMES[family], noises)
+        noisy += _noisy(FAMILY_NAMES[family], noises)
     return UnfitChannels(tuple(left_out), tuple(families), tuple(noisy))
 
 
