@@ -15,8 +15,9 @@ from sim_hardware.daqmx_server.bench.bench import Bench
 from sim_hardware.daqmx_server.errors import Code, DaqmxError
 from sim_hardware.daqmx_server.requests import fields_of
 from sim_hardware.daqmx_server.services.attributes.groups import Handler
-from sim_hardware.daqmx_server.tasks.reading import Reading, read
-from sim_hardware.daqmx_server.tasks.task import Task, task_named
+from sim_hardware.daqmx_server.services.reads.digital_reads import chosen_channels
+from sim_hardware.daqmx_server.tasks.reading import read
+from sim_hardware.daqmx_server.tasks.task import task_named
 
 
 def _varint(value: int) -> bytes:
@@ -91,7 +92,7 @@ def read_raw(bench: Bench, request: Any) -> Any:
     got = read(task, request.num_samps_per_chan, request.timeout)
     types = [
         (f"c{row}", "<i2" if channel.raw_bytes == 2 else "<i4")
-        for row, channel in enumerate(_chosen(task, got))
+        for row, channel in enumerate(chosen_channels(task, got))
     ]
     scans = np.empty(got.count, dtype=types)
     for (name, _), codes in zip(types, got.codes, strict=True):
@@ -102,17 +103,14 @@ def read_raw(bench: Bench, request: Any) -> Any:
     )
 
 
-def _chosen(task: Task, got: Reading) -> list[Any]:
-    return task.channels if got.rows is None else [task.channels[row] for row in got.rows]
-
-
 def read_waveforms(bench: Bench, request: Any) -> Any:
     """Readings with the instant of the first sample, the interval, name and unit of each channel."""
     task = task_named(bench, request.task.name)
     got = read(task, request.num_samps_per_chan, request.timeout)
     mode = fields_of(request)["waveform_attribute_mode"]
     reply = pb.ReadAnalogWaveformsResponse(status=got.status, samps_per_chan_read=got.count)
-    for values, channel in zip(task.scan.readings(got.codes, got.rows), _chosen(task, got), strict=True):
+    readings = task.scan.readings(got.codes, got.rows)
+    for values, channel in zip(readings, chosen_channels(task, got), strict=True):
         waveform = reply.waveforms.add()
         waveform.y_data.extend(values.tolist())
         if mode & WaveformAttributeMode.TIMING.value:
