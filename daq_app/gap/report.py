@@ -74,7 +74,7 @@ def _meanings() -> dict[str, str]:
 
 
 def _pictures(result: Diagnosis, shown: Sequence[Trace], maps: Sequence[ProbeMap]) -> Mapping[str, str]:
-    where, (before, after) = _grid(5.2, 0.9 + 0.22 * len(draw.map_table(result.where)[0]), 1, 2)
+    where, (before, after) = _grid(5.2, 0.9 + 0.22 * len(draw.map_axes(result.where)[0]), 1, 2)
     draw.draw_maps(before, after, result)
     evidence, (axes,) = _grid(5.2, 2.6, 1, 1)
     draw.draw_evidence(draw.bare(axes), result)

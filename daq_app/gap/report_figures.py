@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -22,30 +22,31 @@ _MOST_BARS: Final = 7
 Shape = Mapping[str, tuple[float, float, float]]
 
 
-def map_table(found: GapMap) -> tuple[list[str], list[str], np.ndarray]:
-    """(channels, phases, largest gap of each pair in units of noise and scatter; NaN where nothing is)."""
+def map_axes(found: GapMap) -> tuple[list[str], list[str]]:
+    """Channels and phases of a map, in the order in which they are shown."""
     channels = list(dict.fromkeys(cell.channel for cell in found.cells))
     phases = sorted(
         {cell.phase for cell in found.cells},
         key=lambda phase: (_PHASES.index(phase) if phase in _PHASES else len(_PHASES), phase),
     )
+    return channels, phases
+
+
+def map_table(found: GapMap, channels: Sequence[str], phases: Sequence[str]) -> np.ndarray:
+    """Largest gap of each channel and phase in units of noise and scatter; NaN where nothing is."""
     table = np.full((len(channels), len(phases)), np.nan)
     for cell in found.cells:
-        place = channels.index(cell.channel), phases.index(cell.phase)
-        table[place] = np.fmax(table[place], cell.in_noise)
-    return channels, phases, table
+        if cell.channel in channels and cell.phase in phases:
+            place = channels.index(cell.channel), phases.index(cell.phase)
+            table[place] = np.fmax(table[place], cell.in_noise)
+    return table
 
 
 def draw_maps(before: Axes, after: Axes, result: Diagnosis) -> None:
     """Channel against phase, without and with what was found; 1 is noise and scatter."""
-    channels, phases, first = map_table(result.where)
-    left_channels, left_phases, left = map_table(result.remaining)
-    second = np.full(first.shape, np.nan)
-    for i, channel in enumerate(channels):
-        for j, phase in enumerate(phases):
-            if channel in left_channels and phase in left_phases:
-                second[i, j] = left[left_channels.index(channel), left_phases.index(phase)]
-    for axes, table, title in ((before, first, "before"), (after, second, "after")):
+    channels, phases = map_axes(result.where)
+    for axes, found, title in ((before, result.where, "before"), (after, result.remaining, "after")):
+        table = map_table(found, channels, phases)
         shade = np.log10(np.clip(table, 0.5, 50.0))
         axes.imshow(shade, cmap="OrRd", vmin=np.log10(0.8), vmax=np.log10(30.0), aspect="auto")
         for (i, j), value in np.ndenumerate(table):

@@ -10,7 +10,7 @@ import pytest
 
 from daq_app.gap.core.findings import Finding
 from daq_app.gap.report import write_report
-from daq_app.gap.report_figures import ProbeMap, map_table
+from daq_app.gap.report_figures import ProbeMap, map_axes, map_table
 from daq_app.gap.traces import traces
 from tests.support.gap.made_diagnosis import diagnosis
 from tests.support.simulated_wall import simulate
@@ -118,8 +118,10 @@ def test_a_gap_that_rises_is_said_to_rise_and_nothing_to_be_gained(tmp_path):
 
 
 def test_the_map_has_the_largest_gap_of_each_channel_and_phase():
-    channels, phases, table = map_table(diagnosis({}, ()).where)
+    found = diagnosis({}, ()).where
+    channels, phases = map_axes(found)
     assert (channels, phases) == (["lvdt", "wire"], ["swing", "peak", "run"])
+    table = map_table(found, channels, phases)
     np.testing.assert_array_equal(table, [[9.0, 4.0, np.nan], [np.nan, np.nan, 0.9]])
 
 
