@@ -143,10 +143,7 @@ def _label(name: str, seed: int, category: str, world: World, made: Sequence[Mad
         ],
         "detectability": [detectability(world, effect) for effect in world.effects],
         "wall": {**asdict(wall), "alpha": wall.alpha, "p": wall.p},
-        "nominal": {
-            "alpha": world.rig.specimen.alpha0_rad,
-            "p": world.rig.specimen.p_rad_s,
-        },
+        "nominal": {"alpha": world.rig.specimen.alpha0_rad, "p": world.rig.specimen.p_rad_s},
         "runs": [
             {
                 "test": run.plan.test,

@@ -124,11 +124,7 @@ def table(judged: Sequence[Judged]) -> list[Row]:
         Row("family right, effect ≥ 4 sd", share([j.family_right for j in visible]), low=0.98),
         Row("first answer right, effect < 4 sd", share([j.first_right for j in weak])),
         Row("95 % set holds the truth", share([j.in_set for j in known]), 0.93, 0.98),
-        Row(
-            "95 % set: mean size",
-            bootstrap(sizes, np.mean),
-            high=1.5,
-        ),
+        Row("95 % set: mean size", bootstrap(sizes, np.mean), high=1.5),
         Row("wrong at p > 0.95", share([wrong_and_sure(j) for j in speaking]), high=0.01),
         Row("expected calibration error", calibration(*claims(judged)), high=0.05),
         Row("calibration error by chance alone", calibration_error_by_chance(claims(judged)[0])),
@@ -200,12 +196,7 @@ def _parameter_rows(singles: Sequence[Judged]) -> list[Row]:
     met = [j for j in singles if j.parameter_covered is not None and j.first_right]
     return [
         Row("parameter error, median", bootstrap([j.parameter_error for j in met]), high=0.02),
-        Row(
-            "95 % interval holds the parameter",
-            share([bool(j.parameter_covered) for j in met]),
-            0.92,
-            0.98,
-        ),
+        Row("95 % interval holds the parameter", share([bool(j.parameter_covered) for j in met]), 0.92, 0.98),
     ]
 
 

@@ -21,12 +21,7 @@ from daq_app.gap.rocking_model.inspection.channel_faults import SCREENED
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, coarse, gridded, mean_rotation
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2
-from daq_app.gap.rocking_model.tolerances.inspection import (
-    FEELS_SD,
-    FEELS_SHARE,
-    TILT_UNLIKE,
-    TILT_UNLIKE_SD,
-)
+from daq_app.gap.rocking_model.tolerances.inspection import FEELS_SD, FEELS_SHARE, TILT_UNLIKE, TILT_UNLIKE_SD
 from daq_app.gap.rocking_model.tolerances.motion import AROUND_TEST_S
 
 _TIME_CONSTANTS_S = np.geomspace(0.02, 2.0, 9)

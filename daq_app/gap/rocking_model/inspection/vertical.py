@@ -14,12 +14,7 @@ import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
-from daq_app.gap.rocking_model.features.channel_shapes import (
-    TOLERANCE,
-    Others,
-    block_of,
-    deviation,
-)
+from daq_app.gap.rocking_model.features.channel_shapes import TOLERANCE, Others, block_of, deviation
 from daq_app.gap.rocking_model.inspection.channel_families import smoothed
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid

@@ -39,11 +39,7 @@ def floor_loadings(run: RockingRun, floor: FloorSpectrum) -> FloatArray:
     columns = []
     for frequency_hz, rms_m_s2 in _sinusoids(floor):
         for phase in (0.0, 0.5 * math.pi):
-            wave = {
-                "ambient.amplitude": rms_m_s2,
-                "ambient.frequency": frequency_hz,
-                "ambient.phase": phase,
-            }
+            wave = {"ambient.amplitude": rms_m_s2, "ambient.frequency": frequency_hz, "ambient.phase": phase}
             column = np.zeros(len(run.features))
             column[: quiet.size] = np.concatenate(swing_features(still, {**values, **wave})) - quiet
             columns.append(column)

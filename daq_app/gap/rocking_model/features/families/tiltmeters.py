@@ -13,12 +13,7 @@ from daq_app.gap.core import Parameter
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.parameters import known
 from daq_app.gap.rocking_model.features.block import Block, regress
-from daq_app.gap.rocking_model.features.differences import (
-    base_rotation,
-    difference_of,
-    face_gain,
-    of_shapes,
-)
+from daq_app.gap.rocking_model.features.differences import base_rotation, difference_of, face_gain, of_shapes
 from daq_app.gap.rocking_model.features.family import (
     Scene,
     SensorFamily,
