@@ -201,7 +201,8 @@ class _Asked:
         }
         silent = [name for name, change in changes.items() if change < _SILENT]
         if len(silent) == len(changes) and len(changes) > 1:
-            return [f"Effect {effect.name} changes no feature. Does the model read {_keys(effect)}?"], []
+            keys = ", ".join(map(effect.key, effect.parameters))
+            return [f"Effect {effect.name} changes no feature. Does the model read {keys}?"], []
         if silent:
             keys = ", ".join(f"{effect.name}.{name}" for name in silent)
             return [f"Effect {effect.name} changes no feature by {keys}. Does the model read that name?"], []
@@ -298,7 +299,3 @@ def _robust_residual(problem: Problem) -> FloatArray:
 def _largest(change: FloatArray) -> float:
     """Largest size; what is no number any more has changed."""
     return float(np.max(np.where(np.isfinite(change), np.abs(change), np.inf), initial=0.0))
-
-
-def _keys(effect: Effect) -> str:
-    return ", ".join(effect.key(parameter) for parameter in effect.parameters)

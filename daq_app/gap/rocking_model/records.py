@@ -201,7 +201,8 @@ def load_run(path: Path, rig: Rig | None = None) -> GapRun:
         rig = rig or run.rig
         if rig is None:
             raise CannotDiagnose(f"Run {path.name} carries no rig file.", "Name one with --rig.")
-        ids = [name for name in run.channel_ids if name not in _auxiliary(rig)]
+        beside = {channel.id for channel in rig.channels if channel.auxiliary}  # nothing predicts them
+        ids = [name for name in run.channel_ids if name not in beside]
         missing = [name for name in ids if name not in rig.channel_ids]
         if missing:
             raise CannotDiagnose(
@@ -222,11 +223,6 @@ def load_run(path: Path, rig: Rig | None = None) -> GapRun:
             time_offset_s=offsets,
             start_utc_ns=run.header.start_utc_ns,
         )
-
-
-def _auxiliary(rig: Rig) -> frozenset[str]:
-    """Channels beside the rocking motion: nothing predicts them."""
-    return frozenset(channel.id for channel in rig.channels if channel.auxiliary)
 
 
 def level_of(test: str) -> str:

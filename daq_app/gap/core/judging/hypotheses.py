@@ -119,7 +119,8 @@ class Hypotheses:
         screened = self._screened(base, [*further, *probes], text)
         if with_probes:
             self.alone = screened
-        promising = [e.name for e in further if base == NULL or self._promises(screened[e.name])]
+        gains = {s.effect: max(s.robust.gain, s.strict.gain) for s in screened.values()}
+        promising = [e.name for e in further if base == NULL or gains[e.name] > self.policy.further_nats]
         for name in promising:
             hypothesis = tuple(sorted((*base, name)))
             approximate = fit.log_evidence + screened[name].robust.evidence
@@ -141,9 +142,6 @@ class Hypotheses:
             for k in range(0, len(effects), share)
         ]
         return {screened.effect: screened for part in self.workers.run(tasks, text) for screened in part}
-
-    def _promises(self, screened: Screened) -> bool:
-        return max(screened.robust.gain, screened.strict.gain) > self.policy.further_nats
 
     @staticmethod
     def _chosen(base: Hypothesis, screened: Sequence[Screened]) -> list[tuple[Hypothesis, Step]]:

@@ -130,11 +130,7 @@ def _mains_phasor(count: int, rate_hz: float, mains_hz: float) -> NDArray[np.com
 @lru_cache(maxsize=4)
 def _mains_at_rest(count: int, rate_hz: float, mains_hz: float) -> tuple[FloatArray, FloatArray]:
     """Wave of the mains, offset and slope over `count` samples, (count, 4), and their pseudo-inverse."""
-    design = np.array([*_waves(count, rate_hz, mains_hz), np.ones(count), np.arange(count) / rate_hz]).T
+    samples = np.arange(count)
+    angle = 2.0 * np.pi * mains_hz / rate_hz * samples
+    design = np.array([np.sin(angle), np.cos(angle), np.ones(count), samples / rate_hz]).T
     return design, np.linalg.pinv(design)
-
-
-def _waves(count: int, rate_hz: float, frequency_hz: float) -> FloatArray:
-    """Sine and cosine, (2, count)."""
-    angle = 2.0 * np.pi * frequency_hz / rate_hz * np.arange(count)
-    return np.array([np.sin(angle), np.cos(angle)])
