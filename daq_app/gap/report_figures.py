@@ -208,6 +208,5 @@ def probe_maps(result: Diagnosis, meanings: Mapping[str, str]) -> list[ProbeMap]
 
 def bare(axes: Axes) -> Any:
     """Take away the frame at the top and the right."""
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    axes.spines[["top", "right"]].set_visible(False)
     return axes

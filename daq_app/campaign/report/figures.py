@@ -43,8 +43,7 @@ def _axes(figure: Figure, rows: int, columns: int, *, above: float = 0.0) -> lis
     for axis in axes:
         axis.grid(**_GRID)
         axis.set_axisbelow(True)
-        for side in ("top", "right"):
-            axis.spines[side].set_visible(False)
+        axis.spines[["top", "right"]].set_visible(False)
     return axes
 
 

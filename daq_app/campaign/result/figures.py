@@ -34,8 +34,7 @@ def result_figure(
     for axis in (rotation, restitution, velocity, periods):
         axis.grid(color="#dddddd", lw=0.6)
         axis.set_axisbelow(True)
-        for side in ("top", "right"):
-            axis.spines[side].set_visible(False)
+        axis.spines[["top", "right"]].set_visible(False)
     figure.suptitle(test.test, fontweight="bold", x=0.01, ha="left")
     return figure
 
