@@ -25,6 +25,17 @@ class ClockReading:
     samples: int
     """Per channel, counted like `Block.first_sample`."""
 
+    @property
+    def width_s(self) -> float:
+        """Time between the two instants, within which the count was read."""
+        return self.after_s - self.before_s
+
+    def follows(self, earlier: ClockReading, rate_hz: float, off_s: float) -> bool:
+        """Whether samples taken at a rate since an earlier reading fit the time since, to within `off_s`."""
+        taken_s = (self.samples - earlier.samples) / rate_hz
+        least, most = self.before_s - earlier.after_s, self.after_s - earlier.before_s
+        return least - off_s <= taken_s <= most + off_s
+
 
 @dataclass(frozen=True, slots=True)
 class Block:

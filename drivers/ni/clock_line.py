@@ -50,12 +50,12 @@ class ClockLine:
         """Readings come in order of time."""
         if self._first is None or self._last is None:
             self._first = self._last = self._sure = reading
-        elif self._rate_hz is None or self._is_on(self._last, reading):
+        elif self._rate_hz is None or reading.follows(self._last, self.rate_hz, _OFF_S):
             self._other = None
             self._last = reading
             self._look_at_rate()
             self._look_for_delay(reading)
-        elif self._other is None or not self._is_on(self._other, reading):
+        elif self._other is None or not reading.follows(self._other, self.rate_hz, _OFF_S):
             self._other = reading
         elif _age(self._other, reading) >= _ADOPT_S:
             self._first, self._last, self._other = self._other, reading, None
@@ -72,7 +72,7 @@ class ClockLine:
         if sure is None:
             return None
         passed_s = 0.5 * (before_s + after_s) - 0.5 * (sure.before_s + sure.after_s)
-        uncertain_s = 0.5 * (after_s - before_s) + 0.5 * _width(sure) + self._rate_error * passed_s
+        uncertain_s = 0.5 * (after_s - before_s) + 0.5 * sure.width_s + self._rate_error * passed_s
         if self._behind is not None:  # held up, or the clock has just stood still: nobody knows yet
             uncertain_s += self._lag_s(sure, self._behind)
         return round(sure.samples + passed_s * self.rate_hz), uncertain_s
@@ -119,17 +119,7 @@ class ClockLine:
 
     def _take_rate(self, rate_hz: float, first: ClockReading, last: ClockReading) -> None:
         self._rate_hz = rate_hz
-        self._rate_error = 0.5 * (_width(first) + _width(last)) / _age(first, last)
-
-    def _is_on(self, earlier: ClockReading, reading: ClockReading) -> bool:
-        """Whether a reading can lie on the line through an earlier one."""
-        taken_s = (reading.samples - earlier.samples) / self.rate_hz
-        least, most = reading.before_s - earlier.after_s, reading.after_s - earlier.before_s
-        return least - _OFF_S <= taken_s <= most + _OFF_S
-
-
-def _width(reading: ClockReading) -> float:
-    return reading.after_s - reading.before_s
+        self._rate_error = 0.5 * (first.width_s + last.width_s) / _age(first, last)
 
 
 def _slope(earlier: ClockReading, later: ClockReading) -> float:

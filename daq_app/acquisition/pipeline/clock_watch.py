@@ -79,7 +79,8 @@ class ClockWatch:
             self._last_good = reading.samples
             return None
         young = reading.before_s - self._far.after_s < _FIRST_S
-        if young and _width(reading) < _width(self._far) and self._is_in_step(self._far, reading):
+        sharper = reading.width_s < self._far.width_s
+        if young and sharper and reading.follows(self._far, self._expected, _JUMP_S):
             self._far = self._near = reading  # a sharper reading to count from
             return None
         if "rate" not in self._told:
@@ -102,7 +103,7 @@ class ClockWatch:
         """
         since = self._middle or far
         if reading.before_s - since.after_s < _FIRST_S:
-            if self._middle is None and self._is_in_step(far, reading):
+            if self._middle is None and reading.follows(far, self._expected, _JUMP_S):
                 self._last_good = reading.samples
             return None
         low, high = _rate_bounds(since, reading)
@@ -130,11 +131,6 @@ class ClockWatch:
             seen,
         )
 
-    def _is_in_step(self, near: ClockReading, reading: ClockReading) -> bool:
-        taken_s = (reading.samples - near.samples) / self._expected
-        least, most = reading.before_s - near.after_s, reading.after_s - near.before_s
-        return least - _JUMP_S <= taken_s <= most + _JUMP_S
-
     def _judge_jump(self, near: ClockReading, reading: ClockReading) -> ClockNews | None:
         elapsed_least = reading.before_s - near.after_s
         elapsed_most = reading.after_s - near.before_s
@@ -155,7 +151,7 @@ class ClockWatch:
             self._last_good = reading.samples
             return None
         now = reading.before_s
-        if self._deficit is None or abs(missing_s - self._deficit[1]) > 0.1 * _JUMP_S + _width(reading):
+        if self._deficit is None or abs(missing_s - self._deficit[1]) > 0.1 * _JUMP_S + reading.width_s:
             self._deficit = (now, missing_s, self._last_good)
             return None
         since, missing_s, sample = self._deficit
@@ -177,9 +173,9 @@ class ClockWatch:
         if elapsed_s < _LUMPS_S:
             most, least = self._lag_s
             self._lag_s = max(most, lag_s - reading.after_s), min(least, lag_s - reading.before_s)
-            self._sharpest_s = min(self._sharpest_s, _width(reading))
+            self._sharpest_s = min(self._sharpest_s, reading.width_s)
             return None
-        if _width(reading) > 2.0 * self._sharpest_s:
+        if reading.width_s > 2.0 * self._sharpest_s:
             return None
         lump = max(0.0, self._lag_s[0] - self._lag_s[1]) * self._expected
         self._bounds = _rate_bounds(far, reading, lump)
@@ -211,7 +207,3 @@ def _rate_bounds(first: ClockReading, second: ClockReading, lump: float = 0.0) -
     taken = second.samples - first.samples
     least = max(second.before_s - first.after_s, 1e-9)
     return (taken - 1 - lump) / (second.after_s - first.before_s), (taken + 1 + lump) / least
-
-
-def _width(reading: ClockReading) -> float:
-    return reading.after_s - reading.before_s
