@@ -6,9 +6,8 @@ With it stands what the run says of its test, so that a run whose mark is the sa
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, is_dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +17,7 @@ from daq_app.campaign.recorded import RunAccount
 from daq_app.campaign.status import TestFacts, TestVerdict
 from daq_app.campaign.summaries.mark import AnalysisMark
 from daq_app.campaign.summaries.summary import MethodResult, TestSummary
+from daq_app.plain import plain
 from daq_app.rocking.families.verdict import FamilyView, RVerdict
 from daq_app.runfile.durable import write_whole
 
@@ -40,7 +40,8 @@ class KeptAnalysis:
 
 def keep_analysis(run: Path, mark: AnalysisMark, kept: KeptAnalysis) -> Path:
     """Write the analysis beside its run. Raises `OSError`."""
-    document = {"format": _FORMAT, "mark": asdict(mark), **_encoded(kept)}
+    # JSON knows no NaN and no infinity, which become words that `float` reads.
+    document = {"format": _FORMAT, "mark": asdict(mark), **plain(kept, str)}
     return write_whole(run.with_suffix(SUFFIX), json.dumps(document, allow_nan=False))
 
 
@@ -58,21 +59,6 @@ def kept_analysis(run: Path, mark: AnalysisMark) -> KeptAnalysis:
         raise NotKept("no analysis is kept beside it") from None
     except (ValueError, KeyError, TypeError, AttributeError):
         raise NotKept("the analysis kept beside it cannot be read") from None
-
-
-def _encoded(value: object) -> Any:
-    """As JSON; it knows no NaN and no infinity, which become words that `float` reads."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return {f.name: _encoded(getattr(value, f.name)) for f in fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): _encoded(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return [_encoded(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)
-    return value
 
 
 def _account(content: dict[str, Any]) -> RunAccount:
