@@ -30,6 +30,7 @@ from daq_app.rocking.motion.bending import find_bending
 from daq_app.rocking.motion.impact_pattern import impact_pattern
 from daq_app.rocking.motion.rolling import RollingArray
 from daq_app.rocking.motion.swings import MotionTrack
+from daq_app.rocking.motion.transients import Accelerations
 
 Floats = NDArray[np.float64]
 
@@ -217,7 +218,8 @@ class LiveFamilies:
         first_s = (self._first + start) / self._rate
         inside = [crossing for crossing in wires.crossings_s if crossing > first_s + 0.2]
         offsets = [0.0] * (self._shaken.stop - self._shaken.start)
-        found = shock_timing(read, self._log.end - start, self._rate, first_s, offsets, inside)
+        shown = Accelerations(read, self._log.end - start, self._rate, first_s, offsets)
+        found = shock_timing(shown, inside)
         if found is None or abs(found.lag_s) <= LATE_SHOCKS_S:
             return ()
         if found.lag_s < 0:

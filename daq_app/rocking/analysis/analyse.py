@@ -16,6 +16,7 @@ from daq_app.rocking.analysis.half_cycles import half_cycles_of
 from daq_app.rocking.analysis.joint_summary import summarise_joint
 from daq_app.rocking.analysis.options import AnalysisOptions
 from daq_app.rocking.analysis.own_body import impact_speeds, with_own_body
+from daq_app.rocking.analysis.preparation.compared_families import accelerations_of
 from daq_app.rocking.analysis.preparation.fusion import Fused
 from daq_app.rocking.analysis.preparation.instruments import Instruments, prepare
 from daq_app.rocking.analysis.preparation.signals import Signals
@@ -33,7 +34,7 @@ from daq_app.rocking.geometry.joint import JointMotion
 from daq_app.rocking.motion.filtered_peaks import filtered_peaks
 from daq_app.rocking.motion.motion_fit import MotionFit, fit_motion
 from daq_app.rocking.motion.swings import MotionTrack
-from daq_app.rocking.motion.transients import Onset, find_onsets
+from daq_app.rocking.motion.transients import find_onsets
 from daq_app.rocking.motion.velocity import VelocityFilter
 from daq_app.rocking.record import TestRecord
 from daq_app.rocking.theory import classic as theory
@@ -75,7 +76,7 @@ def _analyse(
     peaks = filtered_peaks(signals.time_s, lambda start, stop: velocity[start:stop], track.impacts_s)
     series = decay_series(signals, tracks, peaks, velocity_filter)
     estimates = estimates_of(series)
-    onsets = _onsets(instruments.record, signals, track)
+    onsets = find_onsets(accelerations_of(instruments.record, signals), track.impacts_s)
     fit = _fit(signals, track, estimates, instruments.gain_sigma) if options.fit else None
     unfit = families_left_out(instruments.findings, held_as_well=True)
     theta0 = theta0_by_family(signals, track, instruments.gains, instruments.bent_at_rest_rad, unfit)
@@ -164,17 +165,6 @@ def _with_what_was_found(
         name: with_findings(with_change_by_speed(estimate, by_speed), findings)
         for name, estimate in estimates.items()
     }
-
-
-def _onsets(record: TestRecord, signals: Signals, track: MotionTrack) -> list[Onset | None]:
-    """The shocks that the accelerometers show; they are read about the impacts only."""
-    ids = record.family("accelerometer")
-
-    def read(start: int, stop: int) -> Floats:
-        return record.load(ids, start, stop)
-
-    offsets = [record.offset_s(channel_id) for channel_id in ids]
-    return find_onsets(read, record.n_samples, record.rate_hz, signals.first_s, offsets, track.impacts_s)
 
 
 def _typical_r(estimates: Mapping[str, RestitutionEstimate]) -> float:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.rocking.motion.transients import find_onsets
+from daq_app.rocking.motion.transients import Accelerations, find_onsets
 
 Floats = NDArray[np.float64]
 
@@ -32,31 +32,21 @@ class ShockTiming:
     impacts: int
 
 
-def shock_timing(
-    read: Callable[[int, int], Floats],
-    n_samples: int,
-    rate_hz: float,
-    first_s: float,
-    offsets_s: Sequence[float],
-    crossings_s: Sequence[float],
-) -> ShockTiming | None:
-    """Lag of the shocks behind the first crossings; None where fewer than three impacts show one.
-
-    `read(start, stop)` gives acceleration (channels, stop − start) of `n_samples` samples; sample k lies at
-    first_s + k / rate + its channel's offset.
-    """
+def shock_timing(shown: Accelerations, crossings_s: Sequence[float]) -> ShockTiming | None:
+    """Lag of the shocks behind the first crossings; None where fewer than three impacts show one."""
     times = np.asarray(crossings_s, dtype=np.float64)[:_MOST_IMPACTS]
-    if len(offsets_s) < 2 or times.size < _FEWEST:
+    if len(shown.offsets_s) < 2 or times.size < _FEWEST:
         return None
-    offset = float(np.mean(offsets_s))
+    first_s, rate_hz = shown.first_s, shown.rate_hz
     start = max(round((times[0] - 2 * _REACH_S - first_s) * rate_hz), 0)
-    stop = min(round((times[-1] + 2 * _REACH_S - first_s) * rate_hz), n_samples)
+    stop = min(round((times[-1] + 2 * _REACH_S - first_s) * rate_hz), shown.n_samples)
     if stop - start < rate_hz * 4 * _REACH_S:
         return None
-    coarse = _coarse(read(start, stop), rate_hz, first_s + start / rate_hz + offset, times)
+    start_s = first_s + start / rate_hz + float(np.mean(shown.offsets_s))
+    coarse = _coarse(shown.read(start, stop), rate_hz, start_s, times)
     if coarse is None:
         return None
-    onsets = find_onsets(read, n_samples, rate_hz, first_s, offsets_s, (times + coarse).tolist())
+    onsets = find_onsets(shown, (times + coarse).tolist())
     lags = [onset.time_s - time for onset, time in zip(onsets, times, strict=True) if onset is not None]
     if len(lags) < max(_FEWEST, times.size // 3):
         return None

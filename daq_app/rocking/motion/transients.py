@@ -19,6 +19,18 @@ _MIN_SAMPLES = 16
 
 
 @dataclass(frozen=True, slots=True)
+class Accelerations:
+    """What accelerometers show: sample k lies at first_s + k / rate + its channel's offset."""
+
+    read: Callable[[int, int], Floats]
+    """(start, stop) → acceleration (channels, stop − start), any unit."""
+    n_samples: int
+    rate_hz: float
+    first_s: float
+    offsets_s: Sequence[float]
+
+
+@dataclass(frozen=True, slots=True)
 class Onset:
     """The shock of one impact."""
 
@@ -27,33 +39,26 @@ class Onset:
     channels: int
 
 
-def find_onsets(
-    read: Callable[[int, int], Floats],
-    n_samples: int,
-    rate_hz: float,
-    first_s: float,
-    offsets_s: Sequence[float],
-    impacts_s: Sequence[float],
-) -> list[Onset | None]:
+def find_onsets(shown: Accelerations, impacts_s: Sequence[float]) -> list[Onset | None]:
     """Shock near each impact time; None where fewer than two channels show one and agree.
 
-    `read(start, stop)` gives acceleration (channels, stop − start) in any unit of a record of `n_samples`;
-    sample k lies at first_s + k / rate + its channel's offset. Only what lies about the impacts is read.
+    Only what lies about the impacts is read.
     Each channel is differenced (slow motion falls away, the shock stays), and its onset is where
     two variances, before and after, describe the window best (Akaike's criterion on a split).
     """
+    first_s, rate_hz = shown.first_s, shown.rate_hz
     gaps = np.diff(np.asarray(impacts_s, dtype=np.float64), prepend=-math.inf, append=math.inf)
     windows: list[_Window] = []
     for k, impact in enumerate(impacts_s):
         reach = min(_REACH_S, 0.45 * gaps[k], 0.45 * gaps[k + 1])
-        for channel, offset in enumerate(offsets_s):
+        for channel, offset in enumerate(shown.offsets_s):
             low = max(round((impact - reach - first_s - offset) * rate_hz), 0)
-            high = min(round((impact + reach - first_s - offset) * rate_hz), n_samples)
+            high = min(round((impact + reach - first_s - offset) * rate_hz), shown.n_samples)
             windows.append(_Window(k, channel, low, max(high, low)))
     if not windows:
         return [None] * len(impacts_s)
     start = min(window.start for window in windows)
-    acceleration = read(start, max(window.stop for window in windows))
+    acceleration = shown.read(start, max(window.stop for window in windows))
     alike: dict[int, list[_Window]] = {}
     for window in windows:
         alike.setdefault(window.stop - window.start, []).append(window)
@@ -62,7 +67,7 @@ def find_onsets(
         parts = np.array([acceleration[w.channel, w.start - start : w.stop - start] for w in together])
         for window, (sample, strength) in zip(together, _picks(parts), strict=True):
             if strength >= _SHOCK_SIGMAS:
-                time_s = first_s + (window.start + sample) / rate_hz + offsets_s[window.channel]
+                time_s = first_s + (window.start + sample) / rate_hz + shown.offsets_s[window.channel]
                 picks_s[window.impact].append(time_s)
     return [_agreement(picks) for picks in picks_s]
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq_app.rocking.analysis.preparation.signals import Lead, Signals, TestTimes
 from daq_app.rocking.families import words
@@ -14,9 +14,8 @@ from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.response import DRIFT_RAD, LATE_S, SLOW_S, Response, compare
 from daq_app.rocking.families.shocks import LATE_SHOCKS_S, ShockTiming, shock_timing
 from daq_app.rocking.motion.bending import Bending, find_bending
+from daq_app.rocking.motion.transients import Accelerations
 from daq_app.rocking.record import TestRecord
-
-Floats = NDArray[np.float64]
 
 _GAIN_SHARE: Final = 0.01
 """Gain of one family against the other that is named: three times what calibration leaves."""
@@ -63,15 +62,17 @@ def lvdts_cover(signals: Signals, times: TestTimes) -> bool:
     return bool(known >= _COVERED)
 
 
+def accelerations_of(record: TestRecord, signals: Signals) -> Accelerations:
+    """Those of all accelerometers of a record."""
+    ids = record.family("accelerometer")
+    offsets = [record.offset_s(channel_id) for channel_id in ids]
+    read = partial(record.load, ids)
+    return Accelerations(read, record.n_samples, record.rate_hz, signals.first_s, offsets)
+
+
 def shocks_of(record: TestRecord, signals: Signals, times: TestTimes) -> ShockTiming | None:
     """When the accelerometers show the impacts, against when the rotation does."""
-    ids = record.family("accelerometer")
-
-    def read(start: int, stop: int) -> Floats:
-        return record.load(ids, start, stop)
-
-    offsets = [record.offset_s(channel_id) for channel_id in ids]
-    return shock_timing(read, record.n_samples, record.rate_hz, signals.first_s, offsets, times.impacts_s)
+    return shock_timing(accelerations_of(record, signals), times.impacts_s)
 
 
 def timing(
