@@ -85,7 +85,8 @@ class _Study(Hypotheses):
         """Ranking, held-out scores, what remains, decision."""
         ranked = self.ranked()
         best = answers(ranked, self.library)[0].effects
-        fit, null = self._finished(best), self.fits[NULL]
+        self._finish([best], "the best once more")
+        fit, null = self.fits[best], self.fits[NULL]
         forms = self.free_forms(best)
         ranked = with_other_forms(ranked, best, forms, self.library, self.policy.prior_other_form)
         classes = answers(ranked, self.library)
@@ -130,15 +131,6 @@ class _Study(Hypotheses):
             for name, others in without.items()
             if others in self.fits
         }
-
-    def _finished(self, hypothesis: Hypothesis) -> Fit:
-        """The fit of a hypothesis with exact Jacobians."""
-        fit = self.fits[hypothesis]
-        if not fit.columns:
-            task = FitTask(effects_of(hypothesis, self.library), fit.known(), fit.sizes)
-            (fit,) = self.workers.run([task], "the best once more")
-            self.fits[hypothesis] = fit
-        return fit
 
     def _scales(self, fit: Fit) -> list[np.ndarray[tuple[int], np.dtype[np.float64]]]:
         """What each feature scatters by when nothing is missing and the model is exact."""
