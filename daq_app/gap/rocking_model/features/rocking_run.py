@@ -90,19 +90,15 @@ class RockingRun:
         features = FeatureSet(np.array(values), np.array(sds), tuple(labels))
         return replace(self, features=features, blocks=blocks, fixed_loadings=loadings, cache=RunCache())
 
+    def of_blocks(self, blocks: Sequence[Block]) -> RockingRun:
+        """The run with these blocks of features in place of those it has."""
+        first, old = len(self.places) + self.peaks.size, self.features
+        of_swings = FeatureSet(old.values[:first], old.sd[:first], old.labels[:first])
+        return replace(self, features=of_swings, blocks=()).with_blocks(blocks)
+
     def without_block(self, family: str) -> RockingRun:
         """The run without the features of one block, if it has it."""
-        first = len(self.places) + self.peaks.size
-        ends = first + np.cumsum([len(block.names) for block in self.blocks], dtype=int)
-        kept = np.ones(len(self.features), dtype=bool)
-        for block, end in zip(self.blocks, ends, strict=True):
-            if block.family == family:
-                kept[end - len(block.names) : end] = False
-        blocks = tuple(block for block in self.blocks if block.family != family)
-        old, rows = self.features, np.flatnonzero(kept)
-        features = FeatureSet(old.values[rows], old.sd[rows], tuple(old.labels[i] for i in rows))
-        loadings = _block_loadings(blocks, first, rows.size)
-        return replace(self, features=features, blocks=blocks, fixed_loadings=loadings, cache=RunCache())
+        return self.of_blocks([block for block in self.blocks if block.family != family])
 
     def with_loadings(self, columns: FloatArray) -> RockingRun:
         """The run whose features move by `columns` (n, k) times draws of unit variance as well."""

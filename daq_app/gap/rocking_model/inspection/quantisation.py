@@ -12,9 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from daq_app.gap.core import FeatureSet
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined
 from daq_app.gap.rocking_model.motion.rotation import opening, straight_line, wall_rotation
@@ -104,13 +102,5 @@ def _known_once(errors_by_run: Sequence[Mapping[str, FloatArray]]) -> list[dict[
 
 def _widened(run: RockingRun, more: Mapping[str, FloatArray]) -> RockingRun:
     """The run with these covariances on top of those of its blocks."""
-    if not more:
-        return run
-
-    def wider(block: Block) -> Block:
-        return replace(block, covariance=block.covariance + more[block.family])
-
-    kept = tuple(wider(b) if b.family in more else b for b in run.blocks)
-    first = len(run.features) - sum(len(b.names) for b in run.blocks)
-    features = FeatureSet(run.features.values[:first], run.features.sd[:first], run.features.labels[:first])
-    return replace(run, features=features, blocks=()).with_blocks(kept)
+    wider = [replace(b, covariance=b.covariance + more.get(b.family, 0.0)) for b in run.blocks]
+    return run.of_blocks(wider) if more else run
