@@ -40,10 +40,8 @@ class HeldState:
     rotation_sd: float
     speed_rad_s: float
     speed_sd: float
-    sway_sd: float
-    """Rms of the sway, rad."""
     sway_speed_sd: float
-    """Rms of its speed, rad/s."""
+    """Rms of the speed of the sway, rad/s."""
     course_rad: FloatArray
     """(k,) rotation in which it sways at the times `COURSE_S` from the release."""
 
@@ -75,7 +73,7 @@ def held_state(theta: FloatArray, release: float, noise_rad: float, rate_hz: flo
         sway = float(np.sqrt(max(np.var(means) - noise**2, 0.0)))
         middle, sd = float(means.mean()), float(np.hypot(sway, noise / np.sqrt(count)))
         fastest = sway / MEAN_S
-        return HeldState(middle, sd, 0.0, fastest, sway, fastest, np.full(COURSE_S.shape, middle))
+        return HeldState(middle, sd, 0.0, fastest, fastest, np.full(COURSE_S.shape, middle))
     sure = max(int(np.searchsorted(time_s, -SURELY_HELD_S)), _FEWEST)
     process = _Process.of(time_s[:sure], means[:sure], noise)
     # A slow release leaves the hold by so little from one mean to the next that its own past hides it, and
@@ -97,7 +95,6 @@ def held_state(theta: FloatArray, release: float, noise_rad: float, rate_hz: flo
         float(np.hypot(rotation_sd, off_s * fastest)),
         speed,
         float(np.hypot(speed_sd, min(off_s / process.scale_s, 1.0) * fastest)),
-        process.sway,
         fastest,
         course[:-1],
     )
