@@ -11,7 +11,7 @@ import pytest
 
 from daq_app.gap.blind.making.make import Order, make_case
 from daq_app.rocking import AnalysisOptions, TestAnalysis, TestRecord, analyse_record
-from daq_app.rocking.families.base_slip import HalfCycleSlips, find_slip
+from daq_app.rocking.families.base.slip import HalfCycleSlips, find_slip
 from daq_app.rocking.theory.friction import slips_below
 from daq_app.runfile import open_run
 

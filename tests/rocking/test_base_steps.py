@@ -10,7 +10,7 @@ import pytest
 
 from daq_app.config import load_rig
 from daq_app.rocking import AnalysisOptions, TestAnalysis, analyse_record
-from daq_app.rocking.families.base_steps import base_steps
+from daq_app.rocking.families.base.steps import base_steps
 from studies.restitution.laboratory import LaboratoryTest, draw_test
 from studies.restitution.walls import mean_r_of_impacts
 

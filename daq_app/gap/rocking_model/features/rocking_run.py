@@ -18,7 +18,7 @@ from daq_app.gap.rocking_model.motion.rotation import Wire
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import Survey, Wiring
 from daq_app.gap.rocking_model.run_cache import RunCache
-from daq_app.rocking.families.base_slip import BaseSlip
+from daq_app.rocking.families.base.slip import BaseSlip
 
 _SMALLEST_LOADING = 1e-3
 

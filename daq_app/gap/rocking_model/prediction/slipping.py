@@ -14,7 +14,7 @@ from daq_app.config.rig import G_M_S2
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.prediction.model import half_cycle_times, peak_slopes
-from daq_app.rocking.families.base_slip import BaseSlip
+from daq_app.rocking.families.base.slip import BaseSlip
 from daq_app.rocking.theory.friction import Slips, slips_below
 from sim_hardware.dynamics import shooting
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from daq_app.config.rig import Specimen
 from daq_app.rocking.analysis.preparation.signals import Signals, TestTimes
-from daq_app.rocking.families.base_slip import BaseSlip, find_slip
-from daq_app.rocking.families.base_steps import NO_STEPS, BaseSteps, base_steps, between_impacts
+from daq_app.rocking.families.base.slip import BaseSlip, find_slip
+from daq_app.rocking.families.base.steps import NO_STEPS, BaseSteps, base_steps, between_impacts
 from daq_app.rocking.families.response import LATE_S, SLOW_S, Response
+from daq_app.rocking.record import TestRecord
 
 _SMALLEST_M: Final = 2e-4
 """Largest slip of a test that is named. Lowering it names what moves r by less than it scatters."""
@@ -32,7 +32,7 @@ STILL: Final = Base()
 
 
 def base_of(
-    signals: Signals, times: TestTimes, response: Response | None, specimen: Specimen, *, leaping: bool
+    record: TestRecord, signals: Signals, times: TestTimes, response: Response | None, *, leaping: bool
 ) -> Base:
     """What the base does; nothing where wires and LVDTs differ by a delay of their own.
 
@@ -47,6 +47,7 @@ def base_of(
     between = between_impacts(*shown)
     slip = None
     if between is not None:
+        specimen = record.rig.specimen
         slip = find_slip(between, specimen.alpha0_rad, specimen.p_rad_s, specimen.r0_m)
     if slip is not None and slip.slip_m < _SMALLEST_M:
         slip = None

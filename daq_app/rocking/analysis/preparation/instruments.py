@@ -171,9 +171,7 @@ def _in_step(
     leap_at_most = all((f.family, f.kind) == ("wires", "leaps") for f in spoiled)
     odd_ones = odd_lvdts(signals, motion) if leap_at_most else []
     hidden = not leap_at_most or bending is not None or bool(odd_ones)
-    base = STILL
-    if not hidden:
-        base = base_of(signals, times, response, record.rig.specimen, leaping=bool(spoiled))
+    base = STILL if hidden else base_of(record, signals, times, response, leaping=bool(spoiled))
     if base.moves:
         # Wires that step with the wall say nothing of the LVDTs, and nothing of each other.
         findings, comparable, response = [f for f in findings if f not in spoiled], False, None

@@ -19,7 +19,7 @@ from daq_app.gap.rocking_model.findings import findings_of
 from daq_app.gap.rocking_model.prediction.slipping import slip_loadings
 from daq_app.gap.rocking_model.records import load_run
 from daq_app.gap.rocking_model.study import diagnose_prepared, model_and_library, prepare
-from daq_app.rocking.families.base_slip import BaseSlip
+from daq_app.rocking.families.base.slip import BaseSlip
 from daq_app.rocking.theory.friction import push, slips_below
 from tests.support.gap.simulated_campaign import simulate
 

@@ -12,7 +12,7 @@ from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Wire, gridded, wall_rotation
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.rocking.families.base_slip import BaseSlip, HalfCycleSlips, find_slip
+from daq_app.rocking.families.base.slip import BaseSlip, HalfCycleSlips, find_slip
 
 _GUARD_S: Final = 0.008
 """Beside an impact: its shock and step."""

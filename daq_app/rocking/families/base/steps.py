@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from daq_app.rocking.families.base_slip import HalfCycleSlips
+from daq_app.rocking.families.base.slip import HalfCycleSlips
 
 Floats = NDArray[np.float64]
 

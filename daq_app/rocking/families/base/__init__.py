@@ -1,0 +1,1 @@
+"""What the base below a wall does: steps at impacts, slips between them."""
