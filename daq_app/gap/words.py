@@ -64,6 +64,7 @@ _PHRASES: Final = {
     "wire_inertia": "spring and drum of {target} swing at {frequency|Hz}",
     "clock": "the sample clock is off by {error|%}",
     "hum": "mains hum in {target}",
+    "noise": "{target} is noisier than its family",
     "quantisation": "steps in the readings of {target}",
     "saturation": "{target} at the end of the range",
     "dropout": "readings of {target} stand still at times",

@@ -21,6 +21,10 @@ class Policy:
     """Rms of a pick-up, or reading step, over the rms noise of one reading, from which it is material.
     Below it averaging over a half-cycle leaves nothing (assumed); raising it hides loud pick-up."""
 
+    finding_noise: float = 3.0
+    """Noise of a channel over that of its family from which it is material: those of ordinary laboratories
+    differ by up to two (assumed); raising it hides loud channels."""
+
     finding_shaking: float = 0.09
     """Acceleration of a burst of the floor, m/s², from which it is material: a hundredth of g turns a wall by
     less than its impacts scatter, and shaken cables show 0.07 in development laboratories; raising it hides

@@ -20,6 +20,7 @@ _IN_NOISE = ("hum", "quantisation", "ringing")
 _LEAST = {
     "hum": POLICY.finding_in_noise,
     "quantisation": POLICY.finding_in_noise,
+    "noise": POLICY.finding_noise,
     "ringing": POLICY.finding_ringing,
     "shaking": POLICY.finding_shaking,
     "ambient": POLICY.finding_shaking,
@@ -94,6 +95,8 @@ def _words(kind: str, target: str, finding: RunFinding, size: float, unit: str) 
             return f"{who} read in steps of {amount}"
         case "dropout":
             return f"{who} stands still for {100 * size:.2g} % of the time"
+        case "noise":
+            return f"noise of {who} is {size:.2g} times that of its family"
         case "spikes":
             return f"{size:.2g} lone samples a second in {who}"
         case "saturation":

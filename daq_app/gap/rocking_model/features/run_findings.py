@@ -16,6 +16,7 @@ EFFECT_SIZES: dict[str, str] = {
     "swap": "places",
     "ambient": "amplitude",
     "acceleration": "share",
+    "noise": "factor",
     "sliding": "slip",
     "corner_twist": "turn",
 }

@@ -31,6 +31,8 @@ from daq_app.gap.rocking_model.tolerances.inspection import (
     FROZEN_S,
     FROZEN_SD,
     GOES_ON_STEPS,
+    LOUD,
+    LOUD_SD,
     RANGE_MARGIN,
     SPIKES_SD_PER_S,
     STANDS_OUT,
@@ -141,6 +143,8 @@ def findings_per_run(
         if not ids:
             continue
         noise = float(np.median([[c.noise_si for c in row] for row in rows]))
+        for run_findings in findings:
+            run_findings += _loud(ids, rows, noise)
         # Every channel has a lone sample now and then: what counts is how many it has in all runs.
         spiky = [often_alone([c.lone for c in of_channel]) for of_channel in zip(*rows, strict=True)]
         seen = [[_seen(c, often) for c, often in zip(row, spiky, strict=True)] for row in rows]
@@ -154,6 +158,16 @@ def findings_per_run(
                 for run_findings, row in zip(findings, cells, strict=True):
                     value, sd = _median_with_sd(name, [row[k] for k in chosen] if chosen else row)
                     run_findings.append(RunFinding(f"{name}@{key}", words, unit, value, sd, rms))
+    return findings
+
+
+def _loud(ids: Sequence[str], rows: Sequence[Sequence[Condition]], usual: float) -> list[RunFinding]:
+    """Channels with more noise than their family has; steps of a reading make some of their own."""
+    findings = []
+    for name, of_channel in zip(ids, zip(*rows, strict=True), strict=True):
+        factor = float(np.median([c.noise_si for c in of_channel])) / usual if usual > 0.0 else 0.0
+        if factor > LOUD and not any(c.step_si for c in of_channel):
+            findings.append(RunFinding(f"noise@{name}", "noise", "1", factor, LOUD_SD * factor))
     return findings
 
 

@@ -200,6 +200,15 @@ STANDS_OUT = 2.0
 Pick-up of sound channels differs by less (development laboratories). Raising it hides one among many.
 """
 
+LOUD = 2.0
+"""Noise of a channel over that of its family, 1, from which it is told.
+
+Sound channels of one family differ by less (development laboratories). Raising it hides loud channels.
+"""
+
+LOUD_SD = 0.1
+"""Sd of that factor, over it, 1 (assumed)."""
+
 # -- single channels -------------------------------------------------------------------------------
 SUSPECT: dict[Family, float] = {"lvdt": 4.0, "wire": 2.0, "accelerometer": 3.0}
 """What a channel must be off by, in what sound ones differ by (`channel_shapes.TOLERANCE`), to be suspect, 1.

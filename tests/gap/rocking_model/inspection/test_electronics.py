@@ -85,3 +85,21 @@ def test_knocks_that_leave_no_tenth_of_a_second_calm_hide_no_hum() -> None:
     _, _, found = hum_of(values, rate_hz)
     assert found is not None
     assert np.max(np.abs(found - wave)) < 0.1 * amplitude
+
+
+@pytest.mark.parametrize("channel", ["LV-A05", "WP-2", "AC-3", "TL-2X"])
+def test_a_channel_that_is_far_noisier_than_its_family_is_named(channel: str) -> None:
+    prepared, _ = prepare(simulate({f"noise@{channel}": {"factor": 8.0}}, LEVELS))
+    assert conditions_found(prepared) == {f"noise@{channel}"}
+    (finding,) = findings_of(prepared)
+    assert finding.material and finding.explained
+    assert finding.size == pytest.approx(8.0, rel=0.15)
+    assert (
+        finding.words == f"noise of {channel} is {finding.size:.2g} times that of its family in 2 of 2 runs"
+    )
+
+
+def test_channels_that_are_half_as_noisy_again_are_ordinary() -> None:
+    (weaker,) = findings_of(prepare(simulate({"noise@LV-A05": {"factor": 2.5}}, LEVELS))[0])
+    assert not weaker.material
+    assert not findings_of(prepare(simulate({"noise@LV-A05": {"factor": 1.5}}, LEVELS))[0])
