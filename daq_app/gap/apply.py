@@ -28,6 +28,8 @@ FORMS_ONLY: Final = {
     ("flexible_wall", "forced"),
     ("flexible_wall", "recoil"),
     ("initial_velocity", "own"),
+    ("sliding", "back"),
+    ("sliding_on", "back"),
     ("sliding_on", "own"),
 }
 """Parameters that the simulator has not: of a form that it knows only one of, or of a run by itself."""

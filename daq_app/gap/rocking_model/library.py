@@ -132,6 +132,10 @@ _PLASTIC = Parameter(
 )
 """Unequal levers make r of the two sides differ where impacts are plastic. A real wall loses another share of
 its speed than a plastic impact takes: its r may differ by anything from nothing to that."""
+_DRAWN_BACK = Parameter(
+    "back", 0.5, 0.5, "1", 0.0, 1.5, meaning="share of what a slip takes back of the rotation"
+)
+"""A base that slips leaves the wall behind: 1 for a rigid block, 0 for slips that act back on nothing."""
 _FORMS = {
     "alpha_asymmetry": (_PLASTIC,),
     "eccentric_mass": (_PLASTIC,),
@@ -143,8 +147,10 @@ _FORMS = {
         Parameter("forced", 0.5, 0.4, "1", 0.0, 1.0, meaning="share of its own inertia in its bending"),
         Parameter("recoil", 0.0, 0.5, "1", 0.0, 1.5, meaning="turn of the base against it, over its tilt"),
     ),
+    "sliding": (_DRAWN_BACK,),
     # In one test further than in another.
     "sliding_on": (
+        _DRAWN_BACK,
         Parameter(
             "own", 0.0, 0.4, "1", meaning="what each test's slips differ by", per_run=True, starts=(0.0,)
         ),

@@ -117,7 +117,7 @@ def swing_features(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
     cycles = run.cache.part("half-cycles", values, partial(_half_cycles, run))
     table, true = departed(run, values, cycles), cycles.true
     speeds_out, speeds_in = table[:, shooting.SPEED_OUT], table[:, shooting.SPEED_IN]
-    pause = pause_at_impact(values, speeds_out)
+    pause = pause_at_impact(values, speeds_out, np.sign(true))
     across = run.across
     times = half_cycle_times(run, table)
     times[across] += pause[run.places[across, 0]]

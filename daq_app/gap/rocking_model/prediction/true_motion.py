@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from daq_app.config.rig import G_M_S2
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.differences import face_gain
 from daq_app.gap.rocking_model.features.pivots import turned_by
@@ -68,11 +69,29 @@ def _second_order(values: Mapping[str, float], name: str) -> float:
     return rounded
 
 
-def pause_at_impact(values: Mapping[str, float], speeds: FloatArray) -> FloatArray:
-    """Time lost at each impact, (k,), s: contact, or the flight of a hop less what it saves on the way up."""
-    pause = np.full(speeds.shape, values.get("dwell.tau", 0.0))
+def pause_at_impact(values: Mapping[str, float], speeds: FloatArray, sides: FloatArray) -> FloatArray:
+    """Time lost at each impact, (k,), s: contact, or the flight of a hop less what it saves on the way up.
+
+    Of half-cycles that end with `speeds`, rad/s, on `sides`, ±1.
+    """
+    pause = values.get("dwell.tau", 0.0) + _behind_slips(values, sides)
     flight = values.get("bounce.tau", 0.0)
     if flight:
         share = values.get("bounce.share", 0.5)
         pause = pause + flight * speeds / 0.2 * (1.0 - values["r"] ** (share - 1.0))
     return pause
+
+
+def _behind_slips(values: Mapping[str, float], sides: FloatArray) -> FloatArray:
+    """Time by which the wall is behind a base that slips at impacts, (k,), s.
+
+    In the frame of the base a slip s is a floor that moves by s: the rotation is −p²/g cos α · s behind
+    (Housner 1963), which a wall that goes on with r times its speed makes good in as long at every impact.
+    """
+    outwards = values.get("sliding.back", 0.0) * values.get("sliding.c", 0.0)
+    on = values.get("sliding_on.back", 0.0) * values.get("sliding_on.c", 0.0)
+    if outwards == on == 0.0:
+        return np.zeros(sides.shape)
+    lever = values["p"] ** 2 / G_M_S2 * math.cos(values["alpha"]) / values["r"]
+    # The wall comes down to the other side than that of the half-cycle.
+    return np.asarray(lever * (outwards - sides * on))

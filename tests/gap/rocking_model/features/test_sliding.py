@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
+from daq_app.config.rig import G_M_S2
 from daq_app.gap.core import Options
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.run_features import examine, extract
+from daq_app.gap.rocking_model.prediction.true_motion import pause_at_impact
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import diagnose_runs, prepare
 from tests.support.simulated_wall import simulate
@@ -125,3 +129,37 @@ def test_a_simulated_wall_that_slides_is_diagnosed_with_its_way(effect: str, sli
     assert (found.decision.verdict, found.decision.effects) == ("effect", (effect,))
     size = next(p for p in found.effect_parameters if p.name == f"{effect}.c")
     assert size.low < slip_s_m < size.high
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_slip_at_an_impact_leaves_the_wall_behind_as_a_moving_floor_does(side: float) -> None:
+    """A block that rises to `side` while its floor moves outwards for 4 ms, by SciPy, against the pause."""
+    alpha, p, r, speed, c = 0.215, 2.2, 0.9, 0.3, 0.004
+    slip_m, lasts_s = c * speed, 0.004
+
+    def acceleration(t: float) -> float:
+        turn = 2.0 * math.pi / lasts_s
+        return slip_m / lasts_s * turn * math.sin(turn * t) if t < lasts_s else 0.0
+
+    def passed_at(size: float) -> float:
+        def rates(t: float, state: np.ndarray) -> list[float]:
+            left = alpha - state[0]
+            floor = size * acceleration(t) / G_M_S2
+            return [state[1], -(p**2) * (math.sin(left) + floor * math.cos(left))]
+
+        def level(_: float, state: np.ndarray) -> float:
+            return float(state[0] - 0.0025)  # soon after the slip: the wall has hardly slowed down
+
+        level.terminal = True  # type: ignore[attr-defined]
+        found = solve_ivp(rates, (0.0, 1.0), [0.0, r * speed], events=level, max_step=2e-4, rtol=1e-10)
+        return float(found.t_events[0][0])
+
+    behind_s = passed_at(1.0) - passed_at(0.0)
+    body = {"alpha": alpha, "p": p, "r": r}
+    # The half-cycle before the impact is on the other side.
+    before, speeds = np.array([-side]), np.array([speed])
+    to_and_fro = pause_at_impact({**body, "sliding.c": c, "sliding.back": 1.0}, speeds, before)
+    one_way = pause_at_impact({**body, "sliding_on.c": c, "sliding_on.back": 1.0}, speeds, before)
+    assert to_and_fro[0] == pytest.approx(behind_s, rel=0.1)
+    assert one_way[0] == pytest.approx(side * behind_s, rel=0.1)
+    assert pause_at_impact({**body, "sliding.c": c, "sliding.back": 0.0}, speeds, before)[0] == 0.0
