@@ -39,7 +39,7 @@ def base_of(
     `response`: how the wires follow the LVDTs, None where they are `leaping` and cannot be compared.
     """
     late = response is not None and (abs(response.delay_s) > LATE_S or abs(response.response_s) > SLOW_S)
-    if signals.joint is None:
+    if signals.joint is None or late:
         return STILL
     wires, rotation = signals.geometry.wires, signals.joint.rotation_rad
     unexplained_m = (signals.wires_m - wires.shortening(rotation)) / wires.shortening_per_shift()[:, None]
@@ -51,4 +51,4 @@ def base_of(
         slip = find_slip(between, specimen.alpha0_rad, specimen.p_rad_s, specimen.r0_m)
     if slip is not None and slip.slip_m < _SMALLEST_M:
         slip = None
-    return Base(NO_STEPS if late else base_steps(*shown, leaping=leaping), slip)
+    return Base(base_steps(*shown, leaping=leaping), slip)

@@ -30,6 +30,9 @@ it hides slips."""
 _EXPLAINED: Final = 0.5
 """Share of what half-cycles differ by that the law explains where a base slips: it is 0.9 of slips, 0.3 at
 most of what rings or springs back. Raising it hides slips under noise."""
+_FASTEST: Final = 6.0
+"""Acceleration of a slip for each rad over p² R: a rectangular block that slips on all of its base has four,
+I_O over I_G. Raising it takes slow wires for slips."""
 _TURNS_ABOUT_M: Final = 3.0
 """Distance of the place that a base turns about where friction fails at one end of it: longer than walls are.
 Raising it says of bases that slip along their whole length that they turn."""
@@ -88,13 +91,15 @@ def find_slip(seen: HalfCycleSlips, alpha_rad: float, p_rad_s: float, r0_m: floa
     """The slip by the law of friction; None where half-cycles show none, or are too few to tell."""
     if seen.side.size < _FEWEST:
         return None
+    most = _FASTEST * p_rad_s**2 * r0_m
     best: tuple[float, float, _Fitted, _Fitted] | None = None
     gain = 0.0
     for below in (_BELOW * alpha_rad).tolist():
         law = slips_below(below, seen.peak_rad, alpha_rad, p_rad_s).slip
         along, turn = (_fitted(law, seen, series) for series in (seen.along_m, seen.turn_rad))
         gained = along.sure**2 + turn.sure**2
-        if gained > gain and (along.stands_out or turn.stands_out):
+        # A wire at fault turns the base about nothing; slow wires would have it slip faster than it can.
+        if gained > gain and along.stands_out and 0.0 < along.sizes[along.place] < most:
             best, gain = (below, float(law.max()), along, turn), gained
     if best is None:
         return None
@@ -111,15 +116,22 @@ class _Fitted:
     sd: Floats
     explained: float
     """Share of what half-cycles differ by."""
+    share: float
+    """Of all that they show, without what goes with the speed or is the same in all: what slow wires do."""
+
+    @property
+    def place(self) -> int:
+        """Of the side that is surer."""
+        return int(np.argmax(np.abs(self.sizes / self.sd)))
 
     @property
     def sure(self) -> float:
-        """Standard errors from none, of the side that is surer."""
-        return float(np.abs(self.sizes / self.sd).max())
+        """Standard errors from none, of that side."""
+        return abs(float(self.sizes[self.place] / self.sd[self.place]))
 
     @property
     def stands_out(self) -> bool:
-        return self.sure > _SURE_SD and self.explained > _EXPLAINED
+        return self.sure > _SURE_SD and min(self.explained, self.share) > _EXPLAINED
 
     @property
     def largest(self) -> tuple[float, float]:
@@ -139,4 +151,7 @@ def _fitted(law: Floats, seen: HalfCycleSlips, series: Floats) -> _Fitted:
     inverse = np.linalg.pinv(design.T @ design)
     sd = noise * np.sqrt(np.maximum(np.diag(inverse)[:2], 1e-30))
     explained = 1.0 - float(left @ left) / max(float(without @ without), 1e-30)
-    return _Fitted((inverse @ design.T @ series)[:2], sd, explained)
+    sizes = (inverse @ design.T @ series)[:2]
+    by_law = design[:, :2] @ sizes
+    share = float(by_law @ by_law) / max(float(series @ series), 1e-30)
+    return _Fitted(sizes, sd, explained, share)
