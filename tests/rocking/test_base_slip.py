@@ -22,7 +22,7 @@ OPTIONS = AnalysisOptions(fit=False, bias_runs=0, keep_series=False)
 
 @pytest.fixture(scope="module")
 def slippery(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[TestAnalysis], float]:
-    """Tests from the two highest levels of a wall that a contact engine moves, and the friction of its base."""
+    """Tests from the highest levels of a wall that a contact engine moves, and the friction of its base."""
     pytest.importorskip("mujoco", reason="the extra 'contact' is not installed")
     folder = tmp_path_factory.mktemp("slippery")
     text = RIG.read_text(encoding="utf-8")
