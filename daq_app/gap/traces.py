@@ -18,6 +18,7 @@ from typing import Final
 import numpy as np
 from scipy.optimize import least_squares
 
+from daq_app.config.rig import G_M_S2
 from daq_app.gap.core import CannotDiagnose, Diagnosis
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.response import bessel, first_order
@@ -41,6 +42,8 @@ TRACE_HZ: Final = 200.0
 _FINE_HZ: Final = 2000.0
 """Rate at which responses of sensors are worked out."""
 _BEFORE_S = 0.1
+_FASTEST: Final = 0.99
+"""Frequency parameter over that of a mass in one point, √(g/R), up to which a body is tried."""
 _MASS_KG = 5000.0  # free in a motion that is described by α, p and R
 _MOTION: Final = frozenset(spec.name for spec in MOTION_EFFECTS)
 _TIME_SD_S: Final = 3e-4
@@ -227,8 +230,10 @@ def _follow(
         slender = survey.alpha_rad * (1.0 + alpha)
         # α may bend, the base stays as wide as it was surveyed.
         r0 = survey.half_base_m / math.sin(slender)
+        # Beyond that a body would have no inertia about its centre of mass.
+        frequency = min(survey.p_rad_s * (1.0 + p), _FASTEST * math.sqrt(G_M_S2 / r0))
         vector = motion_vector(
-            Body(slender, survey.p_rad_s * (1.0 + p), r0, _MASS_KG),
+            Body(slender, frequency, r0, _MASS_KG),
             Release(float(swings.peak_rad[0]) + theta0),
             Restitution(min(r, 1.0)),
             terms,

@@ -51,6 +51,16 @@ def test_each_impact_gets_the_r_that_meets_the_next_peak():
         assert np.nanmax(left) < 0.02 * peak
 
 
+def test_a_record_that_asks_for_a_body_that_cannot_be_is_followed_as_well_as_one_that_can():
+    """A wall that seems faster than a mass in one point, as one on a slipping base does."""
+    (run,) = simulate({}, (0.25,))
+    result, slow = diagnosis({}, ("0",)), {"p": 2.14, "half_base": 0.4528}
+    parameters = tuple(replace(p, value=slow.get(p.name, p.value)) for p in result.parameters)
+    loose = replace(run, survey=replace(run.survey, p_tolerance=0.05))
+    (trace,) = traces(replace(result, parameters=parameters), [loose])
+    assert all(0.0 < rms < 0.02 for rms in trace.rms_rad)
+
+
 def test_the_page_has_a_table_of_what_instruments_were_found_to_do(tmp_path):
     hum = Finding(
         "hum@wire",
