@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from daq_app.gap.blind.making.make import Order, make_case
 from daq_app.rocking import AnalysisOptions, TestAnalysis, TestRecord, analyse_record
 from daq_app.rocking.families.base.slip import HalfCycleSlips, find_slip
 from daq_app.rocking.theory.friction import slips_below
 from daq_app.runfile import open_run
+from tests.support.gap.blind_case import slippery_base
 
-RIG = Path(__file__).parents[2] / "configs" / "fr1.toml"
 ALPHA, P, R0 = 0.215, 2.2, 1.525
 OPTIONS = AnalysisOptions(fit=False, bias_runs=0, keep_series=False)
 
@@ -24,19 +21,12 @@ OPTIONS = AnalysisOptions(fit=False, bias_runs=0, keep_series=False)
 def slippery(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[TestAnalysis], float]:
     """Tests from the highest levels of a wall that a contact engine moves, and the friction of its base."""
     pytest.importorskip("mujoco", reason="the extra 'contact' is not installed")
-    folder = tmp_path_factory.mktemp("slippery")
-    text = RIG.read_text(encoding="utf-8")
-    order = Order(71, folder / "out", folder / "kept", (text,), 4, None, "contact", "", "slippery_base")
-    name = make_case(order, 2)
-    label = json.loads(json.loads((folder / "kept" / f"{name}.json").read_text(encoding="utf-8"))["label"])
+    files, friction = slippery_base(tmp_path_factory.mktemp("slippery"), runs=4, place=2)
     analyses = []
-    for file in sorted((folder / "out" / name).glob("*.h5"))[2:]:
+    for file in files[2:]:
         with open_run(file) as run:
             analyses.append(analyse_record(TestRecord.from_run(run, run.rig), OPTIONS))
-            alpha = run.rig.specimen.alpha0_rad
-    r = 1.0 - 1.5 * math.sin(alpha) ** 2  # of a plastic impact of a slender block (Housner 1963)
-    share = label["effects"][0]["parameters"]["friction_share"]
-    return analyses, share * (1.0 - r) / ((1.0 + r) * math.tan(alpha))
+    return analyses, friction
 
 
 def test_it_is_named_with_its_friction_and_r_is_that_of_the_lvdts(

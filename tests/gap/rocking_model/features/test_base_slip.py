@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from daq_app.config.rig import G_M_S2
-from daq_app.gap.blind.making.make import Order, make_case
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.findings import findings_of
@@ -21,26 +18,16 @@ from daq_app.gap.rocking_model.records import load_run
 from daq_app.gap.rocking_model.study import diagnose_prepared, model_and_library, prepare
 from daq_app.rocking.families.base.slip import BaseSlip
 from daq_app.rocking.theory.friction import push, slips_below
+from tests.support.gap.blind_case import slippery_base
 from tests.support.gap.simulated_campaign import simulate
-
-RIG = Path(__file__).parents[4] / "configs" / "fr1.toml"
-SEED = 71
 
 
 @pytest.fixture(scope="module")
 def slippery(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[RockingRun], float]:
     """Runs of a wall that a contact engine moves, and the friction of its base."""
     pytest.importorskip("mujoco", reason="the extra 'contact' is not installed")
-    folder = tmp_path_factory.mktemp("slippery")
-    text = RIG.read_text(encoding="utf-8")
-    order = Order(SEED, folder / "out", folder / "kept", (text,), 3, None, "contact", "", "slippery_base")
-    name = make_case(order, 0)
-    label = json.loads(json.loads((folder / "kept" / f"{name}.json").read_text(encoding="utf-8"))["label"])
-    runs, _ = prepare([load_run(file) for file in sorted((folder / "out" / name).glob("*.h5"))])
-    share = label["effects"][0]["parameters"]["friction_share"]
-    alpha = runs[0].survey.alpha_rad
-    r = 1.0 - 1.5 * math.sin(alpha) ** 2  # of a plastic impact of a slender block (Housner 1963)
-    return runs, share * (1.0 - r) / ((1.0 + r) * math.tan(alpha))
+    files, friction = slippery_base(tmp_path_factory.mktemp("slippery"), runs=3, place=0)
+    return prepare([load_run(file) for file in files])[0], friction
 
 
 def test_its_friction_is_that_of_the_base(slippery: tuple[list[RockingRun], float]) -> None:

@@ -2,33 +2,26 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from daq_app.gap.blind.making.make import Order, make_case
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.findings import findings_of
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 from daq_app.gap.rocking_model.records import load_run
 from daq_app.gap.rocking_model.study import diagnose_prepared, model_and_library, prepare
 from daq_app.gap.rocking_model.tolerances.motion import KNOCK_S
+from tests.support.gap.blind_case import blind_case
 from tests.support.simulated_wall import simulate
 
-RIG = Path(__file__).parents[4] / "configs" / "fr1.toml"
 SEED = 12
 
 
 def _case(folder: Path, hidden: str) -> tuple[list[RockingRun], dict[str, float]]:
     """The runs of a case of an ordinary laboratory, and the parameters of what it hides."""
-    text = RIG.read_text(encoding="utf-8")
-    order = Order(SEED, folder / "out", folder / "kept", (text,), 3, None, "ordinary", "", hidden)
-    name = make_case(order, 0)
-    label = json.loads(json.loads((folder / "kept" / f"{name}.json").read_text(encoding="utf-8"))["label"])
-    files = sorted((folder / "out" / name).glob("*.h5"))
-    parameters = label["effects"][0]["parameters"] if label["effects"] else {}
+    files, parameters = blind_case(folder, "ordinary", hidden, seed=SEED, runs=3)
     return prepare([load_run(file) for file in files])[0], parameters
 
 
