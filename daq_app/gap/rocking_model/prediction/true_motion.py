@@ -90,6 +90,7 @@ def _behind_slips(values: Mapping[str, float], sides: FloatArray) -> FloatArray:
     """
     outwards = values.get("sliding.back", 0.0) * values.get("sliding.c", 0.0)
     on = values.get("sliding_on.back", 0.0) * values.get("sliding_on.c", 0.0)
+    on *= 1.0 + values.get("sliding_on.own", 0.0)
     if outwards == on == 0.0:
         return np.zeros(sides.shape)
     lever = values["p"] ** 2 / G_M_S2 * math.cos(values["alpha"]) / values["r"]
