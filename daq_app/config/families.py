@@ -63,7 +63,7 @@ FAMILY_NAMES: Final[dict[Family, str]] = {
     "accelerometer": "accelerometers",
     "tiltmeter": "tiltmeters",
 }
-"""Of all that are looked at for the motion of the wall."""
+"""The reader's word for each family that shows the motion of the wall."""
 
 
 def is_auxiliary(family: str) -> bool:

@@ -32,7 +32,7 @@ _LEAST = {
 }
 """Size from which a condition that every laboratory has a little of is material; any other always is."""
 _FAMILIES = {"floor": "ambient", "base": "contact"}
-"""Families of what is no instrument's."""
+"""Family of the effects that a finding belongs to, by who has it, where that is no instrument."""
 
 
 def findings_of(runs: Sequence[RockingRun]) -> tuple[Finding, ...]:

@@ -20,7 +20,8 @@ class FamilyFinding:
     """One instrument, or a whole family, that disagrees with the rest; or the wall, with a rigid block."""
 
     family: str
-    """A `Family`, or several joined by "or" where nothing says which of them it is."""
+    """``wires``, ``LVDTs``, ``tiltmeters``, ``accelerometers``, ``survey``, ``wall``, ``floor``; or several,
+    joined by "or" where nothing says which of them it is."""
     channels: tuple[str, ...]
     """The channels concerned; none where it is the whole family."""
     kind: Kind

@@ -18,7 +18,7 @@ from daq_app.config.rig import G_M_S2
 Floats = NDArray[np.float64]
 
 _STEPS: Final = 120
-"""Steps of a half-cycle: the slip is good to a per cent."""
+"""Number of steps of a half-cycle: with so many the slip is good to a per cent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,17 +26,20 @@ class Slips:
     """Slips of half-cycles, (k,), of a base that accelerates by 1 m/s² for each rad below the rotation."""
 
     time_s: Floats
-    """(steps + 1, k), from the peak."""
+    """(steps + 1, k) times from the peak of each half-cycle, from its first impact to its last."""
     acceleration: Floats
-    """(steps + 1, k), outwards, rad."""
+    """(steps + 1, k) acceleration outwards at these times, rad."""
     end: Floats
-    """Speed at the impact that ends the half-cycle, rad s."""
+    """Speed of the slip at the impact that ends the half-cycle, rad s."""
     slip: Floats
-    """Between the two impacts, rad s²."""
+    """How far the base slips between the two impacts, rad s²."""
 
 
 def push(rotation_rad: float, alpha_rad: float, p_rad_s: float, r0_m: float) -> float:
-    """Force along the floor over that against it, 1, by which a block is held at a rotation."""
+    """The force along the floor that keeps the edge of a rocking block in place, over its weight, 1.
+
+    It gives the centre of mass the acceleration that the block has at rest at this rotation.
+    """
     left = alpha_rad - rotation_rad
     return p_rad_s**2 * r0_m / G_M_S2 * math.sin(left) * math.cos(left)
 

@@ -1,4 +1,4 @@
-"""What a base that slips does to the motion: measured, and as uncertain as a friction law is.
+"""What a base that slips does to the motion: the slip is measured, and its effect is known to a factor.
 
 In the frame of a slipping edge the block is one whose floor moves (Housner 1963): θ̈ = −p² (sin(α − θ) +
 ẍ/g cos(α − θ)). Between impacts that makes half-cycles shorter, and at impacts, where the slip stops, slower.
@@ -27,7 +27,7 @@ def on_its_base(run: RockingRun) -> RockingRun:
 def slip_loadings(run: RockingRun, slip: BaseSlip) -> FloatArray:
     """What the base moves the features of a run by, (n, 2): between impacts, and at impacts.
 
-    Each for a draw of unit variance. The slip is measured, and what it does is known to a factor.
+    Each column is for a draw of unit variance: the factor that the law of friction leaves open.
     """
     peaks = np.abs(run.swings.peak_rad)
     slips = slips_below(slip.below_rad, peaks, run.survey.alpha_rad, run.survey.p_rad_s)

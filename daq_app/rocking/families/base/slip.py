@@ -19,22 +19,22 @@ from daq_app.rocking.theory.friction import push, slips_below
 Floats = NDArray[np.float64]
 
 _BELOW: Final = np.geomspace(0.01, 0.4, 16)
-"""Rotations below which a base may slip, over α."""
+"""Rotations, over α, that are tried as the one below which a base slips."""
 _FEWEST: Final = 7
-"""Half-cycles that tell a law: three more than it has coefficients."""
+"""Number of half-cycles from which the law is fitted: three more than it has coefficients."""
 _NOISE: Final = 2e-5
-"""What slips and turns are known to at best, m or rad: few half-cycles may agree by chance."""
+"""Least error of a slip (m) or turn (rad): few half-cycles may agree better than that by chance."""
 _SURE_SD: Final = 10.0
-"""Standard errors from none from which a base slips: sound laboratories reach 4, walls on springs 7. Raising
-it hides slips."""
+"""Number of standard errors from which a slip is no chance: sound laboratories reach 4, walls on springs 7.
+Raising it hides slips."""
 _EXPLAINED: Final = 0.5
-"""Share of what half-cycles differ by that the law explains where a base slips: it is 0.9 of slips, 0.3 at
+"""Least share of the half-cycles' differences that the law must explain: it explains 0.9 of slips, and 0.3 at
 most of what rings or springs back. Raising it hides slips under noise."""
 _FASTEST: Final = 6.0
-"""Acceleration of a slip for each rad over p² R: a rectangular block that slips on all of its base has four,
-I_O over I_G. Raising it takes slow wires for slips."""
+"""Largest acceleration of a slip for each rad, over p² R: a rectangular block that slips on all of its base
+has four, which is I_O over I_G. Raising it takes slow wires for slips."""
 _TURNS_ABOUT_M: Final = 3.0
-"""Distance of the place that a base turns about where friction fails at one end of it: longer than walls are.
+"""Largest distance of the place that a base turns about where friction fails at one end: walls are shorter.
 Raising it says of bases that slip along their whole length that they turn."""
 
 
@@ -43,19 +43,19 @@ class HalfCycleSlips:
     """What half-cycles show of the base between their two impacts, (k,) each."""
 
     side: Floats
-    """Of the edge that the wall is on, ±1."""
+    """The edge that the wall is on: −1 is the one at x < 0, 1 the one at x > 0."""
     peak_rad: Floats
-    """Without sign."""
+    """Largest rotation of the half-cycle, without sign."""
     speed_rad_s: Floats
-    """Of the impact before, without sign."""
+    """Speed with which the wall comes to the impact that begins the half-cycle, without sign."""
     along_m: Floats
-    """How far it slips outwards, towards the side."""
+    """How far the base slips outwards, towards the edge that the wall is on."""
     turn_rad: Floats
-    """How far it turns, positive where the end at y > 0 moves outwards."""
+    """How far the base turns about the vertical, positive where its end at y > 0 moves outwards."""
 
     @classmethod
     def joined(cls, parts: Sequence[HalfCycleSlips]) -> HalfCycleSlips:
-        """Those of several tests of a wall."""
+        """The half-cycles of several tests of a wall, one test after the other."""
         names = ("side", "peak_rad", "speed_rad_s", "along_m", "turn_rad")
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
@@ -64,7 +64,7 @@ class HalfCycleSlips:
 class BaseSlip:
     """A base that slips outwards below a rotation, and turns about the vertical with that.
 
-    Each pair is of a wall on its edge at x < 0, and on that at x > 0.
+    The first number of each pair holds while the wall is on its edge at x < 0, the second on that at x > 0.
     """
 
     below_rad: float
@@ -73,7 +73,7 @@ class BaseSlip:
     along: Floats
     """(2,) acceleration outwards for each rad below it, m/s²."""
     turning: Floats
-    """(2,) the same of the turn, rad/s²."""
+    """(2,) angular acceleration about the vertical for each rad below it, 1/s²."""
     slip_m: float
     """Largest slip between two impacts."""
     slip_sd_m: float
@@ -110,27 +110,30 @@ def find_slip(seen: HalfCycleSlips, alpha_rad: float, p_rad_s: float, r0_m: floa
 
 @dataclass(frozen=True, slots=True)
 class _Fitted:
-    """Accelerations by which a series follows the law, (2,): at x < 0 and at x > 0."""
+    """Accelerations by which a series follows the law: on the edge at x < 0, and on that at x > 0."""
 
     sizes: Floats
+    """(2,) accelerations for each rad."""
     sd: Floats
+    """(2,) their standard errors."""
     explained: float
-    """Share of what half-cycles differ by."""
+    """Share that the law explains of what a delay and play of the wires leave."""
     share: float
-    """Of all that they show, without what goes with the speed or is the same in all: what slow wires do."""
+    """Share that the law has in the whole series; slow wires put nearly all of it into the delay."""
 
     @property
     def place(self) -> int:
-        """Of the side that is surer."""
+        """Index of the edge whose acceleration is more standard errors from none."""
         return int(np.argmax(np.abs(self.sizes / self.sd)))
 
     @property
     def sure(self) -> float:
-        """Standard errors from none, of that side."""
+        """Number of standard errors by which the acceleration of that edge is from none."""
         return abs(float(self.sizes[self.place] / self.sd[self.place]))
 
     @property
     def stands_out(self) -> bool:
+        """Whether the series follows the law, and not by chance."""
         return self.sure > _SURE_SD and min(self.explained, self.share) > _EXPLAINED
 
     @property

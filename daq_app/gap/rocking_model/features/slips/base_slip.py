@@ -15,11 +15,13 @@ from daq_app.gap.rocking_model.records import GapRun
 from daq_app.rocking.families.base.slip import BaseSlip, HalfCycleSlips, find_slip
 
 _GUARD_S: Final = 0.008
-"""Beside an impact: its shock and step."""
+"""Time beside an impact that is not looked at: its shock and its steps are over then."""
 _WINDOW_S: Final = 0.03
+"""Time after and before an impact whose means are compared."""
 _SHORTEST_S: Final = 0.1
-"""Half-cycles with room for both windows."""
+"""Duration of the shortest half-cycle that is used: both windows fit into it."""
 _FEWEST_WIRES: Final = 4
+"""Number of wires from which slip, turn and rotation are told apart with one to spare."""
 
 
 def slip_of(runs: Sequence[GapRun], grids: Sequence[Grid]) -> BaseSlip | None:
@@ -44,7 +46,11 @@ def slip_findings(slip: BaseSlip | None, runs: int) -> list[RunFinding]:
 
 
 def _seen(run: GapRun, grid: Grid) -> HalfCycleSlips | None:
-    """What the half-cycles of a run show; None where its wires do not tell slip, turn and rotation apart."""
+    """What the half-cycles of a run show; None where its wires do not tell slip, turn and rotation apart.
+
+    The line through the wires over their heights takes up what the rotation is off by. An analysis of r takes
+    up gains of single wires instead (`rocking.families.base.steps`): it has one test, and every sample.
+    """
     _, chosen = wall_rotation(run)
     _, y, z = run.positions(chosen).T
     design = np.column_stack([np.ones_like(y), z, y])
