@@ -132,7 +132,7 @@ def _rotations(run: GapRun, result: Diagnosis) -> tuple[GapRun, Swings, FloatArr
     wires = joint.theta if turned is None else turned
     # What the effect does not touch tells the motion; what it touches is shown.
     true = wires if shown == "lvdt" and "lvdt" in families else joint.theta
-    swings = find_swings(true, sample_noise(true, run.rate_hz), run.rate_hz, run.name)
+    swings = find_swings(true, sample_noise(true, run.rate_hz), run.survey.p_rad_s, run.rate_hz, run.name)
     chosen = {"lvdt": joint.theta, "wire": wires, "tiltmeter": joint.theta}[shown]
     response = 0.0
     if shown == "tiltmeter":

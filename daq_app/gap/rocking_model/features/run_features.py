@@ -59,7 +59,7 @@ def examine(run: GapRun, reference: str = "") -> Examined:
     wanted = reference
     run, joint = from_hold(run)
     reference, theta, noise, notes = _reference(run, joint, wanted)
-    swings = sw.find_swings(theta, noise, run.rate_hz, run.name)
+    swings = sw.find_swings(theta, noise, run.survey.p_rad_s, run.rate_hz, run.name)
     grid = make_grid(theta, joint.valid, swings, run.rate_hz, run.survey)
     scene = Scene(run, joint, grid, swings, reference, quiet(run, grid), wanted == "late")
     seen = (block for family in sensor_families() for block in family.observe(scene))

@@ -13,13 +13,12 @@ from scipy.signal import butter, sosfiltfilt
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.held_state import HeldState, held_state
+from daq_app.gap.rocking_model.motion.release import release_sample
 from daq_app.gap.rocking_model.motion.rotation import HOLD_S
 from daq_app.gap.rocking_model.tolerances.motion import (
     AT_REST_RAD,
-    FALLEN,
     SHORTEST_HALF_CYCLE_S,
     SMALLEST_RAD,
-    SWAYS_ON,
     WITHIN_SWAY,
 )
 from sim_hardware.dynamics.parameters import REST_AMPLITUDE_RAD
@@ -37,10 +36,6 @@ _LAST = 9
 """Peaks from which the fall from one to the next is taken, where it no longer depends on the amplitude."""
 _SMOOTH_HZ = 30.0
 _WINDOW_S = 0.015
-_FALL = (0.05, 0.3)
-"""Shares of the held rotation between which a fall is seen whatever the wall swayed by before it."""
-_HELD_S = (0.6, 0.25)
-"""Before the wall is falling, s: from when to when it is held; it falls to nine tenths within 0.1–0.2 s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +74,11 @@ class Swings:
         return self.peak_rad.size - 1 + max(float(last[-1]) - math.log(REST_AMPLITUDE_RAD), 0.0) / fall
 
 
-def find_swings(theta: FloatArray, noise_rad: float, rate_hz: float, name: str) -> Swings:
-    """Locate everything in a rotation record (n,), rad. Raises `CannotDiagnose` if nothing rocks."""
+def find_swings(theta: FloatArray, noise_rad: float, p_rad_s: float, rate_hz: float, name: str) -> Swings:
+    """Locate everything in a rotation record (n,), rad, of a wall with about this frequency parameter.
+
+    Raises `CannotDiagnose` if nothing rocks.
+    """
     smooth = sosfiltfilt(butter(4, _SMOOTH_HZ, fs=rate_hz, output="sos"), theta)
     held = float(np.mean(theta[: int(HOLD_S * rate_hz)]))
     if abs(held) < max(SMALLEST_RAD, 20 * noise_rad / np.sqrt(HOLD_S * rate_hz)):
@@ -96,7 +94,7 @@ def find_swings(theta: FloatArray, noise_rad: float, rate_hz: float, name: str) 
         raise CannotDiagnose(
             f"Run {name}: the wall never rocks.", "Check that it was released in this record."
         )
-    release = _release(smooth, noise_rad, int(crossings[0]), rate_hz)
+    release = release_sample(smooth, noise_rad, int(crossings[0]), p_rad_s, rate_hz)
     state = held_state(theta, release, noise_rad, rate_hz)
     peaks = _peaks(theta, smooth, crossings, noise_rad, rate_hz)
     if len(peaks) < 3:
@@ -153,42 +151,6 @@ def _level_times(
                 before = samples[k - 1]
                 rise[k, j], rise_sd[k, j] = _crossing(folded, near, level, begin, before, noise, rate_hz)
     return fall, fall_sd, rise, rise_sd
-
-
-def _release(smooth: FloatArray, noise: float, first_crossing: int, rate_hz: float) -> float:
-    """Sample of the release: the fall extrapolated back to the held rotation, |θ₀| − ½ a t².
-
-    The held rotation is that of the last moments before the fall: a hand that sways and a zero that walks
-    move it by more than the first part of the fall does. Where a sway is as large as that, the fall is
-    traced back to its own top instead, whatever the rotation there.
-    """
-    size = np.abs(smooth[:first_crossing])
-    fallen = int(np.flatnonzero(size > FALLEN * size.max())[-1])
-    first, last = (max(fallen - round(back * rate_hz), 0) for back in _HELD_S)
-    hold = size[first : max(last, first + 1)]
-    held = float(np.median(hold))
-    if float(np.std(hold)) > SWAYS_ON * held:
-        return _top_of_fall(size, held, fallen)
-    moved = held - size
-    low, high = max(2.0 * noise, 0.01 * held), 0.1 * held
-    still = np.flatnonzero(moved[: fallen + 1] < low)
-    start = int(still[-1]) + 1 if still.size else first
-    window = np.flatnonzero(moved[start:] < high) + start
-    if window.size < 5:
-        return float(start)
-    slope, intercept = np.polyfit(window, np.sqrt(np.maximum(moved[window], 0.0)), 1)
-    return float(max(-intercept / slope, 0.0)) if slope > 0.0 else float(start)
-
-
-def _top_of_fall(size: FloatArray, held: float, fallen: int) -> float:
-    """Sample at which the parabola through a fall by a twentieth to three tenths has its top."""
-    begin = int(np.flatnonzero(size[: fallen + 1] > (1.0 - _FALL[0]) * held)[-1]) + 1
-    below = np.flatnonzero(size[begin:] < (1.0 - _FALL[1]) * held)
-    end = begin + int(below[0]) if below.size else size.size
-    if end - begin < 5:
-        return float(begin)
-    bend, slope, _ = np.polyfit(np.arange(end - begin), size[begin:end], 2)
-    return float(max(begin - 0.5 * slope / bend, 0.0)) if bend < 0.0 else float(begin)
 
 
 def _peaks(

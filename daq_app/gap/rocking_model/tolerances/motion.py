@@ -39,7 +39,7 @@ WITHIN_SWAY = 6.0
 Raising it gives up the levels nearest to the hold.
 """
 
-SWAYS_ON = 2e-3
+SWAYS_ON = 5e-4
 """Rms sway of a hold over the held rotation, 1, from which the start of the fall is hidden by it (assumed).
 
 Raising it takes a sway for the start of the fall.
