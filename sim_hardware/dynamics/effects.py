@@ -28,6 +28,13 @@ _PLASTIC: Final = Parameter(
 )
 """A wall loses another share of its speed than a plastic impact takes. How this differs by side is open."""
 
+
+def _of_square(index: int) -> Parameter:
+    """An impact throws the base aside, and friction stops it over a way that goes with its speed squared."""
+    text = "share that goes with the square of the speed, told at 0.2 rad/s"
+    return Parameter("square", "1", 0.0, 1.0, text, 0.0, index, 0.0, 1.0)
+
+
 MOTION_EFFECTS: Final[tuple[EffectSpec, ...]] = (
     EffectSpec(
         "pivot_shift",
@@ -213,9 +220,12 @@ MOTION_EFFECTS: Final[tuple[EffectSpec, ...]] = (
         "sliding",
         "contact",
         "the base slips to and fro at impacts",
-        "Δx = c θ̇⁻",
+        "Δx = c θ̇⁻ (1 − q + q |θ̇⁻|/0.2)",
         "sliding block",
-        (Parameter("c", "m s/rad", 2e-4, 0.02, "slip per approach speed", index=par.SLIDE),),
+        (
+            Parameter("c", "m s/rad", 2e-4, 0.02, "slip per approach speed", index=par.SLIDE),
+            _of_square(par.SLIDE_SQUARE),
+        ),
         ("drift",),
         "wires step together, LVDTs do not",
     ),
@@ -223,9 +233,12 @@ MOTION_EFFECTS: Final[tuple[EffectSpec, ...]] = (
         "sliding_on",
         "contact",
         "the base slips to one side at impacts, on and on",
-        "Δx = c |θ̇⁻|",
+        "Δx = c |θ̇⁻| (1 − q + q |θ̇⁻|/0.2)",
         "sliding block on a floor that favours one way",
-        (Parameter("c", "m s/rad", -0.02, 0.02, "slip towards +x per approach speed", index=par.SLIDE_ON),),
+        (
+            Parameter("c", "m s/rad", -0.02, 0.02, "slip towards +x per approach speed", index=par.SLIDE_ON),
+            _of_square(par.SLIDE_ON_SQUARE),
+        ),
         ("drift", "sliding"),
         "wires step together at impacts, LVDTs do not; before and after they are still",
     ),

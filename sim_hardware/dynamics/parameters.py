@@ -77,13 +77,18 @@ SLIDE_ON: Final = 49  # m per (rad/s): base slip at an impact towards +x, from e
 STAY: Final = 50  # stiffness relative to p²
 STAY_LOOSE: Final = 51  # rad: rotation at which it hangs loose, which has the sign of its pull
 STAY_RELEASE: Final = 52  # rad: what is added to that towards the side of the release
-N_PARAMETERS: Final = 53
+# how far a base slips at faster impacts
+SLIDE_SQUARE: Final = 53  # share of the slip that goes with the square of the speed, told at SLIDE_SPEED
+SLIDE_ON_SQUARE: Final = 54  # the same of slips to one side
+N_PARAMETERS: Final = 55
 
 ODD_IN_TIME: Final = (ZETA, COULOMB, QUADRATIC, AMBIENT_HZ)
 """Parameters that change their sign where time runs backwards: losses become gains."""
 
 BOUNCE_SPEED: Final = 0.2
 """Approach speed (rad/s) at which a bounce takes `BOUNCE` seconds; the flight grows with the speed."""
+SLIDE_SPEED: Final = 0.2
+"""Approach speed (rad/s) at which slips in proportion to the speed and to its square are told alike."""
 REST_AMPLITUDE_RAD: Final = 2e-5
 """Default rest criterion: 0.02 mrad is 0.06 mm at the top of a 3 m wall, far below any sensor's noise."""
 STEP_TOLERANCE: Final = 1e-10

@@ -77,7 +77,12 @@ class Scene:
         rows[:, la.EV_INTENSITY] = np.abs(motion.velocity_before_rad_s)
         rows[:, la.EV_JUMP] = motion.velocity_after_rad_s - motion.velocity_before_rad_s
         before = motion.velocity_before_rad_s
-        rows[:, la.EV_SLIP] = motion.vector[par.SLIDE] * before + motion.vector[par.SLIDE_ON] * np.abs(before)
+        for way, size, square in (
+            (before, par.SLIDE, par.SLIDE_SQUARE),
+            (np.abs(before), par.SLIDE_ON, par.SLIDE_ON_SQUARE),
+        ):
+            grown = 1.0 + motion.vector[square] * (np.abs(before) / par.SLIDE_SPEED - 1.0)
+            rows[:, la.EV_SLIP] += motion.vector[size] * way * grown
         alternation = motion.vector[par.TURN_ALTERNATION]
         turning = math.cos(alternation) * np.abs(before) + math.sin(alternation) * before
         rows[:, la.EV_TURN] = motion.vector[par.TURN] * turning

@@ -25,6 +25,8 @@ _FREE = {
     "ambient": ("amplitude", "frequency"),
     "slow_release": ("tau",),
     "corner_twist": ("c",),
+    "sliding": ("c",),
+    "sliding_on": ("c",),
     "alpha_asymmetry": ("delta",),
     "eccentric_mass": ("e",),
 }
@@ -136,6 +138,11 @@ _DRAWN_BACK = Parameter(
     "back", 0.5, 0.5, "1", 0.0, 1.5, meaning="share of what a slip takes back of the rotation"
 )
 """A base that slips leaves the wall behind: 1 for a rigid block, 0 for slips that act back on nothing."""
+_SQUARE = Parameter(
+    "square", 0.5, 0.4, "1", 0.0, 1.0, meaning="share of a slip that goes with the square of the speed"
+)
+"""An impact throws the base aside with a speed in proportion to its own, and friction stops it over a way in
+proportion to the square of that."""
 _FORMS = {
     "alpha_asymmetry": (_PLASTIC,),
     "eccentric_mass": (_PLASTIC,),
@@ -147,10 +154,11 @@ _FORMS = {
         Parameter("forced", 0.5, 0.4, "1", 0.0, 1.0, meaning="share of its own inertia in its bending"),
         Parameter("recoil", 0.0, 0.5, "1", 0.0, 1.5, meaning="turn of the base against it, over its tilt"),
     ),
-    "sliding": (_DRAWN_BACK,),
+    "sliding": (_DRAWN_BACK, _SQUARE),
     # In one test further than in another.
     "sliding_on": (
         _DRAWN_BACK,
+        _SQUARE,
         Parameter(
             "own", 0.0, 0.4, "1", meaning="what each test's slips differ by", per_run=True, starts=(0.0,)
         ),

@@ -172,6 +172,12 @@ def test_structure_effects_show_where_they_should(rig: Rig) -> None:
     np.testing.assert_allclose(np.abs(step[early]), abs(first), rtol=0.02)
     assert np.array_equal(sliding["LV-A01"], plain["LV-A01"])
 
+    stopped = quantities(rig, {"sliding": {"c": 0.02, "square": 0.5}})
+    speed = abs(first) / 0.02
+    further = abs(first) * (0.5 + 0.5 * speed / 0.2)
+    assert speed > 0.25
+    np.testing.assert_allclose(np.abs((stopped["WP-5"] - plain["WP-5"])[early]), further, rtol=0.02)
+
     one_way = quantities(rig, {"sliding_on": {"c": -0.02}})
     truth = wall_with(rig).truth()
     so_far = zip(truth["impact_time_s"], truth["velocity_before_rad_s"], strict=True)

@@ -10,6 +10,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.motion_grid import SETTLING_S, Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 from daq_app.gap.rocking_model.tolerances.sensors import PLAY_RAD
+from sim_hardware.dynamics.parameters import SLIDE_SPEED
 
 Term = tuple[float, str, Callable[[], FloatArray]]
 """Size of a shape, its name, and how it is made, (m,) on the grid."""
@@ -59,13 +60,14 @@ def play_shape(theta: FloatArray) -> FloatArray:
     return np.asarray((with_play(theta, np.array([PLAY_RAD]))[0] - theta) / PLAY_RAD)
 
 
-def stepped_shape(grid: Grid, *, alternating: bool) -> FloatArray:
+def stepped_shape(grid: Grid, *, alternating: bool, power: int = 1) -> FloatArray:
     """Sum of the approach speeds of the impacts so far, with their signs or without, less its last value.
 
     The zero is at rest. The mean over each interval of the grid: in that of an impact only a part of it is
-    after the step.
+    after the step. A second `power` multiplies the speeds by their shares of `SLIDE_SPEED`.
     """
     speeds = grid.approach if alternating else np.abs(grid.approach)
+    speeds = speeds * (np.abs(grid.approach) / SLIDE_SPEED) ** (power - 1)
     return _after(grid) @ speeds - float(np.sum(speeds))
 
 

@@ -14,6 +14,7 @@ from daq_app.gap.rocking_model.features.pivots import turned_by
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.rotation import anchors_turn
 from daq_app.gap.rocking_model.prediction.wires_alone import peaks_carry
+from sim_hardware.dynamics.parameters import SLIDE_SPEED
 
 
 def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
@@ -74,7 +75,7 @@ def pause_at_impact(values: Mapping[str, float], speeds: FloatArray, sides: Floa
 
     Of half-cycles that end with `speeds`, rad/s, on `sides`, ±1.
     """
-    pause = values.get("dwell.tau", 0.0) + _behind_slips(values, sides)
+    pause = values.get("dwell.tau", 0.0) + _behind_slips(values, speeds, sides)
     flight = values.get("bounce.tau", 0.0)
     if flight:
         share = values.get("bounce.share", 0.5)
@@ -82,17 +83,22 @@ def pause_at_impact(values: Mapping[str, float], speeds: FloatArray, sides: Floa
     return pause
 
 
-def _behind_slips(values: Mapping[str, float], sides: FloatArray) -> FloatArray:
+def _behind_slips(values: Mapping[str, float], speeds: FloatArray, sides: FloatArray) -> FloatArray:
     """Time by which the wall is behind a base that slips at impacts, (k,), s.
 
     In the frame of the base a slip s is a floor that moves by s: the rotation is −p²/g cos α · s behind
-    (Housner 1963), which a wall that goes on with r times its speed makes good in as long at every impact.
+    (Housner 1963), which a wall that goes on with r times its speed makes good in s over its approach speed
+    times as long.
     """
-    outwards = values.get("sliding.back", 0.0) * values.get("sliding.c", 0.0)
-    on = values.get("sliding_on.back", 0.0) * values.get("sliding_on.c", 0.0)
-    on *= 1.0 + values.get("sliding_on.own", 0.0)
-    if outwards == on == 0.0:
-        return np.zeros(sides.shape)
+    outwards = _slip_per_speed(values, "sliding", speeds)
+    on = _slip_per_speed(values, "sliding_on", speeds) * (1.0 + values.get("sliding_on.own", 0.0))
     lever = values["p"] ** 2 / G_M_S2 * math.cos(values["alpha"]) / values["r"]
     # The wall comes down to the other side than that of the half-cycle.
     return np.asarray(lever * (outwards - sides * on))
+
+
+def _slip_per_speed(values: Mapping[str, float], effect: str, speeds: FloatArray) -> FloatArray:
+    """Slips that act back on the wall over their approach speeds, (k,), m s/rad."""
+    strength = values.get(f"{effect}.back", 0.0) * values.get(f"{effect}.c", 0.0)
+    square = values.get(f"{effect}.square", 0.0)
+    return np.asarray(strength * (1.0 + square * (speeds / SLIDE_SPEED - 1.0)))

@@ -141,7 +141,7 @@ def _work_out(run: RockingRun, form: str) -> _Carried:
             series = run.leaked
         case "play":
             series = play_shape(grid.theta)
-        case "sliding.on" | "sliding.back" | "corner_twist.on" | "corner_twist.back":
+        case _ if form.startswith(("sliding.", "corner_twist.")):
             series = stepped(run, form)
         case _:
             series = bent_form(run, form)

@@ -123,12 +123,17 @@ def test_a_drift_of_all_wires_is_said_to_be_one(plain: tuple[GapRun, ...]) -> No
     assert (found.decision.verdict, found.decision.effects) == ("effect", ("drift@wire",))
 
 
+@pytest.mark.parametrize("square", [0.0, 1.0])
 @pytest.mark.parametrize(("effect", "slip_s_m"), [("sliding", 0.004), ("sliding_on", -0.004)])
-def test_a_simulated_wall_that_slides_is_diagnosed_with_its_way(effect: str, slip_s_m: float) -> None:
-    found = diagnose_runs(simulate({effect: {"c": slip_s_m}}, LEVELS), Options(workers=1))
+def test_a_simulated_wall_that_slides_is_diagnosed_with_its_way_and_its_law(
+    effect: str, slip_s_m: float, square: float
+) -> None:
+    runs = simulate({effect: {"c": slip_s_m, "square": square}}, LEVELS)
+    found = diagnose_runs(runs, Options(workers=1))
     assert (found.decision.verdict, found.decision.effects) == ("effect", (effect,))
-    size = next(p for p in found.effect_parameters if p.name == f"{effect}.c")
-    assert size.low < slip_s_m < size.high
+    told = {p.name: p for p in found.effect_parameters}
+    assert told[f"{effect}.c"].low < slip_s_m < told[f"{effect}.c"].high
+    assert told[f"{effect}.square"].value == pytest.approx(square, abs=0.2)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -162,4 +167,9 @@ def test_a_slip_at_an_impact_leaves_the_wall_behind_as_a_moving_floor_does(side:
     one_way = pause_at_impact({**body, "sliding_on.c": c, "sliding_on.back": 1.0}, speeds, before)
     assert to_and_fro[0] == pytest.approx(behind_s, rel=0.1)
     assert one_way[0] == pytest.approx(side * behind_s, rel=0.1)
+    # As long at every impact where slips go with the speed, and twice as long at twice the speed where
+    # friction stops them.
+    stopped = {**body, "sliding.c": c, "sliding.back": 1.0, "sliding.square": 1.0}
+    twice = pause_at_impact(stopped, np.array([0.2, 0.4]), np.array([-side, -side]))
+    assert twice == pytest.approx([to_and_fro[0], 2.0 * to_and_fro[0]])
     assert pause_at_impact({**body, "sliding.c": c, "sliding.back": 0.0}, speeds, before)[0] == 0.0

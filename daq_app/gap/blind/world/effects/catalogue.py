@@ -140,7 +140,7 @@ _LIBRARY: Final = (
     Entry("alpha_asymmetry", "geometry", "delta_rad", 2e-4, 5e-3, signed=True),
     Entry("base_tilt", "geometry", "beta_rad", 2e-4, 5e-3, signed=True),
     Entry("eccentric_mass", "geometry", "e_m", 3e-4, 7.5e-3, signed=True),
-    Entry("sliding", "contact", "c_m_s", 1e-3, 2e-2),
+    Entry("sliding", "contact", "c_m_s", 1e-3, 2e-2, others=uniform(square=(0.0, 1.0))),
     Entry("dwell", "contact", "tau_s", 5e-4, 1e-2),
     Entry("bounce", "contact", "tau_s", 1e-3, 1e-2),
     Entry(

@@ -71,6 +71,8 @@ class Mechanics:
     bounce_s: float = 0.0
     slip_s: float = 0.0
     """Slip of the base at an impact per unit of ω, m s/rad."""
+    slip_square: float = 0.0
+    """Share of it that goes with ω instead."""
     release_ramp_s: float = 0.0
     wear_in_run: tuple[float, int] = (0.0, -1)
     """(relative loss of arm, impact number from which it holds): a sudden crack."""
@@ -237,6 +239,10 @@ def _set(name: str, key: str) -> Callable[[Mechanics, Parameters, Release], None
     return add
 
 
+def _sliding(m: Mechanics, q: Parameters, release: Release) -> None:
+    m.slip_s, m.slip_square = q["c_m_s"], q["square"]
+
+
 def _stepped(q: Parameters) -> ImpactTerm:
     return lambda i: q["step"] * (0.5 if i.speed > q["speed_rad_s"] else -0.5)
 
@@ -286,7 +292,7 @@ _ADD: dict[str, Callable[[Mechanics, Parameters, Release], None]] = {
     "compliance": _compliance,
     "dwell": _set("dwell_s", "tau_s"),
     "bounce": _set("bounce_s", "tau_s"),
-    "sliding": _set("slip_s", "c_m_s"),
+    "sliding": _sliding,
     "slow_release": _set("release_ramp_s", "tau_s"),
     "sudden_crack": _sudden_crack,
     "restitution_slope": _impact(lambda q: lambda i: q["k_s_rad"] * (i.speed - 0.25)),

@@ -18,6 +18,8 @@ from daq_app.gap.blind.world.shock import Shock
 _SETTLE_S = 0.003
 _TURN_S = 0.02
 """Time in which a wall slides into its new place about a corner."""
+_SLIP_SPEED_RAD_S = 0.2
+"""Speed at which slips in proportion to ω and to ω² are as large."""
 _FADE = 7.0
 """A ring-down is followed for this many time constants (0.1 %)."""
 
@@ -101,11 +103,12 @@ def _base_rotation(
 
 
 def _slip(mechanics: Mechanics, motion: Followed, time_s: FloatArray) -> FloatArray:
-    """Displacement of the base: a step c·ω at every impact."""
+    """Displacement of the base: a step at every impact, c·ω, of which a share goes with ω² instead."""
     slip = np.zeros_like(time_s)
     if mechanics.slip_s:
         for impact in motion.impacts:
-            slip[np.searchsorted(time_s, impact.time) :] += mechanics.slip_s * impact.before
+            grown = 1.0 + mechanics.slip_square * (abs(impact.before) / _SLIP_SPEED_RAD_S - 1.0)
+            slip[np.searchsorted(time_s, impact.time) :] += mechanics.slip_s * impact.before * grown
     return slip
 
 

@@ -14,45 +14,60 @@ from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import Term, stepped_shape
 from daq_app.gap.rocking_model.motion.rotation import shown_by_wires
 
-_ALTERNATING: Final = {"on": False, "back": True}
-"""Form of the steps → whether they change sign with the side that the wall comes from."""
+_FORMS: Final = {"on": (False, 1), "back": (True, 1), "on squared": (False, 2), "back squared": (True, 2)}
+"""Form of the steps → whether they change sign with the side that the wall comes from, and the power of the
+speed that they go with."""
 
 
-def at_impacts(run: RockingRun, values: Mapping[str, float], key: str) -> float:
-    """What an effect does for each rad/s of an impact's approach speed, in the speeds of the survey's wall.
+def faster(run: RockingRun, values: Mapping[str, float]) -> float:
+    """Speed of the wall's impacts over that of the survey's wall, 1, which the grid has.
 
-    The grid has these. A block falls from a small rotation φ with ω² = 2 p² φ sin α, so that another p and α
-    make all impacts faster by nearly the same share.
+    A block falls from a small rotation φ with ω² = 2 p² φ sin α, so that another p and α make all impacts
+    faster by nearly the same share.
     """
-    if not (strength := values.get(key, 0.0)):
-        return 0.0
     survey = run.survey
-    faster = math.sin(values["alpha"]) / math.sin(survey.alpha_rad)
-    return strength * values["p"] / survey.p_rad_s * math.sqrt(faster)
+    return values["p"] / survey.p_rad_s * math.sqrt(math.sin(values["alpha"]) / math.sin(survey.alpha_rad))
 
 
 def slides(run: RockingRun, values: Mapping[str, float]) -> dict[str, float]:
-    """Form → how far the base slides per approach speed, m s/rad; empty for a base that does not."""
-    on = at_impacts(run, values, "sliding_on.c") * (1.0 + values.get("sliding_on.own", 0.0))
-    return _there("sliding", on, at_impacts(run, values, "sliding.c"))
+    """Form → how far the base slides per approach speed, m s/rad; empty for a base that does not.
+
+    What goes with the square of the speed is told at 0.2 rad/s.
+    """
+    on = values.get("sliding_on.c", 0.0) * (1.0 + values.get("sliding_on.own", 0.0))
+    return {
+        **_slid(run, values, "on", on, values.get("sliding_on.square", 0.0)),
+        **_slid(run, values, "back", values.get("sliding.c", 0.0), values.get("sliding.square", 0.0)),
+    }
+
+
+def _slid(
+    run: RockingRun, values: Mapping[str, float], form: str, strength: float, square: float
+) -> dict[str, float]:
+    if not strength:
+        return {}
+    speed = faster(run, values)
+    sizes = {form: (1.0 - square) * strength * speed, f"{form} squared": square * strength * speed**2}
+    return {f"sliding.{form}": size for form, size in sizes.items() if size != 0.0}
 
 
 def turns(run: RockingRun, values: Mapping[str, float]) -> dict[str, float]:
     """Form → how far the wall turns about the vertical per approach speed, s; empty for one that does not."""
-    size, alternation = at_impacts(run, values, "corner_twist.c"), values.get("corner_twist.alternation", 0.0)
-    return _there("corner_twist", size * math.cos(alternation), size * math.sin(alternation))
-
-
-def _there(effect: str, on: float, back: float) -> dict[str, float]:
-    sizes = {f"{effect}.on": on, f"{effect}.back": back}
+    if not (strength := values.get("corner_twist.c", 0.0)):
+        return {}
+    size, alternation = strength * faster(run, values), values.get("corner_twist.alternation", 0.0)
+    sizes = {
+        "corner_twist.on": size * math.cos(alternation),
+        "corner_twist.back": size * math.sin(alternation),
+    }
     return {form: size for form, size in sizes.items() if size != 0.0}
 
 
 def stepped(run: RockingRun, form: str) -> FloatArray:
     """What one form adds for a step of 1 per rad/s, (m,); 0 at rest."""
-    alternating = _ALTERNATING[form.rpartition(".")[2]]
-    make = partial(stepped_shape, run.grid, alternating=alternating)
-    return np.asarray(run.cache.constant(("stepped", alternating), make))
+    alternating, power = _FORMS[form.rpartition(".")[2]]
+    make = partial(stepped_shape, run.grid, alternating=alternating, power=power)
+    return np.asarray(run.cache.constant(("stepped", alternating, power), make))
 
 
 def step_terms(run: RockingRun, steps: Mapping[str, float], share: float = 1.0) -> Iterator[Term]:
