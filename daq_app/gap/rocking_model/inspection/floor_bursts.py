@@ -33,6 +33,8 @@ the rotation's own second derivative is not known well enough."""
 _USUAL = 3.0
 """Power over the usual one up to which a half-cycle says what is usual."""
 _ROUNDS = 12
+_ALIKE = 7
+"""Half-cycles, those after the nearest jumps, that say what such a jump usually leaves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +61,9 @@ def floor_bursts(
     """Findings of the runs in which the floor shook for a while; no effect explains them.
 
     What is usual is said by all half-cycles of all runs: noise, and what an impact leaves, which grows with
-    the jump of the speed. `ring` is the wall's bending after impacts, whose shape over the heights is not
-    quite z²: it is the same wall in every run, so that one size of it is taken out of all.
+    the jump of the speed, or what half of those leave that follow about as large a jump: a base that slips
+    shows it for longer than an impact takes. `ring` is the wall's bending after impacts, whose shape over the
+    heights is not quite z²: it is the same wall in every run, so that one size of it is taken out of all.
     """
     seen = [_half_cycles(run, grid, survey, ring) for run, grid in zip(runs, grids, strict=True)]
     known = [cycle for cycles in seen for cycle in cycles]
@@ -69,12 +72,13 @@ def floor_bursts(
         return findings
     columns = np.concatenate([cycle.columns for cycle in known])
     rings = np.linalg.lstsq(columns[:, 1:], columns[:, 0], rcond=None)[0]
-    floor, per_jump = _usual(
-        np.array([cycle.jump for cycle in known]), np.array([cycle.power(rings) for cycle in known])
-    )
+    jumps = np.array([cycle.jump for cycle in known])
+    powers = np.array([cycle.power(rings) for cycle in known])
+    floor, per_jump = _usual(jumps, powers)
     for row, cycles in zip(findings, seen, strict=True):
         power = np.array([cycle.power(rings) for cycle in cycles])
-        usual = floor + per_jump * np.array([cycle.jump for cycle in cycles]) ** 2
+        own = np.array([cycle.jump for cycle in cycles])
+        usual = np.maximum(floor + per_jump * own**2, [_of_alike(jump, jumps, powers) for jump in own])
         excess, loud = _loudest(cycles, power, usual)
         if loud > SHAKEN_POWER:
             size = float(np.sqrt(max(excess, 0.0)))
@@ -119,6 +123,12 @@ def _half_cycles(run: GapRun, grid: Grid, survey: Survey, ring: Ring | None) -> 
         middle = float(grid.time_s[part].mean())
         half_cycles.append(_HalfCycle(middle, float(grid.jumps[before]), left, part.size - basis.shape[1]))
     return half_cycles
+
+
+def _of_alike(jump: float, jumps: FloatArray, powers: FloatArray) -> float:
+    """Power that half of the half-cycles after the nearest jumps leave; 0 where they are too few."""
+    nearest = np.argsort(np.abs(np.log(np.abs(jumps) / abs(jump))))[:_ALIKE]
+    return float(np.median(powers[nearest])) if nearest.size == _ALIKE else 0.0
 
 
 def _usual(jump: FloatArray, power: FloatArray) -> tuple[float, float]:
