@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.run_features import examine, extract
 from daq_app.gap.rocking_model.motion.held_state import HeldState
-from daq_app.gap.rocking_model.motion.release import release_sample
 from studies.gap.held_state import HELD_RAD, LET_GO_S, PULL_RAD_S2, RATE_HZ, found, swaying
+from studies.gap.release_timing import late_s, let_go
 from tests.support.gap.simulated_campaign import simulate as longer_held
 from tests.support.simulated_wall import short_rig, simulate
 
@@ -93,23 +91,6 @@ def test_a_wall_is_let_go_where_its_sway_ends_and_not_where_its_fall_has_its_top
     alpha_rad: float, share: float
 ) -> None:
     """Let go while it moves, a fall has its top some tens of milliseconds before or after the release."""
-    rng, p_rad_s = np.random.default_rng(3), 2.1
-    smoothing = butter(4, 30.0, fs=RATE_HZ, output="sos")
-    off_s = []
-    for _ in range(20):
-        theta, rotation, speed = swaying(rng, share * HELD_RAD, 0.0)
-        after_s = np.arange(0.0, 1.5, 1.0 / RATE_HZ)
-        motion = solve_ivp(
-            lambda _, state: [state[1], -(p_rad_s**2) * np.sin(alpha_rad - state[0])],
-            (0.0, 1.5),
-            [rotation, speed],
-            t_eval=after_s,
-            rtol=1e-9,
-        )
-        fall = motion.y[0][: int(np.argmax(motion.y[0] < -0.2 * HELD_RAD))]
-        record = np.concatenate([theta[: round(LET_GO_S * RATE_HZ)], fall])
-        record += 3e-5 * rng.standard_normal(record.size)
-        smooth = sosfiltfilt(smoothing, record)
-        upright = int(np.argmax(smooth < 0.0))
-        off_s.append(release_sample(smooth, 3e-5, upright, p_rad_s, RATE_HZ) / RATE_HZ - LET_GO_S)
+    rng = np.random.default_rng(3)
+    off_s = [late_s(let_go(rng, share, alpha_rad)) for _ in range(20)]
     assert np.percentile(np.abs(off_s), 90) < 0.005
