@@ -2,9 +2,9 @@
 
     python -m studies.gap.release_timing
 
-Draws holds that sway by two harmonics of 0.4 to 3 Hz, the second half as large, and Housner's fall from where
-they are and as fast as they move. Prints by how much the release is off, and the top of a parabola through the
-fall by a twentieth to three tenths, as a table.
+Draws holds that sway by two harmonics of 0.4 to 3 Hz, the second half as large, and Housner's fall from
+where they are and as fast as they move. Prints by how much the release is off, and the top of a parabola
+through the fall by a twentieth to three tenths, as a table.
 """
 
 from __future__ import annotations

@@ -23,6 +23,8 @@ _FALLS_S: Final = 0.1
 """Time after the release, s, that a fall is seen in at least."""
 _EXPLAINED: Final = 0.01
 """Variance that is left, over that of the earliest start, 1, below which a start explains the fall."""
+_COARSE: Final = 4
+"""Readings from one start to the next before those beside the best are looked at."""
 _WORK_HZ: Final = 500.0
 """Rate, Hz, of the readings that are fitted: the rotation is smoothed to far less."""
 
@@ -81,16 +83,18 @@ def _let_go(size: FloatArray, held: float, fallen: int, p_rad_s: float, rate_hz:
     starts = [start for start in near if start >= before and start + least <= end]
     if not starts:
         return float(top)
-    left = np.array(
-        [
-            _left_over(
-                size[start - before : end : step], np.arange(-before, end - start, step) / rate_hz, p_rad_s
-            )
-            for start in starts
-        ]
-    )
+
+    def left_by(start: int) -> float:
+        since_s = np.arange(-before, end - start, step) / rate_hz
+        return _left_over(size[start - before : end : step], since_s, p_rad_s)
+
+    coarse = starts[::_COARSE]
+    left = np.array([left_by(start) for start in coarse])
     lowest = (left[1:-1] <= left[:-2]) & (left[1:-1] < left[2:]) & (left[1:-1] < _EXPLAINED * left.max())
-    return float(starts[1 + int(np.argmax(lowest))] if lowest.any() else top)
+    if not lowest.any():
+        return float(top)
+    middle = _COARSE * (1 + int(np.argmax(lowest)))
+    return float(min(starts[middle - _COARSE : middle + _COARSE + 1], key=left_by))
 
 
 def _left_over(seen: FloatArray, since_s: FloatArray, p_rad_s: float) -> float:
