@@ -23,7 +23,7 @@ _LEAST = {
     "noise": POLICY.finding_noise,
     "ringing": POLICY.finding_ringing,
     "shaking": POLICY.finding_shaking,
-    "ambient": POLICY.finding_shaking,
+    "ambient": POLICY.finding_floor,
     "sliding": POLICY.finding_slip,
     "corner_twist": POLICY.finding_slip,
     "crossed": POLICY.finding_crossed,

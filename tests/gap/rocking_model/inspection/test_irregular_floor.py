@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,16 @@ def test_its_size_is_that_of_the_floor(shaken: tuple[list[RockingRun], dict[str,
     assert finding.material and finding.family == "ambient"
     assert "irregular vibration of the floor" in finding.words
     assert not any(f.name == "shaking@floor" for f in findings_of(runs))
+
+
+def test_a_weak_floor_is_a_cause_as_well(shaken: tuple[list[RockingRun], dict[str, float]]) -> None:
+    runs, _ = shaken
+    weak = []
+    for run in runs:
+        found = [replace(f, value=0.05) if f.key == "ambient@floor" else f for f in run.findings]
+        weak.append(replace(run, findings=found))
+    (finding,) = [f for f in findings_of(weak) if f.name == "ambient@floor"]
+    assert finding.material
 
 
 def test_what_it_does_to_the_motion_is_in_the_errors(
