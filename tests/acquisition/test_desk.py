@@ -107,6 +107,52 @@ def test_a_viewer_hears_and_commands(counters: Callable[..., Counter]) -> None:
         assert listen_until_heard(client, counter).text == "hear this"
 
 
+def test_a_request_whose_answer_is_lost_is_sent_again() -> None:
+    """The first answer never comes, as where a connection breaks."""
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    router = context.socket(zmq.ROUTER)
+    port = router.bind_to_random_port("tcp://127.0.0.1")
+    asked: list[Command] = []
+
+    def serve() -> None:
+        while len(asked) < 3:
+            *envelope, body = router.recv_multipart()
+            asked.append(Command.model_validate_json(body))
+            if len(asked) == 2:
+                continue  # the first "stop"
+            reply = Reply(ok=True, text=str(len(asked)), data={"publisher": "tcp://127.0.0.1:9"})
+            router.send_multipart([*envelope, reply.model_dump_json().encode()])
+
+    serving = threading.Thread(target=serve)
+    serving.start()
+    with AcquisitionClient(f"tcp://127.0.0.1:{port}", TOKEN) as client:
+        assert client.request("stop", timeout_s=30.0).text == "3"
+    serving.join(10.0)
+    context.destroy(linger=0)
+    assert [command.name for command in asked] == ["hello", "stop", "stop"]
+    assert asked[1].request == asked[2].request != asked[0].request
+
+
+@pytest.mark.parametrize("name", ["arm", "later", "break"])
+def test_a_request_that_comes_twice_is_carried_out_once_and_answered_twice(
+    counters: Callable[..., Counter], name: str
+) -> None:
+    counter = counters()
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    dealer = context.socket(zmq.DEALER)
+    dealer.connect(counter.address)
+    answers = {}
+    for request in ("first", "second"):
+        body = Command(name=name, token=TOKEN, request=request).model_dump_json().encode()
+        for _ in range(2):
+            dealer.send_multipart([b"", body])
+        assert dealer.poll(10_000)
+        answers[request] = [dealer.recv_multipart() for _ in range(2)]
+    context.destroy(linger=0)
+    assert all(one == again for one, again in answers.values())
+    assert [command.request for command in counter.asked] == ["first", "second"]
+
+
 @pytest.mark.parametrize("token", ["", "wrong", TOKEN + "x", TOKEN[:-1], "é"])
 def test_without_the_token_one_may_watch_and_not_command(
     counters: Callable[..., Counter], token: str

@@ -205,6 +205,8 @@ class Command(Message):
     arguments: dict[str, float | str] = {}
     token: str = ""
     """The right to command; `hello` alone needs none."""
+    request: str = ""
+    """What tells this request from all others: sent again, it is answered again and not carried out twice."""
 
 
 class Reply(Message):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Final, Self
+from uuid import uuid4
 
 import numpy as np
 import zmq
@@ -37,6 +39,8 @@ MODELS: Final[dict[bytes, type[Message]]] = {
     b"check": CheckMessage,
 }
 _RECEIVE_QUEUE: Final = 1000
+_AGAIN_S: Final = 2.0
+"""Time after which a request that is not answered is sent again."""
 
 
 class AcquisitionUnreachable(Exception):
@@ -108,7 +112,11 @@ class AcquisitionClient:
             raise
 
     def request(self, name: str, timeout_s: float = 10.0, **arguments: float | str) -> Reply:
-        """Send one command and wait for its answer. Raises `AcquisitionUnreachable`."""
+        """Send one command and wait for its answer. Raises `AcquisitionUnreachable`.
+
+        A connection that breaks takes the request or the answer with it: the same request is sent again every
+        two seconds, and the process carries it out once.
+        """
         if self._commands is None:
             self._commands = self._context.socket(zmq.REQ)
             self._commands.linger = 0
@@ -118,12 +126,17 @@ class AcquisitionClient:
             if self._keys is not None:
                 self._keys.apply(self._commands)
             self._commands.connect(self._address)
-        command = Command(name=name, arguments=arguments, token=self._token)
-        self._commands.send(command.model_dump_json().encode())
-        if not self._commands.poll(int(1e3 * timeout_s)):
-            raise AcquisitionUnreachable(
-                f"No answer from {self._address} within {timeout_s:g} s. Is the acquisition process running?"
-            )
+        command = Command(name=name, arguments=arguments, token=self._token, request=uuid4().hex)
+        body, until_s = command.model_dump_json().encode(), time.monotonic() + timeout_s
+        self._commands.send(body)
+        while not self._commands.poll(int(1e3 * min(max(until_s - time.monotonic(), 0.0), _AGAIN_S))):
+            if time.monotonic() >= until_s:
+                raise AcquisitionUnreachable(
+                    f"No answer from {self._address} within {timeout_s:g} s. "
+                    "Is the acquisition process running?"
+                )
+            with contextlib.suppress(zmq.Again):  # nothing can be sent: the connection is on its way back
+                self._commands.send(body, flags=zmq.NOBLOCK)
         try:
             return Reply.model_validate_json(self._commands.recv())
         except ValidationError as error:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hmac
 import json
 import time
+from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -28,6 +29,8 @@ from daq_app.acquisition.viewers.curve import KeyFileError, is_loopback
 _MAX_REQUEST_BYTES: Final = 64 * 1024
 _KEYS_EVERY_S: Final = 0.5
 _REOPENING_S: Final = 5.0
+_REMEMBERED: Final = 256
+"""Requests whose answers are kept for viewers that ask again: a broken connection took the first one."""
 
 Answer = Reply | Future[Reply]
 Handler = Callable[[Command], Answer]
@@ -55,6 +58,7 @@ class Desk:
         self._keys: ServerKeys | None = None
         self._stopping = False
         self._waiting: list[tuple[list[bytes], Future[Reply]]] = []
+        self._answered: OrderedDict[str, Answer] = OrderedDict()
         try:
             # The library takes a port above 65535 modulo 65536; this raises ValueError.
             if urlsplit(bind).scheme != "tcp" or urlsplit(bind).port is None:
@@ -172,6 +176,16 @@ class Desk:
             return Reply(ok=False, text="That is no command. See daq_app/acquisition/messages/published.py")
         if command.name != "hello" and not hmac.compare_digest(command.token.encode(), self._token.encode()):
             return Reply(ok=False, text="This viewer may watch, not command: its token is missing or wrong")
+        if command.request in self._answered:
+            return self._answered[command.request]
+        answer = self._carry_out(command)
+        if command.request:
+            self._answered[command.request] = answer
+            if len(self._answered) > _REMEMBERED:
+                self._answered.popitem(last=False)
+        return answer
+
+    def _carry_out(self, command: Command) -> Answer:
         try:
             return self._handle(command)
         except RequestRefused as error:
