@@ -22,7 +22,7 @@ _SWAY_S: Final = 0.1
 _FALLS_S: Final = 0.1
 """Time after the release, s, that a fall is seen in at least."""
 _EXPLAINED: Final = 0.01
-"""Variance that is left, over that of the earliest start, 1, below which a start explains the fall."""
+"""Variance that a start leaves over the most that any leaves, 1, below which it explains the fall."""
 _COARSE: Final = 4
 """Readings from one start to the next before those beside the best are looked at."""
 _WORK_HZ: Final = 500.0
@@ -35,7 +35,8 @@ def release_sample(
     """Sample of the release: the fall extrapolated back to the held rotation, |θ₀| − ½ a t².
 
     `smooth` (n,), rad, is the rotation without its fast noise, `noise` that of a sample before it was
-    smoothed, rad, and `first_crossing` the sample at which it first passes upright.
+    smoothed, rad, `first_crossing` the sample at which it first passes upright, and `p_rad_s` about the
+    frequency parameter of the wall.
 
     The held rotation is that of the last moments before the fall: a hand that sways and a zero that walks
     move it by more than the first part of the fall does. Where a sway is as large as that, the release is

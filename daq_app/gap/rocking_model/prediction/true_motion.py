@@ -87,8 +87,8 @@ def _behind_slips(values: Mapping[str, float], speeds: FloatArray, sides: FloatA
     """Time by which the wall is behind a base that slips at impacts, (k,), s.
 
     In the frame of the base a slip s is a floor that moves by s: the rotation is −p²/g cos α · s behind
-    (Housner 1963), which a wall that goes on with r times its speed makes good in s over its approach speed
-    times as long.
+    (Housner 1963). A wall that goes on with r times its approach speed makes that good in a time that goes
+    with s over this speed.
     """
     outwards = _slip_per_speed(values, "sliding", speeds)
     on = _slip_per_speed(values, "sliding_on", speeds) * (1.0 + values.get("sliding_on.own", 0.0))
