@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfiltfilt
 
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.findings import findings_of
@@ -15,7 +16,8 @@ from daq_app.gap.rocking_model.records import load_run
 from daq_app.gap.rocking_model.study import diagnose_prepared, model_and_library, prepare
 from daq_app.gap.rocking_model.tolerances.motion import KNOCK_S
 from tests.support.gap.blind_case import blind_case
-from tests.support.simulated_wall import simulate
+from tests.support.gap.simulated_campaign import campaign
+from tests.support.simulated_wall import short_rig, simulate
 
 SEED = 12
 
@@ -39,6 +41,25 @@ def test_its_size_is_that_of_the_floor(shaken: tuple[list[RockingRun], dict[str,
     assert finding.material and finding.family == "ambient"
     assert "irregular vibration of the floor" in finding.words
     assert not any(f.name == "shaking@floor" for f in findings_of(runs))
+
+
+def test_what_the_sway_takes_of_a_floor_is_given_back() -> None:
+    """The wall's own sway is taken out of its accelerometers, and some of the floor with it."""
+    calm = campaign(short_rig(), short_rig(), {}, 1, (0.25, -0.35, 0.3), post_rest_s=8.0)
+    band = butter(4, (2.0, 7.0), "bandpass", fs=calm[0].rate_hz, output="sos")
+    found = []
+    for seed in (0, 1, 3):
+        rng, runs, true = np.random.default_rng(seed), [], []
+        for run in calm:
+            channels, aside = run.channels.copy(), round(5.0 * run.rate_hz)
+            floor = sosfiltfilt(band, rng.standard_normal(channels.shape[1] + 2 * aside))[aside:-aside]
+            channels[run.indices("accelerometer", "x")] += 0.1 * floor / floor.std()
+            runs.append(replace(run, channels=channels))
+            true.append(0.1 * float(floor[-round(7.0 * run.rate_hz) :].std() / floor.std()))
+        spectrum = prepare(runs)[0][0].floor
+        assert spectrum is not None
+        found.append(spectrum.total_m_s2 / float(np.sqrt(np.mean(np.square(true)))))
+    assert np.mean(found) == pytest.approx(1.0, abs=0.03)
 
 
 def test_a_weak_floor_is_a_cause_as_well(shaken: tuple[list[RockingRun], dict[str, float]]) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.oscillations.floor_vibration import quiet_record
+from daq_app.gap.rocking_model.features.oscillations.floor_vibration import QuietRecord, quiet_record
 from daq_app.gap.rocking_model.features.oscillations.rings import Ring
 from daq_app.gap.rocking_model.features.oscillations.vibration import FloorSpectrum
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
@@ -27,6 +27,8 @@ _PART = 200
 """Samples of the grid in a part, 1 s: longer rests are cut."""
 _SHORTEST = 100
 """Samples of a part that is used: a shorter one tells no frequency."""
+_LEAST_KEPT = 0.7
+"""Share of a band's power, where sway and offsets take more than the rest of it."""
 _FEWEST_PARTS = 6
 """Parts at rest from which their differences say how sure the mean is."""
 
@@ -56,10 +58,20 @@ def _parts(run: GapRun, grid: Grid, ring: Ring | None) -> list[tuple[int, FloatA
     record = quiet_record(run, grid, ring)
     if record is None or len(record.each) < 2:
         return []
+    kept = _kept(record)
     gaps = np.flatnonzero(np.diff(record.time_s) > 1.5 / GRID_HZ) + 1
     one, other = (_pieces(record.each[start::2].mean(axis=0), gaps) for start in (0, 1))
     pairs = zip(one, other, strict=True)
-    return [(a.size, _cross_power(a, b)) for a, b in pairs if a.size >= _SHORTEST]
+    return [(a.size, _cross_power(a, b) / kept) for a, b in pairs if a.size >= _SHORTEST]
+
+
+def _kept(record: QuietRecord) -> FloatArray:
+    """Share of each band's power that is left where sway and offsets are taken out, (k,)."""
+    middles_hz = 0.5 * (_BANDS_HZ[1:] + _BANDS_HZ[:-1])
+    angle = 2.0 * np.pi * middles_hz[:, None] * record.time_s
+    waves = np.stack([np.sin(angle), np.cos(angle)], axis=1)
+    taken = np.sum((waves @ record.basis) ** 2, axis=(1, 2)) / np.sum(waves**2, axis=(1, 2))
+    return np.asarray(np.maximum(1.0 - taken, _LEAST_KEPT))
 
 
 def _pieces(values: FloatArray, gaps: NDArray[np.intp]) -> list[FloatArray]:
