@@ -18,7 +18,7 @@ _SWAYS_S: Final = 1.2
 _SEARCHED_S: Final = 0.5
 """Times before and after the top of the fall, s, within which a swaying wall is let go."""
 _SWAY_S: Final = 0.1
-"""Time before the release, s, over which the sway is a cubic: it sways by less than 3 Hz."""
+"""Time before the release, s, over which a sway of less than 3 Hz is a cubic."""
 _FALLS_S: Final = 0.1
 """Time after the release, s, that a fall is seen in at least."""
 _EXPLAINED: Final = 0.01
