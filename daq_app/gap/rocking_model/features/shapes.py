@@ -64,7 +64,7 @@ def stepped_shape(grid: Grid, *, alternating: bool, power: int = 1) -> FloatArra
     """Sum of the approach speeds of the impacts so far, with their signs or without, less its last value.
 
     The zero is at rest. The mean over each interval of the grid: in that of an impact only a part of it is
-    after the step. With a `power` of 2 each speed counts as a share of `SLIDE_SPEED` of itself.
+    after the step. With a `power` of 2 the squares of the speeds over `SLIDE_SPEED` are summed.
     """
     speeds = grid.approach if alternating else np.abs(grid.approach)
     speeds = speeds * (np.abs(grid.approach) / SLIDE_SPEED) ** (power - 1)
