@@ -211,3 +211,31 @@ def test_an_effect_is_less_visible_where_a_laboratory_is_noisier(configs: Path, 
     ratio = detectability(rough, rough.effects[0]) / detectability(own, own.effects[0])
     noise = total_noise(rough) / total_noise(own)
     assert (ratio < 1.0) == (noise[own.rig.channel_ids.index("WP-4")] > 1.0)
+
+
+def _seen(configs: Path, tmp_path: Path, name: str, **parameters: float) -> float:
+    """How visible an effect of that size is in the rough laboratory, sd."""
+    hidden = dataclasses.replace(order(configs, tmp_path, "rough"), hidden=name)
+    world = draw_case(hidden, 1)[0]
+    drawn = world.effects[0]
+    return detectability(world, dataclasses.replace(drawn, parameters=drawn.parameters | parameters))
+
+
+def test_an_effect_is_as_visible_as_what_it_looks_like_is_known(configs: Path, tmp_path: Path) -> None:
+    """A pivot counts in half widths by tape, a gain in calibrations, a hum in what sound channels pick up."""
+    for parameters, least, most in (({"a_m": 9e-3}, 2.9, 4.0), ({"a_m": 18e-3}, 5.9, 8.0)):
+        assert least < _seen(configs, tmp_path, "pivot_shift", **parameters) < most
+    hidden = dataclasses.replace(order(configs, tmp_path, "rough"), hidden="gain")
+    world = draw_case(hidden, 1)[0]
+    one = dataclasses.replace(world.effects[0], targets=("LV-A03",), parameters={"error": 0.012})
+    assert detectability(world, one) == pytest.approx(0.012 / 0.003, rel=0.05)
+    weak, strong = (_seen(configs, tmp_path, "hum", times_noise=size) for size in (0.1, 1.0))
+    assert strong == pytest.approx(10.0 * weak)
+    sizes = dict(world.surroundings.sizes)
+    loud = dataclasses.replace(
+        world.surroundings, sizes=sizes | {"mains_pick_up": 2 * sizes["mains_pick_up"]}
+    )
+    hum = draw_case(dataclasses.replace(hidden, hidden="hum"), 1)[0]
+    assert detectability(dataclasses.replace(hum, surroundings=loud), hum.effects[0]) == pytest.approx(
+        detectability(hum, hum.effects[0]) / 2
+    )

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from daq_app.gap.core import Options, diagnose, fit
+from daq_app.gap.core import Options, Scatter, diagnose, fit
 from daq_app.gap.own_model import Measured
 from tests.support.gap.toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
 
@@ -68,3 +69,37 @@ def test_the_gate_opens_by_degrees() -> None:
     assert unknown[0] < 0.05
     assert unknown[-1] > 0.9
     assert all(b > a - 0.05 for a, b in itertools.pairwise(unknown)), unknown
+
+
+class ScatteringDurations(DecayModel):
+    """Durations that scatter, long ones more than short ones."""
+
+    scatters = (*DecayModel.scatters, Scatter("scatter of durations", 1e-3, 0.7, "s"))  # type: ignore[assignment]
+
+    def predict(self, run, values):  # type: ignore[no-untyped-def]
+        found = super().predict(run, values)
+        of_durations = np.append(np.zeros(PEAKS), np.linspace(2.0, 0.4, PEAKS))
+        return replace(found, loadings={**found.loadings, "scatter of durations": of_durations})
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_errors_that_scatter_are_nothing_unknown_and_errors_in_order_are(seed: int) -> None:
+    """Five times what is expected, of the same sizes: by chance, and up and down in turn."""
+
+    def judged(turned: bool):  # type: ignore[no-untyped-def]
+        runs, rng = make_runs(seed), np.random.default_rng(seed)
+        for run in runs:
+            error = 5e-3 * rng.standard_normal(PEAKS)
+            alternating = np.abs(error) * (-1.0) ** np.arange(PEAKS)
+            run.features.values[PEAKS:] += alternating if turned else error
+        result = diagnose(ScatteringDurations(), runs, LIBRARY.without("free"), Options())
+        (durations,) = (group for group in result.rest.groups if group.observable == "duration")
+        assert durations.discrepancy > 2.5
+        return result, durations
+
+    by_chance, scattered = judged(False)
+    assert scattered.nats < 15.0
+    assert by_chance.rest.unknown < 0.1
+    in_order, turned = judged(True)
+    assert turned.nats > 60.0
+    assert in_order.decision.verdict == "none_of_these"

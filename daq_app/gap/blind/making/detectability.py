@@ -4,12 +4,14 @@ An estimate in units of standard deviations, for sorting cases into weak and str
 two quiet twins of a run, with and without the effect, first in what swings and impacts show locally
 (duration and loss of a swing, speed against peak, restitution of an impact, against impact scatter
 and with α, p and r refitted), then in what the channels show beyond the motion (against their noise,
-with gain and offset refitted). No diagnosis can see much more.
+with gain, offset and the half width of the base refitted as far as they are known to). Hum counts against
+the hum that sound channels pick up. No diagnosis can see much more.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -34,12 +36,18 @@ _CORRELATED: Final = 10.0
 _MODEL_SHARE: Final = 1e-3
 """Part of a channel's signal that nobody trusts."""
 _CLOCK_SD: Final = 1e-3
+_HALF_WIDTH_SD_M: Final = 3e-3
+"""A half width of the base as it is measured by tape (the default of the diagnosis's survey)."""
+_LEAST_HUM: Final = 0.02
+"""Amplitude of the hum that any channel picks up, in noises: the least of all laboratories."""
 
 
 def detectability(world: World, effect: Drawn) -> float:
     """Strength of one effect of a case in standard deviations of what it could be known to."""
     if effect.name == "clock":
         return abs(effect.parameters["error"]) / _CLOCK_SD
+    if effect.name == "hum" and world.surroundings.installation is not None:
+        return _over_ordinary_hum(world, effect)
     alone = replace(
         world,
         effects=(effect,),
@@ -47,13 +55,17 @@ def detectability(world: World, effect: Drawn) -> float:
         runs=_extremes(world),
         surroundings=Surroundings(),
     )
-    square, noise = 0.0, total_noise(world)
+    in_swings, noise, seen = 0.0, total_noise(world), list[list[FloatArray]]()
     for index in range(len(alone.runs)):
         course = alone.course(index, (0, 30 * (len(world.runs) - 1))[index])
-        square += _in_channels(alone, alone.runs[index], course, noise)
+        seen.append(_in_channels(alone, alone.runs[index], course, noise))
         if not effect.targets:
-            square += _in_swings(course.motion, world.wall)
-    return math.sqrt(square * len(world.runs) / len(alone.runs))
+            in_swings += _in_swings(course.motion, world.wall)
+    stand_for = len(world.runs) / len(alone.runs)
+    square = stand_for * in_swings + _evidence(
+        [np.hstack(runs) for runs in zip(*seen, strict=True)], stand_for
+    )
+    return math.sqrt(square)
 
 
 def _extremes(world: World) -> tuple[PlannedRun, PlannedRun]:
@@ -134,8 +146,22 @@ def total_noise(world: World) -> FloatArray:
     return np.asarray(around.installation.noise_si * np.hypot(math.hypot(*parts), mains))
 
 
-def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatArray) -> float:
-    """Squared distance of the channels with and without the effect, for one and the same motion."""
+def _over_ordinary_hum(world: World, effect: Drawn) -> float:
+    """Amplitude of a hum over what a sound channel picks up besides noise, root of the sum of squares."""
+    around = world.surroundings
+    assert around.installation is not None
+    mains = around.sizes.get("mains_pick_up", 0.0)
+    square = 0.0
+    for channel, noise_si in zip(world.rig.channels, around.installation.noise_si.tolist(), strict=True):
+        if channel.id in effect.targets:
+            amplitude = effect.parameters["times_noise"] * channel.noise_si
+            square += (amplitude / (noise_si * max(mains, _LEAST_HUM))) ** 2
+    return math.sqrt(square)
+
+
+def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatArray) -> list[FloatArray]:
+    """What each channel shows of the effect, a gain and a half width that are off by one sd, for one and the
+    same motion: (3, n) each, over its noise, the zero taken out."""
     time_s = np.arange(-0.5, course.motion.rest_s + 0.5, 1.0 / _RATE_HZ)
     place = Place(run.campaign_s + 600.0, abs(run.theta0))
     rng = np.random.default_rng(0)
@@ -143,26 +169,33 @@ def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatA
     with_effect = quiet_signals(alone.rig, scene, alone.faults, rng, place)
     plain = scene if alone.faults else course.plain(time_s)
     without = quiet_signals(alone.rig, plain, (), rng, place)
-    total = 0.0
+    wider = replace(plain, pivot_x=plain.pivot_x * (1.0 + _HALF_WIDTH_SD_M / alone.wall.half_width))
+    of_half_width = quiet_signals(alone.rig, wider, (), rng, place)
+    found = []
     for row, channel in enumerate(alone.rig.channels):
         if plain.pivot_dd is not scene.pivot_dd and channel.family == "accelerometer":
             continue  # pulses of impacts that take their time are not those of the plain twin
         bench = Bench(channel, scene, _RATE_HZ, place.campaign_s, place.largest_rad, rng)
         noise = noise_si[row] * rng.standard_normal(time_s.size)
         signal = through_electronics(with_effect[row] + noise, alone.faults, bench)
-        total += _distance(signal - noise, without[row], noise_si[row])
-    return total
+        reference = without[row]
+        shown = np.vstack(
+            [signal - noise - reference, CALIBRATION_TOLERANCE * reference, of_half_width[row] - reference]
+        )
+        sd = math.hypot(noise_si[row], _MODEL_SHARE * float(np.max(np.abs(reference))))
+        shown -= np.median(shown, axis=1, keepdims=True)
+        found.append(shown / (sd * math.sqrt(_CORRELATED)))
+    return found
 
 
-def _distance(value: FloatArray, reference: FloatArray, noise: float) -> float:
-    difference = value - reference
-    if not np.any(difference):
-        return 0.0
-    sd = np.hypot(noise, _MODEL_SHARE * float(np.max(np.abs(reference))))
-    design = np.column_stack([np.ones_like(reference), reference])
-    # Gain is known to the calibration tolerance only: that much of it is no evidence.
-    slope = float(np.linalg.lstsq(design, difference, rcond=None)[0][1])
-    allowed = float(np.clip(slope, -CALIBRATION_TOLERANCE, CALIBRATION_TOLERANCE))
-    left = difference - allowed * reference
-    left -= np.median(left)
-    return float(left @ left / sd**2) / _CORRELATED
+def _evidence(channels: Sequence[FloatArray], stand_for: float) -> float:
+    """Squared distance of an effect from none, of channels as `_in_channels` shows them in some runs.
+
+    Gains and half width are the same in all runs, of which these `stand_for` so many each.
+    """
+    square = across = of_width = 0.0
+    for shown in channels:
+        products = stand_for * (shown @ shown.T)
+        left = products - np.outer(products[1], products[1]) / (1.0 + products[1, 1])
+        square, across, of_width = square + left[0, 0], across + left[0, 2], of_width + left[2, 2]
+    return float(square - across**2 / (1.0 + of_width))

@@ -52,6 +52,11 @@ class Fit:
         """Unit coordinates by (key, run), to start another fit from."""
         return dict(zip(self.keys, (float(v) for v in self.u), strict=True))
 
+    def linear(self, problem: Problem) -> Linear:
+        """The linearisation of its hypothesis, `problem`, at its end."""
+        lines = [problem.linearise(i, self.u, known=self.columns) for i in range(len(problem.runs))]
+        return Linear(problem, self.u, lines, self.sizes)
+
     def misfit_nats(self, experiment: Experiment, sizes: Sizes) -> FloatArray:
         """What the fit leaves, as half a sum of squares, shape (group + 1,).
 

@@ -15,6 +15,7 @@ from daq_app.gap.core.fitting.fit import Fit, effects_of
 from daq_app.gap.core.fitting.likelihood import Sizes
 from daq_app.gap.core.fitting.problem import Problem
 from daq_app.gap.core.judging.other_forms import FreeForm
+from daq_app.gap.core.judging.scattering import beyond_scatter
 from daq_app.gap.core.policy import Policy
 
 
@@ -30,7 +31,8 @@ class GroupRest:
     in_noise: float
     """Rms of what remains over noise and scatter."""
     nats: float
-    """What it costs that the model misfits this group by more than the usual discrepancy."""
+    """What it costs that the model misfits this group by more than the usual discrepancy, and by more than
+    scatter says."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +97,10 @@ def remainder(
     problem = Problem(experiment, effects_of(best.effects, library))
     white = _white(experiment, problem, best.known(), sizes)
     after = _size(white)
-    groups = _groups(experiment, best, white, policy)
+    costs = misfit_nats(experiment, best.sizes, policy)
+    if np.any(costs):
+        costs = beyond_scatter(best.linear(problem), costs, policy)
+    groups = _groups(experiment, best, white, costs)
     nats = math.fsum(group.nats for group in groups)
     explained = max(best.log_evidence - null.log_evidence, 0.0)
     share = nats / max(nats + explained, 1e-9)
@@ -168,7 +173,7 @@ def misfit_nats(experiment: Experiment, sizes: Sizes, policy: Policy) -> FloatAr
 
 
 def _groups(
-    experiment: Experiment, best: Fit, white: Sequence[FloatArray], policy: Policy
+    experiment: Experiment, best: Fit, white: Sequence[FloatArray], costs: FloatArray
 ) -> tuple[GroupRest, ...]:
     groups = experiment.groups
     square, count = np.zeros(len(groups)), np.zeros(len(groups))
@@ -176,7 +181,6 @@ def _groups(
         square += np.bincount(index, z**2, len(groups))
         count += np.bincount(index, minlength=len(groups))
     rests = []
-    costs = misfit_nats(experiment, best.sizes, policy)
     for (channel, observable), n, nu, s, nats in zip(
         groups.names, count, np.sqrt(best.sizes.discrepancy), square, costs.tolist(), strict=True
     ):

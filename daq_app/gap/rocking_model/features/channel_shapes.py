@@ -161,17 +161,19 @@ def usual_remains(of_channels: Sequence[float]) -> float:
     return max(float(np.median(of_channels)), 0.0)
 
 
-def usual_gain(of_channels: Sequence[tuple[Others, Deviation]]) -> float:
-    """Relative sd of the calibration of one channel, as a family's sound channels and the certificate say it.
+def usual_deviation(family: Family, of_channels: Sequence[tuple[Others, Deviation]]) -> FloatArray:
+    """Sd of what one channel is off by in each shape, (k,), as its family's channels and a table say it.
 
-    The certificate counts as `CERTIFIED` channels: where many agree it is they that say how well.
+    Certificate and table count as `CERTIFIED` channels: where many agree it is they that say how well.
     """
+    shares = [SOUND_WIRE if family == "wire" and name in _OF_ANCHORS else SOUND for name in SHAPES[family]]
+    stated = np.array(shares) * np.array(TOLERANCE[family])
+    stated[_GAIN] = CALIBRATION
     if not of_channels:
-        return CALIBRATION
-    shares = [misfit.values[_GAIN] / beside.spread for beside, misfit in of_channels]
-    seen = robust_sd(np.array(shares))
-    weights = np.array([CERTIFIED, len(shares)]) / (CERTIFIED + len(shares))
-    return float(np.sqrt(weights @ np.square([CALIBRATION, seen])))
+        return np.asarray(stated, dtype=np.float64)
+    seen = [robust_sd(shape) for shape in np.array([m.values / b.spread for b, m in of_channels]).T]
+    weights = np.array([CERTIFIED, len(of_channels)]) / (CERTIFIED + len(of_channels))
+    return np.asarray(np.sqrt(weights @ np.square([stated, seen])), dtype=np.float64)
 
 
 def block_of(
@@ -209,14 +211,12 @@ def block_of(
         noise=misfit.noise * float(np.exp(usual)),
         wire=wire,
         sensor_family=family,
-        levers=_levers(family, beside, usual_gain(sound)),
+        levers=_levers(beside, usual_deviation(family, sound)),
     )
 
 
-def _levers(family: Family, beside: Others, gain: float) -> tuple[float, ...]:
-    """What a sound channel is off by from the others' prediction (sd), by shape; `gain`: its calibration."""
-    shares = [SOUND_WIRE if family == "wire" and name in _OF_ANCHORS else SOUND for name in SHAPES[family]]
-    usual = beside.spread * np.array(shares) * np.array(TOLERANCE[family])
-    usual[_GAIN] = gain * beside.spread
-    usual[_CURVATURE] *= max(beside.curved / beside.spread, 1.0)
-    return tuple(usual.tolist())
+def _levers(beside: Others, usual: FloatArray) -> tuple[float, ...]:
+    """What a sound channel is off by from the others' prediction (sd); `usual`, (k,): from the truth."""
+    levers = beside.spread * usual
+    levers[_CURVATURE] *= max(beside.curved / beside.spread, 1.0)
+    return tuple(levers.tolist())

@@ -218,6 +218,22 @@ def test_a_gain_counts_against_how_well_its_family_is_calibrated() -> None:
     assert room[1] > 1.4 * room[0]
 
 
+def test_a_corner_counts_against_how_the_others_round_theirs() -> None:
+    """LVDTs that are a millisecond apart leave one of them more room than a family that is in step."""
+    rng = np.random.default_rng(4)
+    names = [f"LV-{face}{n:02d}" for face in "AB" for n in range(1, 13)]
+    slow = {
+        f"slow_response@{name}": {"tau": float(t)}
+        for name, t in zip(names, rng.uniform(1e-3, 3e-3, 24), strict=True)
+    }
+    room = []
+    for effects in ({}, slow):
+        (run,) = prepare(simulate(effects | {"gain@LV-A03": {"error": 0.05}}, (-0.35,)))[0]
+        block = next(b for b in run.blocks if b.family == "LV-A03")
+        room.append(block.levers[block.names.index("rounding")])
+    assert room[1] > 1.5 * room[0]
+
+
 def test_a_turn_is_less_sure_without_one_wire_of_the_pair_that_shows_it() -> None:
     sure = []
     for off in ({}, {"WP-5": 1.06}):

@@ -1,0 +1,89 @@
+"""Misfit of a group of features that a larger scatter says nearly as well.
+
+Where all features of a group scatter, a discrepancy of the group and the scatter are two words for one thing,
+and the data tell them apart by how errors are shared out between large and small values alone. Scatter is
+independent from one feature to the next: what follows in order is none.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from daq_app.gap.core.features import FloatArray
+from daq_app.gap.core.fitting.likelihood import Sizes
+from daq_app.gap.core.fitting.linear import Linear, relaxed
+from daq_app.gap.core.policy import Policy
+
+_CLIPPED = 3.0
+"""Residuals count up to so many sd in the test of order, so that no pair of them decides."""
+_ROUNDS = 8
+
+
+def beyond_scatter(linear: Linear, costs: FloatArray, policy: Policy) -> FloatArray:
+    """What no scatter explains of what the misfit of each group costs, in nats, shape (group,).
+
+    `linear` is the fit that leaves it, `costs`, (group,), what it costs as a discrepancy. Where a larger
+    scatter instead of the discrepancy takes less from the restricted likelihood, it is that.
+    """
+    nats = costs.copy()
+    for group in np.flatnonzero(costs > 0.0):
+        if _order(_in_group(linear, int(group))) > policy.ordered_sd:
+            continue
+        for sizes in _with_scatter(linear, int(group)):
+            other, u = relaxed(linear.under(sizes), _ROUNDS)
+            loss = other.marginal_at(u) - linear.marginal_at(linear.solution())
+            nats[group] = min(nats[group], max(loss, 0.0))
+    return nats
+
+
+def _with_scatter(linear: Linear, group: int) -> list[Sizes]:
+    """Sizes with the discrepancy of a group in a scatter instead, for each that acts on all its features."""
+    sizes = linear.sizes
+    found = []
+    for k, scatter in enumerate(linear.problem.model.scatters):
+        shares = _shares(linear, scatter.name, group)
+        if shares is None:
+            continue
+        log_scatter, discrepancy = sizes.log_scatter.copy(), sizes.discrepancy.copy()
+        handed = float(discrepancy[group] * np.median(shares))
+        log_scatter[k] = 0.5 * math.log(math.exp(2.0 * log_scatter[k]) + handed)
+        discrepancy[group] = Sizes.nominal(linear.problem.experiment).discrepancy[group]
+        found.append(replace(sizes, log_scatter=log_scatter, discrepancy=discrepancy))
+    return found
+
+
+def _shares(linear: Linear, scatter: str, group: int) -> FloatArray | None:
+    """Nominal variance of each feature over what the scatter has in it, (n,); None where one has none."""
+    groups = linear.problem.experiment.groups
+    shares: list[FloatArray] = []
+    for line, index, variance in zip(linear.lines, groups.index, groups.variance, strict=True):
+        rows = index == group
+        loading = line.prediction.loadings.get(scatter)
+        if loading is None or loading.ndim > 1 or not np.all(loading[rows]):
+            return None
+        shares.append(variance[rows] / loading[rows] ** 2)
+    return np.concatenate(shares)
+
+
+def _in_group(linear: Linear, group: int) -> list[FloatArray]:
+    """Residuals of a group over their own sd, run by run in the order of the features."""
+    return [
+        (line.residual / covariance.marginal_sd)[index == group]
+        for line, covariance, index in zip(
+            linear.lines, linear.covariances, linear.problem.experiment.groups.index, strict=True
+        )
+    ]
+
+
+def _order(residuals: list[FloatArray]) -> float:
+    """|Correlation| of each residual with the next, in standard errors of independent ones."""
+    clipped = [np.clip(run, -_CLIPPED, _CLIPPED) for run in residuals]
+    square = math.fsum(float(run @ run) for run in clipped)
+    pairs = sum(max(run.size - 1, 0) for run in clipped)
+    if pairs == 0 or square == 0.0:
+        return 0.0
+    product = math.fsum(float(run[:-1] @ run[1:]) for run in clipped)
+    return abs(product) / square * math.sqrt(pairs)
