@@ -55,7 +55,7 @@ def rotation_alone(run: RockingRun) -> RockingRun:
 
 
 def _unscattered(model: RockingModel) -> RockingModel:
-    return UnscatteredModel(model.survey, model.channels)
+    return UnscatteredModel(model.survey, model.channels, on_shaking_floor=model.on_shaking_floor)
 
 
 def _named(library: Library) -> Library:

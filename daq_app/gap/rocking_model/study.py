@@ -147,7 +147,8 @@ def model_and_library(prepared: Sequence[RockingRun]) -> tuple[RockingModel, Lib
     library = rocking_library(found_channels(prepared))
     if not any(run.vibration is not None and run.vibration.found for run in prepared):
         library = library.without("ambient")
-    return RockingModel(prepared[0].survey, calibrations(prepared)), library
+    shaking = any(run.floor_loadings is not None for run in prepared)
+    return RockingModel(prepared[0].survey, calibrations(prepared), on_shaking_floor=shaking), library
 
 
 def _doubt_the_survey(result: Diagnosis) -> Diagnosis:

@@ -58,6 +58,8 @@ class RockingRun:
     vibration: Vibration | None = None
     floor: FloorSpectrum | None = None
     """How the floor vibrates irregularly in all runs; None for one that does not."""
+    floor_loadings: FloatArray | None = None
+    """(n, k): what that moves the features by, for draws of unit variance and the size that is measured."""
     slip: BaseSlip | None = None
     """How the base slips between impacts in all runs; None for one that does not."""
     wires: tuple[Wire, ...] = ()

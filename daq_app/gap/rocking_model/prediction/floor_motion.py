@@ -14,16 +14,17 @@ from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.prediction.model import RockingModel, swing_features
 from daq_app.gap.rocking_model.run_cache import RunCache
 
-_LINES = 2
-"""Sinusoids in each band of half a hertz: they come back together after 4 s, where what the floor did to the
-wall is long lost."""
 _QUIETEST = 0.05
 """Rms of a band over that of the loudest below which it is left out."""
+_FAINTEST = 1e-3
+"""Size of a pattern in the features over that of the largest below which it is left out."""
 
 
 def on_its_floor(run: RockingRun) -> RockingRun:
     """The run with what its floor does to the motion in the errors of its features."""
-    return run if run.floor is None else run.with_loadings(floor_loadings(run, run.floor))
+    if run.floor is None:
+        return run
+    return replace(run, floor_loadings=floor_loadings(run, run.floor), cache=RunCache())
 
 
 def floor_loadings(run: RockingRun, floor: FloorSpectrum) -> FloatArray:
@@ -37,21 +38,28 @@ def floor_loadings(run: RockingRun, floor: FloorSpectrum) -> FloatArray:
     values = {p.name: p.value(0.0) for p in (*model.nuisance, *model.local_nuisance(still))}
     quiet = np.concatenate(swing_features(still, values))
     columns = []
-    for frequency_hz, rms_m_s2 in _sinusoids(floor):
+    for frequency_hz, rms_m_s2 in _sinusoids(floor, run.swings.rest_s - run.swings.release_s):
         for phase in (0.0, 0.5 * math.pi):
             wave = {"ambient.amplitude": rms_m_s2, "ambient.frequency": frequency_hz, "ambient.phase": phase}
-            column = np.zeros(len(run.features))
-            column[: quiet.size] = np.concatenate(swing_features(still, {**values, **wave})) - quiet
-            columns.append(column)
-    return np.column_stack(columns)
+            columns.append(np.concatenate(swing_features(still, {**values, **wave})) - quiet)
+    patterns, sizes, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
+    kept = sizes > _FAINTEST * sizes[0]
+    loadings = np.zeros((len(run.features), np.count_nonzero(kept)))
+    loadings[: quiet.size] = patterns[:, kept] * sizes[kept]
+    return loadings
 
 
-def _sinusoids(floor: FloorSpectrum) -> Iterator[tuple[float, float]]:
-    """(frequency, rms of its sine and of its cosine)."""
+def _sinusoids(floor: FloorSpectrum, motion_s: float) -> Iterator[tuple[float, float]]:
+    """(frequency, rms of its sine and of its cosine).
+
+    So near to each other that they do not come back together within the motion: half-cycles that have nothing
+    to do with each other would be taken for moved alike.
+    """
     width_hz = float(floor.frequency_hz[1] - floor.frequency_hz[0])
+    lines = math.ceil(width_hz * motion_s) + 1
     for middle_hz, rms_m_s2 in zip(floor.frequency_hz, floor.rms_m_s2, strict=True):
         if rms_m_s2 < _QUIETEST * float(floor.rms_m_s2.max()):
             continue
-        for line in range(_LINES):
-            off = (line + 0.5) / _LINES - 0.5
-            yield float(middle_hz + off * width_hz), float(rms_m_s2 / math.sqrt(_LINES))
+        for line in range(lines):
+            off = (line + 0.5) / lines - 0.5
+            yield float(middle_hz + off * width_hz), float(rms_m_s2 / math.sqrt(lines))

@@ -24,13 +24,16 @@ from daq_app.gap.rocking_model.prediction.vector import (
 )
 from daq_app.gap.rocking_model.prediction.wires_alone import times_carry
 from daq_app.gap.rocking_model.records import Survey
-from daq_app.gap.rocking_model.tolerances.walls import PUSH_RAD_S
+from daq_app.gap.rocking_model.tolerances.walls import FLOOR_EFFECT, PUSH_RAD_S
 from sim_hardware.dynamics import shooting
 
 SCATTER_R = "scatter of r"
 SCATTER_TIME = "scatter of times"
 SCATTER_RELEASE = "scatter of releases"
 SCATTER_SENSOR = "scatter of sensors"
+FLOOR = "size of what the floor does"
+
+_OF_FLOOR = Scatter(FLOOR, 1.0, FLOOR_EFFECT, "1", "what an irregular floor does, over what it should do")
 
 
 class RockingModel:
@@ -42,17 +45,29 @@ class RockingModel:
     """
 
     name = "free rocking"
-    scatters = (
+    scatters: tuple[Scatter, ...] = (
         Scatter(SCATTER_R, 0.004, 0.7, "1", "relative scatter of r from impact to impact"),
         Scatter(SCATTER_TIME, 3e-5, 1.0, "s", "what half-cycle times scatter by beyond sensor noise"),
         Scatter(SCATTER_RELEASE, 3e-5, 1.0, "s", "what the times of the first fall scatter by besides"),
         Scatter(SCATTER_SENSOR, 0.7, 0.7, "1", "repeatability of sensor coefficients, in their own units"),
     )
 
-    def __init__(self, survey: Survey, channels: Mapping[str, Mapping[str, float]] | None = None) -> None:
-        """`channels` are examined on their own: what a sound one may be off by in gain, lag, … (sd)."""
+    def __init__(
+        self,
+        survey: Survey,
+        channels: Mapping[str, Mapping[str, float]] | None = None,
+        *,
+        on_shaking_floor: bool = False,
+    ) -> None:
+        """`channels` are examined on their own: what a sound one may be off by in gain, lag, … (sd).
+
+        `on_shaking_floor`: whether a run has `floor_loadings`.
+        """
         self.survey = survey
         self.channels = dict(channels or {})
+        self.on_shaking_floor = on_shaking_floor
+        if on_shaking_floor:
+            self.scatters = (*self.scatters, _OF_FLOOR)
 
     @property
     def nuisance(self) -> tuple[Parameter, ...]:
@@ -138,14 +153,15 @@ def swing_features(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
 
 
 def _loadings(run: RockingRun) -> dict[str, FloatArray]:
-    """What each scatter does to the features, (n,) each: no parameter changes it."""
+    """What each scatter does to the features, (n,), or (n, k) for the floor: no parameter changes it."""
     r, times, releases, sensors = (np.zeros(len(run.features)) for _ in range(4))
     count, last = len(run.places), len(run.places) + run.peaks.size
     r[count:last] = 1.0 / peak_slopes(run)
     times[:count] = 1.0
     releases[:count] = (run.places[:, 0] == 0) & (run.places[:, 2] == 0)
     sensors[last:] = np.concatenate([np.zeros(0), *units(run)])
-    return {SCATTER_R: r, SCATTER_TIME: times, SCATTER_RELEASE: releases, SCATTER_SENSOR: sensors}
+    loadings = {SCATTER_R: r, SCATTER_TIME: times, SCATTER_RELEASE: releases, SCATTER_SENSOR: sensors}
+    return loadings if run.floor_loadings is None else {**loadings, FLOOR: run.floor_loadings}
 
 
 def half_cycle_times(run: RockingRun, table: FloatArray) -> FloatArray:

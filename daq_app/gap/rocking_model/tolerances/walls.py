@@ -112,6 +112,12 @@ Sound laboratories show 0.005; one of 0.035 moves r by up to 0.005. Raising it t
 the motion for an effect.
 """
 
+FLOOR_EFFECT = 0.2
+"""Relative sd, 1, of what an irregular floor does to the motion: of its rms, of the survey's wall (assumed).
+
+Raising it lets an effect hide in the floor; lowering it takes what the floor does for something unknown.
+"""
+
 FLOOR_STANDS_OUT = 4.0
 """The same, squared, over the standard error of its mean over the parts at rest.
 

@@ -85,6 +85,22 @@ def test_what_it_does_to_the_motion_is_in_the_errors(
     assert max(group.discrepancy for group in result.rest.groups) < 2.0
 
 
+def test_half_cycles_that_have_nothing_to_do_with_each_other_are_moved_independently(
+    shaken: tuple[list[RockingRun], dict[str, float]],
+) -> None:
+    """A floor of a few hertz has forgotten its phase after a second or two, and it never comes back."""
+    for run in shaken[0]:
+        assert run.floor_loadings is not None
+        peaks = [label.observable == "log peak after impact" for label in run.features.labels]
+        moved = run.floor_loadings[peaks]
+        moved /= np.linalg.norm(moved, axis=1, keepdims=True)
+        at_s = run.swings.peak_s[run.peaks]
+        apart = np.abs(at_s[:, None] - at_s) > 2.5
+        assert np.count_nonzero(apart) > 20
+        together = np.abs(moved @ moved.T)[apart]
+        assert together.max() < 0.3
+
+
 def test_a_quiet_floor_changes_nothing(tmp_path: Path) -> None:
     runs, _ = _case(tmp_path, "nothing")
 
