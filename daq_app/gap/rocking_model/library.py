@@ -75,13 +75,14 @@ _RANGES = {
 5 Hz, squat ones above 30 Hz (`rings` looks for them there), and a winch or a leaking jack lets go within a
 second."""
 _WIDER = {
-    ("yaw", "kick"): 0.4,
-    ("twist", "kick"): 0.4,
+    ("yaw", "kick"): 2.0,
+    ("twist", "kick"): 2.0,
     ("flexible_wall", "gain"): 0.2,
     ("filter_delay", "tau"): 0.05,
 }
-"""Reach of strengths that have no usual size: how hard an impact kicks depends on its very form, and how far
-the wall bends goes with one over its frequency. A filter may be as late as any other sensor: with a shorter
+"""Reach of strengths that have no usual size: how hard an impact kicks depends on its very form, and where it
+goes with the wall's speed it is a multiple of the jump, which is a tenth of the speed; how far the wall bends
+goes with one over its frequency. A filter may be as late as any other sensor: with a shorter
 reach it would be the likelier answer for short delays, whose form the runs do not show."""
 _FURTHEST = {("dwell", "tau"): 0.3}
 """Ends of strengths beyond six times their reach. A wall that stays on its joint for longer than its fit may

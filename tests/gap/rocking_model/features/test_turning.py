@@ -182,6 +182,15 @@ def test_a_wall_that_rings_slowly_about_the_vertical_is_no_turn_that_stays(
     np.testing.assert_array_less(np.abs(block.values - before.values - told), 0.2 * sd)
 
 
+def test_a_kick_that_goes_with_the_speed_is_many_jumps_and_a_cause_all_the_same() -> None:
+    """A wall loses a tenth of its speed: an eighth of the speed is more than the jump itself."""
+    runs = simulate({"yaw": {"kick": 3.0, "frequency": 4.0, "zeta": 0.04}}, (0.25, -0.35, 0.3))
+    result = diagnose_runs(runs, only=("yaw", "twist", "flexible_wall", "restitution_slope"))
+    assert result.decision.effects == ("yaw",)
+    (kick,) = (p for p in result.effect_parameters if p.name == "yaw.kick")
+    assert kick.value == pytest.approx(3.0, rel=0.05)
+
+
 def _usual(run: RockingRun) -> dict[str, float]:
     model = RockingModel(run.survey)
     return {p.name: p.mean for p in (*model.nuisance, *model.local_nuisance(run))}
