@@ -59,7 +59,7 @@ class RockingRun:
     floor: FloorSpectrum | None = None
     """How the floor vibrates irregularly in all runs; None for one that does not."""
     floor_loadings: FloatArray | None = None
-    """(n, k): what that moves the features by, for draws of unit variance and the size that is measured."""
+    """(T + P, k): what that moves times and peaks by, for draws of unit variance; none for a still floor."""
     slip: BaseSlip | None = None
     """How the base slips between impacts in all runs; None for one that does not."""
     wires: tuple[Wire, ...] = ()

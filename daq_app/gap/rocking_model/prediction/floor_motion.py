@@ -28,7 +28,7 @@ def on_its_floor(run: RockingRun) -> RockingRun:
 
 
 def floor_loadings(run: RockingRun, floor: FloorSpectrum) -> FloatArray:
-    """What the floor moves the features of a run by, (n, k) for draws of unit variance.
+    """What the floor moves the times and peaks of a run by, (T + P, k) for draws of unit variance.
 
     A stationary floor is a sum of sinusoids with independent normal sines and cosines (Rice 1944). The wall
     of the survey answers each as a rocking block with base excitation does (Housner 1963), to first order.
@@ -44,9 +44,7 @@ def floor_loadings(run: RockingRun, floor: FloorSpectrum) -> FloatArray:
             columns.append(np.concatenate(swing_features(still, {**values, **wave})) - quiet)
     patterns, sizes, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
     kept = sizes > _FAINTEST * sizes[0]
-    loadings = np.zeros((len(run.features), np.count_nonzero(kept)))
-    loadings[: quiet.size] = patterns[:, kept] * sizes[kept]
-    return loadings
+    return np.asarray(patterns[:, kept] * sizes[kept])
 
 
 def _sinusoids(floor: FloorSpectrum, motion_s: float) -> Iterator[tuple[float, float]]:

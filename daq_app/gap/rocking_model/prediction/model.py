@@ -161,7 +161,10 @@ def _loadings(run: RockingRun) -> dict[str, FloatArray]:
     releases[:count] = (run.places[:, 0] == 0) & (run.places[:, 2] == 0)
     sensors[last:] = np.concatenate([np.zeros(0), *units(run)])
     loadings = {SCATTER_R: r, SCATTER_TIME: times, SCATTER_RELEASE: releases, SCATTER_SENSOR: sensors}
-    return loadings if run.floor_loadings is None else {**loadings, FLOOR: run.floor_loadings}
+    if run.floor_loadings is not None:
+        loadings[FLOOR] = np.zeros((r.size, run.floor_loadings.shape[1]))
+        loadings[FLOOR][:last] = run.floor_loadings
+    return loadings
 
 
 def half_cycle_times(run: RockingRun, table: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.findings import findings_of
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
+from daq_app.gap.rocking_model.prediction.model import FLOOR
 from daq_app.gap.rocking_model.records import load_run
 from daq_app.gap.rocking_model.study import diagnose_prepared, model_and_library, prepare
 from daq_app.gap.rocking_model.tolerances.motion import KNOCK_S
@@ -85,14 +86,25 @@ def test_what_it_does_to_the_motion_is_in_the_errors(
     assert max(group.discrepancy for group in result.rest.groups) < 2.0
 
 
+def test_times_and_peaks_alone_keep_what_the_floor_does(
+    shaken: tuple[list[RockingRun], dict[str, float]],
+) -> None:
+    bare = [run.of_blocks(()) for run in shaken[0]]
+    model, _ = model_and_library(bare)
+    for run in bare:
+        values = {p.name: p.value(0.0) for p in (*model.nuisance, *model.local_nuisance(run))}
+        moved = model.predict(run, values).loadings[FLOOR]
+        assert moved.shape[0] == len(run.features)
+        assert np.any(moved[-run.peaks.size :])
+
+
 def test_half_cycles_that_have_nothing_to_do_with_each_other_are_moved_independently(
     shaken: tuple[list[RockingRun], dict[str, float]],
 ) -> None:
     """A floor of a few hertz has forgotten its phase after a second or two, and it never comes back."""
     for run in shaken[0]:
         assert run.floor_loadings is not None
-        peaks = [label.observable == "log peak after impact" for label in run.features.labels]
-        moved = run.floor_loadings[peaks]
+        moved = run.floor_loadings[-run.peaks.size :]
         moved /= np.linalg.norm(moved, axis=1, keepdims=True)
         at_s = run.swings.peak_s[run.peaks]
         apart = np.abs(at_s[:, None] - at_s) > 2.5
