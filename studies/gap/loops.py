@@ -23,9 +23,8 @@ from daq_app.gap.core.fitting.held_out import strain_of
 from daq_app.gap.core.fitting.likelihood import Covariance
 from daq_app.gap.core.fitting.problem import Problem
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
-from daq_app.gap.rocking_model.inspection.inspect_runs import calibrations
 from daq_app.gap.rocking_model.prediction.model import RockingModel
-from daq_app.gap.rocking_model.study import prepare
+from daq_app.gap.rocking_model.study import model_and_library, prepare
 from studies.gap.effects import CASES, diagnosed
 from studies.gap.rows import Found, mark_of, run_study, states_in_words
 from tests.support.gap.simulated_campaign import RIG, quick_rig, simulate
@@ -56,7 +55,7 @@ class FileModel(RockingModel):
     """The wall as a rig file has it: what the file says is fixed, calibrations and releases are free."""
 
     def __init__(self, rig: Path, believed: RockingModel) -> None:
-        super().__init__(believed.survey, believed.channels)
+        super().__init__(believed.survey, believed.channels, on_shaking_floor=believed.on_shaking_floor)
         loaded = quick_rig(rig)
         body, simulation = loaded.specimen, loaded.simulation
         p = float(np.sqrt(body.weight_n * body.r0_m / body.rotational_inertia_kg_m2))
@@ -87,14 +86,15 @@ def gap_of(
 
     `yardstick` are the scatters to measure with; the file's own, as fitted, if left out.
     """
-    model = FileModel(rig, RockingModel(runs[0].survey, calibrations(runs)))
+    model = FileModel(rig, model_and_library(runs)[0])
     found = fit(model, runs)
     problem = Problem(Experiment.of(model, runs), ())
     # A calibration that must be far off is a gap too, though the prediction follows it.
     square, count = strain_of(model, found), 0
     for i, (run, left) in enumerate(zip(runs, found.residuals, strict=True)):
         c = Covariance(run.features.sd, problem.predict(i, found.u), yardstick or found.sigmas)
-        square += float(left @ c.solve(left))
+        white = c.whiten(left)
+        square += float(white @ white)
         count += left.size
     return float(np.sqrt(square / count)), found.sigmas
 

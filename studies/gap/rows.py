@@ -101,7 +101,7 @@ def _cells(row: str) -> list[str]:
 
 def cpu_s() -> float:
     """Processor time of this process and of those that it has waited for, s."""
-    return sum(psutil.Process().cpu_times()[:4])
+    return float(sum(psutil.Process().cpu_times()[:4]))
 
 
 def _arguments(

@@ -103,11 +103,11 @@ def main() -> None:
     print_rows(
         console, ("model", "DATA_EMPS (fitted)", "DATA_EMPS_PULSES (held out)"), rows, "Force residual"
     )
-    rows = [
+    against = [
         (k, f"{a:.3f}", f"{b:.3f}", f"{100 * (a / b - 1):+.2f} %") for k, (a, b) in result.published.items()
     ]
     print_rows(
-        console, ("parameter", "found", "published", "difference"), rows, "Against the published values"
+        console, ("parameter", "found", "published", "difference"), against, "Against the published values"
     )
     show(console, "Baseline: mass only; pairs allowed", result.from_mass)
     show(console, "Baseline: mass and viscous friction; pairs allowed", result.from_viscous)

@@ -8,11 +8,10 @@ release and says *how far* the gap shrinks in degrees.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numba as nb
 import numpy as np
 from scipy.signal import butter, filtfilt
 
@@ -30,6 +29,7 @@ from daq_app.gap.core import (
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.core.parameters import positive, signed
 from daq_app.gap.own_model import Measured
+from sim_hardware.jit import kernel
 
 RATE_HZ = 1000.0
 CUTOFF_HZ = 8.0
@@ -141,7 +141,7 @@ def _regressor(key: str, angle: FloatArray, velocity: FloatArray) -> FloatArray:
         heights = np.zeros(6)
         heights[knot] = 1.0
         return np.asarray(np.sign(velocity) * np.interp(np.abs(velocity), np.linspace(0, 18, 6), heights))
-    found: FloatArray = {
+    shapes: dict[str, Callable[[], FloatArray]] = {
         "sin": lambda: np.sin(angle),
         "cos": lambda: np.cos(angle),
         "velocity": lambda: velocity,
@@ -150,8 +150,8 @@ def _regressor(key: str, angle: FloatArray, velocity: FloatArray) -> FloatArray:
         "spring.k": lambda: angle,
         "second_harmonic.s": lambda: np.sin(2 * angle),
         "gain.g": lambda: angle * np.cos(angle) - np.sin(angle),
-    }[key]()
-    return found
+    }
+    return shapes[key]()
 
 
 def library() -> Library:
@@ -205,7 +205,7 @@ def library() -> Library:
     )
 
 
-@nb.njit(cache=True)
+@kernel
 def _swing(
     theta: float, omega: float, w2: float, c: float, q: float, f: float, n: int, every: int
 ) -> np.ndarray:

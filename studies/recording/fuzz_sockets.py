@@ -61,7 +61,20 @@ def changed(data: bytes, rng: random.Random) -> bytes:
 
 def command(rng: random.Random, token: str) -> bytes:
     """A command that looks right and should be refused or be harmless."""
-    strange = (None, 1e308, -1, "", "\x00", "é" * 5000, [], {}, [[]] * 50, True, 2**70, "../../etc/passwd")
+    strange: tuple[object, ...] = (
+        None,
+        1e308,
+        -1,
+        "",
+        "\x00",
+        "é" * 5000,
+        [],
+        {},
+        [[]] * 50,
+        True,
+        2**70,
+        "../../etc/passwd",
+    )
     name = rng.choice(COMMANDS)
     arguments = {rng.choice(("test", "notes", "text", "seconds", "force", "")): rng.choice(strange)}
     # With the right token only what does not end the recording: the others are the owner's to give.

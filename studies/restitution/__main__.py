@@ -13,6 +13,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -199,6 +200,7 @@ def main() -> None:
     parser.add_argument("table", choices=["faults", "walls", "sensors", "coverage"])
     parser.add_argument("--tests", type=int, default=20, help="simulated tests, for each fault or in all")
     parser.add_argument("--first-seed", type=int, default=5000)
+    parser.add_argument("--level", type=float, help="θ0 over α of faulty tests; drawn if left out")
     parser.add_argument("--foreign", type=Path, help="folder of labelled recordings instead")
     parser.add_argument("--cases", nargs="*", default=(), help="cases of that folder; all if none is named")
     parser.add_argument("--ringing", action="store_true", help="simulated walls bend, recordings are cut")
@@ -209,7 +211,7 @@ def main() -> None:
     tests: Iterable[LaboratoryTest]
     if options.foreign is None:
         rig = load_rig(RIG)
-        draw = ringing_test if options.ringing else draw_test
+        draw = ringing_test if options.ringing else partial(draw_test, level=options.level)
         tests = (draw(rig, options.first_seed + place) for place in range(options.tests))
         if options.impacts is not None:
             tests = (test.until_impact(options.impacts) for test in tests)

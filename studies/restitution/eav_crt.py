@@ -284,10 +284,12 @@ def draw(choices: list[Choice], rows: list[Row]) -> Figure:
     left, right = figure.subplots(1, 2, gridspec_kw={"width_ratios": (1.0, 1.25)})
     colours = {"Gaussian": "#1f5fa8", "Butterworth": "#b8560b", "running mean": "#2c7a4b"}
     for name, colour in colours.items():
-        own = [c for c in choices if c.name == name]
+        of_filter = [c for c in choices if c.name == name]
         for level, style in (("L1", "o--"), ("L3", "s-")):
-            y = [c.all_impacts[level] for c in own]
-            left.plot([c.cutoff_hz for c in own], y, style, ms=4, color=colour, label=f"{name}, {level}")
+            y = [c.all_impacts[level] for c in of_filter]
+            left.plot(
+                [c.cutoff_hz for c in of_filter], y, style, ms=4, color=colour, label=f"{name}, {level}"
+            )
     left.set_xscale("log")
     left.set_xticks(CUTOFFS_HZ, [f"{f:g}" for f in CUTOFFS_HZ])
     left.set_xlabel("cut-off of the velocity filter (Hz, −3 dB)")

@@ -72,12 +72,14 @@ def draw_test(
     ordinary: bool = True,
     effects: Mapping[str, Mapping[str, float]] = _NO_EFFECTS,
     laboratory: int | None = None,
+    level: float | None = None,
 ) -> LaboratoryTest:
     """A test of a laboratory drawn by `seed`; without `ordinary` its sensors are perfect but for noise.
 
     `effects`: what its wall does that Housner's block does not, by name with parameters. `laboratory`: the
     seed of all that one laboratory and its wall keep from test to test (calibration, places, levels of noise,
-    clock, body, r and its scatter from impact to impact), so that several `seed` make a campaign.
+    clock, body, r and its scatter from impact to impact), so that several `seed` make a campaign. `level`:
+    θ0 over α in place of the drawn one, to the drawn side.
     """
     rng = np.random.default_rng(seed)
     kept = rng if laboratory is None else np.random.default_rng([laboratory, 3])
@@ -89,9 +91,9 @@ def draw_test(
         update={"simulation": rig.simulation.model_copy(update=timing | {"restitution_scatter": scatter})}
     )
     plan = plan_tasks(rig)
-    level = float(rng.uniform(0.15, 0.4)) * float(rng.choice([-1.0, 1.0]))
+    drawn, side = float(rng.uniform(0.15, 0.4)), float(rng.choice([-1.0, 1.0]))
     r = float(kept.uniform(0.82, 0.94))
-    test = synthesise_test(rig, plan, level, seed, restitution=r, effects=effects)
+    test = synthesise_test(rig, plan, side * (level or drawn), seed, restitution=r, effects=effects)
     upright = test.readings[:, : test.upright_samples].mean(axis=1)
     zeros = {c.id: float(mean - c.offset) for c, mean in zip(rig.channels, upright, strict=True)}
     si = Scaling.of(rig.channels, zeros).to_si(test.readings)
