@@ -164,7 +164,8 @@ def usual_remains(of_channels: Sequence[float]) -> float:
 def usual_deviation(family: Family, of_channels: Sequence[tuple[Others, Deviation]]) -> FloatArray:
     """Sd of what one channel is off by in each shape, (k,), as its family's channels and a table say it.
 
-    Certificate and table count as `CERTIFIED` channels: where many agree it is they that say how well.
+    Certificate and table count as `CERTIFIED` channels: where many agree it is they that say how well. Other
+    shapes than gains are no better known than the table says.
     """
     shares = [SOUND_WIRE if family == "wire" and name in _OF_ANCHORS else SOUND for name in SHAPES[family]]
     stated = np.array(shares) * np.array(TOLERANCE[family])
@@ -173,7 +174,9 @@ def usual_deviation(family: Family, of_channels: Sequence[tuple[Others, Deviatio
         return np.asarray(stated, dtype=np.float64)
     seen = [robust_sd(shape) for shape in np.array([m.values / b.spread for b, m in of_channels]).T]
     weights = np.array([CERTIFIED, len(of_channels)]) / (CERTIFIED + len(of_channels))
-    return np.asarray(np.sqrt(weights @ np.square([stated, seen])), dtype=np.float64)
+    usual = np.sqrt(weights @ np.square([stated, seen]))
+    # The others say of gains alone that one is better than stated: each anchor is measured by tape anew.
+    return np.asarray(np.where(np.arange(usual.size) == _GAIN, usual, np.maximum(usual, stated)))
 
 
 def block_of(
