@@ -31,6 +31,7 @@ from daq_app.acquisition.process.simulated import SimulatedServer
 from daq_app.acquisition.viewers.client import decode
 from daq_app.config import load_rig
 from daq_app.runfile import open_run, verify
+from tests.support.recorder.desk_bench import CALM
 from tests.support.recorder.marked_check import check_marked
 
 RIG = Path(__file__).parents[2] / "configs" / "fr1.toml"
@@ -158,16 +159,7 @@ def hostile_publisher(seed: int, ended: threading.Event, found: list[str]) -> No
     """What a viewer makes of messages from somebody else."""
     rng = random.Random(seed)
     topics = (b"state", b"block", b"motion", b"estimate", b"health", b"event", b"", b"\xff")
-    sample = HealthMessage(
-        sample=1,
-        acknowledged_sample=1,
-        recording=True,
-        backlog_samples=0,
-        buffer_samples=1,
-        gaps=0,
-        lost_samples=0,
-    )
-    bodies = [sample.model_dump_json().encode(), StateMessage(state=State.ARMED).model_dump_json().encode()]
+    bodies = [CALM.model_dump_json().encode(), StateMessage(state=State.ARMED).model_dump_json().encode()]
     bodies.append(b'{"first_sample":0,"n_samples":3,"n_channels":2,"rate_hz":4000.0,"overloaded":[]}')
     while not ended.is_set():
         frames = [

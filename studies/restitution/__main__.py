@@ -200,7 +200,9 @@ def main() -> None:
     parser.add_argument("table", choices=["faults", "walls", "sensors", "coverage"])
     parser.add_argument("--tests", type=int, default=20, help="simulated tests, for each fault or in all")
     parser.add_argument("--first-seed", type=int, default=5000)
-    parser.add_argument("--level", type=float, help="θ0 over α of faulty tests; drawn if left out")
+    parser.add_argument(
+        "--level", type=float, help="θ0 over α of simulated faults and coverage; drawn if left out"
+    )
     parser.add_argument("--foreign", type=Path, help="folder of labelled recordings instead")
     parser.add_argument("--cases", nargs="*", default=(), help="cases of that folder; all if none is named")
     parser.add_argument("--ringing", action="store_true", help="simulated walls bend, recordings are cut")
@@ -208,6 +210,10 @@ def main() -> None:
     kinds = sorted({fault.kind for fault in FAULTS})
     parser.add_argument("--kinds", nargs="*", choices=kinds, default=kinds, help="kinds of fault to put in")
     options = parser.parse_args()
+    if options.level is not None and (
+        options.table in _EFFECTS or options.foreign is not None or options.ringing
+    ):
+        parser.error("--level goes with simulated faults and coverage, without --foreign and --ringing")
     tests: Iterable[LaboratoryTest]
     if options.foreign is None:
         rig = load_rig(RIG)

@@ -93,7 +93,9 @@ def draw_test(
     plan = plan_tasks(rig)
     drawn, side = float(rng.uniform(0.15, 0.4)), float(rng.choice([-1.0, 1.0]))
     r = float(kept.uniform(0.82, 0.94))
-    test = synthesise_test(rig, plan, side * (level or drawn), seed, restitution=r, effects=effects)
+    test = synthesise_test(
+        rig, plan, side * (drawn if level is None else level), seed, restitution=r, effects=effects
+    )
     upright = test.readings[:, : test.upright_samples].mean(axis=1)
     zeros = {c.id: float(mean - c.offset) for c, mean in zip(rig.channels, upright, strict=True)}
     si = Scaling.of(rig.channels, zeros).to_si(test.readings)

@@ -43,6 +43,23 @@ def rig():
     return load_rig(ROOT / "configs" / "fr1.toml")
 
 
+def test_a_level_takes_the_place_of_the_drawn_one_and_changes_nothing_else(rig):
+    drawn, low, high = (draw_test(rig, 5000, level=level).truth for level in (None, 0.2, 0.4))
+
+    assert abs(low["theta0_rad"]) == pytest.approx(0.2 * low["alpha_rad"], rel=0.03)
+    assert high["theta0_rad"] == pytest.approx(2.0 * low["theta0_rad"], rel=1e-3)
+    assert np.sign(low["theta0_rad"]) == np.sign(drawn["theta0_rad"])
+    assert low["restitution"] == high["restitution"] == drawn["restitution"]
+
+
+@pytest.mark.parametrize("other", [["--foreign", "nowhere"], ["--ringing"]])
+def test_a_level_beside_what_has_its_own_is_refused(other):
+    command = [sys.executable, "-m", "studies.restitution", "faults", "--level", "0.2", *other]
+    told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+
+    assert told.returncode == 2 and "--level goes with" in told.stderr
+
+
 def test_a_family_has_one_time_base_that_is_off_by_microseconds(rig):
     planned = {c.channel.id: c.time_offset_s for task in plan_tasks(rig).tasks for c in task.channels}
 

@@ -61,8 +61,8 @@ class Policy:
     starting_discrepancy: float = 0.2
     """Discrepancy, in nominal sd, from which its estimate starts; it decides between two optima only."""
     ordered_sd: float = 3.0
-    """Correlation of residuals with the next ones, in standard errors, from which they are no scatter: of
-    independent ones one group in 370 has it. Raising it takes another law for scatter."""
+    """Correlation of residuals with the next ones, in standard errors, from which they are no scatter: one
+    group of independent residuals in 370 has it. Raising it takes another law for scatter."""
 
     # Hypotheses
     prior_null: float = 0.2

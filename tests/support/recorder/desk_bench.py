@@ -7,11 +7,21 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
-from daq_app.acquisition.messages.published import Command, Reply, State, StateMessage
+from daq_app.acquisition.messages.published import Command, HealthMessage, Reply, State, StateMessage
 from daq_app.acquisition.viewers.client import AcquisitionClient
 from daq_app.acquisition.viewers.desk import Desk
 
 TOKEN = "the right token"
+CALM = HealthMessage(
+    sample=1,
+    acknowledged_sample=1,
+    recording=True,
+    backlog_samples=0,
+    buffer_samples=1,
+    gaps=0,
+    lost_samples=0,
+)
+"""What a recorder says of itself that records and has lost nothing."""
 
 
 class Counter:

@@ -191,7 +191,7 @@ def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatA
 def _evidence(channels: Sequence[FloatArray], stand_for: float) -> float:
     """Squared distance of an effect from none, of channels as `_in_channels` shows them in some runs.
 
-    Gains and half width are the same in all runs, of which these `stand_for` so many each.
+    Gains and half width are the same in all runs. Each of these runs stands for `stand_for` of them.
     """
     square = across = of_width = 0.0
     for shown in channels:

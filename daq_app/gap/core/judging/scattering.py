@@ -2,7 +2,7 @@
 
 Where all features of a group scatter, a discrepancy of the group and the scatter are two words for one thing,
 and the data tell them apart by how errors are shared out between large and small values alone. Scatter is
-independent from one feature to the next: what follows in order is none.
+independent from one feature to the next: residuals that follow one another in order are no scatter.
 """
 
 from __future__ import annotations
@@ -25,17 +25,16 @@ _ROUNDS = 8
 def beyond_scatter(linear: Linear, costs: FloatArray, policy: Policy) -> FloatArray:
     """What no scatter explains of what the misfit of each group costs, in nats, shape (group,).
 
-    `linear` is the fit that leaves it, `costs`, (group,), what it costs as a discrepancy. Where a larger
-    scatter instead of the discrepancy takes less from the restricted likelihood, it is that.
+    `linear` is the fit that leaves it, `costs`, (group,), what it costs as a discrepancy. A group costs no
+    more than what the restricted likelihood loses where a larger scatter stands in place of its discrepancy.
     """
-    nats = costs.copy()
+    nats, left = costs.copy(), linear.marginal_at(linear.solution())
     for group in np.flatnonzero(costs > 0.0):
         if _order(_in_group(linear, int(group))) > policy.ordered_sd:
             continue
         for sizes in _with_scatter(linear, int(group)):
             other, u = relaxed(linear.under(sizes), _ROUNDS)
-            loss = other.marginal_at(u) - linear.marginal_at(linear.solution())
-            nats[group] = min(nats[group], max(loss, 0.0))
+            nats[group] = min(nats[group], max(other.marginal_at(u) - left, 0.0))
     return nats
 
 

@@ -50,8 +50,8 @@ def floor_loadings(run: RockingRun, floor: FloorSpectrum) -> FloatArray:
 def _sinusoids(floor: FloorSpectrum, motion_s: float) -> Iterator[tuple[float, float]]:
     """(frequency, rms of its sine and of its cosine).
 
-    So near to each other that they do not come back together within the motion: half-cycles that have nothing
-    to do with each other would be taken for moved alike.
+    The frequencies are so near to each other that the sinusoids do not come back together within the motion:
+    half-cycles that have nothing to do with each other would be taken for moved alike.
     """
     width_hz = float(floor.frequency_hz[1] - floor.frequency_hz[0])
     lines = math.ceil(width_hz * motion_s) + 1
