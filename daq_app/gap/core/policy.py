@@ -84,8 +84,9 @@ class Policy:
     laboratories, and at less for a real drive, whose third cause is lost at 0.05. Raising it loses weak
     causes beside strong ones."""
     improved_nats: float = 0.5
-    """What a cause must take off the misfit of a group of features to improve it: half a nat is what one more
-    coefficient gains by chance. Raising it compares a cause with less."""
+    """What a cause must take off the misfit of a group of features to improve it, and gain over nothing
+    missing to be called below detection: half a nat is what one more coefficient gains by chance. Raising it
+    compares a cause with less, and passes over weak ones."""
     unforeseen: float = 0.05
     """Probability that an answer is wrong although nothing says so: a further cause too weak to show, a form
     so near one of the library that it leaves nothing. Without it three answers of 62 development cases were

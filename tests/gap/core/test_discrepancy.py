@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from daq_app.gap.core import Options, Scatter, diagnose, fit
+from daq_app.gap.core.policy import POLICY
 from daq_app.gap.own_model import Measured
 from tests.support.gap.toy_wave import LIBRARY, PEAKS, DecayModel, make_runs
 
@@ -56,6 +57,21 @@ def test_a_weak_effect_is_said_to_be_below_detection_with_the_size_that_would_sh
             assert "would have to be k" in result.decision.sentence
             return
     pytest.fail("no effect of three sd was below detection")
+
+
+def test_a_weak_effect_that_the_runs_speak_for_is_below_detection_though_none_is_likelier() -> None:
+    """Where only its rarity speaks against an effect, "no effect is missing" would pass over it."""
+    rare = Options(policy=replace(POLICY, prior_null=0.9))
+    seen = 0
+    for seed in range(12):
+        result = diagnose(DecayModel(), make_runs(seed, slope_k=0.01), LIBRARY, rare)
+        none = next(entry for entry in result.which if not entry.effects)
+        slope = next(entry for entry in result.which if entry.effects == ("slope",))
+        if none.probability > 0.5 and slope.log_evidence > none.log_evidence + 0.5:
+            assert result.decision.verdict == "below_detection"
+            assert result.decision.effects == ("slope",)
+            seen += 1
+    assert seen > 1
 
 
 def test_the_gate_opens_by_degrees() -> None:

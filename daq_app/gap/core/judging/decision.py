@@ -119,8 +119,11 @@ def _another_form(evidence: Evidence) -> tuple[Decision, str]:
 def _null(evidence: Evidence, policy: Policy) -> tuple[Decision, str]:
     probability = evidence.best.probability * evidence.rest.known(policy)
     rivals = [a for a in evidence.answers if a.effects and not is_other_form(a.effects, evidence.library)]
-    if evidence.best.probability < policy.null_probability and rivals:
-        weak = rivals[0]
+    # What the runs themselves speak for, and only its rarity against, is more than nothing.
+    least = evidence.best.first.log_evidence + policy.improved_nats
+    shown = [a for a in rivals if a.first.log_evidence > least]
+    if evidence.best.probability < policy.null_probability or shown:
+        weak = (shown or rivals)[0]
         sentence = (
             f"Nothing is missing that these runs show (probability {probability:.2f}); "
             f"{describe(weak, evidence.library)} (probability {weak.probability:.2f}) is below detection"
