@@ -14,6 +14,7 @@ from daq_app.config.rig import Channel, Family, Rig, Specimen
 from daq_app.gap.core import CannotDiagnose
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.run_cache import RunCache
+from daq_app.rocking.families.base.slip import BaseSlip
 from daq_app.runfile import open_run
 
 GRAVITY_M_S2 = 9.81
@@ -75,6 +76,11 @@ class Survey:
         return cls(specimen.name, specimen.alpha0_rad, p, specimen.base_width_m / 2, specimen.height_m)
 
     @property
+    def r0_m(self) -> float:
+        """Distance of the centre of mass from the edge, m."""
+        return self.half_base_m / math.sin(self.alpha_rad)
+
+    @property
     def r_max(self) -> float:
         """1 − 3/2 sin²α of a rectangular block (Eqn 1.2)."""
         return 1.0 - 1.5 * math.sin(self.alpha_rad) ** 2
@@ -103,6 +109,8 @@ class GapRun:
     scanned_before: tuple[int, ...] = ()
     """Place of the channel that is scanned before each one, −1 for the first; empty where that is the one
     before it in the row, as it is unless plugs were exchanged."""
+    slip: BaseSlip | None = None
+    """The slip of the base that wires and accelerometers are without; None where none is known."""
     cache: RunCache = field(default_factory=RunCache, init=False, repr=False, compare=False)
     """Channels of this very run on the grid of the regressions, and rotations of its wires.
 

@@ -15,12 +15,15 @@ from daq_app.gap.rocking_model.features.run_features import Examined, examine
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.findings import findings_of
 from daq_app.gap.rocking_model.inspection.inspect_runs import (
+    Cleaned,
     calibrations,
     choose_reference,
     completed,
     found_channels,
     inspect,
+    limited,
     without_outlier_channels,
+    without_slip,
 )
 from daq_app.gap.rocking_model.library import rocking_library
 from daq_app.gap.rocking_model.prediction.floor_motion import on_its_floor
@@ -52,7 +55,18 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
             limits.append(f"Left out. {problem}")
     if not usable:
         raise CannotDiagnose("None of the runs can be used.", " ".join(limits))
-    inspected = inspect(usable)
+    cleaned = inspect(usable)
+    whole, more = _examined(cleaned)
+    if whole[0].slip is not None:
+        # With the walk of the base in them wires and accelerometers say of others what they do not do.
+        whole, more = _examined(without_slip(cleaned, whole[0].slip))
+    return whole, limits + more
+
+
+def _examined(cleaned: Cleaned) -> tuple[list[RockingRun], list[str]]:
+    """Features of all runs, and the limits from what was left out."""
+    inspected = limited(cleaned)
+    limits: list[str] = []
     reference, known = choose_reference(inspected)
     examined: list[Examined] = []
     findings: list[Sequence[RunFinding]] = []
@@ -62,7 +76,7 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
         try:
             first_pass = known.get(place) or examine(run, reference)
         except CannotDiagnose as problem:
-            if len(runs) == 1:
+            if len(inspected.runs) == 1:
                 raise
             limits.append(f"Left out. {problem}")
             continue

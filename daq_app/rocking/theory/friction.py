@@ -1,7 +1,7 @@
 """How far a base slips between two impacts whose friction does not hold it while the wall is nearly upright.
 
-A block that rocks on an edge pushes it outwards with p² R/g · sin(α − θ) cos(α − θ) of its weight: most while
-it is nearly upright. Friction that holds less lets the edge slip below a rotation, and slows it beyond that.
+A block that rocks on an edge pushes it outwards, most while it is nearly upright. Friction that holds less
+lets the edge slip below a rotation, and slows it beyond that.
 """
 
 from __future__ import annotations
@@ -36,19 +36,28 @@ class Slips:
 
 
 def push(rotation_rad: float, alpha_rad: float, p_rad_s: float, r0_m: float) -> float:
-    """The force along the floor that keeps the edge of a rocking block in place, over its weight, 1.
+    """Coefficient of friction that keeps the edge of a rocking block in place, 1.
 
-    It gives the centre of mass the acceleration that the block has at rest at this rotation.
+    Force along the floor over that on it, of a block at rest at this rotation: its centre of mass speeds up
+    by p² R sin(α − θ) across the line to the edge.
     """
     left = alpha_rad - rotation_rad
-    return p_rad_s**2 * r0_m / G_M_S2 * math.sin(left) * math.cos(left)
+    faster = p_rad_s**2 * r0_m / G_M_S2 * math.sin(left)
+    return faster * math.cos(left) / (1.0 - faster * math.sin(left))
 
 
-def slips_below(rotation_rad: float, peaks_rad: Floats, alpha_rad: float, p_rad_s: float) -> Slips:
+def slips_below(
+    rotation_rad: float,
+    peaks_rad: Floats,
+    alpha_rad: float,
+    p_rad_s: float,
+    begin: Floats | float = 0.0,
+) -> Slips:
     """Slips of half-cycles with these peaks (k,), by an edge that slips below a rotation.
 
     The motion is that of a block, to first order about upright (Housner 1963), and the slip does not act
-    back on it. The edge is at rest after an impact.
+    back on it. `begin` (k,): speed with which the impact leaves the edge, outwards, over the acceleration
+    for each rad, rad s; 0 for one that friction holds at impacts.
     """
     alpha, p = alpha_rad, p_rad_s
     peaks = np.minimum(peaks_rad, 0.95 * alpha)
@@ -56,7 +65,7 @@ def slips_below(rotation_rad: float, peaks_rad: Floats, alpha_rad: float, p_rad_
     time_s = np.linspace(-1.0, 1.0, _STEPS + 1)[:, None] * half_s
     pushed = rotation_rad - alpha + (alpha - peaks) * np.cosh(p * time_s)
     step_s = 2.0 * half_s / _STEPS
-    speed, slip = np.zeros(peaks.size), np.zeros(peaks.size)
+    speed, slip = np.zeros(peaks.size) + begin, np.zeros(peaks.size)
     acceleration = np.zeros_like(time_s)
     for place in range(_STEPS):
         middle = 0.5 * (pushed[place] + pushed[place + 1])
@@ -66,3 +75,20 @@ def slips_below(rotation_rad: float, peaks_rad: Floats, alpha_rad: float, p_rad_
         speed = faster
     acceleration[-1] = np.maximum(pushed[-1], 0.0)
     return Slips(time_s, acceleration, speed, slip)
+
+
+def slips_as_it_rocks(
+    below_rad: Floats, rotations_rad: Floats, step_s: float, begin: Floats
+) -> tuple[Floats, Floats]:
+    """Speed, rad s, and way, rad s², (n, k), of slips of a half-cycle with these rotations' sizes, (n,).
+
+    The edge speeds up as in `slips_below`. `below_rad`, `begin`: (k,) rotation below which it slips, and the
+    speed with which the impact leaves it, rad s.
+    """
+    pushed = (below_rad - rotations_rad[:, None]) * step_s
+    speeds = np.empty_like(pushed)
+    speed = begin
+    for place, more in enumerate(pushed):
+        speed = np.maximum(speed + more, 0.0)
+        speeds[place] = speed
+    return speeds, np.cumsum(speeds, axis=0) * step_s

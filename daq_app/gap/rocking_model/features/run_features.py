@@ -14,6 +14,7 @@ from daq_app.gap.rocking_model.features.families import sensor_families
 from daq_app.gap.rocking_model.features.families.wires import leaked_turn
 from daq_app.gap.rocking_model.features.family import Scene
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.slips.base_walk import beside_slips
 from daq_app.gap.rocking_model.motion import swings as sw
 from daq_app.gap.rocking_model.motion.hold import from_hold
 from daq_app.gap.rocking_model.motion.motion_grid import make_grid
@@ -61,6 +62,8 @@ def examine(run: GapRun, reference: str = "") -> Examined:
     reference, theta, noise, notes = _reference(run, joint, wanted)
     swings = sw.find_swings(theta, noise, run.survey.p_rad_s, run.rate_hz, run.name)
     grid = make_grid(theta, joint.valid, swings, run.rate_hz, run.survey)
+    if run.slip is not None:
+        grid = beside_slips(grid, run.slip)
     scene = Scene(run, joint, grid, swings, reference, quiet(run, grid), wanted == "late")
     seen = (block for family in sensor_families() for block in family.observe(scene))
     blocks = tuple(block for block in seen if block is not None)

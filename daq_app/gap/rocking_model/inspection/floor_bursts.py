@@ -119,10 +119,17 @@ def _half_cycles(run: GapRun, grid: Grid, survey: Survey, ring: Ring | None) -> 
         if part.size < _SHORTEST:
             continue
         before = int(np.searchsorted(grid.impact_s, grid.time_s[part[0]])) - 1
+        if _slips(run, grid, before):
+            continue
         left = columns[part] - basis @ (basis.T @ columns[part])
         middle = float(grid.time_s[part].mean())
         half_cycles.append(_HalfCycle(middle, float(grid.jumps[before]), left, part.size - basis.shape[1]))
     return half_cycles
+
+
+def _slips(run: GapRun, grid: Grid, impact: int) -> bool:
+    """Whether the edge that an impact sets the wall on slips, and bounces."""
+    return run.slip is not None and bool(run.slip.along[int(grid.approach[impact] > 0.0)] > 0.0)
 
 
 def _of_alike(jump: float, jumps: FloatArray, powers: FloatArray) -> float:

@@ -25,6 +25,7 @@ from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined, examine
 from daq_app.gap.rocking_model.features.run_findings import RunFinding, merged
 from daq_app.gap.rocking_model.features.slips.base_slip import slip_findings, slip_of
+from daq_app.gap.rocking_model.features.slips.base_walk import by_whole_tests, without_walk
 from daq_app.gap.rocking_model.inspection.channel_faults import channel_block, find_outlier_channels
 from daq_app.gap.rocking_model.inspection.conditions import conditions_of, findings_per_run, without_hum
 from daq_app.gap.rocking_model.inspection.floor_bursts import floor_bursts
@@ -40,11 +41,21 @@ from daq_app.gap.rocking_model.records import GapRun, Wiring
 from daq_app.gap.rocking_model.tolerances.inspection import COUNT_SD
 from daq_app.gap.rocking_model.tolerances.sensors import LATE_S
 from daq_app.gap.rocking_model.tolerances.walls import MIDDLE_OF_IMPACT_S, RINGING_GAIN
+from daq_app.rocking.families.base.slip import BaseSlip
+
+
+@dataclass(frozen=True, slots=True)
+class Cleaned:
+    """Runs in which wiring and electronics are put right as far as they can be, and what each shows."""
+
+    runs: list[GapRun]
+    findings: list[list[RunFinding]]
+    wiring: Wiring
 
 
 @dataclass(frozen=True, slots=True)
 class Inspected:
-    """Runs in which wiring and electronics are put right as far as they can be."""
+    """Cleaned runs whose channels stop where they really do."""
 
     runs: list[GapRun]
     findings: list[list[RunFinding]]
@@ -53,7 +64,7 @@ class Inspected:
     wiring: Wiring
 
 
-def inspect(runs: Sequence[GapRun]) -> Inspected:
+def inspect(runs: Sequence[GapRun]) -> Cleaned:
     """Mend the wiring, inspect the electronics. Raises nothing: what cannot be judged is left as it is."""
     mended, wiring = mend(list(runs))
     mended = [run.excluding(wiring.reversed_ids) for run in mended]
@@ -63,11 +74,41 @@ def inspect(runs: Sequence[GapRun]) -> Inspected:
     clean = [without_hum(run, c).at_clock() for run, c in zip(mended, conditions, strict=True)]
     families: dict[str, Family] = {s.id: s.family for s in runs[0].sensors}
     clean = [run.excluding(_spoiled(findings, families)) for run in clean]
-    clean, limits = saturated(clean, _steps(findings))
+    return Cleaned(clean, merged(findings, [_wiring_findings(wiring, families)] * len(clean)), wiring)
+
+
+def limited(cleaned: Cleaned) -> Inspected:
+    """The runs with the ranges that their channels really have."""
+    runs, findings = cleaned.runs, cleaned.findings
+    families: dict[str, Family] = {s.id: s.family for s in runs[0].sensors}
+    clean, limits = saturated(runs, _steps(findings))
     clean = [run.excluding(_spoiled(limits, families)) for run in clean]
-    findings = merged(findings, limits, [_wiring_findings(wiring, families)] * len(clean))
+    findings = merged(findings, limits)
     coarse_lvdts = any(m.key == "quantisation@lvdt" and m.value > 0 for row in findings for m in row)
-    return Inspected(clean, findings, "wire" if coarse_lvdts else "", wiring)
+    return Inspected(clean, findings, "wire" if coarse_lvdts else "", cleaned.wiring)
+
+
+def without_slip(cleaned: Cleaned, slip: BaseSlip) -> Cleaned:
+    """The runs as on a base that does not slip, by the slip that all channels show, or by `slip`.
+
+    Runs in which the wall cannot be followed are left as they are.
+    """
+    examined: dict[int, Examined] = {}
+    for place, run in enumerate(cleaned.runs):
+        try:
+            examined[place] = examine(run)
+        except CannotDiagnose:
+            continue
+    seen = list(examined.values())
+    tests, grids = [e.run for e in seen], [e.features.grid for e in seen]
+    again = by_whole_tests(tests, grids, slip_of(tests, grids) or slip)
+    runs = [
+        without_walk(run, (e := examined[place]).run, e.features.grid, again)
+        if place in examined
+        else replace(run, slip=again)
+        for place, run in enumerate(cleaned.runs)
+    ]
+    return replace(cleaned, runs=runs)
 
 
 def _spoiled(findings: Sequence[Sequence[RunFinding]], channels: Collection[str]) -> list[str]:
@@ -236,7 +277,7 @@ def completed(
         if floor is None
         else [[_irregular(floor, len(examined))] for _ in examined]
     )
-    slip = slip_of(*calm)
+    slip = examined[0].run.slip or slip_of(*calm)
     runs = []
     known = with_quantisation_errors(examined, steps)
     rows = merged(findings, shaken, [slip_findings(slip, len(examined))] * len(examined))

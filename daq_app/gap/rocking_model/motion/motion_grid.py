@@ -52,10 +52,13 @@ class Grid:
     approach: FloatArray
     """θ̇ just before each impact, rad/s."""
 
+    slips: NDArray[np.bool_]
+    """Where the edge that the wall stands on slips; nowhere as long as no slip is known."""
+
     @property
     def near_impact(self) -> NDArray[np.bool_]:
-        """Where an impact spoils accelerations, (m,)."""
-        return np.asarray(self.from_impact_s < MASK_S)
+        """Where an impact, or an edge that slips and bounces, spoils accelerations, (m,)."""
+        return np.asarray((self.from_impact_s < MASK_S) | self.slips)
 
     @property
     def settled(self) -> NDArray[np.bool_]:
@@ -110,6 +113,7 @@ def make_grid(
         speed=omega,
         jumps=side * (before - after),
         approach=-side * before,
+        slips=np.zeros(time_s.size, dtype=np.bool_),
     )
 
 

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Wire, gridded, wall_rotation
@@ -30,8 +31,7 @@ def slip_of(runs: Sequence[GapRun], grids: Sequence[Grid]) -> BaseSlip | None:
     if not parts:
         return None
     survey = runs[0].survey
-    r0_m = survey.half_base_m / math.sin(survey.alpha_rad)
-    return find_slip(HalfCycleSlips.joined(parts), survey.alpha_rad, survey.p_rad_s, r0_m)
+    return find_slip(HalfCycleSlips.joined(parts), survey.alpha_rad, survey.p_rad_s, survey.r0_m)
 
 
 def slip_findings(slip: BaseSlip | None, runs: int) -> list[RunFinding]:
@@ -45,8 +45,9 @@ def slip_findings(slip: BaseSlip | None, runs: int) -> list[RunFinding]:
     return [RunFinding("sliding@base", words, "m", slip.slip_m, more * slip.slip_sd_m)]
 
 
-def _seen(run: GapRun, grid: Grid) -> HalfCycleSlips | None:
-    """What the half-cycles of a run show; None where its wires do not tell slip, turn and rotation apart.
+def base_motion(run: GapRun, grid: Grid) -> FloatArray | None:
+    """What the wires show beside the grid's rotation, (3, m): motion of the base along x, m, an error of the
+    rotation, rad, and a turn about the vertical, rad; None where they do not tell these apart.
 
     The line through the wires over their heights takes up what the rotation is off by. An analysis of r takes
     up gains of single wires instead (`rocking.families.base.steps`): it has one test, and every sample.
@@ -57,7 +58,14 @@ def _seen(run: GapRun, grid: Grid) -> HalfCycleSlips | None:
     if len(chosen) < _FEWEST_WIRES or np.linalg.matrix_rank(design) < design.shape[1]:
         return None
     ideal = np.array([Wire(run.sensors[i], run.survey.half_base_m).shortening(grid.theta) for i in chosen])
-    moved = np.linalg.pinv(design) @ (np.array([gridded(run, i) for i in chosen]) - ideal)
+    return np.asarray(np.linalg.pinv(design) @ (np.array([gridded(run, i) for i in chosen]) - ideal))
+
+
+def _seen(run: GapRun, grid: Grid) -> HalfCycleSlips | None:
+    """What the half-cycles of a run show; None where its wires do not tell slip, turn and rotation apart."""
+    moved = base_motion(run, grid)
+    if moved is None:
+        return None
     rows = []
     for start_s, end_s, approach in zip(
         grid.impact_s[:-1], grid.impact_s[1:], grid.approach[:-1], strict=True
