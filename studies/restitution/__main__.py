@@ -138,7 +138,7 @@ def deviations(test: LaboratoryTest, analysis: TestAnalysis) -> list[tuple[str, 
 
     for name, value in analysis.theta0_by_family.items():
         add(f"θ0 {name}", value.value - truth["theta0_rad"], value.sigma)
-    if analysis.fit is not None:
+    if analysis.fit is not None and "alpha_rad" in truth:
         add("α (fit)", analysis.fit.alpha_rad - truth["alpha_rad"], analysis.fit.sigma_alpha_rad)
         add("p (fit)", analysis.fit.p_rad_s - truth["p_rad_s"], analysis.fit.sigma_p_rad_s)
     if "impact_time_s" not in truth:
@@ -179,7 +179,7 @@ def coverage(tests: Iterable[LaboratoryTest]) -> list[str]:
         reached = [
             (f"r {name}", (i[0] + i[1] - 2.0 * r) / (i[1] - i[0]))
             for name, i in intervals.items()
-            if i is not None
+            if i is not None and math.isfinite(r)
         ]
         reached += [(name, ratio / _REACH) for name, ratio in deviations(test, analysis)]
         for name, error in reached:

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from daq_app.config import Rig, load_rig
-from daq_app.config.rig import Channel, Family
+from daq_app.config.rig import Channel, Family, Specimen
 from daq_app.rocking.theory.block import STANDARD_GRAVITY_M_S2, RigidBlock
 from studies.restitution.laboratory import LaboratoryTest
 
@@ -36,9 +36,28 @@ def foreign_tests(folder: Path, configs: Path, names: tuple[str, ...] = ()) -> I
 
 
 def rig_of(case: Mapping[str, Any], configs: Path) -> Rig:
-    """The shipped rig of the specimen with the sensors where the case has them."""
-    rig = load_rig(configs / f"{case['specimen']['name'].lower()}.toml")
+    """The shipped rig of the specimen, or FR1's with the case's own, with the sensors where the case has them."""
+    shipped = configs / f"{case['specimen']['name'].lower()}.toml"
+    if shipped.exists():
+        rig = load_rig(shipped)
+    else:
+        rig = load_rig(configs / "fr1.toml")
+        rig = rig.model_copy(update={"specimen": _specimen(rig.specimen, case["specimen"])})
     return rig.model_copy(update={"channels": tuple(_channel(rig, entry) for entry in case["channels"])})
+
+
+def _specimen(shipped: Specimen, entry: Mapping[str, Any]) -> Specimen:
+    changes = {
+        "name": entry["name"],
+        "weight_n": entry["weight_N"],
+        "height_m": entry["height_m"],
+        "length_m": entry["length_m"],
+        "rotational_inertia_kg_m2": entry["inertia_about_base_corner_kgm2"],
+        "r0_m": entry["R0_m"],
+        "alpha0_rad": entry["alpha0_rad"],
+        "p_rad_s": entry["p_rad_s"],
+    }
+    return shipped.model_copy(update=changes)
 
 
 def _channel(rig: Rig, entry: Mapping[str, Any]) -> Channel:
@@ -58,8 +77,10 @@ def _channel(rig: Rig, entry: Mapping[str, Any]) -> Channel:
 
 def _truth(label: Mapping[str, Any], run: Mapping[str, Any]) -> dict[str, Any]:
     """The label's `r`, or `r_factor`: the share of the upper bound of a block on the points that the wall
-    turns about.
+    turns about. θ0 alone where a label has neither.
     """
+    if "r" not in label and "r_factor" not in run:
+        return {"restitution": math.nan, "theta0_rad": run["theta0"]}
     body = label["true_body"]
     block = RigidBlock(body["m"] * STANDARD_GRAVITY_M_S2, body["R"], body["IO"], body["alpha"])
     inset = sum(effect["params"].get("inset", 0.0) for effect in label["effects"])

@@ -28,6 +28,8 @@ _POSITION_SIGMA_M = 0.001
 """Standard deviation of each coordinate of a sensor about the drawing."""
 _DATUM_SIGMA_M = 0.001
 """Standard deviation of the level that the heights of all wires are measured from, about the wall's base."""
+_FACES_SIGMA_M = 0.002
+"""Standard deviation of the distance of the faces that LVDTs stand on about the survey's."""
 _TIME_BASE_SIGMA_S = 2e-5
 """Standard deviation of each family's time base about what the analysis is told of it."""
 _SLOW_SAMPLES = 20
@@ -84,7 +86,12 @@ def draw_test(
     rng = np.random.default_rng(seed)
     kept = rng if laboratory is None else np.random.default_rng([laboratory, 3])
     of_all = np.random.default_rng([seed if laboratory is None else laboratory, 2])
-    rig = _drawn_rig(nominal, kept, _DATUM_SIGMA_M * of_all.standard_normal()) if ordinary else nominal
+    of_faces = np.random.default_rng([seed if laboratory is None else laboratory, 4])
+    if ordinary:
+        rig = _drawn_rig(nominal, kept, _DATUM_SIGMA_M * of_all.standard_normal())
+        rig = _on_faces(rig, _FACES_SIGMA_M * of_faces.standard_normal())
+    else:
+        rig = nominal
     timing = {"upright_s": 1.0, "pull_s": 1.0, "hold_s": float(rng.uniform(4.0, 6.0))}
     scatter = float(kept.uniform(0.001, 0.006)) if ordinary else 0.0
     rig = rig.model_copy(
@@ -127,6 +134,18 @@ def _drawn_rig(rig: Rig, rng: np.random.Generator, datum_m: float) -> Rig:
         for channel in rig.channels
     )
     return rig.model_copy(update={"specimen": body, "channels": channels})
+
+
+def _on_faces(rig: Rig, further_m: float) -> Rig:
+    """The rig with its LVDTs on faces that are further apart."""
+    channels = []
+    for channel in rig.channels:
+        if channel.family == "lvdt":
+            x, y, z = channel.position_m
+            place = (x + math.copysign(0.5 * further_m, x), y, z)
+            channel = channel.model_copy(update={"position_m": place})
+        channels.append(channel)
+    return rig.model_copy(update={"channels": tuple(channels)})
 
 
 def _drawn_channel(channel: Channel, noise: float, higher_m: float, rng: np.random.Generator) -> Channel:

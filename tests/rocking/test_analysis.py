@@ -79,6 +79,20 @@ def test_theta0_by_family(whole):
     assert analysis.theta0_over_alpha == pytest.approx(0.35, abs=0.005)
 
 
+def test_faces_that_are_further_apart_than_surveyed_are_in_the_error_of_theta0(whole):
+    """All LVDTs open as much wider, so that nothing in the joint shows it."""
+    test, _ = whole
+    truth = test.motion.side * 0.35 * test.motion.alpha_rad
+    wider = test.si.copy()
+    wider[[channel.family == "lvdt" for channel in test.rig.channels]] *= 1.006
+
+    theta0 = analyse_record(record_of(test, wider), QUICK).theta0_by_family
+
+    assert theta0["lvdts"].value == pytest.approx(1.006 * truth, rel=5e-4)
+    assert abs(theta0["lvdts"].value - truth) < 2.5 * theta0["lvdts"].sigma
+    assert theta0["best"].value == pytest.approx(truth, rel=1.2e-3)
+
+
 @pytest.mark.parametrize(("apart_sigmas", "widened_by"), [(2.9, 1.0), (4.0, 4.0 / math.sqrt(3.0))])
 def test_the_best_theta0_is_known_worse_where_families_differ_by_more_than_chance(apart_sigmas, widened_by):
     """Three values of which one is off: chance puts it by 3.0 standard errors in one test of twenty."""

@@ -14,8 +14,11 @@ from daq_app.rocking.geometry.joint import BaseJoint
 
 _DATUM_SHARE = 0.0005
 """Standard uncertainty of the wires' gain from the datum of their heights, common to all: 1 mm of 2 m,
-assumed. The LVDTs have none: the distance of their faces is the mean of single places, whose errors the
-plane's misfit shows."""
+assumed."""
+_FACES_M = 0.002
+"""Standard uncertainty of the distance of the faces that LVDTs stand on: rough stone is measured with a tape
+(assumed). Walls of a stranger's laboratory were 1.7 mm wider or narrower than surveyed, rms, and θ0 by LVDTs
+was off by as large a share."""
 _PLACE_M = 0.001
 """Standard uncertainty of the place of an LVDT on its face, assumed. While one LVDT was expected to be no
 further off than its calibration, θ0 by LVDTs held the truth in 93.3 % of 450."""
@@ -59,7 +62,15 @@ def gains_of(signals: Signals, times: TestTimes, wires: ComparedChannels | None)
 
 
 def _lvdts(signals: Signals, hold: slice) -> float:
-    """A gain or place that is off shows in the plane's misfit, as a share of the widest opening."""
+    """A gain or place that is off shows in the plane's misfit, as a share of the widest opening.
+
+    Faces that are further apart than surveyed do not: all openings are as much wider.
+    """
+    distance = _FACES_M / signals.record.rig.specimen.base_width_m
+    return math.hypot(_by_single_lvdts(signals, hold), distance)
+
+
+def _by_single_lvdts(signals: Signals, hold: slice) -> float:
     ids = signals.record.family("lvdt")
     if signals.joint is None or hold.start >= hold.stop:
         return CALIBRATION_SHARE
