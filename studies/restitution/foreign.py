@@ -36,7 +36,7 @@ def foreign_tests(folder: Path, configs: Path, names: tuple[str, ...] = ()) -> I
 
 
 def rig_of(case: Mapping[str, Any], configs: Path) -> Rig:
-    """The shipped rig of the specimen, or FR1's with the case's own, with the sensors where the case has them."""
+    """The shipped rig of the specimen, or FR1's with the case's own; sensors are where the case has them."""
     shipped = configs / f"{case['specimen']['name'].lower()}.toml"
     if shipped.exists():
         rig = load_rig(shipped)

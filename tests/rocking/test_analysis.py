@@ -93,6 +93,27 @@ def test_faces_that_are_further_apart_than_surveyed_are_in_the_error_of_theta0(w
     assert theta0["best"].value == pytest.approx(truth, rel=1.2e-3)
 
 
+def test_theta0_of_a_family_that_is_left_out_is_known_no_better_than_it_differs_from_the_others(whole):
+    """The base has walked by 3 mm since the release: wires that are zeroed at rest show it in the hold."""
+    test, sound = whole
+    truth = test.motion.side * 0.35 * test.motion.alpha_rad
+    walked = test.si.copy()
+    time_s = np.arange(test.n_samples) / test.rate_hz
+    steps = 1.5e-3 * np.abs(test.motion.speeds_before_rad_s[:10])
+    path = np.zeros(test.n_samples)
+    for instant_s, step in zip(test.motion.impacts_s, steps, strict=False):
+        path += step * (time_s > instant_s)
+    walked[[channel.family == "wire" for channel in test.rig.channels]] += path
+
+    analysis = analyse_record(record_of(test, walked, tared=False), QUICK)
+
+    wires = analysis.theta0_by_family["wires"]
+    assert "slide" in {finding.kind for finding in analysis.findings}
+    assert abs(wires.value - truth) > 5.0 * sound.theta0_by_family["wires"].sigma
+    assert abs(wires.value - truth) < 2.0 * wires.sigma
+    assert analysis.theta0_by_family["best"].value == pytest.approx(truth, rel=2e-3)
+
+
 @pytest.mark.parametrize(("apart_sigmas", "widened_by"), [(2.9, 1.0), (4.0, 4.0 / math.sqrt(3.0))])
 def test_the_best_theta0_is_known_worse_where_families_differ_by_more_than_chance(apart_sigmas, widened_by):
     """Three values of which one is off: chance puts it by 3.0 standard errors in one test of twenty."""

@@ -49,7 +49,15 @@ def theta0_by_family(
         if name != signals.lead and math.isfinite(value):
             own_zero = bent_zero if name == "wires" else zero
             theta0[name] = _level(value, math.hypot(noise, own_zero), gains.of(name))
-    theta0["best"] = best_value(fit_levels(theta0, unfit))
+    trusted = fit_levels(theta0, unfit)
+    best = best_value(trusted)
+    if math.isfinite(best.value):
+        # What is wrong with a family that is left out moves its θ0 by as much as it differs from the others.
+        for name in theta0.keys() - trusted.keys():
+            shown = theta0[name]
+            sigma = math.hypot(shown.sigma, shown.value - best.value)
+            theta0[name] = ValueWithSigma(shown.value, sigma)
+    theta0["best"] = best
     return theta0
 
 
