@@ -64,13 +64,15 @@ def without_walk(run: GapRun, test: GapRun, grid: Grid, slip: BaseSlip) -> GapRu
         for values in (walk.along_m, walk.turn_rad, walk.along_m_s2, walk.turn_rad_s2)
     )
     lean = np.interp(time_s, grid.time_s, grid.theta)
+    shares = {"x": np.cos(lean), "z": np.sin(lean)}
     channels = run.channels.copy()
-    for i in run.indices("wire"):
-        channels[i] -= along + run.sensors[i].position_m[1] * turn
-    for axis, share in (("x", np.cos(lean)), ("z", np.sin(lean))):
-        for i in run.indices("accelerometer", axis):
-            if not run.sensors[i].ac_coupled:
-                channels[i] -= (faster + run.sensors[i].position_m[1] * turns) * share
+    # Channels that are examined on their own stand on the same base.
+    for row, sensor in zip(channels, run.sensors, strict=True):
+        y = sensor.position_m[1]
+        if sensor.family == "wire":
+            row -= along + y * turn
+        elif sensor.family == "accelerometer" and not sensor.ac_coupled and sensor.axis in shares:
+            row -= (faster + y * turns) * shares[sensor.axis]
     return replace(run, channels=channels, slip=slip)
 
 
