@@ -12,6 +12,7 @@ import pytest
 
 from daq_app.config import load_rig, plan_tasks
 from studies.restitution import laboratory
+from studies.restitution.foreign import rig_of
 from studies.restitution.laboratory import draw_test
 
 ROOT = Path(__file__).parents[2]
@@ -50,6 +51,26 @@ def test_a_level_takes_the_place_of_the_drawn_one_and_changes_nothing_else(rig):
     assert high["theta0_rad"] == pytest.approx(2.0 * low["theta0_rad"], rel=1e-3)
     assert np.sign(low["theta0_rad"]) == np.sign(drawn["theta0_rad"])
     assert low["restitution"] == high["restitution"] == drawn["restitution"]
+
+
+def test_a_case_of_a_wall_that_is_not_shipped_has_its_own_survey(rig):
+    wall = {
+        "name": "Kufstein-D15",
+        "weight_N": 36250.0,
+        "height_m": 2.601,
+        "length_m": 1.282,
+        "inertia_about_base_corner_kgm2": 9207.0,
+        "R0_m": 1.3772,
+        "p_rad_s": 2.3286,
+        "alpha0_rad": 0.20299,
+    }
+    lvdt = {"name": "LV-1", "kind": "LVDT", "unit": "mm", "position_m": [-0.28, 0.1, 0.05], "range": [-5, 70]}
+    theirs = rig_of({"specimen": wall, "channels": [lvdt]}, ROOT / "configs")
+    ours = rig_of({"specimen": {"name": "FR1"}, "channels": [lvdt]}, ROOT / "configs")
+
+    assert (theirs.specimen.name, theirs.specimen.r0_m) == ("Kufstein-D15", 1.3772)
+    assert theirs.channel("LV-1").range_si == pytest.approx((-0.005, 0.07))
+    assert ours.specimen == rig.specimen
 
 
 @pytest.mark.parametrize("other", [["--foreign", "nowhere"], ["--ringing"]])

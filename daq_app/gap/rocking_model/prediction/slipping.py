@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
@@ -16,15 +15,10 @@ from daq_app.config.rig import G_M_S2
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.prediction.model import half_cycle_times, peak_slopes
+from daq_app.gap.rocking_model.tolerances.walls import SLIP_LEFT_OPEN, SLIP_TO_FIRST_ORDER
 from daq_app.rocking.families.base.slip import BaseSlip
 from daq_app.rocking.theory.friction import Slips, slips_below
 from sim_hardware.dynamics import shooting
-
-_LEFT_OPEN: Final = 0.3
-"""Share of what slips do in a test that the law of friction leaves open. Raising it hides causes in slips."""
-_SCATTERS: Final = 0.25
-"""Share by which that differs from half-cycle to half-cycle: the law is to first order in the slip, and an
-edge that slips bounces. Raising it hides causes in slips."""
 
 
 def on_its_base(run: RockingRun) -> RockingRun:
@@ -35,9 +29,9 @@ def on_its_base(run: RockingRun) -> RockingRun:
     features = replace(
         run.features,
         values=run.features.values - moved.sum(axis=1),
-        sd=np.hypot(run.features.sd, _SCATTERS * np.abs(moved).max(axis=1)),
+        sd=np.hypot(run.features.sd, SLIP_TO_FIRST_ORDER * np.abs(moved).max(axis=1)),
     )
-    return replace(run, features=features).with_loadings(_LEFT_OPEN * moved)
+    return replace(run, features=features).with_loadings(SLIP_LEFT_OPEN * moved)
 
 
 def slip_effects(run: RockingRun, slip: BaseSlip) -> FloatArray:

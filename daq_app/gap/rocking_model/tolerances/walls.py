@@ -23,6 +23,22 @@ PUSH_RAD_S = 3e-4
 Raising it hides releases with a speed.
 """
 
+# -- a base that friction does not hold ------------------------------------------------------------
+SLIP_LEFT_OPEN = 0.3
+"""Share, 1, of what slips do in a test, and of how far a half-cycle slips, that the law of friction leaves
+open (assumed).
+
+Raising it hides causes in slips, and lets noise of the wires into small ones.
+"""
+
+SLIP_TO_FIRST_ORDER = 0.25
+"""Share, 1, by which what slips do differs from half-cycle to half-cycle: the law is to first order in the
+slip, and an edge that slips bounces. With 0.1 two of sixteen walls of the contact engine have a cause beside
+their slip.
+
+Raising it hides causes in slips.
+"""
+
 # -- impacts ---------------------------------------------------------------------------------------
 MIDDLE_OF_IMPACT_S = 1.5e-3
 """Time, s, from the contact to the middle of an impact, by which accelerometers seem late that are not.

@@ -20,11 +20,10 @@ from daq_app.gap.rocking_model.features.slips.base_slip import base_motion
 from daq_app.gap.rocking_model.motion.motion_grid import SMOOTH_HZ, Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.tolerances.walls import SLIP_LEFT_OPEN
 from daq_app.rocking.families.base.slip import BaseSlip
 from daq_app.rocking.theory.friction import push, slips_as_it_rocks
 
-_SCATTERS: Final = 0.3
-"""Share by which a half-cycle's slip may differ from the law's. Raising it lets noise into small slips."""
 _AROUND: Final = np.geomspace(0.5, 1.4, 10)
 """Rotations below which the base slips that are tried, over that which half-cycles show."""
 _BEGINS_S2: Final = (0.0, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3)
@@ -153,8 +152,8 @@ def _with_rotation(theta: FloatArray) -> FloatArray:
 def _factors(laws: FloatArray, others: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Factor of each law (k, n), near 1, and sizes of the columns `others` (n, j), by least squares."""
     design = np.column_stack([laws.T, others]) / _NOISE_M
-    near = np.eye(len(laws), design.shape[1]) / _SCATTERS
-    wanted = np.append(seen / _NOISE_M, np.full(len(laws), 1.0 / _SCATTERS))
+    near = np.eye(len(laws), design.shape[1]) / SLIP_LEFT_OPEN
+    wanted = np.append(seen / _NOISE_M, np.full(len(laws), 1.0 / SLIP_LEFT_OPEN))
     sizes = np.linalg.lstsq(np.vstack([design, near]), wanted, rcond=None)[0]
     return sizes[: len(laws)], sizes[len(laws) :]
 
