@@ -87,6 +87,7 @@ def test_a_slip_within_an_interval_counts_for_the_part_of_it_that_follows() -> N
         empty,
         jumps=empty,
         approach=speeds,
+        slips=none,
     )
     assert np.abs(stepped_shape(grid, alternating=True) - coarse(slipped, RATE_HZ)).max() < 0.02
 
