@@ -56,17 +56,17 @@ def prepare(runs: Sequence[GapRun]) -> tuple[list[RockingRun], list[str]]:
     if not usable:
         raise CannotDiagnose("None of the runs can be used.", " ".join(limits))
     cleaned = inspect(usable)
-    whole, more = _examined(cleaned)
+    whole, stated = _examined(cleaned, limits)
     if whole[0].slip is not None:
         # With the walk of the base in them wires and accelerometers say of others what they do not do.
-        whole, more = _examined(without_slip(cleaned, whole[0].slip))
-    return whole, limits + more
+        whole, stated = _examined(without_slip(cleaned, whole[0].slip), limits)
+    return whole, stated
 
 
-def _examined(cleaned: Cleaned) -> tuple[list[RockingRun], list[str]]:
-    """Features of all runs, and the limits from what was left out."""
+def _examined(cleaned: Cleaned, stated: Sequence[str]) -> tuple[list[RockingRun], list[str]]:
+    """Features of all runs, and the limits from what was left out, behind those that are `stated`."""
     inspected = limited(cleaned)
-    limits: list[str] = []
+    limits = list(stated)
     reference, known = choose_reference(inspected)
     examined: list[Examined] = []
     findings: list[Sequence[RunFinding]] = []
@@ -76,7 +76,7 @@ def _examined(cleaned: Cleaned) -> tuple[list[RockingRun], list[str]]:
         try:
             first_pass = known.get(place) or examine(run, reference)
         except CannotDiagnose as problem:
-            if len(inspected.runs) == 1:
+            if len(inspected.runs) == 1 and not stated:
                 raise
             limits.append(f"Left out. {problem}")
             continue

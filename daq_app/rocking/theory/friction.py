@@ -64,17 +64,10 @@ def slips_below(
     half_s = np.arccosh(alpha / (alpha - peaks)) / p
     time_s = np.linspace(-1.0, 1.0, _STEPS + 1)[:, None] * half_s
     pushed = rotation_rad - alpha + (alpha - peaks) * np.cosh(p * time_s)
-    step_s = 2.0 * half_s / _STEPS
-    speed, slip = np.zeros(peaks.size) + begin, np.zeros(peaks.size)
-    acceleration = np.zeros_like(time_s)
-    for place in range(_STEPS):
-        middle = 0.5 * (pushed[place] + pushed[place + 1])
-        faster = np.maximum(speed + middle * step_s, 0.0)
-        acceleration[place] = np.where((speed > 0.0) | (pushed[place] > 0.0), pushed[place], 0.0)
-        slip += 0.5 * (speed + faster) * step_s
-        speed = faster
+    speeds, way = _slides(pushed, 2.0 * half_s / _STEPS, np.zeros(peaks.size) + begin)
+    acceleration = np.where((speeds > 0.0) | (pushed > 0.0), pushed, 0.0)
     acceleration[-1] = np.maximum(pushed[-1], 0.0)
-    return Slips(time_s, acceleration, speed, slip)
+    return Slips(time_s, acceleration, speeds[-1], way[-1])
 
 
 def slips_as_it_rocks(
@@ -85,10 +78,15 @@ def slips_as_it_rocks(
     The edge speeds up as in `slips_below`. `below_rad`, `begin`: (k,) rotation below which it slips, and the
     speed with which the impact leaves it, rad s.
     """
-    pushed = (below_rad - rotations_rad[:, None]) * step_s
-    speeds = np.empty_like(pushed)
-    speed = begin
-    for place, more in enumerate(pushed):
-        speed = np.maximum(speed + more, 0.0)
-        speeds[place] = speed
-    return speeds, np.cumsum(speeds, axis=0) * step_s
+    return _slides(below_rad - rotations_rad[:, None], step_s, begin)
+
+
+def _slides(pushed: Floats, step_s: Floats | float, begin: Floats) -> tuple[Floats, Floats]:
+    """Speed and way, (n, k), of edges with these accelerations outwards, (n, k), as long as they slip."""
+    faster = 0.5 * (pushed[1:] + pushed[:-1]) * step_s
+    speeds, way = np.empty_like(pushed), np.zeros_like(pushed)
+    speeds[0] = begin
+    for place, more in enumerate(faster, start=1):
+        speeds[place] = np.maximum(speeds[place - 1] + more, 0.0)
+    way[1:] = np.cumsum(0.5 * (speeds[1:] + speeds[:-1]) * step_s, axis=0)
+    return speeds, way

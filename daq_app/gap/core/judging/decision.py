@@ -122,8 +122,9 @@ def _null(evidence: Evidence, policy: Policy) -> tuple[Decision, str]:
     # What the runs themselves speak for, and only its rarity against, is more than nothing.
     least = evidence.best.first.log_evidence + policy.improved_nats
     shown = [a for a in rivals if a.first.log_evidence > least]
-    if evidence.best.probability < policy.null_probability or shown:
-        weak = (shown or rivals)[0]
+    candidates = shown or (rivals if evidence.best.probability < policy.null_probability else [])
+    if candidates:
+        weak = candidates[0]
         sentence = (
             f"Nothing is missing that these runs show (probability {probability:.2f}); "
             f"{describe(weak, evidence.library)} (probability {weak.probability:.2f}) is below detection"

@@ -93,20 +93,18 @@ def without_slip(cleaned: Cleaned, slip: BaseSlip) -> Cleaned:
 
     Runs in which the wall cannot be followed are left as they are.
     """
-    examined: dict[int, Examined] = {}
-    for place, run in enumerate(cleaned.runs):
+    examined: list[Examined | None] = []
+    for run in cleaned.runs:
         try:
-            examined[place] = examine(run)
+            examined.append(examine(run))
         except CannotDiagnose:
-            continue
-    seen = list(examined.values())
-    tests, grids = [e.run for e in seen], [e.features.grid for e in seen]
+            examined.append(None)
+    tests = [e.run for e in examined if e is not None]
+    grids = [e.features.grid for e in examined if e is not None]
     again = by_whole_tests(tests, grids, slip_of(tests, grids) or slip)
     runs = [
-        without_walk(run, (e := examined[place]).run, e.features.grid, again)
-        if place in examined
-        else replace(run, slip=again)
-        for place, run in enumerate(cleaned.runs)
+        replace(run, slip=again) if e is None else without_walk(run, e.run, e.features.grid, again)
+        for run, e in zip(cleaned.runs, examined, strict=True)
     ]
     return replace(cleaned, runs=runs)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from daq_app.gap.rocking_model.tolerances.walls import SLIP_LEFT_OPEN, SLIP_TO_F
 from daq_app.rocking.families.base.slip import BaseSlip
 from daq_app.rocking.theory.friction import Slips, slips_below
 from sim_hardware.dynamics import shooting
+
+_MOST_TAKEN: Final = 0.9
+"""Share of its speed that a slip takes from a wall at most: to first order it could be all of it."""
 
 
 def on_its_base(run: RockingRun) -> RockingRun:
@@ -54,6 +58,7 @@ def slip_effects(run: RockingRun, slip: BaseSlip) -> FloatArray:
     jumps = p**2 / G_M_S2 * math.cos(alpha) * ((along * slips.end)[k - 1] + (along * begin)[k])
     # In proportion to the speed that the wall has: jumps are as large as the speeds of the last half-cycles.
     before, after = table[k - 1, shooting.SPEED_OUT] / speeds[k - 1], table[k, shooting.SPEED_IN] / speeds[k]
+    before, after = (np.maximum(share, -_MOST_TAKEN) for share in (before, after))
     moved[count:last, 0] = (np.log1p(before) - np.log1p(after)) / slopes
     moved[count:last, 1] = -np.log1p(jumps / speeds[k]) / slopes
     return moved

@@ -7,7 +7,7 @@ before the next one. The rotation is as small there as here, so that no calibrat
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -20,9 +20,6 @@ Floats = NDArray[np.float64]
 
 _BELOW: Final = np.geomspace(0.01, 0.4, 16)
 """Rotations, over α, that are tried as the one below which a base slips."""
-_BEGINS_S2: Final = (0.0, 2e-4, 4e-4, 8e-4, 1.6e-3)
-"""Speeds of a slip just after an impact that are tried, over the speed of the impact and the acceleration for
-each rad."""
 _FEWEST: Final = 7
 """Number of half-cycles from which the law is fitted: three more than it has coefficients."""
 _NOISE: Final = 2e-5
@@ -87,7 +84,8 @@ class BaseSlip:
     """Largest turn between two impacts."""
     turn_sd_rad: float
     begins_s2: float = 0.0
-    """Speed with which an impact leaves it, over that of the impact and over the acceleration, s²."""
+    """Speed with which an impact leaves it, over that of the impact and over the acceleration, s²; 0 where
+    half-cycles alone are known, which do not tell it."""
 
     @property
     def turns(self) -> bool:
@@ -100,61 +98,20 @@ def find_slip(seen: HalfCycleSlips, alpha_rad: float, p_rad_s: float, r0_m: floa
     if seen.side.size < _FEWEST:
         return None
     least, most = (share * p_rad_s**2 * r0_m for share in (_SLOWEST, _FASTEST))
-
-    def best(belows: Iterable[float], begins: Iterable[float]) -> _Law | None:
-        laws = (_law(seen, below, begin, alpha_rad, p_rad_s) for below in belows for begin in begins)
-        found = [law for law in laws if law.along.stands_out and least < law.faster < most]
-        return max(found, key=lambda law: law.gained, default=None)
-
-    # Friction that an impact overcomes is told on top of what it does between impacts.
-    tried = (_BELOW * alpha_rad).tolist()
-    law = best(tried, _BEGINS_S2) if best(tried, _BEGINS_S2[:1]) is not None else None
-    if law is None:
-        return None
-    (slip_m, slip_sd_m), (turn_rad, turn_sd_rad) = (
-        (law.largest * size, law.largest * sd) for size, sd in (law.along.largest, law.turn.largest)
-    )
-    return BaseSlip(
-        below_rad=law.below_rad,
-        friction=push(law.below_rad, alpha_rad, p_rad_s, r0_m),
-        along=law.along.sizes,
-        turning=law.turn.sizes,
-        slip_m=slip_m,
-        slip_sd_m=slip_sd_m,
-        turn_rad=turn_rad,
-        turn_sd_rad=turn_sd_rad,
-        begins_s2=law.begins_s2,
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class _Law:
-    """The law for one rotation and one beginning, fitted to half-cycles."""
-
-    below_rad: float
-    begins_s2: float
-    along: _Fitted
-    turn: _Fitted
-    largest: float
-    """Largest slip of a half-cycle for an acceleration of 1 m/s² for each rad, rad s²."""
-
-    @property
-    def gained(self) -> float:
-        """How sure it is, as a chi-square."""
-        return self.along.sure**2 + self.turn.sure**2
-
-    @property
-    def faster(self) -> float:
-        """Acceleration for each rad of the edge whose slip is the surer, m/s²."""
+    best: tuple[float, float, _Fitted, _Fitted] | None = None
+    gain = 0.0
+    for below in (_BELOW * alpha_rad).tolist():
+        law = slips_below(below, seen.peak_rad, alpha_rad, p_rad_s).slip
+        along, turn = (_fitted(law, seen, series) for series in (seen.along_m, seen.turn_rad))
+        gained = along.sure**2 + turn.sure**2
         # A wire at fault turns the base about nothing; slow wires would have it slip faster than it can.
-        return float(self.along.sizes[self.along.place])
-
-
-def _law(seen: HalfCycleSlips, below_rad: float, begins_s2: float, alpha_rad: float, p_rad_s: float) -> _Law:
-    begin = begins_s2 * seen.speed_rad_s
-    slips = slips_below(below_rad, seen.peak_rad, alpha_rad, p_rad_s, begin).slip
-    along, turn = (_fitted(slips, seen, series) for series in (seen.along_m, seen.turn_rad))
-    return _Law(below_rad, begins_s2, along, turn, float(slips.max()))
+        if gained > gain and along.stands_out and least < along.sizes[along.place] < most:
+            best, gain = (below, float(law.max()), along, turn), gained
+    if best is None:
+        return None
+    below, largest, along, turn = best
+    sizes = (largest * size for fit in (along, turn) for size in fit.largest)
+    return BaseSlip(below, push(below, alpha_rad, p_rad_s, r0_m), along.sizes, turn.sizes, *sizes)
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ from daq_app.rocking.theory.friction import push, slips_as_it_rocks
 _AROUND: Final = np.geomspace(0.5, 1.4, 10)
 """Rotations below which the base slips that are tried, over that which half-cycles show."""
 _BEGINS_S2: Final = (0.0, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3)
-"""Speeds of a slip just after an impact that are tried (`BaseSlip.begins_s2`)."""
+"""Speeds of a slip just after an impact that are tried, as `BaseSlip` has them."""
 _SETTLED_S: Final = 0.3
 """Time before the release from which on the base is looked at."""
 _SHORTEST: Final = 4
