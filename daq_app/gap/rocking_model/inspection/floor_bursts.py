@@ -21,7 +21,7 @@ from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
 from daq_app.gap.rocking_model.tolerances.sensors import SPREAD_ALONG_M
-from daq_app.gap.rocking_model.tolerances.walls import BURST_SD, SHAKEN_POWER
+from daq_app.gap.rocking_model.tolerances.walls import BURST_SD, SHAKEN_POWER, USUAL_POWER
 
 WINDOW_S = 0.5
 """Half-cycles whose middles are this near count together …"""
@@ -30,8 +30,6 @@ _ENOUGH = 60
 _SHORTEST = 40
 """Samples of the grid that a half-cycle must have: in a shorter one a smooth curve takes up a vibration, and
 the rotation's own second derivative is not known well enough."""
-_USUAL = 3.0
-"""Power over the usual one up to which a half-cycle says what is usual."""
 _ROUNDS = 12
 _ALIKE = 7
 """Half-cycles, those after the nearest jumps, that say what such a jump usually leaves."""
@@ -147,5 +145,5 @@ def _usual(jump: FloatArray, power: FloatArray) -> tuple[float, float]:
         parts, _ = nnls((columns / usual[:, None])[kept], (power / usual)[kept])
         usual = np.maximum(columns @ parts, 1e-3 * float(np.median(power)))
         ratio = power / usual
-        kept = ratio < _USUAL * float(np.median(ratio))
+        kept = ratio < USUAL_POWER * float(np.median(ratio))
     return float(parts[0]), float(parts[1])

@@ -14,11 +14,9 @@ from daq_app.gap.rocking_model.features.shapes import with_play
 from daq_app.gap.rocking_model.inspection.channel_families import ChannelFamily, alike_in_all, beside
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances.inspection import PLAY_GAIN, PLAY_M
+from daq_app.gap.rocking_model.tolerances.inspection import PLAY_GAIN, PLAY_M, PLAY_STEPS
 
 _PLAYS_M = np.geomspace(PLAY_M, 16.0 * PLAY_M, 9)
-_OVER_STEPS = 2.0
-"""Steps of a reading up to which play is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +44,7 @@ def plays(
         seen = [_play(family, name, without) for family in data]
         explained, size_m = np.median([(play.explained, play.size_m) for play in seen], axis=0)
         step_m = max(steps_m.get("wire", 0.0), steps_m.get(name, 0.0))
-        if explained < PLAY_GAIN or size_m < max(PLAY_M, _OVER_STEPS * step_m):
+        if explained < PLAY_GAIN or size_m < max(PLAY_M, PLAY_STEPS * step_m):
             continue
         for row, play in zip(findings, seen, strict=True):
             row.append(RunFinding(f"play@{name}", "play", "m", play.size_m, play.sd_m))

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.tolerances.motion import FALLEN, SWAYS_ON
+from daq_app.gap.rocking_model.tolerances.motion import FALLEN, START_LEAVES, SWAYS_ON
 
 _FALL: Final = (0.05, 0.3)
 """Shares of the held rotation between which a fall is seen whatever the wall swayed by before it."""
@@ -21,8 +21,6 @@ _SWAY_S: Final = 0.1
 """Time before the release, s, over which a sway of less than 3 Hz is a cubic."""
 _FALLS_S: Final = 0.1
 """Time after the release, s, that a fall is seen in at least."""
-_EXPLAINED: Final = 0.01
-"""Variance that a start leaves over the most that any leaves, 1, below which it explains the fall."""
 _COARSE: Final = 4
 """Readings from one start to the next before those beside the best are looked at."""
 _WORK_HZ: Final = 500.0
@@ -91,7 +89,7 @@ def _let_go(size: FloatArray, held: float, fallen: int, p_rad_s: float, rate_hz:
 
     coarse = starts[::_COARSE]
     left = np.array([left_by(start) for start in coarse])
-    lowest = (left[1:-1] <= left[:-2]) & (left[1:-1] < left[2:]) & (left[1:-1] < _EXPLAINED * left.max())
+    lowest = (left[1:-1] <= left[:-2]) & (left[1:-1] < left[2:]) & (left[1:-1] < START_LEAVES * left.max())
     if not lowest.any():
         return float(top)
     middle = _COARSE * (1 + int(np.argmax(lowest)))

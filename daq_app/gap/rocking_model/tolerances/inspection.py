@@ -290,6 +290,12 @@ PLAY_GAIN = 0.5
 In development laboratories sound wires stay below 0.2. Raising it hides loose drums in noise.
 """
 
+PLAY_STEPS = 2.0
+"""Play over the step of a reading, 1, up to which it is none: a reading in steps stands still as well.
+
+Raising it hides loose drums in coarse readings.
+"""
+
 TURNED = 0.03
 """Share of the rotation, 1, that a second axis may show: a mount that is turned by 1.7° (assumed).
 

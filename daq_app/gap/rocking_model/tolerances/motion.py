@@ -45,6 +45,13 @@ SWAYS_ON = 5e-4
 Raising it takes a sway for the start of the fall.
 """
 
+START_LEAVES = 0.01
+"""Variance that a start of the fall leaves over the most that any leaves, 1, up to which it may be the
+release (assumed).
+
+Raising it takes swings of the sway for the release.
+"""
+
 SURELY_HELD_S = 0.25
 """Time before the release, s, up to which a wall does nothing but sway (assumed).
 

@@ -39,6 +39,12 @@ their slip.
 Raising it hides causes in slips.
 """
 
+BASE_NOISE_M = 1e-4
+"""Noise, m, of the motion of the base by the wires on the grid, for the law of friction (assumed).
+
+Raising it fits the law to fast slips alone.
+"""
+
 # -- impacts ---------------------------------------------------------------------------------------
 MIDDLE_OF_IMPACT_S = 1.5e-3
 """Time, s, from the contact to the middle of an impact, by which accelerometers seem late that are not.
@@ -116,6 +122,12 @@ SHAKEN_POWER = 4.0
 """Power over the usual one, 1, averaged over a second, from which the floor shook: twice the amplitude.
 
 Raising it hides weak bursts.
+"""
+
+USUAL_POWER = 3.0
+"""The same, 1, of one half-cycle, up to which that half-cycle says what is usual (assumed).
+
+Raising it takes bursts for what is usual.
 """
 
 BURST_SD = 0.1

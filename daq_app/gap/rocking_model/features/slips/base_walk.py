@@ -20,7 +20,7 @@ from daq_app.gap.rocking_model.features.slips.base_slip import base_motion
 from daq_app.gap.rocking_model.motion.motion_grid import SMOOTH_HZ, Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances.walls import SLIP_LEFT_OPEN
+from daq_app.gap.rocking_model.tolerances.walls import BASE_NOISE_M, SLIP_LEFT_OPEN
 from daq_app.rocking.families.base.slip import BaseSlip
 from daq_app.rocking.theory.friction import push, slips_as_it_rocks
 
@@ -32,8 +32,6 @@ _SETTLED_S: Final = 0.3
 """Time before the release from which on the base is looked at."""
 _SHORTEST: Final = 4
 """Number of samples of the grid in the shortest half-cycle that is looked at."""
-_NOISE_M: Final = 1e-4
-"""Noise of the base's motion by the wires, on the grid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,9 +149,9 @@ def _with_rotation(theta: FloatArray) -> FloatArray:
 
 def _factors(laws: FloatArray, others: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Factor of each law (k, n), near 1, and sizes of the columns `others` (n, j), by least squares."""
-    design = np.column_stack([laws.T, others]) / _NOISE_M
+    design = np.column_stack([laws.T, others]) / BASE_NOISE_M
     near = np.eye(len(laws), design.shape[1]) / SLIP_LEFT_OPEN
-    wanted = np.append(seen / _NOISE_M, np.full(len(laws), 1.0 / SLIP_LEFT_OPEN))
+    wanted = np.append(seen / BASE_NOISE_M, np.full(len(laws), 1.0 / SLIP_LEFT_OPEN))
     sizes = np.linalg.lstsq(np.vstack([design, near]), wanted, rcond=None)[0]
     return sizes[: len(laws)], sizes[len(laws) :]
 
