@@ -9,6 +9,7 @@ release is the state that the rocking begins from.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -118,22 +119,21 @@ class _Process:
     @classmethod
     def of(cls, time_s: FloatArray, seen: FloatArray, noise: float) -> _Process:
         """The one under which `seen`, (n,), at `time_s` is most likely; its noise is at least `noise`."""
-        best, found = -np.inf, cls(0.0, float(_SCALES_S[-1]), noise)
         off = seen - seen.mean()
-        apart = time_s[:, None] - time_s
-        for scale in _SCALES_S:
-            values, vectors = np.linalg.eigh(_matern(apart, scale) + _LEVEL)
-            along = (off @ vectors) ** 2
-            for ratio in _RATIOS:
-                spread = ratio * np.maximum(values, 0.0) + 1.0
-                variance = max(float(np.mean(along / spread)), noise**2)
-                likelihood = -0.5 * float(
-                    np.sum(along / spread) / variance + np.sum(np.log(spread)) + off.size * np.log(variance)
-                )
-                if likelihood > best:
-                    best = likelihood
-                    found = cls(float(np.sqrt(ratio * variance)), float(scale), float(np.sqrt(variance)))
-        return found
+        found = []
+        # Rounded to a picosecond: releases between samples move the times of all means alike.
+        spectra = _spectra(seen.size, round(float(time_s[1] - time_s[0]), 12))
+        for scale, (values, vectors) in zip(_SCALES_S, spectra, strict=True):
+            spread = _RATIOS[:, None] * values + 1.0
+            squares = (off @ vectors) ** 2 / spread
+            variance = np.maximum(squares.mean(axis=1), noise**2)
+            likelihood = -0.5 * (
+                squares.sum(axis=1) / variance + np.log(spread).sum(axis=1) + off.size * np.log(variance)
+            )
+            k = int(np.argmax(likelihood))
+            sway, noisy = np.sqrt(_RATIOS[k] * variance[k]), np.sqrt(variance[k])
+            found.append((float(likelihood[k]), cls(float(sway), float(scale), float(noisy))))
+        return max(found, key=lambda entry: entry[0])[1]
 
     @property
     def sway_speed(self) -> float:
@@ -168,6 +168,14 @@ class _Process:
         weights = np.linalg.solve(covariance + self.noise**2 * np.eye(seen.size), across.T).T
         left = variance - np.sum(weights * across, axis=1)
         return weights @ (seen - seen.mean()), np.sqrt(np.maximum(left, 0.0))
+
+
+@lru_cache(maxsize=64)
+def _spectra(count: int, apart_s: float) -> list[tuple[FloatArray, FloatArray]]:
+    """Eigenvalues (n,) and eigenvectors (n, n) of the covariance of evenly spaced means, for each scale."""
+    apart = apart_s * np.subtract.outer(np.arange(count), np.arange(count))
+    spectra = (np.linalg.eigh(_matern(apart, scale) + _LEVEL) for scale in _SCALES_S)
+    return [(np.maximum(values, 0.0), vectors) for values, vectors in spectra]
 
 
 def _matern(apart_s: FloatArray, scale_s: float) -> FloatArray:
