@@ -78,6 +78,15 @@ class Linear:
         """Posterior covariance of the unknowns in unit coordinates, (p, p)."""
         return dense.solve(self.factor, np.eye(len(self.problem)))
 
+    @cached_property
+    def lowest(self) -> float:
+        """Half the squares of unknowns and of weighted white residuals at the lowest point without bounds."""
+        here = float(self.u @ self.u) + sum(
+            run.features.independent_fraction * float(white[:, -1] @ white[:, -1])
+            for run, white in zip(self.problem.runs, self.white, strict=True)
+        )
+        return 0.5 * here - 0.5 * float(self.gradient @ dense.solve(self.factor, self.gradient))
+
     def free(self, gradient: FloatArray, u: FloatArray) -> Mask:
         """Unknowns, (p,), that the gradient does not press against a bound at `u`."""
         low, high = self.problem.low, self.problem.high

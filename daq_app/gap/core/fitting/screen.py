@@ -213,12 +213,7 @@ class _Attached:
                 break
         reached = self._reached + float(self.slope @ move) + 0.5 * float(move @ self.own @ move)
         linear = self.linear
-        without = 0.5 * float(linear.u @ linear.u) + 0.5 * sum(
-            run.features.independent_fraction * float(white[:, -1] @ white[:, -1])
-            for run, white in zip(self.problem.runs, linear.white, strict=True)
-        )
-        without -= 0.5 * float(linear.gradient @ dense.solve(linear.factor, linear.gradient))
-        gain = without - reached
+        gain = linear.lowest - reached
         moved = linear.u - dense.solve(self._factor, self._slope_base + self._across @ move)
         own = [self.problem.unknowns[k] for k in self.unknowns]
         ends = zip(
