@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from daq_app.config import Rig, Scaling, load_rig
 from daq_app.gap.blind.world.campaign import PlannedRun, World, draw_world
 from daq_app.gap.blind.world.effects.catalogue import ENTRIES, Drawn, draw
-from daq_app.gap.blind.world.sensors.chain import Place, quiet_signals
-from daq_app.gap.blind.world.sensors.faults import ELECTRONICS
+from daq_app.gap.blind.world.sensors.chain import Place, quiet_signals, within_range
+from daq_app.gap.blind.world.sensors.faults import ELECTRONICS, Fault
 from daq_app.gap.blind.world.wall import Wall
 
 THETA0 = 0.05
@@ -97,6 +97,14 @@ def test_an_accelerometer_feels_height_times_angular_acceleration(rig: Rig) -> N
     arm = x - rig.specimen.base_width_m / 2.0
     expected = theta_dd * z - omega**2 * arm - 9.80665 * np.sin(theta)
     assert row(rig, found, "AC-4")[falling] == pytest.approx(expected[falling], abs=1e-9)
+
+
+def test_reversed_leads_reverse_the_range_of_a_sensor_as_well(rig: Rig) -> None:
+    lvdt, signal = rig.channel("LV-B12"), np.linspace(-0.2, 0.2, 401)
+    sound = within_range(signal, lvdt, ())
+    assert (sound.min(), sound.max()) == lvdt.range_si
+    turned = within_range(-signal, lvdt, (Fault("polarity", {"on": 1.0}, ("LV-B12",)),))
+    np.testing.assert_array_equal(turned, -sound)
 
 
 @pytest.mark.parametrize("name", ["lag", "filter_delay", "slow_response"])

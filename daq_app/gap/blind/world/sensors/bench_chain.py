@@ -11,7 +11,13 @@ from scipy.signal import lfilter
 from daq_app.config import Scaling
 from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.events.scene import Scene
-from daq_app.gap.blind.world.sensors.chain import Calibration, Place, clipped_readings, quiet_signals
+from daq_app.gap.blind.world.sensors.chain import (
+    Calibration,
+    Place,
+    clipped_readings,
+    quiet_signals,
+    within_range,
+)
 from daq_app.gap.blind.world.sensors.faults import Bench, Fault, through_electronics
 from daq_app.gap.blind.world.sensors.installation import Installation, Sizes
 
@@ -53,7 +59,7 @@ def bench_readings(
         signal += installation.noise_si[row] * added
         bench = Bench(channel, scene, rate_hz, place.campaign_s, place.largest_rad, rng)
         signal = through_electronics(signal, faults, bench)
-        rows[row] = np.clip(signal, *channel.range_si) + calibration.zero_si[row]
+        rows[row] = within_range(signal, channel, faults) + calibration.zero_si[row]
     volts = clipped_readings(rig, Scaling.of(rig.channels).to_readings(rows))
     steps = installation.step_v[:, None]
     return np.asarray(np.round(volts / steps) * steps)

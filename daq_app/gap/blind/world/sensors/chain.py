@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from daq_app.config import Rig, Scaling
+from daq_app.config.rig import Channel
 from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.events.scene import Scene
 from daq_app.gap.blind.world.sensors.faults import RESPONSES, Bench, Fault, through_electronics
@@ -99,9 +100,17 @@ def readings(
         signal += channel.noise_si * (noise + walk)
         bench = Bench(channel, scene, rate_hz, place.campaign_s, place.largest_rad, rng)
         signal = through_electronics(signal, faults, bench)
-        rows[row] = np.clip(signal, *channel.range_si) + calibration.zero_si[row]
+        rows[row] = within_range(signal, channel, faults) + calibration.zero_si[row]
     steps = np.array([ADC_STEP_V if c.measurement == "voltage" else 1e-7 for c in rig.channels])[:, None]
     return np.asarray(np.round(clipped_readings(rig, scaling.to_readings(rows)) / steps) * steps)
+
+
+def within_range(signal: FloatArray, channel: Channel, faults: Sequence[Fault]) -> FloatArray:
+    """A reading (n,), SI, as far as its sensor goes: where its leads are reversed, its range is as well."""
+    low, high = channel.range_si
+    if any(fault.name == "polarity" and channel.id in fault.targets for fault in faults):
+        low, high = -high, -low
+    return np.clip(signal, low, high)
 
 
 def clipped_readings(rig: Rig, volts: FloatArray) -> FloatArray:
