@@ -7,7 +7,14 @@ from typing import Final
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.tolerances.motion import FALLEN, START_LEAVES, SWAYS_ON
+from daq_app.gap.rocking_model.tolerances.motion import (
+    FALLEN,
+    HARDLY_RISES,
+    RISEN,
+    RISES,
+    START_LEAVES,
+    SWAYS_ON,
+)
 
 _FALL: Final = (0.05, 0.3)
 """Shares of the held rotation between which a fall is seen whatever the wall swayed by before it."""
@@ -21,6 +28,8 @@ _SWAY_S: Final = 0.1
 """Time before the release, s, over which a sway of less than 3 Hz is a cubic."""
 _FALLS_S: Final = 0.1
 """Time after the release, s, that a fall is seen in at least."""
+_FEWEST: Final = 8
+"""Readings of a rise and fall from which its motion is fitted."""
 _COARSE: Final = 4
 """Readings from one start to the next before those beside the best are looked at."""
 _WORK_HZ: Final = 500.0
@@ -38,7 +47,8 @@ def release_sample(
 
     The held rotation is that of the last moments before the fall: a hand that sways and a zero that walks
     move it by more than the first part of the fall does. Where a sway is as large as that, the release is
-    where the acceleration leaves that of the sway for that of the fall, whatever the rotation there.
+    where the acceleration leaves that of the sway for that of the fall, whatever the rotation there. A wall
+    that is thrown up is let go where its rise begins, not at its top.
     """
     size = np.abs(smooth[:first_crossing])
     fallen = int(np.flatnonzero(size > FALLEN * size.max())[-1])
@@ -46,6 +56,9 @@ def release_sample(
     hold = size[first : max(last, first + 1)]
     held = float(np.median(hold))
     swaying = size[max(fallen - round(_SWAYS_S * rate_hz), 0) : max(last, first + 1)]
+    thrown = _thrown_up(size[first : fallen + 1], held, RISES * float(np.std(swaying)))
+    if thrown is not None:
+        return first + thrown
     if float(np.std(swaying)) > SWAYS_ON * held:
         return _let_go(size, held, fallen, p_rad_s, rate_hz)
     moved = held - size
@@ -57,6 +70,24 @@ def release_sample(
         return float(start)
     slope, intercept = np.polyfit(window, np.sqrt(np.maximum(moved[window], 0.0)), 1)
     return float(max(-intercept / slope, 0.0)) if slope > 0.0 else float(start)
+
+
+def _thrown_up(size: FloatArray, held: float, least: float) -> float | None:
+    """Sample of `size`, (n,), rad, at which a wall leaves its hold upwards; None where it rises by less.
+
+    From there until it passes its hold again it moves as a stone that is thrown up, |θ₀| + ω t − ½ a t².
+    """
+    top = int(np.argmax(size))
+    if size[top] - held < max(least, HARDLY_RISES * held):
+        return None
+    above = size > held + RISEN * (size[top] - held)
+    begin, end = (int(np.argmin(above[top::step])) for step in (-1, 1))
+    around = np.arange(1 - begin, end)
+    if not begin or not end or around.size < _FEWEST:
+        return None
+    bend, slope, level = np.polyfit(around, size[top + around] - held, 2)
+    under = slope**2 - 4.0 * bend * level
+    return float(top + (np.sqrt(under) - slope) / (2.0 * bend)) if bend < 0.0 < under else None
 
 
 def _let_go(size: FloatArray, held: float, fallen: int, p_rad_s: float, rate_hz: float) -> float:

@@ -45,6 +45,20 @@ SWAYS_ON = 5e-4
 Raising it takes a sway for the start of the fall.
 """
 
+RISES = 6.0
+"""Rise of a wall beyond its hold over the rms sway of the hold, 1, from which it was thrown up (assumed).
+
+Raising it times the release of weakly thrown walls at the top of their rise.
+"""
+
+HARDLY_RISES = 1e-3
+"""The same over the held rotation, 1, that what holds a wall and the noise of its readings may make of it
+(assumed). Raising it does the same.
+"""
+
+RISEN = 0.3
+"""Share of its rise, 1, from which on the way of such a wall is read: less is lost in sway and noise."""
+
 START_LEAVES = 0.01
 """Variance that a start of the fall leaves over the most that any leaves, 1, up to which it may be the
 release (assumed).

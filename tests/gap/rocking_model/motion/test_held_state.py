@@ -94,3 +94,11 @@ def test_a_wall_is_let_go_where_its_sway_ends_and_not_where_its_fall_has_its_top
     rng = np.random.default_rng(3)
     off_s = [late_s(let_go(rng, share, alpha_rad)) for _ in range(20)]
     assert np.percentile(np.abs(off_s), 90) < 0.005
+
+
+@pytest.mark.parametrize(("share", "thrown_rad_s"), [(3e-4, 0.02), (3e-4, 0.04), (3e-3, 0.04)])
+def test_a_wall_that_is_thrown_up_is_let_go_where_its_rise_begins(share: float, thrown_rad_s: float) -> None:
+    """The top of its rise is 30 to 70 ms after the release."""
+    rng = np.random.default_rng(4)
+    off_s = [late_s(let_go(rng, share, 0.2, thrown_rad_s)) for _ in range(20)]
+    assert np.percentile(np.abs(off_s), 90) < 0.006
