@@ -30,6 +30,7 @@ _ALPHAS_RAD = (0.2, 0.09)
 _SHARES = (3e-4, 1e-3, 3e-3, 1e-2)
 """Amplitude of the first harmonic over the held rotation."""
 _THROWN_RAD_S = (0.01, 0.02, 0.04)
+"""Speeds away from upright of walls that are thrown up."""
 
 
 def let_go(rng: np.random.Generator, share: float, alpha_rad: float, thrown_rad_s: float = 0.0) -> FloatArray:
@@ -66,7 +67,10 @@ def _top_late_s(smooth: FloatArray) -> float:
 
 def main() -> int:
     """Print the table."""
-    print("| held at, of α | sway over it | thrown up by, mrad/s | release off by, ms: rms; 95 % | top, ms |")
+    print(
+        "| held at, of α | sway over it | thrown up by, mrad/s "
+        "| release off by, ms: rms; 95 % | top of the fall off by, ms |"
+    )
     print("|---|---|---|---|---|")
     drawn = [(share, 0.0) for share in _SHARES] + [(_SHARES[0], thrown) for thrown in _THROWN_RAD_S]
     for alpha, (share, thrown) in itertools.product(_ALPHAS_RAD, drawn):

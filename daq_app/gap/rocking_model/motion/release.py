@@ -73,7 +73,7 @@ def release_sample(
 
 
 def _thrown_up(size: FloatArray, held: float, least: float) -> float | None:
-    """Sample of `size`, (n,), rad, at which a wall leaves its hold upwards; None where it rises by less.
+    """Sample of `size`, (n,), rad, at which a wall leaves its hold and rises by `least`, rad; None for less.
 
     From there until it passes its hold again it moves as a stone that is thrown up, |θ₀| + ω t − ½ a t².
     """

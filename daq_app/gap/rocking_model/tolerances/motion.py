@@ -52,12 +52,16 @@ Raising it times the release of weakly thrown walls at the top of their rise.
 """
 
 HARDLY_RISES = 1e-3
-"""The same over the held rotation, 1, that what holds a wall and the noise of its readings may make of it
-(assumed). Raising it does the same.
+"""The same over the held rotation, 1, up to which a cable and the noise of readings may make it (assumed).
+
+Raising it times the release of weakly thrown walls at the top of their rise.
 """
 
 RISEN = 0.3
-"""Share of its rise, 1, from which on the way of such a wall is read: less is lost in sway and noise."""
+"""Share of its rise, 1, from which on the motion of such a wall is fitted (assumed).
+
+Raising it leaves fewer readings, lowering it lets the sway and the noise of the hold into the fit.
+"""
 
 START_LEAVES = 0.01
 """Variance that a start of the fall leaves over the most that any leaves, 1, up to which it may be the
