@@ -92,8 +92,8 @@ def _examined(cleaned: Cleaned, stated: Sequence[str]) -> tuple[list[RockingRun]
     runs_of_all = completed(examined, findings_of_all, channels, inspected.wiring)
     whole = [on_its_base(on_its_floor(run)) for run in runs_of_all]
     limits += [
-        f"{name} disagrees with the other {family} channels; it is examined on its own."
-        for name, family in channels.items()
+        f"{name} disagrees with the other {lone.family} channels; it is examined on its own."
+        for name, lone in channels.items()
     ]
     return whole, limits
 

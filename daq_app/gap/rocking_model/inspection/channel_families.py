@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -12,14 +12,15 @@ from scipy.signal import oaconvolve
 
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.channel_shapes import FURTHER, Others
-from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
+from daq_app.gap.rocking_model.features.channel_shapes import FURTHER, TOLERANCE, Others, shape_columns
+from daq_app.gap.rocking_model.features.noise import coefficient_covariance
+from daq_app.gap.rocking_model.motion.crosstalk import UNKNOWN_LEAK, Leak, crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rigid_body import across_axes
 from daq_app.gap.rocking_model.motion.rotation import coarse, gridded, sooner, wall_rotation, zeroed
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.tolerances.motion import AROUND_TEST_S
-from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, CROSSTALK, MOUNT_RAD
+from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, CROSSTALK, LEAKS_DIFFER, MOUNT_RAD
 
 _SMOOTH_S = 0.04
 """Window over which accelerations are averaged: with 30 ms of ringing it stays within the mask of 50 ms."""
@@ -40,6 +41,28 @@ class ChannelFamily:
     """What one sd of crosstalk from the channel that is scanned before adds to each signal; common to all."""
     turned: FloatArray | None = None
     """What a mount that is turned by one sd adds to each signal; each has an angle of its own."""
+    lateral_m: FloatArray | None = None
+    """Of wires: how far along the wall each is fixed, (k,)."""
+
+    def untwisted(self) -> ChannelFamily | None:
+        """The same of a wall that does not turn about the vertical; None of channels that cannot show it.
+
+        Of two wires beside each other this leaves their mean.
+        """
+        if self.lateral_m is None:
+            return None
+        motions = np.column_stack([self.design, self.lateral_m])
+        if np.linalg.matrix_rank(motions) < motions.shape[1]:
+            return None
+        turn = (np.linalg.pinv(motions) @ self.signals)[-1]
+        return replace(self, signals=self.signals - self.lateral_m[:, None] * turn)
+
+    def knowing(self, leak: Leak) -> ChannelFamily:
+        """The same of a family whose crosstalk was unknown: less what is known of it."""
+        if self.leaked is None:
+            return self
+        whole = self.leaked / CROSSTALK
+        return replace(self, signals=self.signals - leak.share * whole, leaked=leak.sd * whole)
 
 
 def channel_family(
@@ -69,6 +92,7 @@ def channel_family(
         further=FURTHER[family],
         leaked=CROSSTALK * crosstalk(run, chosen),
         turned=MOUNT_RAD * across_axes(run, grid, chosen) if family == "accelerometer" else None,
+        lateral_m=run.positions(chosen)[:, 1] if family == "wire" else None,
     )
 
 
@@ -141,6 +165,79 @@ def _usual_errors(data: ChannelFamily) -> FloatArray:
     usual = CALIBRATION * float(np.sqrt(np.mean(data.signals**2))) + 1e-300
     leaked = 0.0 if data.leaked is None else np.mean(data.leaked**2, axis=1)
     return np.asarray(np.sqrt(usual**2 + leaked) * np.ones(len(data.ids)))
+
+
+def leaks(data: Mapping[Family, Sequence[ChannelFamily]], run: GapRun) -> dict[Family, Leak]:
+    """What the other families say of the crosstalk in each, from its runs with a leak that is unknown.
+
+    It shows in a channel that is scanned after one of another family or face, whose signal is like nothing
+    that it shows itself. A family is not asked of its own: a wire whose anchor is off looks like crosstalk.
+    """
+    told = {family: _told(entries, run) for family, entries in data.items()}
+    return {
+        family: _joint(np.array([row for other, rows in told.items() if other != family for row in rows]))
+        for family in data
+    }
+
+
+def _told(entries: Sequence[ChannelFamily], run: GapRun) -> list[tuple[float, float]]:
+    """Share of crosstalk with its sd, 1, of each channel of a family that is scanned after another signal."""
+    rows = []
+    for name in sorted(set.intersection(*(set(entry.ids) for entry in entries))):
+        place = run.place(name)
+        before = run.before(place)
+        if before < 0 or _signal_of(run, before) == _signal_of(run, place):
+            continue
+        seen = np.array([_share(beside(entry, name, ()), run.sensors[place].family) for entry in entries])
+        if np.isfinite(seen).all() and (seen[:, 1] > 0.0).all():
+            # What sound channels differ by is the same in all runs: many know it no better than one.
+            rows.append((float(np.median(seen[:, 0])), float(np.median(seen[:, 1]))))
+    return rows
+
+
+def _signal_of(run: GapRun, place: int) -> tuple[str, bool]:
+    """What a channel shows: its family, of LVDTs the face."""
+    sensor = run.sensors[place]
+    return sensor.family, sensor.family == "lvdt" and sensor.position_m[0] > 0.0
+
+
+def _share(other: Others, family: Family) -> tuple[float, float]:
+    """Share of crosstalk in what a channel shows beyond the others, with its sd; NaN where none can show.
+
+    Generalised least squares with the shapes in which sound channels differ, by what they differ.
+    """
+    leaked = np.zeros(0) if other.imperfections is None else other.imperfections[0][other.pick] / CROSSTALK
+    if not leaked.any():
+        return np.nan, np.nan
+    columns = np.column_stack([shape_columns(other), leaked])
+    scale = np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
+    inverse = np.linalg.pinv(columns / scale, rcond=1e-9) / scale[:, None]
+    difference = (other.measured - other.expected)[other.pick]
+    values = inverse @ difference
+    covariance = coefficient_covariance(difference - columns @ values, inverse, other.pick, columns.shape[1])
+    k = len(TOLERANCE[family])
+    usual = np.diag((other.spread * np.array(TOLERANCE[family])) ** 2)
+    gain = np.linalg.solve(covariance[:k, :k] + usual, covariance[:k, -1])
+    variance = covariance[-1, -1] - gain @ covariance[:k, -1]
+    return float(values[-1] - gain @ values[:k]), float(np.sqrt(max(variance, 0.0)))
+
+
+def _joint(rows: FloatArray) -> Leak:
+    """One share from what channels say, (k, 2): each with its sd; with what they differ by beyond that.
+
+    The mean of random effects (DerSimonian and Laird 1986), beside what the table says. One channel alone
+    says nothing: an LVDT that does not stand where the rig file says looks like crosstalk as well.
+    """
+    if len(rows) < 2:
+        return UNKNOWN_LEAK
+    shares, weights = rows[:, 0], rows[:, 1] ** -2
+    mean = float(shares @ weights / weights.sum())
+    excess = float(weights @ (shares - mean) ** 2) - (shares.size - 1)
+    between = max(excess / float(weights.sum() - (weights**2).sum() / weights.sum()), 0.0)
+    between += (LEAKS_DIFFER * mean) ** 2
+    weights = 1.0 / (rows[:, 1] ** 2 + between)
+    known = weights.sum() + CROSSTALK**-2
+    return Leak(float(shares @ weights / known), min(float(np.sqrt(1.0 / known + between)), CROSSTALK))
 
 
 def smoothed(run: GapRun, chosen: Sequence[int], late_s: float = 0.0) -> FloatArray:

@@ -24,7 +24,8 @@ from daq_app.gap.rocking_model.features.channel_shapes import (
     deviation,
     usual_remains,
 )
-from daq_app.gap.rocking_model.inspection.channel_families import ChannelFamily, beside, channel_family
+from daq_app.gap.rocking_model.inspection.channel_families import ChannelFamily, beside, channel_family, leaks
+from daq_app.gap.rocking_model.motion.crosstalk import UNKNOWN_LEAK, Leak
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Wire, finer_step, zeroed
 from daq_app.gap.rocking_model.records import GapRun
@@ -46,10 +47,25 @@ SCREENED = 3
 
 
 @dataclass(frozen=True, slots=True)
+class Lone:
+    """A channel that is examined on its own."""
+
+    family: Family
+    leak: Leak
+    """What is known of the crosstalk in it."""
+    twisted: bool
+    """Whether the others of its family agree only beside a wall that turns about the vertical."""
+
+
+@dataclass(frozen=True, slots=True)
 class OutlierChannels:
     """Channels that disagree with their family: those of each family without which the others agree."""
 
     channels: dict[Family, tuple[str, ...]]
+    leaks: dict[Family, Leak]
+    """What the other families say of the crosstalk in each."""
+    twisted: frozenset[Family] = frozenset()
+    """Families that were compared beside a wall that turns about the vertical."""
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -57,10 +73,14 @@ class OutlierChannels:
         return tuple(name for names in self.channels.values() for name in names)
 
     @property
-    def single(self) -> dict[str, Family]:
-        """Those whose faults effects may explain one by one, each with its family."""
+    def single(self) -> dict[str, Lone]:
+        """Those whose faults effects may explain one by one."""
         few = {family: names for family, names in self.channels.items() if len(names) <= AS_SINGLE}
-        return {name: family for family, names in few.items() for name in names}
+        return {
+            name: Lone(family, self.leaks.get(family, UNKNOWN_LEAK), family in self.twisted)
+            for family, names in few.items()
+            for name in names
+        }
 
     @property
     def several(self) -> dict[Family, tuple[str, ...]]:
@@ -72,7 +92,7 @@ class OutlierChannels:
         if name is None:
             return self
         known = {*self.channels.get(family, ()), name}
-        return OutlierChannels({**self.channels, family: tuple(sorted(known))})
+        return replace(self, channels={**self.channels, family: tuple(sorted(known))})
 
 
 def find_outlier_channels(
@@ -82,25 +102,44 @@ def find_outlier_channels(
 
     `steps` are those of the families, m, whose readings go in steps.
     """
-    channels: dict[Family, tuple[str, ...]] = {}
+    families: dict[Family, list[ChannelFamily]] = {}
     for family in TOLERANCE:
         step = steps.get(family, 0.0)
         data = [channel_family(run, grid, family, step) for run, grid in zip(runs, grids, strict=True)]
-        usable = [d for d in data if d is not None]
-        if len(usable) < len(data) or not usable:
-            continue
-        some = usable[:: max(len(usable) // SCREENED, 1)][:SCREENED]
-        sizes = _sizes(some, family, ())
-        order = [n for n in sorted(sizes, key=lambda n: -sizes[n]) if sizes[n] > 0.5 * SUSPECT[family]]
-        if not order:
-            continue
-        several_ids = _outlier_set(usable, family)
-        single_id = None if several_ids else _single_outlier(usable, family, order[:LOOKED_AT])
-        if several_ids:
-            channels[family] = several_ids
-        elif single_id is not None:
-            channels[family] = (single_id,)
-    return OutlierChannels(channels)
+        present = [d for d in data if d is not None]
+        if present and len(present) == len(data):
+            families[family] = present
+    known = leaks({family: _some(data) for family, data in families.items()}, runs[0])
+    channels: dict[Family, tuple[str, ...]] = {}
+    twisted = set[Family]()
+    for family, of_runs in families.items():
+        usable = [entry.knowing(known[family]) for entry in of_runs]
+        names = _disagreeing(usable, family)
+        straight = [s for s in (entry.untwisted() for entry in usable) if s is not None]
+        if not names and len(straight) == len(usable):
+            # Of a wall that turns about the vertical no wire agrees with the others.
+            names = _disagreeing(straight, family)
+            twisted.update({family} if names else ())
+        if names:
+            channels[family] = names
+    return OutlierChannels(channels, known, frozenset(twisted))
+
+
+def _disagreeing(usable: Sequence[ChannelFamily], family: Family) -> tuple[str, ...]:
+    """The channels of a family without which the others agree; none where there are no such."""
+    sizes = _sizes(_some(usable), family, ())
+    order = [n for n in sorted(sizes, key=lambda n: -sizes[n]) if sizes[n] > 0.5 * SUSPECT[family]]
+    if not order:
+        return ()
+    if several := _outlier_set(usable, family):
+        return several
+    single = _single_outlier(usable, family, order[:LOOKED_AT])
+    return () if single is None else (single,)
+
+
+def _some(of_runs: Sequence[ChannelFamily]) -> Sequence[ChannelFamily]:
+    """Those of the runs that are looked at before all are."""
+    return of_runs[:: max(len(of_runs) // SCREENED, 1)][:SCREENED]
 
 
 def _single_outlier(usable: Sequence[ChannelFamily], family: Family, order: Sequence[str]) -> str | None:
@@ -240,11 +279,15 @@ def _straightened(data: ChannelFamily) -> ChannelFamily:
     return replace(data, signals=data.signals - kappa * data.signals**2)
 
 
-def channel_block(run: GapRun, grid: Grid, family: Family, name: str, step: float = 0.0) -> Block | None:
+def channel_block(run: GapRun, grid: Grid, name: str, lone: Lone, step: float = 0.0) -> Block | None:
     """The coefficients of one channel as a block of features; `step` as for `find_outlier_channels`."""
+    family = lone.family
     data = channel_family(run, grid, family, step, include=(name,))
     if data is None or name not in data.ids:
         return None
+    data = data.knowing(lone.leak)
+    if lone.twisted:
+        data = data.untwisted() or data
     others = beside(data, name, (name,))
     sound = [(row, deviation(row)) for row in (beside(data, n, (name,)) for n in data.ids if n != name)]
     wire = Wire(run.sensors[run.place(name)], run.survey.half_base_m) if family == "wire" else None

@@ -26,7 +26,7 @@ from daq_app.gap.rocking_model.features.run_features import Examined, examine
 from daq_app.gap.rocking_model.features.run_findings import RunFinding, merged
 from daq_app.gap.rocking_model.features.slips.base_slip import slip_findings, slip_of
 from daq_app.gap.rocking_model.features.slips.base_walk import by_whole_tests, without_walk
-from daq_app.gap.rocking_model.inspection.channel_faults import channel_block, find_outlier_channels
+from daq_app.gap.rocking_model.inspection.channel_faults import Lone, channel_block, find_outlier_channels
 from daq_app.gap.rocking_model.inspection.conditions import conditions_of, findings_per_run, without_hum
 from daq_app.gap.rocking_model.inspection.floor_bursts import floor_bursts
 from daq_app.gap.rocking_model.inspection.lone_rings import lone_rings
@@ -176,7 +176,7 @@ def _late(run: RockingRun) -> float:
 
 def without_outlier_channels(
     examined: Sequence[Examined], findings: Sequence[Sequence[RunFinding]], reference: str
-) -> tuple[list[Examined], dict[str, Family], list[list[RunFinding]]]:
+) -> tuple[list[Examined], dict[str, Lone], list[list[RunFinding]]]:
     """The runs less the channels that disagree with their family; single ones; findings with the several.
 
     What one or two of a family show, effects may explain. More than two have no causes that the library
@@ -243,7 +243,7 @@ def _steps(findings: Sequence[Sequence[RunFinding]]) -> dict[str, float]:
 def completed(
     examined: Sequence[Examined],
     findings: Sequence[Sequence[RunFinding]],
-    channels: dict[str, Family],
+    channels: dict[str, Lone],
     wiring: Wiring,
 ) -> list[RockingRun]:
     """Features of all runs with the blocks and findings of what was inspected over all of them.
@@ -255,10 +255,10 @@ def completed(
     blocks_by_run: list[list[Block]] = [[] for _ in examined]
     steps = _steps(findings)
     for row, entry in zip(blocks_by_run, examined, strict=True):
-        for name, family in channels.items():
+        for name, lone in channels.items():
             grid = entry.features.grid
-            block = channel_block(entry.run, grid, family, name, steps.get(family, 0.0))
-            if block is None and family == "accelerometer":
+            block = channel_block(entry.run, grid, name, lone, steps.get(lone.family, 0.0))
+            if block is None and lone.family == "accelerometer":
                 block = vertical_block(entry.run, grid, name, _late(entry.features))
             if block is not None:
                 row.append(block)

@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.motion.rotation import gridded
 from daq_app.gap.rocking_model.records import GapRun, Sensor
+from daq_app.gap.rocking_model.tolerances.sensors import CROSSTALK
+
+
+@dataclass(frozen=True, slots=True)
+class Leak:
+    """What is known of the share that channels show of the one that is scanned before them, 1."""
+
+    share: float = 0.0
+    sd: float = CROSSTALK
+
+
+UNKNOWN_LEAK: Final = Leak()
+"""What the table says where no channel tells it."""
 
 
 def crosstalk(run: GapRun, places: Sequence[int]) -> FloatArray:

@@ -210,7 +210,7 @@ LOUD_SD = 0.1
 """Sd of that factor, over it, 1 (assumed)."""
 
 # -- single channels -------------------------------------------------------------------------------
-SUSPECT: dict[Family, float] = {"lvdt": 4.0, "wire": 2.0, "accelerometer": 3.0}
+SUSPECT: dict[Family, float] = {"lvdt": 3.5, "wire": 2.0, "accelerometer": 3.0}
 """What a channel must be off by, in what sound ones differ by (`channel_shapes.TOLERANCE`), to be suspect, 1.
 
 Each wire is told from few others, so its tolerance is wide already. Raising it hides single channels.

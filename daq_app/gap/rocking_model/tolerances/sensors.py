@@ -28,6 +28,13 @@ Multiplexed modules leave 0.1–1 % behind long cables (assumed). Raising it hid
 in the shape of another family's signal.
 """
 
+LEAKS_DIFFER = 0.25
+"""Relative sd of one channel's crosstalk against that of others of the same modules, 1 (assumed).
+
+It goes with the impedance of the source, which is alike for sensors of one make. Raising it hides anchors of
+a wire that is scanned after an LVDT.
+"""
+
 PLAY_RAD = 1e-4
 """Prior sd of the play of the wires' drums in the rotation that they show together, rad.
 

@@ -8,6 +8,7 @@ import pytest
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.channel_response import channel
 from daq_app.gap.rocking_model.inspection.inspect_runs import found_channels
+from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import prepare
 from tests.support.simulated_wall import simulate
 
@@ -87,3 +88,33 @@ def test_a_sound_wire_may_have_an_anchor_a_centimetre_off_and_not_six(name: str)
     )
     assert of_tape < 1.05 * block.levers[side]
     assert of_a_mistake > 1.5 * block.levers[side]
+
+
+def _leaking(runs: list[GapRun], share: float) -> list[GapRun]:
+    """The runs with that share of the channel that is scanned before, in volts, in each but the first."""
+    for run in runs:
+        sensitivity = np.array([sensor.si_per_reading for sensor in run.sensors])[:, None]
+        run.channels[1:] += share * sensitivity[1:] * (run.channels / sensitivity)[:-1]
+    return runs
+
+
+@pytest.mark.parametrize(
+    ("share", "height", "found"),
+    [(0.004, 0.15, {"WP-1": "wire"}), (0.008, 0.0, {}), (0.008, -0.15, {"WP-1": "wire"})],
+)
+def test_what_leaks_into_the_first_wire_is_told_by_other_channels(
+    share: float, height: float, found: dict[str, str]
+) -> None:
+    """A share of the last LVDT looks like an anchor; the first of the other face says how large it is."""
+    effects = {"wire_anchor@WP-1": {"height": height}} if height else {}
+    assert found_channels(prepare(_leaking(simulate(effects, (-0.35, 0.25)), share))[0]) == found
+
+
+@pytest.mark.parametrize(("height", "found"), [(-0.18, {"WP-2": "wire"}), (0.0, {})])
+def test_a_wire_of_a_wall_that_turns_about_the_vertical_is_compared_with_the_others(
+    height: float, found: dict[str, str]
+) -> None:
+    """Two wires beside each other differ by what such a wall turns; none of the two is wrong."""
+    anchor = {"wire_anchor@WP-2": {"height": height}} if height else {}
+    runs = simulate({"corner_twist": {"c": 0.003}, **anchor}, (-0.35, 0.25))
+    assert found_channels(prepare(runs)[0]) == found
