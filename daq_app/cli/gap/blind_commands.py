@@ -251,9 +251,9 @@ def _print_confusion(found: Score, console: Console) -> None:
     table = Table(title="Hidden and answered", title_justify="left")
     for column in ("hidden", "answers (cases)"):
         table.add_column(column, overflow="fold")
-    for truth in counts.rows:
+    for truth in sorted({hidden for hidden, _ in counts}):
         answers = sorted(
-            ((n, answer) for (hidden, answer), n in counts.counts.items() if hidden == truth),
+            ((n, answer) for (hidden, answer), n in counts.items() if hidden == truth),
             key=lambda pair: (-pair[0], pair[1]),
         )
         table.add_row(truth, ", ".join(f"{answer} {n}" for n, answer in answers))

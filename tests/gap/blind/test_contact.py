@@ -32,7 +32,8 @@ from daq_app.gap.blind.world.events.mechanics import Effects, Release, build
 from daq_app.gap.blind.world.events.motion import Motion, integrate
 from daq_app.gap.blind.world.events.scene import stage
 from daq_app.gap.blind.world.laboratories.numerics import Numerics
-from daq_app.gap.blind.world.sensors.chain import Place, quiet_signals
+from daq_app.gap.blind.world.sensors.chain import quiet_signals
+from daq_app.gap.blind.world.sensors.faults import Place
 from daq_app.gap.blind.world.wall import Wall
 from sim_hardware.dynamics import Body, Restitution, simulate_motion
 from sim_hardware.dynamics import Release as SimulatedRelease

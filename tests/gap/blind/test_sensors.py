@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from daq_app.config import Rig, Scaling, load_rig
 from daq_app.gap.blind.world.campaign import PlannedRun, World, draw_world
 from daq_app.gap.blind.world.effects.catalogue import ENTRIES, Drawn, draw
-from daq_app.gap.blind.world.sensors.chain import Place, quiet_signals, within_range
-from daq_app.gap.blind.world.sensors.faults import ELECTRONICS, Fault
+from daq_app.gap.blind.world.sensors.chain import quiet_signals, within_range
+from daq_app.gap.blind.world.sensors.faults import ELECTRONICS, Fault, Place
 from daq_app.gap.blind.world.wall import Wall
 
 THETA0 = 0.05

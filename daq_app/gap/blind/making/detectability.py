@@ -22,8 +22,8 @@ from daq_app.gap.blind.world.campaign import PlannedRun, World
 from daq_app.gap.blind.world.course import Course
 from daq_app.gap.blind.world.effects.catalogue import Drawn
 from daq_app.gap.blind.world.events.motion import Followed
-from daq_app.gap.blind.world.sensors.chain import CALIBRATION_TOLERANCE, Place, quiet_signals
-from daq_app.gap.blind.world.sensors.faults import Bench, through_electronics
+from daq_app.gap.blind.world.sensors.chain import CALIBRATION_TOLERANCE, quiet_signals
+from daq_app.gap.blind.world.sensors.faults import Bench, Place, through_electronics
 from daq_app.gap.blind.world.surroundings import Surroundings
 from daq_app.gap.blind.world.wall import Wall
 
@@ -175,7 +175,7 @@ def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatA
     for row, channel in enumerate(alone.rig.channels):
         if plain.pivot_dd is not scene.pivot_dd and channel.family == "accelerometer":
             continue  # pulses of impacts that take their time are not those of the plain twin
-        bench = Bench(channel, scene, _RATE_HZ, place.campaign_s, place.largest_rad, rng)
+        bench = Bench(channel, scene, place, rng)
         noise = noise_si[row] * rng.standard_normal(time_s.size)
         signal = through_electronics(with_effect[row] + noise, alone.faults, bench)
         reference = without[row]

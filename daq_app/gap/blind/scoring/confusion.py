@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Final
 
 from daq_app.gap.blind.names import base_name
@@ -12,26 +12,14 @@ from daq_app.gap.blind.scoring.judge import Judged
 _SEVERAL_OR_NONE: Final = {"pair": "(pair)", "triple": "(triple)", "null": "(nothing)"}
 
 
-@dataclass(frozen=True, slots=True)
-class Confusion:
-    """Counts of (truth, answer)."""
-
-    rows: tuple[str, ...]
-    columns: tuple[str, ...]
-    counts: dict[tuple[str, str], int] = field(default_factory=dict)
-
-
-def confusion(judged: Sequence[Judged]) -> Confusion:
-    """Truth (effect, or how many there are) against answer (effect, or the decision that names none)."""
-    counts: dict[tuple[str, str], int] = {}
+def confusion(judged: Sequence[Judged]) -> Counter[tuple[str, str]]:
+    """Cases by truth (effect, or how many) and answer (effect, or the decision that names none)."""
+    counts: Counter[tuple[str, str]] = Counter()
     for one in judged:
         truth = _SEVERAL_OR_NONE.get(one.category) or one.truth[0]
         answer = f"({one.decision})"
         if one.decision == "effect" and len(one.named) == 1:
-            name = base_name(one.named[0])
             # Accepted synonyms stand on the diagonal.
-            answer = truth if one.first_right else name
-        counts[truth, answer] = counts.get((truth, answer), 0) + 1
-    rows = tuple(sorted({truth for truth, _ in counts}))
-    columns = tuple(sorted({answer for _, answer in counts}))
-    return Confusion(rows, columns, counts)
+            answer = truth if one.first_right else base_name(one.named[0])
+        counts[truth, answer] += 1
+    return counts

@@ -132,17 +132,18 @@ def _picture(draw: Callable[[Axes], None], size: tuple[float, float]) -> bytes:
 
 
 def _draw_confusion(axes: Axes, score: Score) -> None:
-    found = confusion(score.judged)
-    grid = np.zeros((max(1, len(found.rows)), max(1, len(found.columns))))
-    for (truth, answer), count in found.counts.items():
-        grid[found.rows.index(truth), found.columns.index(answer)] = count
+    counts = confusion(score.judged)
+    truths, answers = (sorted(set(names)) for names in zip(*counts, strict=True)) if counts else ([], [])
+    grid = np.zeros((max(1, len(truths)), max(1, len(answers))))
+    for (truth, answer), count in counts.items():
+        grid[truths.index(truth), answers.index(answer)] = count
     axes.imshow(grid, cmap="Blues", aspect="auto", vmax=1.3 * grid.max() or 1.0)
-    for (truth, answer), count in found.counts.items():
-        column, row = found.columns.index(answer), found.rows.index(truth)
+    for (truth, answer), count in counts.items():
+        column, row = answers.index(answer), truths.index(truth)
         ink = "white" if count > 0.5 * grid.max() else "black"
         axes.text(column, row, str(count), ha="center", va="center", fontsize=7, color=ink)
-    axes.set_xticks(range(len(found.columns)), found.columns, rotation=90, fontsize=7)
-    axes.set_yticks(range(len(found.rows)), found.rows, fontsize=7)
+    axes.set_xticks(range(len(answers)), answers, rotation=90, fontsize=7)
+    axes.set_yticks(range(len(truths)), truths, fontsize=7)
     axes.set_xlabel("answer")
     axes.set_ylabel("hidden")
 

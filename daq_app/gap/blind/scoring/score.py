@@ -152,26 +152,20 @@ def _outside_rows(judged: Sequence[Judged]) -> list[Row]:
     """
     outside = [j for j in judged if j.category == "outside" and not j.known]
     inside = [j for j in judged if j.category != "outside" and j.decision != "failed"]
-    said_outside = [j for j in inside if j.decision == "none_of_these"]
-    threshold = at_false_alarms(
-        [j.outside_score for j in outside], [j.outside_score for j in inside], _FALSE_ALARMS
-    )
+    scores_outside, scores_inside = ([j.outside_score for j in group] for group in (outside, inside))
+    threshold = at_false_alarms(scores_inside, _FALSE_ALARMS)
     attributed = [j.blames and not j.outside_score > threshold for j in outside]
     other_family = [
         a and not set(j.families) & set(j.named_family.split(" + "))
         for a, j in zip(attributed, outside, strict=True)
     ]
     return [
-        Row(
-            "outside the library: AUROC",
-            auroc_interval([j.outside_score for j in outside], [j.outside_score for j in inside]),
-            low=0.97,
-        ),
+        Row("outside the library: AUROC", auroc_interval(scores_outside, scores_inside), low=0.97),
         Row("outside, attributed to an effect (at 5 % false alarms)", share(attributed), high=0.05),
         Row("outside, attributed to a wrong family (at 5 % false alarms)", share(other_family), high=0.02),
         Row(
             'known, yet decided "none of these"',
-            share([j in said_outside for j in inside]),
+            share([j.decision == "none_of_these" for j in inside]),
             high=_FALSE_ALARMS,
         ),
         Row("outside, blamed on an effect as decided", share([j.blames for j in outside])),

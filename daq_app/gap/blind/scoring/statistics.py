@@ -131,7 +131,7 @@ def auroc_interval(positive: Sequence[float], negative: Sequence[float]) -> Valu
     return _resampled(auroc, np.asarray(positive), np.asarray(negative), resamples=_DEAR_RESAMPLES)
 
 
-def at_false_alarms(positive: Sequence[float], negative: Sequence[float], share_of_false: float) -> float:
+def at_false_alarms(negative: Sequence[float], share_of_false: float) -> float:
     """Lowest threshold (flag if score > threshold) that flags at most this share of the negatives."""
     ranked = np.sort(np.asarray(negative, dtype=np.float64))[::-1]
     if not ranked.size:

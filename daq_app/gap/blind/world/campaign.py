@@ -22,11 +22,10 @@ from daq_app.gap.blind.world.sensors.bench_chain import bench_readings
 from daq_app.gap.blind.world.sensors.chain import (
     CALIBRATION_TOLERANCE,
     Calibration,
-    Place,
     draw_calibration,
     readings,
 )
-from daq_app.gap.blind.world.sensors.faults import Fault
+from daq_app.gap.blind.world.sensors.faults import Fault, Place
 from daq_app.gap.blind.world.sensors.field_chain import field_readings
 from daq_app.gap.blind.world.surroundings import Surroundings, draw_surroundings
 from daq_app.gap.blind.world.sway import Sway, draw_sway

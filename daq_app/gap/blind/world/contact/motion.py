@@ -17,7 +17,7 @@ import numpy as np
 from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.contact.feet import Foot, feet, plastic_restitution
 from daq_app.gap.blind.world.events.mechanics import Effects, Release
-from daq_app.gap.blind.world.events.motion import LONGEST_S, REST_RAD, ImpactRecord
+from daq_app.gap.blind.world.events.motion import LONGEST_S, REST_RAD, Followed, ImpactRecord
 from daq_app.gap.blind.world.laboratories.numerics import Numerics
 from daq_app.gap.blind.world.wall import GRAVITY_M_S2, Wall
 
@@ -40,22 +40,17 @@ class EngineMissing(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class ContactMotion:
-    """As `motion.Motion`, from states at every step; times in seconds after the release."""
+class ContactMotion(Followed):
+    """The motion of one run, from states at every step."""
 
-    release: Release
     time_s: FloatArray
     """(n,) from 0."""
     states: FloatArray
     """(9, n): x, z of the middle of the base, θ; their velocities; their accelerations."""
     upright: FloatArray
     """(3,) x, z, θ of the wall that stands, before it is pulled."""
-    impacts: tuple[ImpactRecord, ...]
-    peaks: tuple[tuple[float, float], ...]
-    rest_s: float
 
     def sample(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """θ, θ̇, θ̈ at rising times (n,); held before the release, at rest after the rest."""
         theta = np.interp(time_s, self.time_s, self.states[2]) - self.upright[2]
         return theta, self._moving(time_s, 5), self._moving(time_s, 8)
 
@@ -99,7 +94,7 @@ def rock(wall: Wall, effects: Effects, release: Release, numerics: Numerics = _A
     states = np.concatenate(blocks).T
     time_s = numerics.step_s * np.arange(states.shape[1], dtype=np.float64)
     rest_s = watch.time_s if watch.ended else float(time_s[-1])
-    return ContactMotion(release, time_s, states, upright, tuple(watch.impacts), tuple(watch.peaks), rest_s)
+    return ContactMotion(release, tuple(watch.impacts), tuple(watch.peaks), rest_s, time_s, states, upright)
 
 
 class _Watch:

@@ -13,7 +13,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from daq_app.config import Rig
+from daq_app.config import Channel, Rig
 
 Kind = Literal["library", "near", "far"]
 Parameters = dict[str, float]
@@ -76,17 +76,17 @@ def _of(*families: str) -> Targets:
 
     def choose(rig: Rig, rng: np.random.Generator) -> tuple[str, ...]:
         family = families[int(rng.integers(len(families)))]
-        return tuple(c.id for c in rig.channels if c.family == family and _moves(c.id, rig))
+        return tuple(c.id for c in rig.channels if c.family == family and _moves(c))
 
     return choose
 
 
 def _one(*families: str) -> Targets:
     """One channel of one of the families."""
+    every = _of(*families)
 
     def choose(rig: Rig, rng: np.random.Generator) -> tuple[str, ...]:
-        family = families[int(rng.integers(len(families)))]
-        ids = [c.id for c in rig.channels if c.family == family and _moves(c.id, rig)]
+        ids = every(rig, rng)
         return (ids[int(rng.integers(len(ids)))],)
 
     return choose
@@ -97,9 +97,8 @@ def _one_or_all(*families: str) -> Targets:
     return lambda rig, rng: one(rig, rng) if rng.uniform() < 0.6 else every(rig, rng)
 
 
-def _moves(channel_id: str, rig: Rig) -> bool:
+def _moves(channel: Channel) -> bool:
     """Channels that see rocking at all: a tiltmeter across it shows no fault of scale or time."""
-    channel = rig.channel(channel_id)
     return not (channel.family == "tiltmeter" and channel.axis != "x")
 
 

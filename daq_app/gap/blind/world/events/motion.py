@@ -6,9 +6,9 @@ a piece, also with friction that changes sign at the peak.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -48,37 +48,28 @@ class ImpactRecord:
     restitution: float
 
 
-class Followed(Protocol):
+@dataclass(frozen=True, slots=True)
+class Followed(ABC):
     """A motion that was followed to rest, however; times in seconds after the release."""
 
-    @property
-    def release(self) -> Release: ...
-
-    @property
-    def impacts(self) -> tuple[ImpactRecord, ...]: ...
-
-    @property
-    def peaks(self) -> tuple[tuple[float, float], ...]: ...
-
-    @property
-    def rest_s(self) -> float: ...
-
-    def sample(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]: ...
-
-
-@dataclass(frozen=True, slots=True)
-class Motion:
-    """The motion of one run; times in seconds after the release."""
-
     release: Release
-    pieces: tuple[Piece, ...]
     impacts: tuple[ImpactRecord, ...]
     peaks: tuple[tuple[float, float], ...]
     """(time, θ) of the turning points after the release."""
     rest_s: float
 
+    @abstractmethod
     def sample(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """θ, θ̇, θ̈ at rising times (n,); held before the release, upright after the rest."""
+        """θ, θ̇, θ̈ at rising times (n,); held before the release, at rest after the rest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motion(Followed):
+    """The motion of one run, piece by piece."""
+
+    pieces: tuple[Piece, ...]
+
+    def sample(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         theta = np.where(time_s < 0.0, self.release.theta0, 0.0)
         omega = np.zeros_like(theta)
         alpha = np.zeros_like(theta)
@@ -119,7 +110,7 @@ def integrate(mechanics: Mechanics, release: Release, numerics: Numerics = _AS_O
             continue
         t, omega = _strike(mechanics, release, t, omega, side, scatter, pieces, impacts)
         side, theta, inward = -side, 0.0, False
-    return Motion(release, tuple(pieces), tuple(impacts), tuple(peaks), t)
+    return Motion(release, tuple(impacts), tuple(peaks), t, tuple(pieces))
 
 
 def _half_swing(

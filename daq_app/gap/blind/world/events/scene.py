@@ -53,6 +53,11 @@ class Scene:
     their pulses; None where the turning point rests and an impact is a jump of ω."""
     shock: Shock = field(default_factory=Shock)
 
+    @property
+    def rate_hz(self) -> float:
+        """Sampling rate of the times."""
+        return 1.0 / float(self.time_s[1] - self.time_s[0])
+
 
 def stage(mechanics: Mechanics, motion: Followed, effects: Effects, time_s: FloatArray) -> Scene:
     """Evaluate a run at rising times."""

@@ -8,28 +8,17 @@ from typing import Final
 import numpy as np
 from scipy.signal import lfilter
 
-from daq_app.config import Scaling
 from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.events.scene import Scene
-from daq_app.gap.blind.world.sensors.chain import (
-    Calibration,
-    Place,
-    clipped_readings,
-    quiet_signals,
-    within_range,
-)
-from daq_app.gap.blind.world.sensors.faults import Bench, Fault, through_electronics
-from daq_app.gap.blind.world.sensors.installation import Installation, Sizes
+from daq_app.gap.blind.world.sensors.chain import Calibration, as_read, quiet_signals, rounded_readings
+from daq_app.gap.blind.world.sensors.faults import Bench, Fault, Place
+from daq_app.gap.blind.world.sensors.installation import KICK_RAD_S, SPIKY, Installation, Sizes
 
 _FORGETS: Final = 0.05
 """Share that slow noise forgets with each sample."""
 _PINK_TIMES_S: Final = tuple(0.0005 * 8.0**k for k in range(5))
 """Time constants of the first-order processes whose sum is 1/f noise from 0.1 Hz to 300 Hz."""
 _MAINS_HZ, _MAINS_SPREAD_HZ = 50.0, 0.03
-_KICK_RAD_S: Final = 0.1
-"""Jump of ω for which the size of a shaken cable is given."""
-_SPIKY: Final = 0.1
-"""Share of the channels that spikes reach."""
 
 
 def bench_readings(
@@ -43,7 +32,7 @@ def bench_readings(
 ) -> FloatArray:
     """(channels, n) what the NI channels return for one run of an ordinary laboratory."""
     rig = installation.rig
-    rate_hz = 1.0 / float(scene.time_s[1] - scene.time_s[0])
+    rate_hz = scene.rate_hz
     rows = quiet_signals(rig, scene, (*faults, *installation.faults), rng, place)
     samples = np.arange(scene.time_s.size, dtype=np.float64)
     mains_hz = _MAINS_HZ + _MAINS_SPREAD_HZ * rng.uniform(-1.0, 1.0)
@@ -57,12 +46,8 @@ def bench_readings(
         added += _cable(scene, installation.cable[row], sizes, rng)
         added += _spikes(sizes, samples.size, rate_hz, rng)
         signal += installation.noise_si[row] * added
-        bench = Bench(channel, scene, rate_hz, place.campaign_s, place.largest_rad, rng)
-        signal = through_electronics(signal, faults, bench)
-        rows[row] = within_range(signal, channel, faults) + calibration.zero_si[row]
-    volts = clipped_readings(rig, Scaling.of(rig.channels).to_readings(rows))
-    steps = installation.step_v[:, None]
-    return np.asarray(np.round(volts / steps) * steps)
+        rows[row] = as_read(signal, faults, Bench(channel, scene, place, rng)) + calibration.zero_si[row]
+    return rounded_readings(rig, rows, installation.step_v)
 
 
 def _noise(sizes: Sizes, n: int, rate_hz: float, rng: np.random.Generator) -> FloatArray:
@@ -105,7 +90,7 @@ def _cable(scene: Scene, susceptibility: float, sizes: Sizes, rng: np.random.Gen
     for start, jump in zip(scene.impact_times, scene.impact_jumps, strict=True):
         low, high = np.searchsorted(scene.time_s, [start, start + 0.6])
         t = scene.time_s[low:high] - start
-        kick = susceptibility * abs(jump) / _KICK_RAD_S
+        kick = susceptibility * abs(jump) / KICK_RAD_S
         decay, frequency = rng.uniform(0.02, 0.1), rng.uniform(4.0, 40.0)
         burst = np.exp(-t / decay) * np.sin(2.0 * math.pi * frequency * t + rng.uniform(0.0, 2.0 * math.pi))
         added[low:high] += shake * kick * rng.uniform(0.3, 1.0) * burst
@@ -115,7 +100,7 @@ def _cable(scene: Scene, susceptibility: float, sizes: Sizes, rng: np.random.Gen
 
 def _spikes(sizes: Sizes, n: int, rate_hz: float, rng: np.random.Generator) -> FloatArray:
     added = np.zeros(n)
-    if "spikes" in sizes and rng.uniform() < _SPIKY:
+    if "spikes" in sizes and rng.uniform() < SPIKY:
         count = rng.poisson(sizes["spikes"] * n / rate_hz)
         at = rng.integers(0, n, count)
         added[at] += rng.uniform(5.0, 25.0, count) * rng.choice([-1.0, 1.0], count)

@@ -11,7 +11,7 @@ from daq_app.config import Rig, Scaling
 from daq_app.config.rig import Channel
 from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.events.scene import Scene
-from daq_app.gap.blind.world.sensors.faults import RESPONSES, Bench, Fault, through_electronics
+from daq_app.gap.blind.world.sensors.faults import RESPONSES, Bench, Fault, Place, through_electronics
 from daq_app.gap.blind.world.sensors.instruments import ideal
 
 CALIBRATION_TOLERANCE = 0.003
@@ -20,16 +20,6 @@ ADC_STEP_V = 20.5 / 65536
 _TARE_SAMPLES = 2000
 _ZERO_WALK = 0.2
 """Zero of a channel from run to run, in units of its noise."""
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """A run's place in its campaign."""
-
-    campaign_s: float
-    """Time since the first run."""
-    largest_rad: float
-    """Largest planned release rotation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,13 +53,12 @@ def quiet_signals(
     rig: Rig, scene: Scene, faults: Sequence[Fault], rng: np.random.Generator, place: Place
 ) -> FloatArray:
     """(channels, n) signals in SI without noise and calibration, with the faults of the first kind."""
-    rate_hz = 1.0 / float(scene.time_s[1] - scene.time_s[0])
     rows = np.empty((len(rig.channels), scene.time_s.size))
     for row, channel in enumerate(rig.channels):
         mine = [fault for fault in faults if channel.id in fault.targets]
         shift = sum(fault.parameters["anchor_m"] for fault in mine if fault.name == "wire_cosine")
         signal = ideal(channel, scene, shift)
-        bench = Bench(channel, scene, rate_hz, place.campaign_s, place.largest_rad, rng)
+        bench = Bench(channel, scene, place, rng)
         for fault in mine:
             if fault.name in RESPONSES:
                 signal = RESPONSES[fault.name](signal, fault.parameters, bench)
@@ -88,21 +77,21 @@ def readings(
 ) -> FloatArray:
     """(channels, n) what the NI channels return for one run, quantised."""
     rows = quiet_signals(rig, scene, faults, rng, place)
-    rate_hz = 1.0 / float(scene.time_s[1] - scene.time_s[0])
-    scaling = Scaling.of(rig.channels)
     for row, channel in enumerate(rig.channels):
         signal = rows[row]
-        part = min(max(skew_s.get(channel.id, 0.0) * rate_hz, 0.0), 1.0)
+        part = min(max(skew_s.get(channel.id, 0.0) * scene.rate_hz, 0.0), 1.0)
         signal[:-1] += part * np.diff(signal)
         signal *= 1.0 + calibration.gain[row]
         noise = rng.standard_normal(signal.size, dtype=np.float32)
         walk = _ZERO_WALK * rng.standard_normal()
         signal += channel.noise_si * (noise + walk)
-        bench = Bench(channel, scene, rate_hz, place.campaign_s, place.largest_rad, rng)
-        signal = through_electronics(signal, faults, bench)
-        rows[row] = within_range(signal, channel, faults) + calibration.zero_si[row]
-    steps = np.array([ADC_STEP_V if c.measurement == "voltage" else 1e-7 for c in rig.channels])[:, None]
-    return np.asarray(np.round(clipped_readings(rig, scaling.to_readings(rows)) / steps) * steps)
+        rows[row] = as_read(signal, faults, Bench(channel, scene, place, rng)) + calibration.zero_si[row]
+    return rounded_readings(rig, rows, finest_steps(rig.channels))
+
+
+def as_read(signal: FloatArray, faults: Sequence[Fault], bench: Bench) -> FloatArray:
+    """A signal with noise, (n,), SI, after its electronics, as far as its sensor goes."""
+    return within_range(through_electronics(signal, faults, bench), bench.channel, faults)
 
 
 def within_range(signal: FloatArray, channel: Channel, faults: Sequence[Fault]) -> FloatArray:
@@ -113,10 +102,22 @@ def within_range(signal: FloatArray, channel: Channel, faults: Sequence[Fault]) 
     return np.clip(signal, low, high)
 
 
-def clipped_readings(rig: Rig, volts: FloatArray) -> FloatArray:
-    """(channels, n) readings within what each module converts."""
+def finest_steps(channels: Sequence[Channel]) -> FloatArray:
+    """Smallest step of each channel's converter, (channels,), in the unit of its reading."""
+    return np.array([ADC_STEP_V if c.measurement == "voltage" else 1e-7 for c in channels])
+
+
+def rounded_readings(rig: Rig, rows: FloatArray, steps: FloatArray) -> FloatArray:
+    """(channels, n) readings of signals in SI, rounded to the steps (channels,) of their converters."""
+    each = steps[:, None]
+    return np.asarray(np.round(clipped_readings(rig, rows) / each) * each)
+
+
+def clipped_readings(rig: Rig, rows: FloatArray) -> FloatArray:
+    """(channels, n) readings of signals in SI, within what each module converts."""
     limits = np.array([_limits(c.input_range_v, c.measurement) for c in rig.channels])
-    return np.asarray(np.clip(volts, limits[:, :1], limits[:, 1:]))
+    readings_of_rows = Scaling.of(rig.channels).to_readings(rows)
+    return np.asarray(np.clip(readings_of_rows, limits[:, :1], limits[:, 1:]))
 
 
 def _limits(range_v: tuple[float, float], measurement: str) -> tuple[float, float]:

@@ -31,16 +31,22 @@ class Fault:
 
 
 @dataclass(frozen=True, slots=True)
+class Place:
+    """A run's place in its campaign."""
+
+    campaign_s: float
+    """Time since the first run."""
+    largest_rad: float
+    """Largest planned release rotation."""
+
+
+@dataclass(frozen=True, slots=True)
 class Bench:
     """What a fault may depend on."""
 
     channel: Channel
     scene: Scene
-    rate_hz: float
-    campaign_s: float
-    """Time since the first run of the campaign."""
-    largest_rad: float
-    """Largest planned release rotation of the campaign."""
+    place: Place
     rng: np.random.Generator = field(repr=False)
 
 
@@ -48,7 +54,7 @@ Apply = Callable[[FloatArray, Parameters, Bench], FloatArray]
 
 
 def _delayed(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
-    samples = np.arange(signal.size) - q["tau_s"] * bench.rate_hz
+    samples = np.arange(signal.size) - q["tau_s"] * bench.scene.rate_hz
     return np.asarray(np.interp(samples, np.arange(signal.size), signal))
 
 
@@ -64,17 +70,17 @@ def _drift(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
 
 
 def _slow(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
-    return first_order(signal, q["tau_s"], 1.0 / bench.rate_hz)
+    return first_order(signal, q["tau_s"], 1.0 / bench.scene.rate_hz)
 
 
 def _filter_delay(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
     """Linear-phase filter of length 2 τ: a moving average (Hann), and what is missing to a delay of τ."""
-    length = max(int(2.0 * q["tau_s"] * bench.rate_hz) - 1, 0) | 1
+    length = max(int(2.0 * q["tau_s"] * bench.scene.rate_hz) - 1, 0) | 1
     taps = np.hanning(length + 2)[1:-1]
     taps /= taps.sum()
     start = np.full(length - 1, signal[0])
     averaged = np.convolve(np.concatenate([start, signal]), taps, mode="valid")
-    missing_s = q["tau_s"] - (length - 1) / 2.0 / bench.rate_hz
+    missing_s = q["tau_s"] - (length - 1) / 2.0 / bench.scene.rate_hz
     return _delayed(averaged, {"tau_s": missing_s}, bench)
 
 
@@ -82,7 +88,7 @@ def _saturation(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
     """Clips at a level that cuts the share `cut` off what the largest planned release would give."""
     x, _, z = bench.channel.position_m
     lever = z if bench.channel.family == "wire" else 2.0 * abs(x)
-    limit = (1.0 - q["cut"]) * bench.largest_rad * lever
+    limit = (1.0 - q["cut"]) * bench.place.largest_rad * lever
     return np.asarray(np.clip(signal, -limit, limit))
 
 
@@ -92,7 +98,7 @@ def _wire_sag(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
 
 def _wire_inertia(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
     """Second-order response of the drum and spring (bilinear)."""
-    natural, zeta, rate = 2.0 * math.pi * q["frequency_hz"], q["zeta"], bench.rate_hz
+    natural, zeta, rate = 2.0 * math.pi * q["frequency_hz"], q["zeta"], bench.scene.rate_hz
     k = 2.0 * rate
     a = np.array([k * k + 2 * zeta * natural * k + natural**2, 2 * (natural**2 - k * k), 0.0])
     a[2] = k * k - 2 * zeta * natural * k + natural**2
@@ -131,7 +137,7 @@ def _loose_bracket(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArra
 
 
 def _amplifier_temperature(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
-    warmed = 1.0 - math.exp(-bench.campaign_s / q["warm_up_s"])
+    warmed = 1.0 - math.exp(-bench.place.campaign_s / q["warm_up_s"])
     return signal * (1.0 + q["share"] * warmed)
 
 
@@ -144,9 +150,9 @@ def _hum(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
 def _dropout(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
     """The reading freezes now and then."""
     out = signal.copy()
-    count = max(1, round(q["share"] * out.size / (q["duration_s"] * bench.rate_hz)))
+    count = max(1, round(q["share"] * out.size / (q["duration_s"] * bench.scene.rate_hz)))
     for start in bench.rng.integers(0, out.size, count):
-        out[start : start + round(q["duration_s"] * bench.rate_hz)] = out[start]
+        out[start : start + round(q["duration_s"] * bench.scene.rate_hz)] = out[start]
     return out
 
 
@@ -157,7 +163,7 @@ def _quantisation(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray
 
 def _spikes(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
     out = signal.copy()
-    count = bench.rng.poisson(q["per_second"] * out.size / bench.rate_hz)
+    count = bench.rng.poisson(q["per_second"] * out.size / bench.scene.rate_hz)
     at = bench.rng.integers(0, out.size, count)
     out[at] += q["times_noise"] * bench.channel.noise_si * bench.rng.choice([-1.0, 1.0], count)
     return out

@@ -12,18 +12,11 @@ from typing import Final
 import numpy as np
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from daq_app.config import Scaling
 from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.events.scene import Scene
-from daq_app.gap.blind.world.sensors.chain import (
-    Calibration,
-    Place,
-    clipped_readings,
-    quiet_signals,
-    within_range,
-)
-from daq_app.gap.blind.world.sensors.faults import Bench, Fault, through_electronics
-from daq_app.gap.blind.world.sensors.installation import Installation, Sizes
+from daq_app.gap.blind.world.sensors.chain import Calibration, as_read, clipped_readings, quiet_signals
+from daq_app.gap.blind.world.sensors.faults import Bench, Fault, Place
+from daq_app.gap.blind.world.sensors.installation import KICK_RAD_S, SPIKY, Installation, Sizes
 
 _PASS: Final = 0.7
 """Corner of the anti-alias filter as a share of half the sampling rate."""
@@ -32,8 +25,6 @@ _SLOW_CORNER_HZ: Final = 35.0
 _LOWEST_HZ: Final = 0.05
 _CLIPS_AT: Final = 0.8
 """Level at which the wave that is picked up is cut, of its amplitude."""
-_KICK_RAD_S: Final = 0.1
-_SPIKY: Final = 0.1
 _BEND: Final = 3.0
 """Integral non-linearity of a converter at half of its range, in steps, at most."""
 _FULL_SCALE: Final = 10.0
@@ -50,7 +41,7 @@ def field_readings(
 ) -> FloatArray:
     """(channels, n) what the NI channels return for one run of a left-out laboratory."""
     rig = installation.rig
-    rate_hz = 1.0 / float(scene.time_s[1] - scene.time_s[0])
+    rate_hz = scene.rate_hz
     rows = quiet_signals(rig, scene, (*faults, *installation.faults), rng, place)
     alias = butter(3, _PASS, output="sos")
     mains = _picked_up(scene.time_s, rng)
@@ -64,11 +55,8 @@ def field_readings(
         added += _glitches(sizes, signal.size, rate_hz, rng)
         signal = signal + installation.noise_si[row] * added
         signal = sosfilt(alias, signal, zi=sosfilt_zi(alias) * signal[0])[0]
-        bench = Bench(channel, scene, rate_hz, place.campaign_s, place.largest_rad, rng)
-        signal = through_electronics(signal, faults, bench)
-        rows[row] = within_range(signal, channel, faults) + calibration.zero_si[row]
-    volts = Scaling.of(rig.channels).to_readings(rows)
-    return _converted(clipped_readings(rig, volts), installation, rng)
+        rows[row] = as_read(signal, faults, Bench(channel, scene, place, rng)) + calibration.zero_si[row]
+    return _converted(clipped_readings(rig, rows), installation, rng)
 
 
 def _shifted(signal: FloatArray, samples: float) -> FloatArray:
@@ -124,7 +112,7 @@ def _charged_cable(
         t = scene.time_s[low:high] - start
         if t.size == 0:
             continue
-        kick = susceptibility * abs(jump) / _KICK_RAD_S
+        kick = susceptibility * abs(jump) / KICK_RAD_S
         burst = sosfilt(soft, rng.standard_normal(t.size) * np.exp(-t / 0.05))
         largest = float(np.max(np.abs(burst))) or 1.0
         added[low:high] += shake * kick * burst / largest
@@ -135,7 +123,7 @@ def _charged_cable(
 def _glitches(sizes: Sizes, n: int, rate_hz: float, rng: np.random.Generator) -> FloatArray:
     """Pulses of two to four samples, one way and back."""
     added = np.zeros(n)
-    if "spikes" not in sizes or rng.uniform() >= _SPIKY:
+    if "spikes" not in sizes or rng.uniform() >= SPIKY:
         return added
     for at in rng.integers(0, n - 4, rng.poisson(sizes["spikes"] * n / rate_hz)):
         width = int(rng.integers(1, 3))

@@ -12,7 +12,7 @@ import numpy as np
 from daq_app.config import Rig
 from daq_app.config.rig import Channel
 from daq_app.gap.blind.world.arrays import FloatArray
-from daq_app.gap.blind.world.sensors.chain import ADC_STEP_V
+from daq_app.gap.blind.world.sensors.chain import finest_steps
 from daq_app.gap.blind.world.sensors.faults import Fault
 
 Sizes = Mapping[str, float]
@@ -20,6 +20,10 @@ Sizes = Mapping[str, float]
 
 _CABLES_THAT_MOVE: Final = 0.4
 """Share of the cables that touch something which moves."""
+KICK_RAD_S: Final = 0.1
+"""Jump of ω for which the size of a shaken cable is given."""
+SPIKY: Final = 0.1
+"""Share of the channels that spikes reach."""
 _FAMILY_SHARE: Final = 0.8
 """Part of the logarithm of unequal noise that a family has in common."""
 
@@ -52,14 +56,14 @@ def draw_installation(rig: Rig, sizes: Sizes, rng: np.random.Generator) -> Insta
     modules = [c.physical_channel.partition("/")[0] for c in channels]
     skew = sizes.get("skew", 0.0)
     lost_bits = sizes.get("coarse_steps", 0.0)
-    finest = np.array([ADC_STEP_V if c.measurement == "voltage" else 1e-7 for c in channels])
     mains = sizes.get("mains_pick_up", 0.0) * np.exp(rng.uniform(-0.7, 0.7, n))
     return Installation(
         rig=rig.model_copy(update={"channels": tuple(_as_it_stands(c, sizes, rng) for c in channels)}),
         faults=tuple(_ordinary_faults(rig, sizes, rng)),
         noise_si=np.array([c.noise_si for c in channels]) * _unequal(channels, sizes, rng),
         skew_s=_by_module(modules, lambda: skew * rng.uniform(-1.0, 1.0)),
-        step_v=finest * _by_module(modules, lambda: 2.0 ** round(rng.uniform(0.0, lost_bits))),
+        step_v=finest_steps(channels)
+        * _by_module(modules, lambda: 2.0 ** round(rng.uniform(0.0, lost_bits))),
         mains_amplitude=mains,
         mains_phase=rng.uniform(0.0, 2.0 * math.pi, n),
         cable=np.where(rng.uniform(size=n) < _CABLES_THAT_MOVE, rng.uniform(0.3, 1.0, n), 0.0),
