@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -46,6 +47,13 @@ class FeatureSet:
     sd: FloatArray
     labels: tuple[Label, ...]
     independent_fraction: float = 1.0
+
+    @classmethod
+    def of(cls, rows: Sequence[tuple[float, float, Label]]) -> FeatureSet:
+        """From (value, sd, label) of each feature."""
+        values = np.array([value for value, _, _ in rows], dtype=np.float64)
+        sds = np.array([sd for _, sd, _ in rows], dtype=np.float64)
+        return cls(values, sds, tuple(label for _, _, label in rows))
 
     def __post_init__(self) -> None:
         if (

@@ -48,6 +48,7 @@ _SENSORS = {
     "wire_anchor": ("wire",),
     "wire_inertia": ("wire",),
 }
+_ON_SENSORS = {spec.name: spec for spec in SENSOR_EFFECTS}
 _OF_ALL = ("gain", "lag", "slow_response", "filter_delay", "drift")
 _ONE_CHANNEL: dict[str, tuple[str, ...]] = {
     "lvdt": _OF_ALL,
@@ -207,7 +208,7 @@ def _motion_effect(spec: EffectSpec, known: set[str]) -> Effect:
 
 def _sensor_effect(name: str, target: str, family: str, known: set[str]) -> Effect:
     """An effect on the sensors of a family or on one channel."""
-    spec = next(spec for spec in SENSOR_EFFECTS if spec.name == name)
+    spec = _ON_SENSORS[name]
     parameters = tuple(_parameter(spec, p) for p in spec.parameters)
     if name == "drift":
         unit = {"tiltmeter": "rad/s", "accelerometer": "m/s³"}.get(family, "m/s")
@@ -226,11 +227,10 @@ def _sensor_effect(name: str, target: str, family: str, known: set[str]) -> Effe
 
 
 def _sensor_effects(known: set[str]) -> Iterable[Effect]:
-    by_name = {spec.name: spec for spec in SENSOR_EFFECTS}
     for name, families in _SENSORS.items():
         for family in families:
             yield _sensor_effect(name, family, family, known)
-    clock = by_name["clock"]
+    clock = _ON_SENSORS["clock"]
     yield Effect(
         "clock",
         "sensor",

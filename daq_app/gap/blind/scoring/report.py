@@ -9,45 +9,20 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from jinja2 import Environment
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from daq_app.campaign.pages import page_environment
 from daq_app.gap.blind.scoring.confusion import confusion
 from daq_app.gap.blind.scoring.judge import Judged
 from daq_app.gap.blind.scoring.score import Score, claims
 from daq_app.gap.blind.scoring.statistics import Value, reliability
 from daq_app.runfile.durable import write_whole
 
-_PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>Blind check</title>
-<style>body{font-family:sans-serif;max-width:70rem;margin:2rem auto;color:#222}
-table{border-collapse:collapse;margin:1rem 0}
-td,th{padding:.25rem .7rem;border-bottom:1px solid #ddd;text-align:left}
-.no{color:#b00020;font-weight:bold}.yes{color:#1b6e2c}img{max-width:100%}small{color:#666}</style></head><body>
-<h1>Blind check of the diagnosis</h1>
-<p>{{ n }} cases with a result{% if waiting %}, {{ waiting|length }} still without{% endif %}.
-Every label was opened after the diagnosis and agreed with its seal. Intervals are 95 % (Wilson for shares,
-bootstrap otherwise).</p>
-<table><tr><th>score</th><th>found</th><th>95 % interval</th><th>cases</th><th>target</th><th></th></tr>
-{% for row in rows %}<tr><td>{{ row.name }}</td><td>{{ number(row.found.value) }}</td>
-<td>{{ interval(row.found) }}</td><td>{{ row.found.n }}</td><td>{{ row.target }}</td>
-<td>{% if row.met is true %}<span class="yes">met</span>{% elif row.met is false %}
-<span class="no">missed</span>{% endif %}</td></tr>{% endfor %}</table>
-{% for title, note, data in pictures %}<h2>{{ title }}</h2><p><small>{{ note }}</small></p>
-<img alt="{{ title }}" src="data:image/png;base64,{{ data }}">{% endfor %}
-<h2>Cases that were answered wrongly</h2>
-<table><tr><th>case</th><th>hidden</th><th>strength, sd</th><th>decision</th><th>named</th><th>p</th></tr>
-{% for j in wrong %}<tr><td>{{ j.case }}</td><td>{{ j.truth|join(" + ") or "nothing" }}</td>
-<td>{{ number(j.strength) }}</td><td>{{ j.decision }}{% if j.failure %}: {{ j.failure[:200] }}{% endif %}</td>
-<td>{{ j.named|join(" + ") }}</td><td>{{ number(j.claimed) }}</td></tr>{% endfor %}</table>
-</body></html>
-"""
-
 
 def write_report(score: Score, path: Path) -> None:
     """Write the page as HTML with the pictures inside."""
-    template = Environment(autoescape=True).from_string(_PAGE)
+    template = page_environment("daq_app.gap").get_template("blind_score.html")
     text = template.render(
         n=len(score.judged),
         waiting=score.waiting,

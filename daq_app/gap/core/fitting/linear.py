@@ -89,8 +89,7 @@ class Linear:
 
     def free(self, gradient: FloatArray, u: FloatArray) -> Mask:
         """Unknowns, (p,), that the gradient does not press against a bound at `u`."""
-        low, high = self.problem.low, self.problem.high
-        return np.asarray(~(((u <= low) & (gradient > 0)) | ((u >= high) & (gradient < 0))))
+        return not_pressed(u, gradient, self.problem.low, self.problem.high)
 
     def solution(self, damping: float = 0.0) -> FloatArray:
         """The lowest point, (p,), within the bounds in unit coordinates.
@@ -157,6 +156,11 @@ class Linear:
     def under(self, sizes: Sizes) -> Linear:
         """The same linearisation in the metric of other sizes."""
         return Linear(self.problem, self.u, self.lines, sizes, self._stacked)
+
+
+def not_pressed(u: FloatArray, gradient: FloatArray, low: FloatArray, high: FloatArray) -> Mask:
+    """Unknowns that a gradient does not press against a bound; all of shape (p,)."""
+    return np.asarray(~(((u <= low) & (gradient > 0)) | ((u >= high) & (gradient < 0))))
 
 
 def relaxed(linear: Linear, rounds: int) -> tuple[Linear, FloatArray]:

@@ -96,12 +96,7 @@ class Workers:
         pending = set(futures)
         while pending:
             self._progress(len(futures) - len(pending), len(futures), text)
-            try:
-                self._check()
-            except Interrupted:
-                for future in pending:
-                    future.cancel()
-                raise
+            self._check()
             _, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
         self._progress(len(futures), len(futures), text)
 

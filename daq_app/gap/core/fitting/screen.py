@@ -18,7 +18,7 @@ from daq_app.gap.core.fitting import dense
 from daq_app.gap.core.fitting.experiment import Experiment
 from daq_app.gap.core.fitting.fit import Fit, starts
 from daq_app.gap.core.fitting.likelihood import Sizes
-from daq_app.gap.core.fitting.linear import Linear
+from daq_app.gap.core.fitting.linear import Linear, Mask, not_pressed
 from daq_app.gap.core.fitting.problem import Columns, Linearised, Problem
 
 _FLAT = 1.0 - 1e-4
@@ -187,12 +187,10 @@ class _Attached:
         self.slope: FloatArray = slope_own - both.T @ slope_base
         self._reached = 0.5 * square - 0.5 * float(slope_base @ dense.solve(self._factor, slope_base))
 
-    def free(self, move: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def free(self, move: FloatArray) -> Mask:
         """Which of the effect's unknowns no bound stops, after a move of them."""
-        at = self.start + move
-        slope = self.slope + self.own @ move
         low, high = self.problem.low[self.unknowns], self.problem.high[self.unknowns]
-        return np.asarray(~(((at <= low) & (slope > 0)) | ((at >= high) & (slope < 0))))
+        return not_pressed(self.start + move, self.slope + self.own @ move, low, high)
 
     def step(self) -> Step:
         """The step within the bounds of the effect's parameters."""

@@ -16,7 +16,12 @@ from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Rotation
 from daq_app.gap.rocking_model.motion.swings import Swings
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun, Survey
-from daq_app.gap.rocking_model.tolerances.motion import AROUND_TEST_S, HELD_STILL, HELD_UNTIL_S
+from daq_app.gap.rocking_model.tolerances.motion import (
+    AROUND_TEST_S,
+    HELD_STILL,
+    HELD_UNTIL_S,
+    SHORTEST_HOLD_S,
+)
 from daq_app.gap.rocking_model.tolerances.walls import SWAY_SHARE
 
 Predict = Callable[[RockingRun, Block, Mapping[str, float]], FloatArray]
@@ -74,7 +79,7 @@ class Scene:
         before = grid.time_s < -HELD_UNTIL_S
         middle = float(np.median(grid.raw[before])) if before.any() else 0.0
         held = self.calm & (np.abs(grid.raw - middle) < HELD_STILL * abs(middle))
-        mean_error = 3.0 * self.swings.held.sway_speed_sd / max(float(held.sum()) / GRID_HZ, 0.05)
+        mean_error = 3.0 * self.swings.held.sway_speed_sd / max(float(held.sum()) / GRID_HZ, SHORTEST_HOLD_S)
         return held & (mean_error < SWAY_SHARE * GRAVITY_M_S2 * abs(middle))
 
 

@@ -76,21 +76,21 @@ class RockingRun:
         """The run with further blocks of features after those it has."""
         blocks = (*self.blocks, *more)
         old = self.features
-        values, sds, labels = list(old.values), list(old.sd), list(old.labels)
+        rows = list(zip(old.values, old.sd, old.labels, strict=True))
+        size = float(abs(self.swings.peak_rad[0]))
         for block in more:
             share = 1.0 if block.independent else _SMALLEST_LOADING
             for name, unit, value, variance in zip(
                 block.names, block.units, block.values, np.diag(block.covariance), strict=True
             ):
-                values.append(float(value))
-                sds.append(share * float(np.sqrt(variance)) + 1e-15)
-                size = float(abs(self.swings.peak_rad[0]))
                 channel, observable = block.said.get(name, (block.family, name))
-                labels.append(Label(channel, "run", observable, unit, size, 0.5))
+                label = Label(channel, "run", observable, unit, size, 0.5)
+                rows.append((value, share * np.sqrt(variance) + 1e-15, label))
         first = len(self.places) + self.peaks.size
-        loadings = _block_loadings(blocks, first, len(values))
-        features = FeatureSet(np.array(values), np.array(sds), tuple(labels))
-        return replace(self, features=features, blocks=blocks, fixed_loadings=loadings, cache=RunCache())
+        loadings = _block_loadings(blocks, first, len(rows))
+        return replace(
+            self, features=FeatureSet.of(rows), blocks=blocks, fixed_loadings=loadings, cache=RunCache()
+        )
 
     def of_blocks(self, blocks: Sequence[Block]) -> RockingRun:
         """The run with these blocks of features in place of those it has."""

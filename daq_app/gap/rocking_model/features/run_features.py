@@ -71,20 +71,17 @@ def examine(run: GapRun, reference: str = "") -> Examined:
     if initial_speed is not None:
         entry = ("speed away from upright", "rad/s", initial_speed[0], initial_speed[1] ** 2)
         blocks = (*blocks, scalar_block("release", (entry,), grid))
-    values, sds, labels, places = _times(swings, reference, run.survey)
+    rows, places = _times(swings, reference, run.survey)
     peaks = np.arange(1, swings.peak_s.size)
     amplitude, order = swings.peak_rad, swings.peak_s / swings.peak_s[-1]
     for k in peaks:
-        values.append(float(np.log(abs(amplitude[k]))))
         relative = [swings.peak_sd[j] / abs(amplitude[j]) for j in (k, k - 1)]
-        sds.append(float(np.hypot(*relative)))
-        labels.append(
-            Label(reference, "peak", "log peak after impact", "1", float(amplitude[k - 1]), float(order[k]))
-        )
+        of_peak = "peak", "log peak after impact", "1", float(amplitude[k - 1]), float(order[k])
+        rows.append((np.log(abs(amplitude[k])), np.hypot(*relative), Label(reference, *of_peak)))
     features = RockingRun(
         run.name,
         run.level,
-        FeatureSet(np.array(values), np.array(sds), tuple(labels)),
+        FeatureSet.of(rows),
         run.survey,
         swings,
         places,
@@ -95,7 +92,7 @@ def examine(run: GapRun, reference: str = "") -> Examined:
         reference,
         run.impacts_before,
         *_wire_heights(run),
-        np.zeros((len(values), 0)),
+        np.zeros((len(rows), 0)),
         notes,
         wires=wires_of(run),
         leaked=leaked_turn(run) if reference == "wire" else np.zeros(0),
@@ -119,11 +116,12 @@ def _reference(run: GapRun, joint: Rotation, wanted: str) -> tuple[str, FloatArr
 
 def _times(
     swings: sw.Swings, reference: str, survey: Survey
-) -> tuple[list[float], list[float], list[Label], NDArray[np.intp]]:
-    """Time features of all half-cycles: parts of the fall and rise, over the top, across the impact."""
-    values: list[float] = []
-    sds: list[float] = []
-    labels: list[Label] = []
+) -> tuple[list[tuple[float, float, Label]], NDArray[np.intp]]:
+    """Time features of all half-cycles: parts of the fall and rise, over the top, across the impact.
+
+    (value, sd, label) of each, and its crossings as in `RockingRun.places`.
+    """
+    rows: list[tuple[float, float, Label]] = []
     places: list[tuple[int, int, int, int]] = []
     count = swings.levels.shape[1]
     last = swings.peak_s[-1]
@@ -137,13 +135,9 @@ def _times(
         (ta, sa), (tb, sb) = crossing(ka, a), crossing(kb, b)
         if not np.isfinite(ta + tb + sa + sb):
             return
-        values.append(tb - ta)
-        sds.append(float(np.sqrt(sa**2 + sb**2 + _from_peak_error(swings, survey, ka, a, kb, b) ** 2)))
-        labels.append(
-            Label(
-                reference, phase, observable, "s", float(swings.peak_rad[ka]), float(swings.peak_s[ka] / last)
-            )
-        )
+        sd = float(np.sqrt(sa**2 + sb**2 + _from_peak_error(swings, survey, ka, a, kb, b) ** 2))
+        size, order = float(swings.peak_rad[ka]), float(swings.peak_s[ka] / last)
+        rows.append((tb - ta, sd, Label(reference, phase, observable, "s", size, order)))
         places.append((ka, a, kb, b))
 
     for k in range(swings.peak_s.size):
@@ -157,7 +151,7 @@ def _times(
             add("time over the top", "peak", k, count, k, 0)
         if k + 1 < swings.peak_s.size:
             add("time across the impact", "impact", k, used - 1, k + 1, count + len(sw.FRACTIONS) - 1)
-    return values, sds, labels, np.array(places, dtype=np.intp)
+    return rows, np.array(places, dtype=np.intp)
 
 
 def _wire_heights(run: GapRun) -> tuple[float, float, float, float]:

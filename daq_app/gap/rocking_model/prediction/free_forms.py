@@ -19,8 +19,8 @@ _MIDDLE = 0.1
 _ZETA_STEP = 1e-4
 _RADIUS_STEP_M = 1e-3
 _LOSS_STEP = 1e-4
-_FREE_TIMES = {"free_restoring": "alike", "free_dissipation": "way", "free_geometry": "side"}
-"""How the times of a free form go with the half-cycle, by its name."""
+_FREE_TIMES = {"free_restoring": "", "free_dissipation": "way", "free_geometry": "side"}
+"""How the times of a free form go with the half-cycle, by its name; empty for one that is the same in all."""
 
 
 def free_times(run: RockingRun, values: Mapping[str, float]) -> FloatArray | float:
@@ -34,7 +34,7 @@ def free_times(run: RockingRun, values: Mapping[str, float]) -> FloatArray | flo
         knots = np.array([values.get(f"{form}.t{i}", 0.0) for i in range(9)])
         first = knots[3 * basis.kind + basis.low]
         at_peak = first + (knots[3 * basis.kind + basis.low + 1] - first) * basis.share
-        total += at_peak * getattr(basis, _FREE_TIMES[form])
+        total += at_peak * (getattr(basis, _FREE_TIMES[form]) if _FREE_TIMES[form] else 1.0)
     return total
 
 
@@ -48,8 +48,6 @@ class _FreeBasis:
     """Knot below the peak."""
     share: FloatArray
     """Share of the way from that knot to the next."""
-    alike: FloatArray
-    """1 in all: the same up and down."""
     way: FloatArray
     """1 in a fall, −1 in a rise, 0 over the top and across an impact."""
     side: FloatArray
@@ -68,7 +66,7 @@ def _free_basis(run: RockingRun) -> _FreeBasis:
     low = np.minimum(place.astype(int), 1)
     way = np.where(turning, 0.0, np.where(falls, 1.0, -1.0))
     side = np.where(ka == kb, np.sign(peaks), 0.0)
-    return _FreeBasis(kind, low, place - low, np.ones(way.size), way, side)
+    return _FreeBasis(kind, low, place - low, way, side)
 
 
 def departed(run: RockingRun, values: Mapping[str, float], cycles: HalfCycles) -> FloatArray:

@@ -100,6 +100,12 @@ HELD_STILL = 0.01
 Raising it takes the start of the fall for the hold.
 """
 
+SHORTEST_HOLD_S = 0.05
+"""Duration, s, that any hold counts as, where its sway says how far its mean acceleration is off (assumed).
+
+Raising it takes the sway of a short hold for a gain of the accelerometers.
+"""
+
 FREE_FROM_S = 0.05
 """Time after the release, s, from which the wall moves freely (assumed): a cable may give way slowly.
 

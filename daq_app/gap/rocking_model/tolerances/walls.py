@@ -45,6 +45,62 @@ BASE_NOISE_M = 1e-4
 Raising it fits the law to fast slips alone.
 """
 
+FEWEST_WIRES = 4
+"""Wires, 1, from which slip, turn and rotation are told apart with one to spare, and from which their scatter
+says what their mean is off by.
+
+Raising it finds no slip on walls with few wires.
+"""
+
+SLIP_GUARD_S = 0.008
+"""Time beside an impact, s, in which no slip is looked for: its shock and its steps are over then (assumed).
+
+Raising it leaves less of short half-cycles.
+"""
+
+SLIP_WINDOW_S = 0.03
+"""Time after and before an impact, s, whose means are compared for a slip between two impacts (assumed).
+
+Raising it makes slips surer, and smaller than they are.
+"""
+
+SLIP_WINDOW_SHARE = 0.2
+"""Share of a half-cycle, 1, that such a window takes at most (assumed).
+
+Raising it makes slips of short half-cycles surer, and smaller than they are.
+"""
+
+SHORTEST_SLIP_S = 0.1
+"""Duration of the shortest half-cycle, s, in which a slip is looked for: both windows fit into it.
+
+Raising it tells slips from fewer half-cycles.
+"""
+
+BASE_SETTLED_S = 0.3
+"""Time before the release, s, from which on the walk of the base is looked at (assumed).
+
+Raising it takes the end of the pull for a walk.
+"""
+
+SLIP_SCATTER = 2e-4
+"""What the slips of a part of a test repeat by, m s/rad: 0.2 mm over a part in which the impacts' speeds add
+up to 1 rad/s. LVDTs whose zeros walk by 0.03 mm seem to move all wires by 0.1 mm.
+
+Raising it hides slides.
+"""
+
+TURN_SCATTER_S = 1e-4
+"""What a turn about the vertical at an impact repeats by, s, from a pair of wires a metre apart (assumed).
+
+Raising it hides turns about a corner.
+"""
+
+BENDING_OF_MEAN = 2.0
+"""What a bending with z² moves the mean of wires over a wall's height by, over what it moves them apart, 1.
+
+Raising it takes slides for bending.
+"""
+
 # -- impacts ---------------------------------------------------------------------------------------
 MIDDLE_OF_IMPACT_S = 1.5e-3
 """Time, s, from the contact to the middle of an impact, by which accelerometers seem late that are not.
@@ -105,6 +161,16 @@ It is no free scatter, which would grow until an effect that nobody named hides 
 weak bending and turning.
 """
 
+DISPLACEMENT_MASK_S = 0.02
+"""Time after an impact, s, in which wires and LVDTs tell no ring-down: a base that gives way takes
+milliseconds to turn, a quick decay but no ring (assumed).
+
+Raising it loses rings that die away quickly.
+"""
+
+ACCELERATION_MASK_S = 0.035
+"""The same of accelerometers, s: their mounts ring after the shock (assumed)."""
+
 RINGING_GAIN = 50.0
 """Gain in ln likelihood per run, 1, from which a wall rings so that wires tell no slide of its base.
 
@@ -150,6 +216,18 @@ FLOOR_STANDS_OUT = 4.0
 """The same, squared, over the standard error of its mean over the parts at rest.
 
 Lowering it takes a wall that rings on after its last impact for a floor.
+"""
+
+FEWEST_PARTS = 6
+"""Parts at rest, 1, from which their differences say how sure the mean of the floor is (assumed).
+
+Raising it finds no irregular floor in short records.
+"""
+
+LEAST_KEPT = 0.7
+"""Share of a band's power, 1, that counts as left where sway and offsets take more than the rest (assumed).
+
+Raising it makes floors look quieter at the lowest frequencies.
 """
 
 # -- effects ---------------------------------------------------------------------------------------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -40,14 +40,13 @@ from daq_app.gap.rocking_model.features.shapes import (
     turn_shape,
     turning_shape,
 )
+from daq_app.gap.rocking_model.features.slips.base_slip import beyond_rigid, shown_of_base
 from daq_app.gap.rocking_model.features.slips.impact_steps import slides, step_terms, turn_share, turns
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import (
-    Wire,
     anchors_move,
     coarse,
-    gridded,
     mean_rotation,
     straight_line,
     wall_rotation,
@@ -56,31 +55,28 @@ from daq_app.gap.rocking_model.motion.rotation import (
 from daq_app.gap.rocking_model.records import GapRun, Survey
 from daq_app.gap.rocking_model.tolerances.motion import AROUND_TEST_S
 from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, OTHER_WIRES, PLAY_RAD
+from daq_app.gap.rocking_model.tolerances.walls import (
+    BENDING_OF_MEAN,
+    FEWEST_WIRES,
+    SLIP_SCATTER,
+    TURN_SCATTER_S,
+)
 
 Columns = dict[str, tuple[FloatArray, str]]
 """Shapes of a regression, (m,) each, with the units of their coefficients."""
 
 SLIDE, STEADY = "slide", "steady"
 """Blocks of which a run keeps one: drift of the wires beside steps at impacts, and as if there were none."""
-_FEWEST_WIRES = 4
-"""Wires from which their scatter tells what their mean is off by."""
 _ON = "slip per speed to one side"
 _PARTS = 3
 """Parts of a test, over each of which steps of all wires at impacts are added up: a slide goes on through all
 of them, and slips are uneven, which averages out over several impacts."""
-_BENDING = 2.0
-"""What a bending with z² moves the mean of wires over a wall's height by, over what it moves them apart."""
 _FEWEST_IMPACTS = 4 * _PARTS
 """Impacts from which each part has some to either side."""
-_SLIP_SCATTER = 2e-4
-"""What these repeat by, m s/rad: 0.2 mm over a part in which the impacts' speeds add up to 1 rad/s. LVDTs
-whose zeros walk by 0.03 mm seem to move all wires by 0.1 mm. Raising it hides slides."""
 _TURNS = 8
 """Impacts at which a turn about the vertical is looked for: those with most speed."""
-_TURN_SCATTER_S = 1e-4
-"""What such a turn repeats by, from a pair of wires a metre apart …"""
 _TURN_LEVER_1_M = math.sqrt(2.0)
-"""… whose turn is this many times, 1/m, what one of them steps by."""
+"""Turn that a pair of wires a metre apart shows, over what one of them steps by."""
 
 
 def _rotation_block(scene: Scene, family: str, absorbed: tuple[str, ...]) -> Block | None:
@@ -165,15 +161,15 @@ def _as_wires_agree(block: Block, scene: Scene, theta: FloatArray) -> FloatArray
     """
     run = scene.run
     _, chosen = wall_rotation(run)
-    if len(chosen) < _FEWEST_WIRES:
+    if len(chosen) < FEWEST_WIRES:
         return block.covariance
     weights = run.positions(chosen)[:, 2] / run.positions(chosen)[:, 2].sum()
-    each = _beyond_rigid(run, theta, chosen)[:, block.pick] @ block.projection.T / wire_height(run)
+    each = beyond_rigid(run, theta, chosen)[:, block.pick] @ block.projection.T / wire_height(run)
     apart = each - weights @ each
     scatter = (weights * apart.T) @ apart / (1.0 - float(weights @ weights))
     # A wall that bends moves the mean of its wires further than it moves them apart, however many there are.
     # Few wires tell correlations badly: half of each is kept.
-    return np.asarray(_BENDING**2 * 0.5 * (scatter + np.diag(np.diag(scatter))))
+    return np.asarray(BENDING_OF_MEAN**2 * 0.5 * (scatter + np.diag(np.diag(scatter))))
 
 
 def leaked_turn(run: GapRun) -> FloatArray:
@@ -181,12 +177,6 @@ def leaked_turn(run: GapRun) -> FloatArray:
     _, chosen = wall_rotation(run)
     heights = run.positions(chosen)[:, 2]
     return np.asarray(heights @ crosstalk(run, chosen) / (heights @ heights))
-
-
-def _beyond_rigid(run: GapRun, theta: FloatArray, chosen: Sequence[int]) -> FloatArray:
-    """What wires show beyond those of a rigid wall at `theta`, (m,), rad, on still edges: (k, m), m."""
-    ideal = [Wire(run.sensors[i], run.survey.half_base_m).shortening(theta) for i in chosen]
-    return np.array([gridded(run, i) for i in chosen]) - np.array(ideal)
 
 
 def rotation_columns(grid: Grid, alpha: float) -> dict[str, tuple[FloatArray, str]]:
@@ -209,7 +199,7 @@ def _translation_block(scene: Scene) -> Block | None:
     if len(set(np.round(heights, 2))) < 2 or len(chosen) < len(run.indices("wire")):
         return None  # what the base seems to do hangs on the calibration of each wire
     at_base = straight_line(heights)[0]
-    moved = at_base @ _beyond_rigid(run, grid.theta, chosen)
+    moved = at_base @ beyond_rigid(run, grid.theta, chosen)
     columns = {
         "zero": (np.ones_like(grid.theta), "m"),
         "slip per speed": (stepped_shape(grid, alternating=True), "m s/rad"),
@@ -230,11 +220,15 @@ def _turn_block(scene: Scene) -> Block | None:
     run, grid = scene.run, scene.grid
     _, chosen = wall_rotation(run)
     _, y, z = run.positions(chosen).T
-    design = _turning_design(y, z)
-    if len(chosen) < len(run.indices("wire")) or np.linalg.matrix_rank(design) < 3 or len(chosen) < 4:
+    design = shown_of_base(y, z)
+    if (
+        len(chosen) < len(run.indices("wire"))
+        or np.linalg.matrix_rank(design) < 3
+        or len(chosen) < FEWEST_WIRES
+    ):
         return None
     weights = -np.linalg.pinv(design)[2]
-    turned = weights @ _beyond_rigid(run, grid.theta, chosen)
+    turned = weights @ beyond_rigid(run, grid.theta, chosen)
     theta, count = grid.theta, min(_TURNS, grid.impact_s.size - 1)
     absorbed = {
         "gain": (theta, "1"),
@@ -255,7 +249,7 @@ def _turn_block(scene: Scene) -> Block | None:
         return None
     # Without one wire of a pair the turn hangs on a longer lever, and with it on what every wire steps by.
     lever = float(weights @ weights) / _TURN_LEVER_1_M**2
-    steps = max(lever - 1.0, 0.0) * _TURN_SCATTER_S**2 * np.eye(count)
+    steps = max(lever - 1.0, 0.0) * TURN_SCATTER_S**2 * np.eye(count)
     tops = {f"top {k + 1}": (top_shape(grid, k), "s") for k in range(count)}
     at_tops = _regress_about_mean(turned, columns | tops, pick, tuple(columns))
     covariance = block.covariance
@@ -280,11 +274,6 @@ def _beyond_stated(at_tops: Block) -> float:
     """
     seen = float(np.mean(at_tops.values**2 / np.diag(at_tops.covariance)))
     return max(1.0, 0.5 * (seen + 1.0))
-
-
-def _turning_design(y: FloatArray, z: FloatArray) -> FloatArray:
-    """What wires at (y, z), (k,) each, show of a base that moves, a rotation and a turn, (k, 3)."""
-    return np.column_stack([np.ones_like(y), z, y])
 
 
 def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
@@ -339,7 +328,7 @@ def _rung(run: RockingRun, key: str) -> FloatArray:
     if key == "yaw.kick":
         return wave
     y, z = np.array([wire.sensor.position_m[1:] for wire in run.wires]).T
-    return np.asarray(-np.linalg.pinv(_turning_design(y, z))[2] @ (y * z) * wave)
+    return np.asarray(-np.linalg.pinv(shown_of_base(y, z))[2] @ (y * z) * wave)
 
 
 def _observe(scene: Scene) -> Iterator[Block | None]:
@@ -376,10 +365,10 @@ FAMILY = SensorFamily(
         ("wire", "step with moment"): Size(3e-6, 4e-6, "rad"),
         (STEADY, "drift"): Size(2e-6, 5e-6, "rad/s"),
         (SLIDE, "drift"): Size(5e-6, 5e-6, "rad/s"),
-        **{(SLIDE, f"slip {part + 1}"): Size(_SLIP_SCATTER, 1e-4, "m s/rad") for part in range(_PARTS)},
+        **{(SLIDE, f"slip {part + 1}"): Size(SLIP_SCATTER, 1e-4, "m s/rad") for part in range(_PARTS)},
         ("base", "slip per speed"): Size(5e-5, 1e-4, "m s/rad"),
         ("base", "follows rotation"): Size(3e-4),
-        **{("turn", f"impact {k + 1}"): Size(_TURN_SCATTER_S) for k in range(_TURNS)},
+        **{("turn", f"impact {k + 1}"): Size(TURN_SCATTER_S) for k in range(_TURNS)},
     },
     _priors,
 )

@@ -13,24 +13,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.gap.core.features import FloatArray
-from daq_app.gap.rocking_model.features.oscillations.floor_vibration import QuietRecord, quiet_record
+from daq_app.gap.rocking_model.features.oscillations.floor_vibration import (
+    QuietRecord,
+    quiet_record,
+    sinusoids,
+)
 from daq_app.gap.rocking_model.features.oscillations.rings import Ring
 from daq_app.gap.rocking_model.features.oscillations.vibration import FloorSpectrum
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances.walls import FLOOR_RMS_M_S2, FLOOR_STANDS_OUT
+from daq_app.gap.rocking_model.tolerances.walls import (
+    FEWEST_PARTS,
+    FLOOR_RMS_M_S2,
+    FLOOR_STANDS_OUT,
+    LEAST_KEPT,
+)
 
 _BANDS_HZ = np.arange(0.5, 13.0, 0.5)
 """Ends of the bands. Slower ones show in no part at rest; what is faster turns a wall by less than noise."""
+_MIDDLES_HZ = 0.5 * (_BANDS_HZ[1:] + _BANDS_HZ[:-1])
 _PART = 200
 """Samples of the grid in a part, 1 s: longer rests are cut."""
 _SHORTEST = 100
 """Samples of a part that is used: a shorter one tells no frequency."""
-_LEAST_KEPT = 0.7
-"""Share of a band's power, where sway and offsets take more than the rest of it."""
-_FEWEST_PARTS = 6
-"""Parts at rest from which their differences say how sure the mean is."""
 
 
 def floor_spectrum(runs: Sequence[GapRun], grids: Sequence[Grid], ring: Ring | None) -> FloorSpectrum | None:
@@ -39,7 +45,7 @@ def floor_spectrum(runs: Sequence[GapRun], grids: Sequence[Grid], ring: Ring | N
     `ring` is the wall's own ring-down after impacts.
     """
     parts = [part for run, grid in zip(runs, grids, strict=True) for part in _parts(run, grid, ring)]
-    if len(parts) < _FEWEST_PARTS:
+    if len(parts) < FEWEST_PARTS:
         return None
     weights = np.array([samples for samples, _ in parts], dtype=float)
     weights /= weights.sum()
@@ -50,7 +56,7 @@ def floor_spectrum(runs: Sequence[GapRun], grids: Sequence[Grid], ring: Ring | N
     if mean < max(FLOOR_RMS_M_S2**2, FLOOR_STANDS_OUT * sd):
         return None
     bands = np.sqrt(np.maximum(weights @ powers, 0.0))
-    return FloorSpectrum(0.5 * (_BANDS_HZ[1:] + _BANDS_HZ[:-1]), bands, 0.5 * sd / float(np.sqrt(mean)))
+    return FloorSpectrum(_MIDDLES_HZ, bands, 0.5 * sd / float(np.sqrt(mean)))
 
 
 def _parts(run: GapRun, grid: Grid, ring: Ring | None) -> list[tuple[int, FloatArray]]:
@@ -67,11 +73,9 @@ def _parts(run: GapRun, grid: Grid, ring: Ring | None) -> list[tuple[int, FloatA
 
 def _kept(record: QuietRecord) -> FloatArray:
     """Share of each band's power that is left where sway and offsets are taken out, (k,)."""
-    middles_hz = 0.5 * (_BANDS_HZ[1:] + _BANDS_HZ[:-1])
-    angle = 2.0 * np.pi * middles_hz[:, None] * record.time_s
-    waves = np.stack([np.sin(angle), np.cos(angle)], axis=1)
+    waves = sinusoids(_MIDDLES_HZ, record.time_s)
     taken = np.sum((waves @ record.basis) ** 2, axis=(1, 2)) / np.sum(waves**2, axis=(1, 2))
-    return np.asarray(np.maximum(1.0 - taken, _LEAST_KEPT))
+    return np.asarray(np.maximum(1.0 - taken, LEAST_KEPT))
 
 
 def _pieces(values: FloatArray, gaps: NDArray[np.intp]) -> list[FloatArray]:

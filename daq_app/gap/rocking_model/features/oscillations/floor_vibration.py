@@ -146,13 +146,20 @@ def _fit(
     data: QuietRecord, values: FloatArray, frequencies: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Sine and cosine, (k, 2), explained power, (k,), inverse Gram matrix, (k, 2, 2), of k sinusoids."""
-    angle = 2.0 * np.pi * frequencies[:, None] * data.time_s
-    waves = np.stack([np.sin(angle), np.cos(angle)], axis=1)
+    waves = sinusoids(frequencies, data.time_s)
     waves = waves - (waves @ data.basis) @ data.basis.T
-    inverse = np.linalg.inv(waves @ waves.transpose(0, 2, 1) + 1e-9 * np.eye(2))
+    inverse: FloatArray = np.asarray(
+        np.linalg.inv(waves @ waves.transpose(0, 2, 1) + 1e-9 * np.eye(2)), dtype=np.float64
+    )
     projected = waves @ values
     sizes = (inverse @ projected[:, :, None])[:, :, 0]
     return sizes, np.sum(projected * sizes, axis=1), inverse
+
+
+def sinusoids(frequencies_hz: FloatArray, time_s: FloatArray) -> FloatArray:
+    """Sine and cosine of each frequency (k,) at times (n,), (k, 2, n)."""
+    angle = 2.0 * np.pi * frequencies_hz[:, None] * time_s
+    return np.stack([np.sin(angle), np.cos(angle)], axis=1)
 
 
 def _share(data: QuietRecord, frequency: float, frequency_sd: float, found: bool) -> Vibration:

@@ -15,11 +15,11 @@ from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Rotation, coarse, gridded, wall_rotation
 from daq_app.gap.rocking_model.records import GRAVITY_M_S2, GapRun
 from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, RING_LATE_S, SPREAD_ALONG_M
-from daq_app.gap.rocking_model.tolerances.walls import MIDDLE_OF_IMPACT_S
-
-DISPLACEMENT_MASK_S = 0.02
-"""A base that gives way takes milliseconds to turn after an impact: a quick decay, but no ring-down."""
-ACCELERATION_MASK_S = 0.035
+from daq_app.gap.rocking_model.tolerances.walls import (
+    ACCELERATION_MASK_S,
+    DISPLACEMENT_MASK_S,
+    MIDDLE_OF_IMPACT_S,
+)
 
 
 @dataclass(frozen=True, slots=True)

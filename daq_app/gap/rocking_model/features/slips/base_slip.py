@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 
@@ -13,16 +12,14 @@ from daq_app.gap.rocking_model.features.run_findings import RunFinding
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Wire, gridded, wall_rotation
 from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.tolerances.walls import (
+    FEWEST_WIRES,
+    SHORTEST_SLIP_S,
+    SLIP_GUARD_S,
+    SLIP_WINDOW_S,
+    SLIP_WINDOW_SHARE,
+)
 from daq_app.rocking.families.base.slip import BaseSlip, HalfCycleSlips, find_slip
-
-_GUARD_S: Final = 0.008
-"""Time beside an impact that is not looked at: its shock and its steps are over then."""
-_WINDOW_S: Final = 0.03
-"""Time after and before an impact whose means are compared."""
-_SHORTEST_S: Final = 0.1
-"""Duration of the shortest half-cycle that is used: both windows fit into it."""
-_FEWEST_WIRES: Final = 4
-"""Number of wires from which slip, turn and rotation are told apart with one to spare."""
 
 
 def slip_of(runs: Sequence[GapRun], grids: Sequence[Grid]) -> BaseSlip | None:
@@ -54,11 +51,21 @@ def base_motion(run: GapRun, grid: Grid) -> FloatArray | None:
     """
     _, chosen = wall_rotation(run)
     _, y, z = run.positions(chosen).T
-    design = np.column_stack([np.ones_like(y), z, y])
-    if len(chosen) < _FEWEST_WIRES or np.linalg.matrix_rank(design) < design.shape[1]:
+    design = shown_of_base(y, z)
+    if len(chosen) < FEWEST_WIRES or np.linalg.matrix_rank(design) < design.shape[1]:
         return None
-    ideal = np.array([Wire(run.sensors[i], run.survey.half_base_m).shortening(grid.theta) for i in chosen])
-    return np.asarray(np.linalg.pinv(design) @ (np.array([gridded(run, i) for i in chosen]) - ideal))
+    return np.asarray(np.linalg.pinv(design) @ beyond_rigid(run, grid.theta, chosen))
+
+
+def shown_of_base(y: FloatArray, z: FloatArray) -> FloatArray:
+    """What wires at (y, z), (k,) each, show of a base that moves, a rotation and a turn, (k, 3)."""
+    return np.column_stack([np.ones_like(y), z, y])
+
+
+def beyond_rigid(run: GapRun, theta: FloatArray, chosen: Sequence[int]) -> FloatArray:
+    """What wires show beyond those of a rigid wall at `theta`, (m,), rad, on still edges: (k, m), m."""
+    ideal = [Wire(run.sensors[i], run.survey.half_base_m).shortening(theta) for i in chosen]
+    return np.array([gridded(run, i) for i in chosen]) - np.array(ideal)
 
 
 def _seen(run: GapRun, grid: Grid) -> HalfCycleSlips | None:
@@ -70,10 +77,10 @@ def _seen(run: GapRun, grid: Grid) -> HalfCycleSlips | None:
     for start_s, end_s, approach in zip(
         grid.impact_s[:-1], grid.impact_s[1:], grid.approach[:-1], strict=True
     ):
-        if end_s - start_s < _SHORTEST_S:
+        if end_s - start_s < SHORTEST_SLIP_S:
             break
-        window_s = min(_WINDOW_S, 0.2 * (end_s - start_s))
-        after, before = grid.time_s - start_s - _GUARD_S, end_s - _GUARD_S - grid.time_s
+        window_s = min(SLIP_WINDOW_S, SLIP_WINDOW_SHARE * (end_s - start_s))
+        after, before = grid.time_s - start_s - SLIP_GUARD_S, end_s - SLIP_GUARD_S - grid.time_s
         first, last = ((side > 0.0) & (side < window_s) for side in (after, before))
         inside = grid.theta[(after > 0.0) & (before > 0.0)]
         if not (first.any() and last.any() and grid.valid[first | last].all()):

@@ -20,7 +20,7 @@ from daq_app.gap.rocking_model.features.slips.base_slip import base_motion
 from daq_app.gap.rocking_model.motion.motion_grid import SMOOTH_HZ, Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances.walls import BASE_NOISE_M, SLIP_LEFT_OPEN
+from daq_app.gap.rocking_model.tolerances.walls import BASE_NOISE_M, BASE_SETTLED_S, SLIP_LEFT_OPEN
 from daq_app.rocking.families.base.slip import BaseSlip
 from daq_app.rocking.theory.friction import push, slips_as_it_rocks
 
@@ -28,8 +28,6 @@ _AROUND: Final = np.geomspace(0.5, 1.4, 10)
 """Rotations below which the base slips that are tried, over that which half-cycles show."""
 _BEGINS_S2: Final = (0.0, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3)
 """Speeds of a slip just after an impact that are tried, as `BaseSlip` has them."""
-_SETTLED_S: Final = 0.3
-"""Time before the release from which on the base is looked at."""
 _SHORTEST: Final = 4
 """Number of samples of the grid in the shortest half-cycle that is looked at."""
 
@@ -83,7 +81,7 @@ def walk_of(run: GapRun, grid: Grid, slip: BaseSlip) -> _Course | None:
     courses = [] if seen is None else list(_courses(grid, slip))
     if seen is None or not courses:
         return None
-    first, last = np.searchsorted(grid.time_s, (-_SETTLED_S, grid.impact_s[-1]))
+    first, last = np.searchsorted(grid.time_s, (-BASE_SETTLED_S, grid.impact_s[-1]))
     told, others = slice(first, last), _with_rotation(grid.theta)
     laws = np.array([course.along_m for course in courses])
     factors, kept = _factors(laws[:, told], others[told], seen[0, told])
@@ -116,7 +114,7 @@ def by_whole_tests(runs: Sequence[GapRun], grids: Sequence[Grid], slip: BaseSlip
         moved = base_motion(run, grid)
         if moved is None or not grid.impact_s.size:
             continue
-        told = slice(*np.searchsorted(grid.time_s, (-_SETTLED_S, grid.impact_s[-1])))
+        told = slice(*np.searchsorted(grid.time_s, (-BASE_SETTLED_S, grid.impact_s[-1])))
         basis, _ = np.linalg.qr(_with_rotation(grid.theta)[told])
         walks = np.zeros((told.stop - told.start, 2 * len(tried)))
         for cycle in _half_cycles(grid, below_rad, begins_s2):
