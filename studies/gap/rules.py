@@ -19,7 +19,7 @@ from typing import Any
 from daq_app.gap.blind.names import class_of
 from daq_app.gap.blind.running.runner import case_folders, read_outcome
 from daq_app.gap.blind.scoring.judge import Judged, judge
-from daq_app.gap.blind.scoring.laboratories import by_laboratory
+from daq_app.gap.blind.scoring.score import by_laboratory
 from daq_app.gap.blind.seal import open_label
 from daq_app.gap.core.policy import POLICY, Policy
 from daq_app.gap.core.result import verdict_of

@@ -23,8 +23,7 @@ from daq_app.runfile.durable import write_whole
 from daq_app.runfile.folder import require_replaceable
 
 if TYPE_CHECKING:
-    from daq_app.gap.blind.scoring.laboratories import LaboratoryScore
-    from daq_app.gap.blind.scoring.score import Score
+    from daq_app.gap.blind.scoring.score import LaboratoryScore, Score
 
 _RIGS = (Path("configs/fr1.toml"), Path("configs/fr2.toml"))
 _PRODUCT = "daq_app.gap.blind.running.diagnosers:product"
@@ -126,8 +125,7 @@ def run(
 ) -> None:
     """Diagnose every case in a process that has nothing but its files. Goes on where it was interrupted."""
     from daq_app.gap.blind.running.diagnosers import load_diagnoser
-    from daq_app.gap.blind.running.runner import case_folders, pending, run_pending
-    from daq_app.gap.blind.running.scheduler import run_on_scheduler
+    from daq_app.gap.blind.running.runner import case_folders, pending, run_on_scheduler, run_pending
 
     with _refusals():
         load_diagnoser(diagnoser)
@@ -189,8 +187,7 @@ def table(
     misses: Annotated[bool, typer.Option("--misses", help="Also list what was not right.")] = False,
 ) -> None:
     """Scores of all cases that have a result, a column for each laboratory. Always exit code 0."""
-    from daq_app.gap.blind.scoring.laboratories import by_laboratory
-    from daq_app.gap.blind.scoring.score import score_folder
+    from daq_app.gap.blind.scoring.score import by_laboratory, score_folder
 
     with _refusals():
         scores = [score_folder(folder, _beside(folder), results) for folder in folders]
@@ -245,7 +242,7 @@ def _print_score(found: Score) -> None:
 
 def _print_confusion(found: Score, console: Console) -> None:
     """What was hidden → what was answered, most frequent first; the matrix is in the HTML page."""
-    from daq_app.gap.blind.scoring.confusion import confusion
+    from daq_app.gap.blind.scoring.score import confusion
 
     counts = confusion(found.judged)
     table = Table(title="Hidden and answered", title_justify="left")

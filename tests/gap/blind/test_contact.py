@@ -20,13 +20,12 @@ from daq_app.gap.blind.making.mix import case_generator, category_of, draw_effec
 from daq_app.gap.blind.running.diagnosers import product
 from daq_app.gap.blind.world.campaign import World, draw_world
 from daq_app.gap.blind.world.contact.feet import needed_friction, plastic_restitution
-from daq_app.gap.blind.world.contact.motion import ContactMotion, rock
-from daq_app.gap.blind.world.contact.scene import contact_stage
-from daq_app.gap.blind.world.effects.catalogue import Drawn
-from daq_app.gap.blind.world.effects.contact_catalogue import (
+from daq_app.gap.blind.world.contact.motion import ContactMotion, contact_stage, rock
+from daq_app.gap.blind.world.effects.catalogue import (
     CONTACT_ENTRIES,
     CONTACT_LIBRARY,
     CONTACT_OUTSIDE,
+    Drawn,
 )
 from daq_app.gap.blind.world.events.mechanics import Effects, Release, build
 from daq_app.gap.blind.world.events.motion import Motion, integrate

@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 from daq_app.config import Scaling
 from daq_app.gap.blind.making.detectability import detectability, total_noise
 from daq_app.gap.blind.making.make import Order, draw_case
-from daq_app.gap.blind.world.campaign import World
-from daq_app.gap.blind.world.laboratories.imperfections import IMPERFECTIONS
-from daq_app.gap.blind.world.laboratories.table import LABORATORIES, draw_sizes
+from daq_app.gap.blind.world.campaign import Surroundings, World
+from daq_app.gap.blind.world.laboratories.table import IMPERFECTIONS, LABORATORIES, draw_sizes
 from daq_app.gap.blind.world.shock import Shock
-from daq_app.gap.blind.world.surroundings import Surroundings
 
 RATE_HZ = 4000.0
 HELD_S = 1.9

@@ -17,11 +17,17 @@ from daq_app.gap.blind.layout import SEAL_FILE
 from daq_app.gap.blind.making.mix import category_of
 from daq_app.gap.blind.names import COMPARABLE, accepted_names, base_name, class_of, comparable
 from daq_app.gap.blind.running.runner import Outcome, save_outcome
-from daq_app.gap.blind.scoring.confusion import confusion
 from daq_app.gap.blind.scoring.judge import Judged, judge
-from daq_app.gap.blind.scoring.laboratories import by_laboratory
 from daq_app.gap.blind.scoring.report import write_markdown, write_report
-from daq_app.gap.blind.scoring.score import Row, Score, claims, score_folder, table
+from daq_app.gap.blind.scoring.score import (
+    Row,
+    Score,
+    by_laboratory,
+    claims,
+    confusion,
+    score_folder,
+    table,
+)
 from daq_app.gap.blind.scoring.statistics import (
     auroc,
     calibration_error,

@@ -18,13 +18,12 @@ from typing import Final
 import numpy as np
 
 from daq_app.gap.blind.world.arrays import FloatArray
-from daq_app.gap.blind.world.campaign import PlannedRun, World
+from daq_app.gap.blind.world.campaign import PlannedRun, Surroundings, World
 from daq_app.gap.blind.world.course import Course
 from daq_app.gap.blind.world.effects.catalogue import Drawn
 from daq_app.gap.blind.world.events.motion import Followed
 from daq_app.gap.blind.world.sensors.chain import CALIBRATION_TOLERANCE, quiet_signals
 from daq_app.gap.blind.world.sensors.faults import Bench, Place, through_electronics
-from daq_app.gap.blind.world.surroundings import Surroundings
 from daq_app.gap.blind.world.wall import Wall
 
 _SMALLEST_PEAK_RAD: Final = 4e-3

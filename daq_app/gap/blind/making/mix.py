@@ -17,18 +17,21 @@ from typing import Final, Literal
 import numpy as np
 
 from daq_app.config import Rig
-from daq_app.gap.blind.world.effects.catalogue import ENTRIES, LIBRARY, OUTSIDE, Drawn, Entry, draw
-from daq_app.gap.blind.world.effects.contact_catalogue import (
+from daq_app.gap.blind.world.effects.catalogue import (
     BESIDE_CONTACT,
     CONTACT_ENTRIES,
     CONTACT_LIBRARY,
     CONTACT_OUTSIDE,
-)
-from daq_app.gap.blind.world.effects.wide_catalogue import (
+    ENTRIES,
+    LIBRARY,
+    OUTSIDE,
     WIDE_CONTACT_ENTRIES,
     WIDE_CONTACT_LIBRARY,
     WIDE_ENTRIES,
     WIDE_LIBRARY,
+    Drawn,
+    Entry,
+    draw,
 )
 from daq_app.gap.blind.world.laboratories.numerics import Engine
 

@@ -20,6 +20,7 @@ from typing import Any
 from daq_app.gap.blind.layout import CASE_PREFIX, RESULTS, SEAL_FILE
 from daq_app.gap.blind.running.apart import Apart
 from daq_app.gap.blind.seal import check_files, read_seal
+from daq_app.machines import RETRIES, scheduler_client
 from daq_app.runfile.digest import file_sha256
 from daq_app.runfile.durable import write_whole
 
@@ -113,3 +114,24 @@ def diagnose_apart(case: Path, diagnoser: str, timeout_s: float, apart: Apart | 
         result, failure = process.diagnose(case, timeout_s)
         seconds = time.perf_counter() - started
     return Outcome(case.name, diagnoser, file_sha256(case / SEAL_FILE), seconds, result, failure)
+
+
+def run_on_scheduler(
+    folder: Path, diagnoser: str, address: str, timeout_s: float, kept: str = RESULTS
+) -> Iterator[Outcome]:
+    """As `run_pending`, on the workers of the scheduler at `address` (``tcp://HOST:PORT``).
+
+    Every worker must see the folder under the same path and have this program installed. Outcomes
+    come back to this process, which alone writes them. Raises `SchedulerMissing`.
+    """
+    with scheduler_client(address) as client:
+        from distributed import as_completed
+
+        cases = [case.resolve() for case in pending(folder, diagnoser, kept)]
+        jobs = client.map(
+            diagnose_apart, cases, diagnoser=diagnoser, timeout_s=timeout_s, pure=False, retries=RETRIES
+        )
+        for job in as_completed(jobs):
+            outcome: Outcome = job.result()
+            save_outcome(folder, outcome, kept)
+            yield outcome

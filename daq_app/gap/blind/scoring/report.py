@@ -13,9 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from daq_app.campaign.pages import page_environment
-from daq_app.gap.blind.scoring.confusion import confusion
 from daq_app.gap.blind.scoring.judge import Judged
-from daq_app.gap.blind.scoring.score import Score, claims
+from daq_app.gap.blind.scoring.score import Score, claims, confusion
 from daq_app.gap.blind.scoring.statistics import Value, reliability
 from daq_app.runfile.durable import write_whole
 

@@ -1,16 +1,18 @@
-"""The score table of the design page, with intervals, from all cases of a check."""
+"""The scores of a check: the table of the design page, laboratory by laboratory, and the confusion matrix."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from daq_app.gap.blind.layout import RESULTS, SEAL_FILE
+from daq_app.gap.blind.names import base_name
 from daq_app.gap.blind.running.runner import case_folders, read_outcome
 from daq_app.gap.blind.scoring.judge import Judged, judge
 from daq_app.gap.blind.scoring.statistics import (
@@ -29,6 +31,22 @@ from daq_app.runfile.digest import file_sha256
 _SURE = 0.95
 _FALSE_ALARMS = 0.05
 _HIDDEN = ("single", "pair", "triple")
+_SEVERAL_OR_NONE: Final = {"pair": "(pair)", "triple": "(triple)", "null": "(nothing)"}
+_COLUMNS: Final = {
+    "decisions right": "decision right, all cases",
+    "first right ≥ 4 sd": "first answer right, effect ≥ 4 sd",
+    "calibration error": "expected calibration error",
+    "calibration error by chance": "calibration error by chance alone",
+    "AUROC outside": "outside the library: AUROC",
+    "set holds truth": "95 % set holds the truth",
+    "closure ≥ 0.9": "closure ≥ 0.9",
+    "pairs exact": "pairs exact",
+    "triples exact": "triples exact",
+    "outside blamed": "outside, blamed on an effect as decided",
+    "null blamed": "nothing hidden, yet blamed on an effect",
+    "intervals": "95 % interval holds the parameter",
+}
+"""Column → row of the score table."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,3 +225,50 @@ def claims(judged: Sequence[Judged]) -> tuple[list[float], list[bool]]:
     spoken = [j for j in judged if j.decision not in ("failed", "none_of_these")]
     kept = [j for j in spoken if not math.isnan(j.claimed)]
     return [j.claimed for j in kept], [j.first_right for j in kept]
+
+
+def confusion(judged: Sequence[Judged]) -> Counter[tuple[str, str]]:
+    """Cases by truth (effect, or how many) and answer (effect, or the decision that names none)."""
+    counts: Counter[tuple[str, str]] = Counter()
+    for one in judged:
+        truth = _SEVERAL_OR_NONE.get(one.category) or one.truth[0]
+        answer = f"({one.decision})"
+        if one.decision == "effect" and len(one.named) == 1:
+            # Accepted synonyms stand on the diagonal.
+            answer = truth if one.first_right else base_name(one.named[0])
+        counts[truth, answer] += 1
+    return counts
+
+
+@dataclass(frozen=True, slots=True)
+class LaboratoryScore:
+    """One row: the laboratory, how many of its cases have a result, and a short text for each column."""
+
+    laboratory: str
+    cases: int
+    columns: dict[str, str]
+
+
+def by_laboratory(judged: Sequence[Judged]) -> list[LaboratoryScore]:
+    """One row for each laboratory in the order in which they come, and one for all if there are several."""
+    names = list(dict.fromkeys(j.laboratory for j in judged))
+    rows = [_score(name, [j for j in judged if j.laboratory == name]) for name in names]
+    return [*rows, _score("all", judged)] if len(names) > 1 else rows
+
+
+def _score(name: str, judged: Sequence[Judged]) -> LaboratoryScore:
+    found: dict[str, Row] = {row.name: row for row in table(judged)}
+    columns = {column: _short(found[row].found) for column, row in _COLUMNS.items() if row in found}
+    sure = sum(wrong_and_sure(j) for j in judged)
+    columns["wrong at p > 0.95"] = f"{sure}/{len(judged)}"
+    for title, category in (("singles", "single"), ("outside", "outside"), ("nothing", "null")):
+        columns[title] = _count([j for j in judged if j.category == category])
+    return LaboratoryScore(name, len(judged), columns)
+
+
+def _count(judged: Sequence[Judged]) -> str:
+    return f"{sum(j.answered_rightly for j in judged)}/{len(judged)}" if judged else "–"
+
+
+def _short(value: Value) -> str:
+    return f"{value.value:.2f} ({value.n})" if value.n else "–"

@@ -16,8 +16,8 @@ from daq_app.gap.blind.world.effects.catalogue import Drawn
 from daq_app.gap.blind.world.events.mechanics import Release
 from daq_app.gap.blind.world.events.motion import Followed
 from daq_app.gap.blind.world.events.scene import Scene
-from daq_app.gap.blind.world.laboratories.numerics import Engine
-from daq_app.gap.blind.world.laboratories.table import Laboratory, draw_sizes
+from daq_app.gap.blind.world.laboratories.numerics import Engine, Numerics
+from daq_app.gap.blind.world.laboratories.table import Chain, Laboratory, draw_sizes
 from daq_app.gap.blind.world.sensors.bench_chain import bench_readings
 from daq_app.gap.blind.world.sensors.chain import (
     CALIBRATION_TOLERANCE,
@@ -27,7 +27,8 @@ from daq_app.gap.blind.world.sensors.chain import (
 )
 from daq_app.gap.blind.world.sensors.faults import Fault, Place
 from daq_app.gap.blind.world.sensors.field_chain import field_readings
-from daq_app.gap.blind.world.surroundings import Surroundings, draw_surroundings
+from daq_app.gap.blind.world.sensors.installation import Installation, draw_installation
+from daq_app.gap.blind.world.shock import Shock, draw_shock
 from daq_app.gap.blind.world.sway import Sway, draw_sway
 from daq_app.gap.blind.world.wall import Wall, draw_wall, off_survey
 
@@ -39,6 +40,35 @@ _SHORTEST_S = 1.5
 """Shortest part of a record before the release and after the rest."""
 _SURROUNDINGS = 0x5AB0
 """Tells the random numbers of a case's surroundings from those of its wall."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """Everything that a laboratory decides for one case; the defaults are those of `own`."""
+
+    laboratory: str = "own"
+    chain: Chain = "own"
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    """Imperfection → its size."""
+    numerics: Numerics = field(default_factory=Numerics)
+    shock: Shock = field(default_factory=Shock)
+    installation: Installation | None = None
+    """None where everything stands as the rig file says."""
+
+
+def draw_surroundings(
+    laboratory: Laboratory, rig: Rig, sizes: Mapping[str, float], rng: np.random.Generator
+) -> Surroundings:
+    """Surroundings with imperfections of these sizes."""
+    form = laboratory.shocks[int(rng.integers(len(laboratory.shocks)))]
+    return Surroundings(
+        laboratory=laboratory.name,
+        chain=laboratory.chain,
+        sizes=sizes,
+        numerics=laboratory.numerics.draw(rng),
+        shock=draw_shock(form, sizes["impact_shock"], rng) if "impact_shock" in sizes else Shock(),
+        installation=draw_installation(rig, sizes, rng),
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,7 @@ from typing import Final
 import numpy as np
 
 from daq_app.gap.blind.world.arrays import FloatArray
-from daq_app.gap.blind.world.contact.motion import rock
-from daq_app.gap.blind.world.contact.scene import contact_stage
+from daq_app.gap.blind.world.contact.motion import contact_stage, rock
 from daq_app.gap.blind.world.events.mechanics import Effects, Release, build
 from daq_app.gap.blind.world.events.motion import Followed, integrate
 from daq_app.gap.blind.world.events.scene import Scene, stage

@@ -14,7 +14,6 @@ from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.channel_response import channel
 from daq_app.gap.rocking_model.features.families import sensor_families
 from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE, Predict, Size
-from daq_app.gap.rocking_model.features.oscillations.floor_response import floor
 from daq_app.gap.rocking_model.features.oscillations.ring_response import bending, turning
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.records import Survey
@@ -31,13 +30,22 @@ def _release(run: RockingRun, block: Block, values: Mapping[str, float]) -> Floa
     return np.array([values["omega0"] + pushed])
 
 
+def _floor(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
+    """The sinusoid of the floor while the wall does not move."""
+    sizes = {
+        "amplitude": values.get("ambient.amplitude", 0.0),
+        "frequency": values.get("ambient.fitted", run.vibration.frequency_hz if run.vibration else 0.0),
+    }
+    return np.array([sizes[name] for name in block.names])
+
+
 @cache
 def _rules() -> Mapping[str, Predict]:
     rules: dict[str, Predict] = {
         "channel": channel,
         "bending": bending,
         "turning": turning,
-        "floor": floor,
+        "floor": _floor,
         "release": _release,
     }
     for family in sensor_families():

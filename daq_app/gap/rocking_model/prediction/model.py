@@ -12,7 +12,6 @@ from daq_app.gap.core import Parameter, Prediction, Run, Scatter
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.coefficients import block_coefficients, sensor_priors, units
 from daq_app.gap.rocking_model.features.families.lvdts import FACE_SKEW
-from daq_app.gap.rocking_model.features.oscillations.floor_response import with_measured_inputs
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.prediction.free_forms import departed, free_times
 from daq_app.gap.rocking_model.prediction.true_motion import pause_at_impact, true_rotations
@@ -114,7 +113,7 @@ class RockingModel:
 
     def predict(self, run: Run, values: Mapping[str, float]) -> Prediction:
         assert isinstance(run, RockingRun)
-        values = with_measured_inputs(run, values)
+        values = _with_measured_inputs(run, values)
         predicted = np.empty(len(run.features))
         count = len(run.places)
         last = count + run.peaks.size
@@ -124,6 +123,18 @@ class RockingModel:
         predicted[last:] = block_coefficients(run, values)
         loadings = run.cache.constant("loadings", partial(_loadings, run))
         return Prediction(predicted, loadings, run.fixed_loadings)
+
+
+def _with_measured_inputs(run: RockingRun, values: Mapping[str, float]) -> Mapping[str, float]:
+    """The values with what is not fitted but read from the run itself: the floor's frequency and phase."""
+    if "ambient.amplitude" not in values or run.vibration is None:
+        return values
+    seen = run.vibration
+    given = {**values, "ambient.frequency": seen.frequency_hz}
+    given["ambient.phase"] = seen.phase + seen.phase_sd * values.get("ambient.shift", 0.0)
+    if "ambient.frequency" in values:
+        given["ambient.fitted"] = values["ambient.frequency"]
+    return given
 
 
 def swing_features(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:

@@ -77,9 +77,15 @@ def _settling(run: RockingRun, values: Mapping[str, float]) -> FloatArray | floa
     jump = grid.jumps[place, None]
     turn = -2.0 * np.sign(grid.approach[place, None]) * values["p"] ** 2 * math.sin(values["alpha"])
     left = np.sum([response(since, jump, turn) for response in responses], axis=0)
-    speeds = np.interp(swings.rise_s, grid.time_s, grid.omega)
-    late = np.hstack([np.zeros_like(swings.fall_s), -left / np.where(speeds == 0.0, np.inf, speeds)])
-    late[0] = 0.0
+    left[0] = 0.0
+    return _longer(run, np.hstack([np.zeros_like(swings.fall_s), left]))
+
+
+def _longer(run: RockingRun, beyond: FloatArray) -> FloatArray:
+    """How much longer time features are, (T,), s, for crossings that show so much more, (n, 2F), rad."""
+    crossings = np.hstack([run.swings.fall_s, run.swings.rise_s])
+    speeds = np.interp(crossings, run.grid.time_s, run.grid.omega)
+    late = -beyond / np.where(speeds == 0.0, np.inf, speeds)
     first, a, second, b = run.places.T
     return np.asarray(late[second, b] - late[first, a])
 
@@ -154,7 +160,4 @@ def _work_out(run: RockingRun, form: str) -> _Carried:
             top = Polynomial.fit(grid.time_s[over], series[over], TOP_DEGREE)
             peaks[k] = top(swings.peak_s[k])
     beyond = np.interp(crossings, grid.time_s, series) - peaks[:, None]
-    speeds = np.interp(crossings, grid.time_s, grid.omega)
-    late = -beyond / np.where(speeds == 0.0, np.inf, speeds)
-    first, a, second, b = run.places.T
-    return _Carried(peaks, late[second, b] - late[first, a])
+    return _Carried(peaks, _longer(run, beyond))

@@ -18,6 +18,7 @@ from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.contact.feet import Foot, feet, plastic_restitution
 from daq_app.gap.blind.world.events.mechanics import Effects, Release
 from daq_app.gap.blind.world.events.motion import LONGEST_S, REST_RAD, Followed, ImpactRecord
+from daq_app.gap.blind.world.events.scene import Scene, corner_twist
 from daq_app.gap.blind.world.laboratories.numerics import Numerics
 from daq_app.gap.blind.world.wall import GRAVITY_M_S2, Wall
 
@@ -95,6 +96,32 @@ def rock(wall: Wall, effects: Effects, release: Release, numerics: Numerics = _A
     time_s = numerics.step_s * np.arange(states.shape[1], dtype=np.float64)
     rest_s = watch.time_s if watch.ended else float(time_s[-1])
     return ContactMotion(release, tuple(watch.impacts), tuple(watch.peaks), rest_s, time_s, states, upright)
+
+
+def contact_stage(motion: ContactMotion, wall: Wall, effects: Effects, time_s: FloatArray) -> Scene:
+    """Evaluate a run at rising times: the wall turns about the middle of its base, and that moves."""
+    theta, omega, theta_dd = motion.sample(time_s)
+    x, z, x_dd, z_dd = motion.base(time_s)
+    zero = np.zeros_like(theta)
+    return Scene(
+        time_s=time_s,
+        theta=theta,
+        omega=omega,
+        theta_dd=theta_dd,
+        lean=theta,
+        pivot_x=zero,
+        lift=z,
+        slip=x,
+        yaw=zero + corner_twist(effects, time_s, motion.impacts),
+        yaw_dd=zero,
+        bend=zero,
+        bend_dd=zero,
+        ground=zero,
+        impact_times=np.array([impact.time for impact in motion.impacts]),
+        impact_jumps=np.array([impact.after - impact.before for impact in motion.impacts]),
+        height=wall.height,
+        pivot_dd=(x_dd, z_dd),
+    )
 
 
 class _Watch:

@@ -2,13 +2,18 @@
 
 `library` effects are those of the table in the design page (the diagnosis may know them); `near` ones
 are another form of a family of that table; `far` ones belong to none of its forms.
+
+A contact engine is given shapes and places. Where the table has a formula for what contact does (a slip c ω,
+an impact on a Winkler bed that takes r), friction and a bed as an engine knows them are other forms: these
+are outside. Laboratories beside `own` also hide what walls on real bases do: they ring, twist about a corner,
+hang on a cable, stand on shaken floors.
 Strengths are drawn between `low` and `high` on a logarithmic scale; the first parameter carries them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -18,15 +23,10 @@ from daq_app.config import Channel, Rig
 Kind = Literal["library", "near", "far"]
 Parameters = dict[str, float]
 Targets = Callable[[Rig, np.random.Generator], tuple[str, ...]]
-Others = Callable[[np.random.Generator], Parameters]
 
 
 def _no_targets(rig: Rig, rng: np.random.Generator) -> tuple[str, ...]:
     return ()
-
-
-def _nothing_else(rng: np.random.Generator) -> Parameters:
-    return {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,8 @@ class Entry:
     low: float
     high: float
     targets: Targets = _no_targets
-    others: Others = _nothing_else
+    others: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Other parameters, each drawn evenly from its range."""
     signed: bool = False
     kind: Kind = "library"
 
@@ -67,7 +68,8 @@ def draw(entry: Entry, rig: Rig, rng: np.random.Generator, strength: float | Non
     value = entry.low * (entry.high / entry.low) ** place
     if entry.signed and rng.uniform() < 0.5:
         value = -value
-    parameters = {entry.parameter: value, **entry.others(rng)}
+    others = {name: float(rng.uniform(*limits)) for name, limits in entry.others.items()}
+    parameters = {entry.parameter: value, **others}
     return Drawn(entry.name, entry.family, entry.kind, parameters, entry.targets(rig, rng), place)
 
 
@@ -121,11 +123,6 @@ def _any(rig: Rig, rng: np.random.Generator) -> tuple[str, ...]:
     return tuple(ids[int(i)] for i in sorted(rng.choice(len(ids), 3, replace=False)))
 
 
-def uniform(**ranges: tuple[float, float]) -> Others:
-    """Other parameters of an effect, each drawn evenly from its range."""
-    return lambda rng: {name: float(rng.uniform(*limits)) for name, limits in ranges.items()}
-
-
 _LIBRARY: Final = (
     Entry("pivot_shift", "interface", "a_m", 0.008, 0.05),
     Entry("winkler", "interface", "theta_c_rad", 1e-5, 9e-4),
@@ -139,7 +136,7 @@ _LIBRARY: Final = (
     Entry("alpha_asymmetry", "geometry", "delta_rad", 2e-4, 5e-3, signed=True),
     Entry("base_tilt", "geometry", "beta_rad", 2e-4, 5e-3, signed=True),
     Entry("eccentric_mass", "geometry", "e_m", 3e-4, 7.5e-3, signed=True),
-    Entry("sliding", "contact", "c_m_s", 1e-3, 2e-2, others=uniform(square=(0.0, 1.0))),
+    Entry("sliding", "contact", "c_m_s", 1e-3, 2e-2, others={"square": (0.0, 1.0)}),
     Entry("dwell", "contact", "tau_s", 5e-4, 1e-2),
     Entry("bounce", "contact", "tau_s", 1e-3, 1e-2),
     Entry(
@@ -148,7 +145,7 @@ _LIBRARY: Final = (
         "gain",
         0.05,
         0.6,
-        others=uniform(frequency_hz=(9.0, 35.0), zeta=(0.01, 0.05)),
+        others={"frequency_hz": (9.0, 35.0), "zeta": (0.01, 0.05)},
     ),
     Entry("compliance", "structure", "phi_rad", 1e-4, 3e-3),
     Entry(
@@ -157,24 +154,24 @@ _LIBRARY: Final = (
         "gain",
         0.03,
         0.5,
-        others=uniform(frequency_hz=(2.0, 8.0), zeta=(0.01, 0.05)),
+        others={"frequency_hz": (2.0, 8.0), "zeta": (0.01, 0.05)},
         signed=True,
     ),
-    Entry("residual_cable", "release", "k", 0.005, 0.2, others=uniform(slack=(0.2, 0.7))),
+    Entry("residual_cable", "release", "k", 0.005, 0.2, others={"slack": (0.2, 0.7)}),
     Entry("initial_velocity", "release", "omega_rad_s", 3e-3, 3e-2, signed=True),
     Entry("slow_release", "release", "tau_s", 0.02, 0.4),
-    Entry("ambient", "ambient", "amplitude_m_s2", 5e-3, 0.1, others=uniform(frequency_hz=(0.5, 4.0))),
+    Entry("ambient", "ambient", "amplitude_m_s2", 5e-3, 0.1, others={"frequency_hz": (0.5, 4.0)}),
     Entry("gain", "sensor", "error", 0.01, 0.1, _one_or_all("lvdt", "wire", "accelerometer"), signed=True),
     Entry("drift", "sensor", "rate_rad_s", 2e-5, 1e-3, _one_or_all("lvdt", "wire"), signed=True),
     Entry("lag", "sensor", "tau_s", 1e-3, 0.05, _of("lvdt", "wire", "accelerometer")),
     Entry("slow_response", "sensor", "tau_s", 1e-3, 0.05, _one_or_all("lvdt", "wire")),
     Entry("filter_delay", "sensor", "tau_s", 1e-3, 0.03, _of("lvdt", "wire", "accelerometer")),
     Entry("saturation", "sensor", "cut", 0.05, 0.5, _of("lvdt", "wire")),
-    Entry("dropout", "sensor", "share", 0.01, 0.2, _one("lvdt", "wire"), uniform(duration_s=(0.02, 0.3))),
+    Entry("dropout", "sensor", "share", 0.01, 0.2, _one("lvdt", "wire"), {"duration_s": (0.02, 0.3)}),
     Entry("quantisation", "sensor", "times_noise", 4.0, 40.0, _one_or_all("lvdt", "wire")),
     Entry("wire_cosine", "sensor", "anchor_m", 0.03, 0.4, _one_or_all("wire"), signed=True),
     Entry("wire_sag", "sensor", "kappa_1_m", 0.03, 0.5, _one_or_all("wire"), signed=True),
-    Entry("wire_inertia", "sensor", "frequency_hz", 6.0, 30.0, _of("wire"), uniform(zeta=(0.05, 0.4))),
+    Entry("wire_inertia", "sensor", "frequency_hz", 6.0, 30.0, _of("wire"), {"zeta": (0.05, 0.4)}),
     Entry("hum", "sensor", "times_noise", 0.5, 10.0, _one_or_all("lvdt", "wire", "accelerometer")),
     Entry("clock", "sensor", "error", 0.002, 0.07, signed=True),
     Entry("polarity", "sensor", "on", 1.0, 1.0, _one("lvdt", "wire", "accelerometer")),
@@ -190,7 +187,7 @@ _OUTSIDE: Final = (
         "step",
         0.01,
         0.06,
-        others=uniform(speed_rad_s=(0.1, 0.3)),
+        others={"speed_rad_s": (0.1, 0.3)},
         signed=True,
         kind="near",
     ),
@@ -202,7 +199,7 @@ _OUTSIDE: Final = (
         "share",
         0.02,
         0.2,
-        others=uniform(theta_h_rad=(1e-3, 8e-3)),
+        others={"theta_h_rad": (1e-3, 8e-3)},
         kind="near",
     ),
     Entry("sudden_crack", "interface", "loss", 0.01, 0.05, kind="near"),
@@ -215,7 +212,7 @@ _OUTSIDE: Final = (
         0.01,
         0.1,
         _one("lvdt", "wire"),
-        uniform(frequency_hz=(8.0, 60.0)),
+        {"frequency_hz": (8.0, 60.0)},
         kind="far",
     ),
     Entry(
@@ -225,24 +222,98 @@ _OUTSIDE: Final = (
         0.01,
         0.06,
         _of("lvdt", "wire"),
-        uniform(warm_up_s=(300.0, 1500.0)),
+        {"warm_up_s": (300.0, 1500.0)},
         signed=True,
         kind="far",
     ),
     Entry("crosstalk", "sensor", "share", 0.02, 0.15, _any, kind="far"),
-    Entry("spikes", "sensor", "times_noise", 15.0, 80.0, _any, uniform(per_second=(0.5, 5.0)), kind="far"),
+    Entry("spikes", "sensor", "times_noise", 15.0, 80.0, _any, {"per_second": (0.5, 5.0)}, kind="far"),
     Entry(
         "passing_lorry",
         "ambient",
         "amplitude_m_s2",
         0.1,
         0.8,
-        others=uniform(frequency_hz=(6.0, 15.0)),
+        others={"frequency_hz": (6.0, 15.0)},
         kind="far",
     ),
-    Entry("rope_snag", "release", "strength", 0.05, 0.5, others=uniform(at_s=(0.6, 2.0)), kind="far"),
+    Entry("rope_snag", "release", "strength", 0.05, 0.5, others={"at_s": (0.6, 2.0)}, kind="far"),
 )
 
 ENTRIES: Final[dict[str, Entry]] = {entry.name: entry for entry in _LIBRARY + _OUTSIDE}
 LIBRARY: Final = tuple(entry.name for entry in _LIBRARY)
 OUTSIDE: Final = tuple(entry.name for entry in _OUTSIDE)
+
+CONTACT_LIBRARY: Final = (
+    "pivot_shift",
+    "rounded_edge",
+    "crushing",
+    "alpha_asymmetry",
+    "base_tilt",
+    "eccentric_mass",
+)
+_CONTACT_OUTSIDE: Final = (
+    Entry("one_round_edge", "interface", "rho_m", 0.008, 0.06, kind="near"),
+    # Low: a wall that never tips over its step turns on the inner edge, and that is a shifted pivot.
+    Entry("stepped_edge", "interface", "height_m", 3e-4, 6e-4, others={"width_m": (0.02, 0.08)}, kind="near"),
+    Entry("damped_bed", "interface", "theta_c_rad", 1e-4, 9e-4, kind="near"),
+    Entry("slippery_base", "contact", "friction_share", 0.99, 0.9, kind="near"),
+    Entry("slippery_edge", "contact", "friction_share", 0.99, 0.9, kind="near"),
+)
+CONTACT_OUTSIDE: Final = tuple(entry.name for entry in _CONTACT_OUTSIDE)
+BESIDE_CONTACT: Final = tuple(entry.name for entry in _LIBRARY if entry.on_sensors)
+"""Faults of sensors: what a contact-born effect makes a pair with."""
+CONTACT_ENTRIES: Final[Mapping[str, Entry]] = {
+    **{name: ENTRIES[name] for name in (*CONTACT_LIBRARY, *BESIDE_CONTACT)},
+    **{entry.name: entry for entry in _CONTACT_OUTSIDE},
+}
+
+_RING: Final = ENTRIES["flexible_wall"]
+_FAST_RING: Final = replace(
+    _RING, others={"frequency_hz": (7.0, 42.0), "zeta": (0.005, 0.05), "recoil": (0.0, 0.2)}
+)
+_SLOW_RING: Final = replace(
+    _RING,
+    low=0.03,
+    high=0.3,
+    others={"frequency_hz": (2.0, 7.0), "zeta": (0.005, 0.05), "recoil": (0.0, 0.2)},
+)
+_CORNER_TWIST: Final = Entry("corner_twist", "contact", "turn_s", 3e-4, 6e-3, signed=True)
+_TAUT_CABLE: Final = Entry(
+    "taut_cable",
+    "release",
+    "k",
+    0.01,
+    0.15,
+    others={"reach_rad": (0.02, 0.1), "side": (-1.0, 1.0), "moved": (0.0, 1.0)},
+)
+_IRREGULAR_FLOOR: Final = Entry(
+    "irregular_floor",
+    "ambient",
+    "rms_m_s2",
+    0.05,
+    0.25,
+    others={"low_hz": (1.5, 5.0), "band_hz": (2.0, 6.0)},
+)
+
+WIDE_ENTRIES: Final[Mapping[str, Entry]] = {
+    **ENTRIES,
+    "flexible_wall": _FAST_RING,
+    "slow_flexible_wall": _SLOW_RING,
+    "corner_twist": _CORNER_TWIST,
+    "taut_cable": _TAUT_CABLE,
+    "irregular_floor": _IRREGULAR_FLOOR,
+}
+WIDE_LIBRARY: Final = (*LIBRARY, "slow_flexible_wall", "corner_twist", "taut_cable", "irregular_floor")
+
+WIDE_CONTACT_ENTRIES: Final[Mapping[str, Entry]] = {**CONTACT_ENTRIES, "corner_twist": _CORNER_TWIST}
+WIDE_CONTACT_LIBRARY: Final = (
+    *CONTACT_LIBRARY,
+    "gain",
+    "lag",
+    "slow_response",
+    "drift",
+    "wire_inertia",
+    "quantisation",
+    "corner_twist",
+)

@@ -39,13 +39,16 @@ class Joint:
 
 def rigid(wall: Wall) -> Joint:
     """Sharp edges at x = ±b/2."""
-    half = wall.half_width
-    return Joint(lambda q, s: half, lambda q, s: (s * half, 0.0 * q), lambda q: 0.0, half)
+    return _on_edges(wall.half_width)
 
 
 def pivot_shift(wall: Wall, parameters: Parameters) -> Joint:
     """Crushed or soft edge: the wall turns about a point `a_m` inside the face (Eqns 2.1 to 2.3)."""
-    arm = wall.half_width - parameters["a_m"]
+    return _on_edges(wall.half_width - parameters["a_m"])
+
+
+def _on_edges(arm: float) -> Joint:
+    """A wall that turns about x = ±`arm`, m."""
     return Joint(lambda q, s: arm, lambda q, s: (s * arm, 0.0 * q), lambda q: 0.0, arm)
 
 

@@ -50,12 +50,6 @@ def _acceleration_block(scene: Scene) -> Block | None:
     x, _, height = run.positions(chosen).mean(axis=0).tolist()
     arm = x - np.sign(grid.theta) * run.survey.half_base_m
     gravity, inertia = -GRAVITY_M_S2 * np.sin(grid.theta), height * grid.alpha
-    expected = gravity + inertia - grid.omega**2 * arm
-    columns = {
-        "zero": (np.ones_like(expected), "m/s²"),
-        "gain of gravity": (gravity, "1"),
-        "gain of inertia": (inertia, "1"),
-    }
     # The held wall sways: only the mean of that part, less the sway's, says what gravity alone shows.
     held = pick & (grid.time_s < 0.0)
     leaked = crosstalk(run, chosen).mean(axis=0)
@@ -65,8 +59,12 @@ def _acceleration_block(scene: Scene) -> Block | None:
         before = grid.time_s < 0.0
         swaying = height * float(sway(grid.raw, before)[1][held[before]].mean())
         measured[held], gravity[held] = measured[held].mean() - swaying, gravity[held].mean()
-        expected = gravity + inertia - grid.omega**2 * arm
-        columns["gain of gravity"], columns["gain of inertia"] = (gravity, "1"), (inertia, "1")
+    expected = gravity + inertia - grid.omega**2 * arm
+    columns = {
+        "zero": (np.ones_like(expected), "m/s²"),
+        "gain of gravity": (gravity, "1"),
+        "gain of inertia": (inertia, "1"),
+    }
     # No lag here: between impacts the specific force hardly changes. The impacts themselves tell it.
     block = with_crosstalk(regress("accelerometer", measured - expected, columns, pick, ("zero",)), leaked)
     return block and with_systematic(block, _TURNED, across_axes(run, grid, chosen).mean(axis=0))
