@@ -223,17 +223,13 @@ def _laboratory_table(rows: list[LaboratoryScore]) -> Table:
 
 
 def _print_score(found: Score) -> None:
-    from daq_app.gap.blind.scoring.report import interval, number
-
     console = Console()
     table = Table(title=f"Blind check: {len(found.judged)} cases", title_justify="left")
     for column in ("score", "found", "95 % interval", "cases", "target", ""):
         table.add_column(column, overflow="fold")
     for row in found.rows:
         verdict = {True: "met", False: "missed", None: ""}[row.met]
-        table.add_row(
-            row.name, number(row.found.value), interval(row.found), str(row.found.n), row.target, verdict
-        )
+        table.add_row(*row.cells, verdict)
     console.print(table)
     _print_confusion(found, console)
     if found.waiting:

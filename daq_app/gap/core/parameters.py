@@ -91,15 +91,7 @@ def known(name: str, sd: float, unit: str, meaning: str, *, mean: float = 0.0) -
     return Parameter(name, mean, sd, unit, meaning=meaning, linear=True)
 
 
-def signed(
-    name: str,
-    reach: float,
-    unit: str = "",
-    meaning: str = "",
-    *,
-    per_run: bool = False,
-    linear: bool = False,
-) -> Parameter:
+def signed(name: str, reach: float, unit: str = "", meaning: str = "", *, linear: bool = False) -> Parameter:
     """A strength of either sign: prior N(0, (reach/2)²), bounded at 6·reach.
 
     A linear one is started from 0 alone: from anywhere else its fit would arrive at the same place.
@@ -112,27 +104,15 @@ def signed(
         -6 * reach,
         6 * reach,
         meaning=meaning,
-        per_run=per_run,
         starts=(0.0,) if linear else (-reach / 4, reach / 4),
         linear=linear,
     )
 
 
-def positive(
-    name: str, reach: float, unit: str = "", meaning: str = "", *, per_run: bool = False
-) -> Parameter:
+def positive(name: str, reach: float, unit: str = "", meaning: str = "") -> Parameter:
     """A strength that cannot be negative: half-normal prior of scale reach/2, bounded at 6·reach."""
-    return Parameter(
-        name,
-        0.0,
-        reach / 2,
-        unit,
-        0.0,
-        6 * reach,
-        meaning=meaning,
-        per_run=per_run,
-        starts=(reach / 20, reach / 2),
-    )
+    starts = (reach / 20, reach / 2)
+    return Parameter(name, 0.0, reach / 2, unit, 0.0, 6 * reach, meaning=meaning, starts=starts)
 
 
 def between(name: str, low: float, high: float, unit: str = "", meaning: str = "") -> Parameter:

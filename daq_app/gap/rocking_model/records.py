@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -218,8 +217,6 @@ def load_run(path: Path, rig: Rig | None = None) -> GapRun:
                 "Give the rig file with which it was recorded.",
             )
         channels = [rig.channel(name) for name in ids]
-        known = _offsets(run.header.plan)
-        offsets = np.array([known.get(name, 0.0) for name in ids])
         name = run.header.test or path.stem
         return GapRun(
             name=name,
@@ -228,7 +225,7 @@ def load_run(path: Path, rig: Rig | None = None) -> GapRun:
             sensors=tuple(Sensor.from_channel(channel) for channel in channels),
             channels=np.asarray(run.si(ids), dtype=float),
             survey=Survey.from_specimen(rig.specimen),
-            time_offset_s=offsets,
+            time_offset_s=np.array([run.header.time_offset_s(name) for name in ids]),
             start_utc_ns=run.header.start_utc_ns,
         )
 
@@ -237,17 +234,6 @@ def level_of(test: str) -> str:
     """``FR1-L3-2`` → ``L3``; the whole name where there is no level in it."""
     parts = [part for part in test.split("-") if part[:1] == "L" and part[1:].isdigit()]
     return parts[0] if parts else test
-
-
-def _offsets(plan: dict[str, Any]) -> dict[str, float]:
-    """Time offset of each channel from a run's task plan: multiplexer skew less converter delay."""
-    offsets_s = {}
-    for task in plan.get("tasks", []):
-        for entry in task.get("channels", []):
-            offsets_s[str(entry["id"])] = float(entry.get("skew_s", 0.0)) - float(
-                entry.get("input_delay_s", 0.0)
-            )
-    return offsets_s
 
 
 def check_consistent(runs: Sequence[GapRun]) -> None:

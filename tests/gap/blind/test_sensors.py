@@ -33,7 +33,7 @@ def rig(configs: Path) -> Rig:
 def world_with(rig: Rig, *effects: Drawn) -> World:
     """One run of an exactly known wall that loses much at impacts, hence is short."""
     drawn = draw_world(rig, effects, 1, np.random.default_rng(3))
-    wall = dataclasses.replace(Wall.nominal(rig.specimen, 0.7), restitution_scatter=0.0)
+    wall = Wall.nominal(rig.specimen, 0.7)
     run = PlannedRun("FR1-L2-1", "L2", THETA0, 1, 0.5, 0.0, 11, 600.0)
     return dataclasses.replace(drawn, wall=wall, runs=(run,))
 

@@ -8,6 +8,7 @@ the first peak only.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -71,7 +72,7 @@ LIBRARY = Library(
             confusable_with=(Confusion("shift", "durations"),),
         ),
         Effect("shift", "stiffness", (signed("s", 0.1, "s"),), "D + s a²", "test"),
-        Effect("kick", "release", (positive("j", 0.2, "rad", per_run=True),), "a₁ + j", "test"),
+        Effect("kick", "release", (replace(positive("j", 0.2, "rad"), per_run=True),), "a₁ + j", "test"),
         Effect("free", "loss", tuple(signed(f"k{i}", 0.06) for i in range(5)), "r(a)", "test", kind="probe"),
     ]
 )

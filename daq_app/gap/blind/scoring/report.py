@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from daq_app.campaign.pages import page_environment
 from daq_app.gap.blind.scoring.judge import Judged
 from daq_app.gap.blind.scoring.score import Score, claims, confusion
-from daq_app.gap.blind.scoring.statistics import Value, reliability
+from daq_app.gap.blind.scoring.statistics import number, reliability
 from daq_app.runfile.durable import write_whole
 
 
@@ -29,7 +29,6 @@ def write_report(score: Score, path: Path) -> None:
         pictures=[(title, note, base64.b64encode(data).decode()) for title, note, data in _pictures(score)],
         wrong=[j for j in score.judged if not j.answered_rightly],
         number=number,
-        interval=interval,
     )
     write_whole(path, text)
 
@@ -44,11 +43,7 @@ def write_markdown(score: Score, path: Path) -> None:
         "",
         "| score | found | 95 % interval | cases | target | |",
         "|---|---|---|---|---|---|",
-        *(
-            f"| {r.name} | {number(r.found.value)} | {interval(r.found)} | {r.found.n} | {r.target} | "
-            f"{met[r.met]} |"
-            for r in score.rows
-        ),
+        *(f"| {' | '.join(row.cells)} | {met[row.met]} |" for row in score.rows),
     ]
     images = path.parent / "images"
     images.mkdir(parents=True, exist_ok=True)
@@ -86,15 +81,6 @@ def _pictures(score: Score) -> list[tuple[str, str, bytes]]:
             _picture(lambda axes: _draw_closure(axes, score), (9.0, 9.0)),
         ),
     ]
-
-
-def number(value: float) -> str:
-    """Three significant digits; a dash where there is none."""
-    return "–" if not math.isfinite(value) else f"{value:.3g}"
-
-
-def interval(value: Value) -> str:
-    return "–" if math.isnan(value.value) else f"{value.low:.3g} to {value.high:.3g}"
 
 
 def _picture(draw: Callable[[Axes], None], size: tuple[float, float]) -> bytes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,6 +22,7 @@ from daq_app.gap.blind.scoring.statistics import (
     bootstrap,
     calibration,
     calibration_error_by_chance,
+    number,
     share,
 )
 from daq_app.gap.blind.seal import SealBroken, open_label
@@ -70,6 +71,13 @@ class Row:
             case (low, high):
                 return f"{low:g} to {high:g}"
         return ""
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Name, value, 95 % interval, cases and target as a table shows them."""
+        value, low, high, n = astuple(self.found)
+        interval = "–" if math.isnan(value) else f"{low:.3g} to {high:.3g}"
+        return self.name, number(value), interval, str(n), self.target
 
     @property
     def met(self) -> bool | None:

@@ -28,6 +28,11 @@ class Value:
     n: int
 
 
+def number(value: float) -> str:
+    """Three significant digits; a dash where there is none."""
+    return "–" if not math.isfinite(value) else f"{value:.3g}"
+
+
 NOTHING: Final = Value(math.nan, math.nan, math.nan, 0)
 
 

@@ -46,8 +46,8 @@ class Wall:
         return math.sqrt(self.mass_kg * GRAVITY_M_S2 * radius / self.inertia_about(self.half_width))
 
     @classmethod
-    def nominal(cls, specimen: Specimen, restitution: float, scatter: float = 0.0) -> Wall:
-        """The wall exactly as surveyed."""
+    def nominal(cls, specimen: Specimen, restitution: float) -> Wall:
+        """The wall exactly as surveyed, whose restitution does not scatter."""
         mass = specimen.weight_n / GRAVITY_M_S2
         return cls(
             mass_kg=mass,
@@ -57,7 +57,7 @@ class Wall:
             height=specimen.height_m,
             length=specimen.length_m,
             restitution=restitution,
-            restitution_scatter=scatter,
+            restitution_scatter=0.0,
         )
 
 
