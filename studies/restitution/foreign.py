@@ -77,10 +77,10 @@ def _channel(rig: Rig, entry: Mapping[str, Any]) -> Channel:
 
 def _truth(label: Mapping[str, Any], run: Mapping[str, Any]) -> dict[str, Any]:
     """The label's `r`, or `r_factor`: the share of the upper bound of a block on the points that the wall
-    turns about. θ0 alone where a label has neither.
+    turns about. Labels with neither have θ0, and `_truth_of_block`.
     """
     if "r" not in label and "r_factor" not in run:
-        return {"restitution": math.nan, "theta0_rad": run["theta0"]}
+        return {"theta0_rad": run["theta0"], **_truth_of_block(label)}
     body = label["true_body"]
     block = RigidBlock(body["m"] * STANDARD_GRAVITY_M_S2, body["R"], body["IO"], body["alpha"])
     inset = sum(effect["params"].get("inset", 0.0) for effect in label["effects"])
@@ -91,6 +91,20 @@ def _truth(label: Mapping[str, Any], run: Mapping[str, Any]) -> dict[str, Any]:
         "alpha_rad": pivoted.alpha0_rad,
         "p_rad_s": pivoted.p_rad_s,
     }
+
+
+def _truth_of_block(label: Mapping[str, Any]) -> dict[str, float]:
+    """α and p of a body that is given by them, and the r that its impacts were drawn about.
+
+    No α and p where an effect on the wall makes it turn about other points, and NaN for r where impacts came
+    out of contacts and not of an r that was asked for.
+    """
+    body = label["true_body"]
+    drawn_r = "r_intended" in body and body["r_contact"] is None
+    truth = {"restitution": body["r_intended"] if drawn_r else math.nan}
+    if "p" in body and all(effect["where"] != "wall" for effect in label["effects"]):
+        truth |= {"alpha_rad": body["alpha"], "p_rad_s": body["p"]}
+    return truth
 
 
 def _test(path: Path, rig: Rig, truth: dict[str, Any]) -> LaboratoryTest:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import subprocess
 import sys
@@ -12,7 +14,7 @@ import pytest
 
 from daq_app.config import load_rig, plan_tasks
 from studies.restitution import laboratory
-from studies.restitution.foreign import rig_of
+from studies.restitution.foreign import foreign_tests, rig_of
 from studies.restitution.laboratory import draw_test
 
 ROOT = Path(__file__).parents[2]
@@ -71,6 +73,45 @@ def test_a_case_of_a_wall_that_is_not_shipped_has_its_own_survey(rig):
     assert (theirs.specimen.name, theirs.specimen.r0_m) == ("Kufstein-D15", 1.3772)
     assert theirs.channel("LV-1").range_si == pytest.approx((-0.005, 0.07))
     assert ours.specimen == rig.specimen
+
+
+BODY = {"alpha": 0.2, "p": 2.3, "r_intended": 0.9, "r_contact": None}
+
+
+@pytest.mark.parametrize(
+    ("where", "r_contact", "told", "r"),
+    [
+        ("wires", None, {"alpha_rad": 0.2, "p_rad_s": 2.3}, 0.9),
+        ("wires", 0.92, {"alpha_rad": 0.2, "p_rad_s": 2.3}, math.nan),
+        ("wall", None, {}, 0.9),
+    ],
+)
+def test_a_label_tells_alpha_and_p_of_a_wall_without_an_effect_and_r_that_was_drawn(
+    tmp_path, rig, where, r_contact, told, r
+):
+    label = {
+        "effects": [{"where": where}],
+        "true_body": BODY | {"r_contact": r_contact},
+        "runs": [{"theta0": 0.05}],
+    }
+    wire = rig.of_family("wire")[0]
+    channel = {"name": "WP-1", "kind": "WIREPOT", "unit": "mm", "position_m": wire.position_m}
+    channel |= {"range": [-500, 500], "anchor_m": wire.anchor_m}
+    case = {"specimen": {"name": "FR1"}, "channels": [channel], "runs": [{"npz": "run.npz"}]}
+    (tmp_path / "case_1").mkdir()
+    (tmp_path / "labels.json").write_text(json.dumps({"case_1": label}))
+    (tmp_path / "case_1" / "case.json").write_text(json.dumps(case))
+    one = np.ones(1)
+    np.savez(
+        tmp_path / "case_1" / "run.npz",
+        data=np.zeros((1, 4)), scale=one, offset=0.0 * one, names=["WP-1"], units=["mm"], fs=4000.0,
+    )  # fmt: skip
+
+    (test,) = foreign_tests(tmp_path, ROOT / "configs")
+
+    truth = dict(test.truth)
+    assert truth.pop("restitution") == pytest.approx(r, nan_ok=True)
+    assert truth == {"theta0_rad": 0.05, **told}
 
 
 @pytest.mark.parametrize("other", [["--foreign", "nowhere"], ["--ringing"]])
