@@ -182,8 +182,8 @@ def test_a_wall_that_is_let_go_slowly_is_fitted_from_where_nothing_holds_it_any_
 
 
 def test_a_slow_release_is_left_out_of_the_fit_even_where_the_rest_is_no_rigid_blocks_motion_either():
-    effects = {"slow_release": {"tau": 0.3}, "base_tilt": {"beta": 0.004}}
-    test = draw_test(RIG, SEED, effects=effects)
+    effects = {"slow_release": {"tau": 0.3}, "residual_cable": {"k": 0.3}}
+    test = draw_test(RIG, SEED, effects=effects, level=0.4)
     analysis = analyse_record(test.record(), AnalysisOptions(bias_runs=0, keep_series=False))
     fit = analysis.fit
 
@@ -280,7 +280,7 @@ def test_p_and_alpha_of_a_wall_that_is_no_rigid_block_have_no_stated_error(effec
 
 
 def test_a_motion_that_the_fit_does_not_explain_is_remarked_and_the_verdict_of_r_stands():
-    test = draw_test(RIG, SEED, effects={"base_tilt": {"beta": 0.004}})
+    test = draw_test(RIG, 6104, effects={"residual_cable": {"k": 0.06}}, level=0.4)
     analysis = analyse_record(test.record(), AnalysisOptions(bias_runs=0, keep_series=False))
 
     assert {finding.kind for finding in analysis.findings if finding.severity == "warning"} == {"misfit"}

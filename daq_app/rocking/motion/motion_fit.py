@@ -1,6 +1,6 @@
 """r by a fit of the whole motion: exact Housner rocking to the recorded rotation, all at once.
 
-Free: θ0, release time, p, α, the zero of the rotation and r; p and α are held to their nominal
+Free: θ0, release time, p, α of either side, the zero of the rotation and r; p and α are held to their nominal
 values by 5 % and 10 %. Where r scatters from impact to impact, each impact has its own deviation,
 held to zero by that scatter: the standard error of the mean r then says so.
 """
@@ -24,6 +24,7 @@ from daq_app.rocking.motion.motion_model import (
     POINT_S,
     ZERO_PRIOR_RAD,
     MotionModel,
+    held,
 )
 from daq_app.rocking.motion.swings import REST_ZERO_SIGMA_RAD
 from daq_app.rocking.theory.housner import exact_amplitude, exact_energy, exact_quarter_period
@@ -64,6 +65,7 @@ class MotionFit:
     """NaN, as that of α, in the analysis of a wall that is no rigid block with one r."""
     alpha_rad: float
     sigma_alpha_rad: float
+    """Of `alpha_rad`, the mean of both sides."""
     theta0_rad: float
     release_s: float
     zero_rad: float
@@ -79,6 +81,9 @@ class MotionFit:
     degrees_of_freedom: float = math.inf
     """Degrees of freedom of the standard error of r, which knows what r scatters by from these impacts only.
     They are infinite where the usual scatter is taken."""
+    lean_rad: float = 0.0
+    """By how much α is larger where θ > 0, and smaller where θ < 0: the base is off level, or a mass off the
+    middle."""
 
     @property
     def explains_the_motion(self) -> bool:
@@ -312,7 +317,7 @@ def _of_walking_zero(answer: Floats, sigma: float) -> Floats:
 
 def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: float) -> MotionFit | None:
     x = found.x
-    data = found.fun[: found.fun.size - 3 - (x.size - FIXED)]
+    data = found.fun[: found.fun.size - len(held(x.size))]
     # Data rows are weakened by what the model leaves; priors keep their weight.
     scaled = found.jac.copy()
     try:
@@ -344,4 +349,5 @@ def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: floa
         residual_rad=float(np.sqrt(np.mean(data**2))) * sigma,
         noise_rad=sigma,
         degrees_of_freedom=max(count - 1, 1),
+        lean_rad=motion.lean_rad,
     )

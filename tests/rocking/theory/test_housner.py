@@ -18,11 +18,11 @@ from daq_app.rocking.theory.housner import (
 P, ALPHA = 2.2, 0.215
 
 
-def integrate(theta0: float, r: float, impacts: int):
+def integrate(theta0: float, r: float, impacts: int, lean: float = 0.0):
     """Peaks, impact times and a dense θ(t) by event integration: shares nothing with the product."""
 
     def motion(_, y):
-        return [y[1], -(P**2) * np.sin(ALPHA * side - y[0])]
+        return [y[1], -(P**2) * np.sin(ALPHA * side + lean - y[0])]
 
     def crossing(_, y):
         return y[0]
@@ -60,6 +60,25 @@ def test_motion_matches_an_independent_integration(phi, r, side):
         got_theta, got_omega = motion.at(t[1:])
         np.testing.assert_allclose(got_theta, theta[1:], atol=1e-9)
         np.testing.assert_allclose(got_omega, omega[1:], atol=1e-8)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_motion_of_a_block_that_leans_matches_an_independent_integration(side):
+    """A tilted base turns gravity: θ̈ = −p² sin(α·sgn θ + lean − θ)."""
+    times, samples = integrate(side * 0.4 * ALPHA, 0.9, 8, lean=2e-3)
+    motion = free_rocking(side * 0.4 * ALPHA, 0.9, P, ALPHA, lean_rad=2e-3)
+    np.testing.assert_allclose(motion.impacts_s[:8], [t for t, _ in times], atol=1e-9)
+    np.testing.assert_allclose(motion.speeds_before_rad_s[:8], [abs(v) for _, v in times], atol=1e-10)
+    for t, theta, omega in samples:
+        got_theta, got_omega = motion.at(t[1:])
+        np.testing.assert_allclose(got_theta, theta[1:], atol=1e-9)
+        np.testing.assert_allclose(got_omega, omega[1:], atol=1e-8)
+        np.testing.assert_allclose(motion.rotation(t[1:]), got_theta, atol=2e-8)
+
+
+def test_a_release_beyond_the_alpha_of_its_side_is_refused():
+    with pytest.raises(ValueError, match=r"between 0 and α = 0\.205"):
+        free_rocking(-0.21, 0.9, P, ALPHA, lean_rad=0.01)
 
 
 @pytest.mark.parametrize("phi", [0.01, 0.15, 0.4, 0.8])

@@ -1,0 +1,31 @@
+"""Walls with another α to either side: the whole fit finds both, and what the wall leans by."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from daq_app.config import load_rig
+from daq_app.rocking import AnalysisOptions, analyse_record
+from studies.restitution.laboratory import draw_test
+
+RIG = load_rig(Path(__file__).parents[2] / "configs" / "fr1.toml")
+SEED = 6101
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameters"),
+    [("base_tilt", {"beta": 0.004}), ("eccentric_mass", {"e": 0.007}), ("alpha_asymmetry", {"delta": 0.005})],
+)
+def test_a_wall_with_another_alpha_to_either_side_is_fitted_as_one(effect, parameters):
+    test = draw_test(RIG, SEED, effects={effect: parameters})
+    analysis = analyse_record(test.record(), AnalysisOptions(bias_runs=0, keep_series=False))
+    fit, truth = analysis.fit, test.truth
+
+    assert analysis.verdict.trust == "good"
+    assert fit.explains_the_motion
+    assert 0.003 < abs(fit.lean_rad) < 0.006
+    assert fit.p_rad_s == pytest.approx(truth["p_rad_s"], rel=0.001)
+    assert fit.alpha_rad == pytest.approx(truth["alpha_rad"], rel=0.005)
+    assert fit.r == pytest.approx(truth["restitution"], abs=0.002)
