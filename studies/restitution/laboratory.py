@@ -142,7 +142,7 @@ def _on_faces(rig: Rig, further_m: float) -> Rig:
     for channel in rig.channels:
         if channel.family == "lvdt":
             x, y, z = channel.position_m
-            place = (x + math.copysign(0.5 * further_m, x), y, z)
+            place = (x + math.copysign(0.5, x) * further_m, y, z)
             channel = channel.model_copy(update={"position_m": place})
         channels.append(channel)
     return rig.model_copy(update={"channels": tuple(channels)})

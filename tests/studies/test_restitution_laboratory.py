@@ -133,6 +133,16 @@ def test_a_family_has_one_time_base_that_is_off_by_microseconds(rig):
         assert 0.0 < abs(off_s[0]) < 2e-4
 
 
+@pytest.mark.parametrize("further_m", [0.002, -0.002])
+def test_faces_are_drawn_further_apart_and_nearer(rig, further_m):
+    drawn = laboratory._on_faces(rig, further_m)
+
+    def distance_m(of):
+        return np.ptp([channel.position_m[0] for channel in of.of_family("lvdt")])
+
+    assert distance_m(drawn) - distance_m(rig) == pytest.approx(further_m)
+
+
 def test_all_heights_of_wires_are_off_by_one_datum(rig, monkeypatch):
     nominal = draw_test(rig, 5000)
     monkeypatch.setattr(laboratory, "_DATUM_SIGMA_M", 0.1)
