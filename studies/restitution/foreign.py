@@ -80,7 +80,9 @@ def _truth(label: Mapping[str, Any], run: Mapping[str, Any]) -> dict[str, Any]:
     turns about. Labels with neither have θ0, and `_truth_of_block`.
     """
     if "r" not in label and "r_factor" not in run:
-        return {"theta0_rad": run["theta0"], **_truth_of_block(label)}
+        # A wall that sways is let go from its first peak; it was held at θ0 on the average.
+        let_go_rad = math.copysign(run["peaks"][0], run["theta0"]) if "peaks" in run else run["theta0"]
+        return {"theta0_rad": let_go_rad, **_truth_of_block(label)}
     body = label["true_body"]
     block = RigidBlock(body["m"] * STANDARD_GRAVITY_M_S2, body["R"], body["IO"], body["alpha"])
     inset = sum(effect["params"].get("inset", 0.0) for effect in label["effects"])

@@ -37,12 +37,30 @@ class MadeTest:
         return int(self.readings.shape[1])
 
 
-def rotation_history(motion: FreeRocking, time_s: Floats) -> Floats:
+@dataclass(frozen=True)
+class Sway:
+    """What a held wall sways by until it is let go from θ0."""
+
+    share: float = 0.0
+    """Amplitude over θ0."""
+    frequency_hz: float = 1.0
+
+    def factor(self, before_release_s: Floats) -> Floats:
+        """θ over θ0 of the held wall; (n,) times to the release."""
+        phase = 0.7 - 2.0 * np.pi * self.frequency_hz * before_release_s
+        return np.asarray(1.0 + self.share * (np.sin(phase) - np.sin(0.7)))
+
+
+STILL = Sway()
+
+
+def rotation_history(motion: FreeRocking, time_s: Floats, sway: Sway = STILL) -> Floats:
     """θ with the wall upright for 1 s, pulled for 1 s, then held until the release."""
     theta, _ = motion.at(time_s)
     ramp = np.clip((time_s - UPRIGHT_S) / PULL_S, 0.0, 1.0)
     smooth = ramp * ramp * (3.0 - 2.0 * ramp)
-    return np.where(time_s < motion.release_s, theta * smooth, theta)
+    held = smooth * sway.factor(motion.release_s - time_s)
+    return np.where(time_s < motion.release_s, theta * held, theta)
 
 
 def sensor_values(
@@ -53,6 +71,7 @@ def sensor_values(
     rng: np.random.Generator,
     *,
     full: bool = True,
+    sway: Sway = STILL,
 ) -> Floats:
     """Ideal SI values of every channel at its own instants, plus white noise of the channel's rms.
 
@@ -66,7 +85,7 @@ def sensor_values(
             rows.append(np.zeros_like(time_s))
             continue
         t = time_s + offsets_s.get(channel.id, 0.0)
-        theta = rotation_history(motion, t)
+        theta = rotation_history(motion, t, sway)
         pivot = np.where(theta < 0, -half, half)
         x, y, z = channel.position_m
         if channel.family == "wire":
@@ -106,6 +125,8 @@ def make_test(
     skewed: bool = True,
     p_factor: float = 1.0,
     full: bool = False,
+    sway_share: float = 0.0,
+    sway_hz: float = 1.0,
 ) -> MadeTest:
     """A whole test; `r` is the truth."""
     specimen = rig.specimen
@@ -124,7 +145,7 @@ def make_test(
         plan = plan_tasks(rig)
         offsets = {c.channel.id: c.time_offset_s for task in plan.tasks for c in task.channels}
     rng = np.random.default_rng(seed)
-    si = sensor_values(rig, motion, time, offsets, rng, full=full)
+    si = sensor_values(rig, motion, time, offsets, rng, full=full, sway=Sway(sway_share, sway_hz))
     readings = Scaling.of(rig.channels).to_readings(si)
     return MadeTest(rig, rate, motion, readings, si, offsets)
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import Final
+
+from scipy.signal import lfilter
 
 from daq_app.rocking.analysis.preparation.fusion import best_value
 from daq_app.rocking.analysis.preparation.gains import FamilyGains, hold_samples
@@ -12,10 +15,13 @@ from daq_app.rocking.analysis.preparation.signals import Signals
 from daq_app.rocking.analysis.results import ValueWithSigma
 from daq_app.rocking.families.finding import FamilyFinding
 from daq_app.rocking.families.levels import level_outlier
-from daq_app.rocking.motion.swings import MotionTrack, steady_level
+from daq_app.rocking.motion.swings import MotionTrack, hold_level, steady_level
 
 NAMES: Final = {"tiltmeters": "tiltmeters", "wires": "wires", "lvdts": "LVDTs"}
 """The word for the reader by the key of `TestAnalysis.theta0_by_family`."""
+_TIME_CONSTANTS: Final = 6.0
+"""Time constants of the tiltmeters before their levels are read in which what they follow counts:
+0.2 % of what was before is left then."""
 
 
 def theta0_by_family(
@@ -25,30 +31,36 @@ def theta0_by_family(
     bent_rad: float = 0.0,
     unfit: Collection[str] = (),
 ) -> dict[str, ValueWithSigma]:
-    """θ0 over the last half second of the still hold (slow tiltmeters have settled), and the best.
+    """θ0, the rotation that the wall is let go from, by each family, and the best.
+
+    Tiltmeters are read over the last half second of the still hold. What the wall sways by from there to the
+    release is that of the family that leads, for they are too slow to show it.
 
     `bent_rad`: what a wall that bends adds to the zeros of wires and tiltmeters. `unfit`: families, by the
     word for the reader, that the best has no part of.
     """
     hold, rate = hold_samples(signals, track.held_until_s), signals.record.rate_hz
-    zero = signals.settings.zero_sigma_rad
+    settings = signals.settings
+    zero = settings.zero_sigma_rad
     bent_zero = math.hypot(zero, bent_rad)
     theta0: dict[str, ValueWithSigma] = {}
     tilts = signals.tilts_rad[:, hold]
     value = signals.geometry.tilt(tilts, track.theta0_rad)
     if math.isfinite(value):
         _, noise = steady_level(tilts.mean(axis=0), rate)
-        theta0["tiltmeters"] = _level(value, math.hypot(noise, bent_zero), gains.tiltmeters)
+        sway, sway_noise = (0.0, 0.0) if NAMES[signals.lead] in unfit else _sway(signals, track, hold)
+        sigma = math.hypot(noise, sway_noise, bent_zero)
+        theta0["tiltmeters"] = _level(value + sway, sigma, gains.tiltmeters)
     sigma = math.hypot(track.sigma_theta0_rad, bent_rad if signals.lead == "wires" else 0.0)
     theta0[signals.lead] = _level(track.theta0_rad, sigma, gains.of(signals.lead))
     others = {"wires": signals.wire_rotation_rad}
     if signals.joint is not None:
         others["lvdts"] = signals.joint.rotation_rad
     for name, rotation in others.items():
-        value, noise = steady_level(rotation[hold], rate)
+        own = replace(settings, zero_sigma_rad=bent_zero if name == "wires" else zero)
+        value, sigma = hold_level(signals.time_s, rotation, track.held_until_s, own)
         if name != signals.lead and math.isfinite(value):
-            own_zero = bent_zero if name == "wires" else zero
-            theta0[name] = _level(value, math.hypot(noise, own_zero), gains.of(name))
+            theta0[name] = _level(value, sigma, gains.of(name))
     trusted = fit_levels(theta0, unfit)
     best = best_value(trusted)
     if math.isfinite(best.value):
@@ -59,6 +71,26 @@ def theta0_by_family(
             theta0[name] = ValueWithSigma(shown.value, sigma)
     theta0["best"] = best
     return theta0
+
+
+def _sway(signals: Signals, track: MotionTrack, hold: slice) -> tuple[float, float]:
+    """What the rotation moves by from what tiltmeters show over `hold` to the release, and its sigma.
+
+    The mean is that of the rotation of the family that leads, with the time constant of the tiltmeters.
+    """
+    rig, rate = signals.record.rig, signals.record.rate_hz
+    time_constant_s = max(
+        rig.channel(name).time_constant_s for name in signals.record.family("tiltmeter", "x")
+    )
+    start = max(0, hold.start - round(_TIME_CONSTANTS * time_constant_s * rate))
+    followed = signals.bridged_rad[start : hold.stop]
+    if time_constant_s > 0.0:
+        kept = math.exp(-1.0 / (time_constant_s * rate))
+        followed = followed[0] + lfilter([1.0 - kept], [1.0, -kept], followed - followed[0])
+    exact = replace(signals.settings, zero_sigma_rad=0.0)
+    _, noise = hold_level(signals.time_s, signals.rotation_rad, track.held_until_s, exact)
+    moved = track.theta0_rad - float(followed[hold.start - start :].mean())
+    return (moved, noise) if math.isfinite(moved) and math.isfinite(noise) else (0.0, 0.0)
 
 
 def _level(value_rad: float, sigma_rad: float, gain_sigma: float) -> ValueWithSigma:
