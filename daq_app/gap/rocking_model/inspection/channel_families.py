@@ -167,17 +167,14 @@ def _usual_errors(data: ChannelFamily) -> FloatArray:
     return np.asarray(np.sqrt(usual**2 + leaked) * np.ones(len(data.ids)))
 
 
-def leaks(data: Mapping[Family, Sequence[ChannelFamily]], run: GapRun) -> dict[Family, Leak]:
-    """What the other families say of the crosstalk in each, from its runs with a leak that is unknown.
+def leak_into_wires(data: Mapping[Family, Sequence[ChannelFamily]], run: GapRun) -> Leak:
+    """What the other families, whose crosstalk is unknown, say of that in the wires.
 
     It shows in a channel that is scanned after one of another family or face, whose signal is like nothing
-    that it shows itself. A family is not asked of its own: a wire whose anchor is off looks like crosstalk.
+    that it shows itself. Wires are not asked: an anchor that is off looks like the crosstalk of an LVDT.
     """
-    told = {family: _told(entries, run) for family, entries in data.items()}
-    return {
-        family: _joint(np.array([row for other, rows in told.items() if other != family for row in rows]))
-        for family in data
-    }
+    told = [row for family, entries in data.items() if family != "wire" for row in _told(entries, run)]
+    return _joint(np.array(told))
 
 
 def _told(entries: Sequence[ChannelFamily], run: GapRun) -> list[tuple[float, float]]:

@@ -24,7 +24,12 @@ from daq_app.gap.rocking_model.features.channel_shapes import (
     deviation,
     usual_remains,
 )
-from daq_app.gap.rocking_model.inspection.channel_families import ChannelFamily, beside, channel_family, leaks
+from daq_app.gap.rocking_model.inspection.channel_families import (
+    ChannelFamily,
+    beside,
+    channel_family,
+    leak_into_wires,
+)
 from daq_app.gap.rocking_model.motion.crosstalk import UNKNOWN_LEAK, Leak
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import GRID_HZ, Wire, finer_step, zeroed
@@ -62,8 +67,8 @@ class OutlierChannels:
     """Channels that disagree with their family: those of each family without which the others agree."""
 
     channels: dict[Family, tuple[str, ...]]
-    leaks: dict[Family, Leak]
-    """What the other families say of the crosstalk in each."""
+    leak: Leak
+    """What the other families say of the crosstalk in the wires."""
     twisted: frozenset[Family] = frozenset()
     """Families that were compared beside a wall that turns about the vertical."""
 
@@ -77,7 +82,7 @@ class OutlierChannels:
         """Those whose faults effects may explain one by one."""
         few = {family: names for family, names in self.channels.items() if len(names) <= AS_SINGLE}
         return {
-            name: Lone(family, self.leaks.get(family, UNKNOWN_LEAK), family in self.twisted)
+            name: Lone(family, self.leak if family == "wire" else UNKNOWN_LEAK, family in self.twisted)
             for family, names in few.items()
             for name in names
         }
@@ -109,11 +114,11 @@ def find_outlier_channels(
         present = [d for d in data if d is not None]
         if present and len(present) == len(data):
             families[family] = present
-    known = leaks({family: _some(data) for family, data in families.items()}, runs[0])
+    leak = leak_into_wires({family: _some(data) for family, data in families.items()}, runs[0])
     channels: dict[Family, tuple[str, ...]] = {}
     twisted = set[Family]()
     for family, of_runs in families.items():
-        usable = [entry.knowing(known[family]) for entry in of_runs]
+        usable = [entry.knowing(leak) for entry in of_runs] if family == "wire" else of_runs
         names = _disagreeing(usable, family)
         straight = [s for s in (entry.untwisted() for entry in usable) if s is not None]
         if not names and len(straight) == len(usable):
@@ -122,7 +127,7 @@ def find_outlier_channels(
             twisted.update({family} if names else ())
         if names:
             channels[family] = names
-    return OutlierChannels(channels, known, frozenset(twisted))
+    return OutlierChannels(channels, leak, frozenset(twisted))
 
 
 def _disagreeing(usable: Sequence[ChannelFamily], family: Family) -> tuple[str, ...]:
