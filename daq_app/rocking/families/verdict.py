@@ -191,11 +191,12 @@ def _touches_r(finding: FamilyFinding) -> bool:
     """Whether r may be off by it: a gain cancels in EAV and moves CRT by 0.0001 for 1 %; no time is in r.
 
     What a scatter or noise makes of r is in its error, what the survey's α makes of it in that of CRT, and a
-    misfit is in the error of r by the fit alone. r is a ratio of speeds, and no p is in it.
+    misfit is in the error of r by the fit alone. r is a ratio of speeds: no p is in it, and what a wall leans
+    by cancels between the sides.
     """
     if finding.family in ("tiltmeters", "accelerometers"):
         return False
-    return finding.kind not in ("gain", "late", "scatter", "misfit", "alpha", "p", "noise", "turn")
+    return finding.kind not in ("gain", "late", "scatter", "misfit", "alpha", "lean", "p", "noise", "turn")
 
 
 def _share_of_r(finding: FamilyFinding, r: float) -> float:

@@ -279,6 +279,17 @@ def not_housner_motion(residual_rad: float, noise_rad: float, *, notable: bool) 
     return FamilyFinding("wall", (), "misfit", residual_rad, "rad", "none", severity, text)
 
 
+def alpha_by_side(lean_rad: float) -> FamilyFinding:
+    """α of one side is larger than that of the other, by twice `lean_rad`, which is signed as θ."""
+    side = "θ > 0" if lean_rad > 0.0 else "θ < 0"
+    text = (
+        f"α is {2e3 * abs(lean_rad):.1f} mrad larger where {side} than to the other side: the fit of the "
+        "whole motion counts with both, r by peaks and durations with their mean. Usual causes: a base that "
+        "is not level, a mass off the middle, unequal edges, a cable to one side"
+    )
+    return FamilyFinding("wall", (), "lean", lean_rad, "rad", "none", "warning", text)
+
+
 def slow_release(misfit_share: float) -> FamilyFinding:
     """The wall was let go slowly, or pushed: its fall is not that of a block from rest at θ0."""
     text = (
