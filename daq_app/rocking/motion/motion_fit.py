@@ -8,6 +8,7 @@ held to zero by that scatter: the standard error of the mean r then says so.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -24,6 +25,7 @@ from daq_app.rocking.motion.motion_model import (
     POINT_S,
     ZERO_PRIOR_RAD,
     MotionModel,
+    below_one,
     held,
 )
 from daq_app.rocking.motion.swings import REST_ZERO_SIGMA_RAD
@@ -48,6 +50,10 @@ _FALL_TO_BLAME = 0.5
 what the fit with it leaves. Raising it leaves the fall out where the rest is no better understood."""
 _HIGHEST = 0.99
 """Share of the energy at which a block falls over that a motion is begun with at most."""
+_FIRST_IN_PHASE = 4
+"""Impacts that are fitted first, so few that none is out of phase where α is off by a quarter."""
+_EVALUATIONS = 60
+"""Residuals that one search works out at most; one that comes to an end takes some twenty."""
 _CORRELATED_POINTS = 12
 """Residuals this many points (0.1 s) apart may still be correlated: slow noise, hum, sway of the wall."""
 _LEAST_LEFT = 0.2
@@ -216,15 +222,26 @@ def _stepwise(
     """The fit of `count` impacts.
 
     Where r is one number, later half-cycles join once the earlier ones are in phase; where every impact has
-    its own, the speeds put all of them in phase from the start.
+    its own, the speeds put all of them in phase from the start, unless α or p is far from the survey's.
+    `thorough`: they join anyway, and all at once in other ways as well where that leaves too much.
     """
-    x = np.zeros(FIXED)
-    for span in sorted({min(4, count), count}) if problem.spread is None else [count]:
-        x = np.concatenate((x, start[x.size - FIXED : span]))
-        end = min(impacts_s[span] if span < len(impacts_s) else stop_s, stop_s)
-        solution = _least(problem, x, span, end, thorough=thorough)
-        x = solution.x
-    return _result(problem, solution, count, problem.sigma)
+
+    def joined(spans: Iterable[int], *, thorough: bool) -> OptimizeResult:
+        x = np.zeros(FIXED)
+        for span in spans:
+            x = np.concatenate((x, start[x.size - FIXED : span]))
+            end = min(impacts_s[span] if span < len(impacts_s) else stop_s, stop_s)
+            solution = _least(problem, x, span, end, thorough=thorough)
+            x = solution.x
+        return solution
+
+    few = min(_FIRST_IN_PHASE, count)
+    growing = [few * 2**k for k in range(count.bit_length()) if few * 2**k < count]
+    usual = sorted({few, count}) if problem.spread is None else [count]
+    best = joined([*growing, count] if thorough else usual, thorough=False)
+    if thorough and np.mean(best.fun**2) > _POOR**2:
+        best = min(best, joined(usual, thorough=True), key=lambda found: float(found.cost))
+    return _result(problem, best, count, problem.sigma)
 
 
 def _least(
@@ -237,7 +254,12 @@ def _least(
     evaluations where Levenberg's steps creep, or goes on from the level that suits them.
     """
     search = partial(
-        least_squares, problem.residual, jac=problem.jacobian, args=(span, stop_s), x_scale="jac", max_nfev=60
+        least_squares,
+        problem.residual,
+        jac=problem.jacobian,
+        args=(span, stop_s),
+        x_scale="jac",
+        max_nfev=_EVALUATIONS,
     )
     best = search(start, method="lm")
     if best.status == 0 and problem.spread is not None:
@@ -333,10 +355,10 @@ def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: floa
     # for the motion is the same with another level and deviations to match. How far it was still to go is
     # in the error.
     deviation = 0.0 if problem.spread is None else problem.spread * float(np.mean(x[FIXED:]))
-    r = math.exp(problem.log_r + 0.01 * float(x[5]) + deviation)
+    r, slope = below_one(np.asarray(problem.log_r + 0.01 * x[5] + deviation))
     return MotionFit(
-        r=r,
-        standard_error=r * math.hypot(0.01 * float(deviations[5]), deviation),
+        r=float(r),
+        standard_error=float(r * slope) * math.hypot(0.01 * float(deviations[5]), deviation),
         p_rad_s=motion.p_rad_s,
         sigma_p_rad_s=motion.p_rad_s * P_PRIOR * float(deviations[2]),
         alpha_rad=motion.alpha_rad,

@@ -32,9 +32,9 @@ POINT_S = 0.008
 """The fitted points are means over this time."""
 FIXED = 7
 """Parameters before the deviations of single impacts."""
-_LOG_R, _LEAN = 5, 6
+_LOG_R, LEAN = 5, 6
 """Places of the mean ln r and of the lean among them."""
-_HELD = (2, 3, 4, _LEAN)
+_HELD = (2, 3, 4, LEAN)
 """Parameters that a prior holds: p, α, the zero and the lean; so are the deviations of single impacts."""
 _THETA0_STEP_RAD, _RELEASE_STEP_S, _R_STEP = 1e-3, 0.01, 0.01
 _SOFT = 100.0
@@ -42,6 +42,15 @@ _LEAST_R = 1e-3
 _MOST_LEAN = 0.2
 """Share of α that the lean is kept below: a search that strays goes no further."""
 _EPSILON = 1e-6
+
+
+def below_one(log_r: Floats) -> tuple[Floats, Floats]:
+    """r kept below 1 without a corner, for ln r of any sign, and d ln r / d`log_r`; of one shape.
+
+    −ln(1 + e^(−100 ln r))/100 in place of ln r: a fit cannot get stuck at 1.
+    """
+    softened = np.logaddexp(0.0, -_SOFT * log_r)
+    return np.exp(-softened / _SOFT), -np.expm1(-softened)
 
 
 def held(parameters: int) -> list[int]:
@@ -83,12 +92,11 @@ class MotionModel:
     """A fit asks for residuals and derivatives at the same place, one after the other."""
 
     def restitutions(self, x: Floats) -> Floats:
-        """r of each impact (one value where all are the same), kept below 1 without a corner.
+        """r of each impact (one value where all are the same).
 
-        −ln(1 + e^(−100 ln r))/100 in place of ln r: a fit cannot get stuck at 1. One that strays to nothing
-        has the least r, with which it finds no better place.
+        A search that strays to nothing has the least r, with which it finds no better place.
         """
-        return np.maximum(np.exp(-np.logaddexp(0.0, -_SOFT * self._log_r(x)) / _SOFT), _LEAST_R)
+        return np.maximum(below_one(self._log_r(x))[0], _LEAST_R)
 
     def levelled(self, x: Floats) -> Floats:
         """Parameters of the same motion whose deviations of single impacts have the mean zero."""
@@ -102,7 +110,7 @@ class MotionModel:
     def motion(self, x: Floats, impacts: int) -> FreeRocking:
         """The motion of these parameters."""
         alpha = self.alpha * math.exp(min(max(ALPHA_PRIOR * x[3], -0.5), 0.5))
-        lean = min(max(LEAN_PRIOR_RAD * x[_LEAN], -_MOST_LEAN * alpha), _MOST_LEAN * alpha)
+        lean = min(max(LEAN_PRIOR_RAD * x[LEAN], -_MOST_LEAN * alpha), _MOST_LEAN * alpha)
         theta0 = min(max(self.theta0 + _THETA0_STEP_RAD * x[0], 1e-3), 0.97 * (alpha + self.side * lean))
         return free_rocking(
             self.side * theta0,
@@ -137,7 +145,7 @@ class MotionModel:
         columns = by_energy[:, None] * energy[index] + by_peak_time[:, None] * peak_time[index]
         # All times after the release are as 1/p: a larger p shows later rotations.
         columns[:, 2] = -P_PRIOR * np.maximum(time - motion.release_s, 0.0) * by_peak_time
-        for place in (3, _LEAN):
+        for place in (3, LEAN):
             step = np.zeros(x.size)
             step[place] = _EPSILON
             columns[:, place] = (self.motion(x + step, span).at(time)[0] - rotation) / _EPSILON
@@ -184,7 +192,7 @@ class MotionModel:
         nearby = exact_energy(np.array([start - 1e-6, start, start + 1e-6]), alpha[0])
         energy = np.zeros((n, x.size))
         energy[:, 0] = _THETA0_STEP_RAD * (nearby[2] - nearby[0]) / 2e-6 / nearby[1]
-        soft = 1.0 / (1.0 + np.exp(np.minimum(_SOFT * self._log_r(x), 50.0)))
+        soft = below_one(self._log_r(x))[1]
         each = np.concatenate((soft, np.full(max(n - 1 - soft.size, 0), soft[-1])))[: n - 1]
         energy[1:, _LOG_R] = 2.0 * _R_STEP * np.cumsum(each)
         if self.spread is not None:
