@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from daq_app.gap.core import Finding, Options, diagnose
+from daq_app.gap.core.judging.joined import with_findings
 from tests.support.gap.toy_wave import LIBRARY, DecayModel, make_runs
 
 HUM = Finding(
@@ -74,3 +75,15 @@ def test_what_no_effect_explains_counts_by_degrees() -> None:
     assert result.which[0].probability == pytest.approx(0.75 * alone.which[0].probability)
     assert result.decision.confidence == pytest.approx(0.75 * alone.decision.confidence)
     assert result.rest.unknown == pytest.approx(1.0 - 0.75 * (1.0 - alone.rest.unknown))
+
+
+def test_two_weak_signs_of_something_unknown_are_none_of_these_together() -> None:
+    """A finding that may matter, and a remainder that may: either alone leaves the causes standing."""
+    runs = make_runs(4, slope_k=0.05, shift_s=0.05)
+    alone = diagnose(DecayModel(), runs, LIBRARY, Options())
+    may_matter = replace(STRANGE, material=False, unknown=0.45)
+    left = replace(alone, rest=replace(alone.rest, unknown=0.2))
+    assert with_findings(left, (may_matter,)).decision.verdict == "none_of_these"
+    assert STRANGE.words in with_findings(left, (may_matter,)).decision.sentence
+    assert with_findings(alone, (may_matter,)).decision.effects == alone.decision.effects
+    assert with_findings(left, (ORDINARY,)).decision.effects == alone.decision.effects

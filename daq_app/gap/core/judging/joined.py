@@ -27,7 +27,7 @@ def with_findings(result: Diagnosis, findings: Sequence[Finding], policy: Policy
         result,
         which=tuple(_joined(entry, joining, known) for entry in result.which),
         set95=tuple(_joined(entry, joining) for entry in result.set95),
-        decision=_decision(result.decision, findings, policy),
+        decision=_decision(result, findings, policy),
         rest=replace(result.rest, unknown=1.0 - known * (1.0 - result.rest.unknown)),
         effect_parameters=(*result.effect_parameters, *sizes),
         findings=tuple(findings),
@@ -44,13 +44,16 @@ def _joined(entry: Ranked, findings: Sequence[Finding], known: float = 1.0) -> R
     return replace(entry, effects=tuple(sorted((*entry.effects, *names))), family=family)
 
 
-def _decision(decision: Decision, findings: Sequence[Finding], policy: Policy) -> Decision:
-    strange = unknown(findings)
-    if strange >= policy.refused and decision.verdict != "none_of_these":
-        worst = max(findings, key=lambda finding: finding.unknown)
-        words = "; ".join(f.words for f in findings if f.material and not f.explained)
+def _decision(result: Diagnosis, findings: Sequence[Finding], policy: Policy) -> Decision:
+    decision, strange = result.decision, unknown(findings)
+    # What no effect does may show in a finding, in what remains of the fit, or in a little of both.
+    either = 1.0 - (1.0 - strange) * (1.0 - result.rest.unknown)
+    telling = [f for f in findings if f.unknown >= policy.listed]
+    if either >= policy.refused and telling and decision.verdict != "none_of_these":
+        worst = max(telling, key=lambda finding: finding.unknown)
+        words = "; ".join(f.words for f in telling)
         sentence = f"None of these explains what was measured directly: {words}. {decision.sentence}"
-        return Decision("none_of_these", (), worst.family, sentence, strange)
+        return Decision("none_of_these", (), worst.family, sentence, either)
     decision = replace(decision, confidence=(1.0 - strange) * decision.confidence)
     joining = material(findings)
     if not joining or decision.verdict == "none_of_these":
