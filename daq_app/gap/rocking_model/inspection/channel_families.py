@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import oaconvolve
 
+from daq_app.campaign.report.statistics import random_effects_mean
 from daq_app.config.rig import Family
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.channel_shapes import FURTHER, TOLERANCE, Others, shape_columns
@@ -174,7 +176,7 @@ def leak_into_wires(data: Mapping[Family, Sequence[ChannelFamily]], run: GapRun)
     that it shows itself. Wires are not asked: an anchor that is off looks like the crosstalk of an LVDT.
     """
     told = [row for family, entries in data.items() if family != "wire" for row in _told(entries, run)]
-    return _joint(np.array(told))
+    return _joint(told)
 
 
 def _told(entries: Sequence[ChannelFamily], run: GapRun) -> list[tuple[float, float]]:
@@ -219,22 +221,20 @@ def _share(other: Others, family: Family) -> tuple[float, float]:
     return float(values[-1] - gain @ values[:k]), float(np.sqrt(max(variance, 0.0)))
 
 
-def _joint(rows: FloatArray) -> Leak:
-    """One share from what channels say, (k, 2): each with its sd; with what they differ by beyond that.
+def _joint(rows: Sequence[tuple[float, float]]) -> Leak:
+    """One share from what channels say, each with its sd, and the sd of that of any further channel.
 
-    The mean of random effects (DerSimonian and Laird 1986), beside what the table says. One channel alone
-    says nothing: an LVDT that does not stand where the rig file says looks like crosstalk as well.
+    Channels differ by what these differ by and by what the table says. One channel alone says nothing: an
+    LVDT that does not stand where the rig file says looks like crosstalk.
     """
     if len(rows) < 2:
         return UNKNOWN_LEAK
-    shares, weights = rows[:, 0], rows[:, 1] ** -2
-    mean = float(shares @ weights / weights.sum())
-    excess = float(weights @ (shares - mean) ** 2) - (shares.size - 1)
-    between = max(excess / float(weights.sum() - (weights**2).sum() / weights.sum()), 0.0)
-    between += (LEAKS_DIFFER * mean) ** 2
-    weights = 1.0 / (rows[:, 1] ** 2 + between)
-    known = weights.sum() + CROSSTALK**-2
-    return Leak(float(shares @ weights / known), min(float(np.sqrt(1.0 / known + between)), CROSSTALK))
+    shares, errors = np.array(rows).T
+    group = random_effects_mean(shares.tolist(), errors.tolist())
+    between = group.scatter**2 + (LEAKS_DIFFER * group.mean) ** 2
+    weights = 1.0 / (errors**2 + between)
+    known = float(weights.sum()) + CROSSTALK**-2
+    return Leak(float(shares @ weights) / known, min(math.sqrt(1.0 / known + between), CROSSTALK))
 
 
 def smoothed(run: GapRun, chosen: Sequence[int], late_s: float = 0.0) -> FloatArray:

@@ -56,9 +56,9 @@ class Lone:
     """A channel that is examined on its own."""
 
     family: Family
-    leak: Leak
+    leak: Leak = UNKNOWN_LEAK
     """What is known of the crosstalk in it."""
-    twisted: bool
+    twisted: bool = False
     """Whether the others of its family agree only beside a wall that turns about the vertical."""
 
 
@@ -69,8 +69,8 @@ class OutlierChannels:
     channels: dict[Family, tuple[str, ...]]
     leak: Leak
     """What the other families say of the crosstalk in the wires."""
-    twisted: frozenset[Family] = frozenset()
-    """Families that were compared beside a wall that turns about the vertical."""
+    twisted: bool = False
+    """Whether the wires were compared beside a wall that turns about the vertical."""
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -81,8 +81,9 @@ class OutlierChannels:
     def single(self) -> dict[str, Lone]:
         """Those whose faults effects may explain one by one."""
         few = {family: names for family, names in self.channels.items() if len(names) <= AS_SINGLE}
+        wire = Lone("wire", self.leak, self.twisted)
         return {
-            name: Lone(family, self.leak if family == "wire" else UNKNOWN_LEAK, family in self.twisted)
+            name: wire if family == "wire" else Lone(family)
             for family, names in few.items()
             for name in names
         }
@@ -116,18 +117,18 @@ def find_outlier_channels(
             families[family] = present
     leak = leak_into_wires({family: _some(data) for family, data in families.items()}, runs[0])
     channels: dict[Family, tuple[str, ...]] = {}
-    twisted = set[Family]()
+    twisted = False
     for family, of_runs in families.items():
         usable = [entry.knowing(leak) for entry in of_runs] if family == "wire" else of_runs
         names = _disagreeing(usable, family)
         straight = [s for s in (entry.untwisted() for entry in usable) if s is not None]
         if not names and len(straight) == len(usable):
-            # Of a wall that turns about the vertical no wire agrees with the others.
+            # No wire of a wall that turns about the vertical agrees with the others.
             names = _disagreeing(straight, family)
-            twisted.update({family} if names else ())
+            twisted = bool(names)
         if names:
             channels[family] = names
-    return OutlierChannels(channels, leak, frozenset(twisted))
+    return OutlierChannels(channels, leak, twisted)
 
 
 def _disagreeing(usable: Sequence[ChannelFamily], family: Family) -> tuple[str, ...]:
