@@ -15,8 +15,9 @@ from daq_app.gap.core.findings import Finding, material
 from daq_app.gap.core.fitting.experiment import Experiment
 from daq_app.gap.core.fitting.fit import Fit, effects_of
 from daq_app.gap.core.fitting.held_out import GapSize, HeldOutRun, gap_size
-from daq_app.gap.core.fitting.parallel import FitTask, ScoreTask, Workers
+from daq_app.gap.core.fitting.parallel import Workers
 from daq_app.gap.core.fitting.problem import Problem
+from daq_app.gap.core.fitting.tasks import FitTask, ScoreTask
 from daq_app.gap.core.judging.decision import Evidence, decide
 from daq_app.gap.core.judging.evidence import NULL, Hypothesis, Ranked, answers, credible_set, inclusion
 from daq_app.gap.core.judging.hypotheses import Hypotheses, Options

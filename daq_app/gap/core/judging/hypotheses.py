@@ -12,8 +12,9 @@ from daq_app.gap.core.effects import Effect, Library
 from daq_app.gap.core.fitting.experiment import Experiment
 from daq_app.gap.core.fitting.fit import Fit, effects_of
 from daq_app.gap.core.fitting.likelihood import Sizes
-from daq_app.gap.core.fitting.parallel import FitTask, FormsTask, ScreenTask, Workers
+from daq_app.gap.core.fitting.parallel import Workers
 from daq_app.gap.core.fitting.screen import Screened, Step
+from daq_app.gap.core.fitting.tasks import FitTask, FormsTask, ScreenTask
 from daq_app.gap.core.judging.evidence import NULL, Hypothesis, Ranked, rank
 from daq_app.gap.core.judging.other_forms import FreeForm
 from daq_app.gap.core.policy import POLICY, Policy
