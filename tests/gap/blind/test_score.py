@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -27,13 +26,6 @@ from daq_app.gap.blind.scoring.score import (
     confusion,
     score_folder,
     table,
-)
-from daq_app.gap.blind.scoring.statistics import (
-    auroc,
-    calibration_error,
-    calibration_error_by_chance,
-    reliability,
-    share,
 )
 from daq_app.gap.blind.seal import SealBroken, read_seal, seal_case
 from daq_app.gap.blind.world.effects.catalogue import ENTRIES, LIBRARY, OUTSIDE
@@ -333,24 +325,6 @@ def test_a_failed_diagnosis_counts_against_it() -> None:
     rows = {row.name: row for row in table(judged)}
     assert rows["no result"].met is False
     assert rows["first answer right, effect ≥ 4 sd"].found.value == 0.0
-
-
-def test_wilson_and_calibration_against_known_numbers() -> None:
-    nine_of_ten = share([True] * 9 + [False])
-    assert (nine_of_ten.low, nine_of_ten.high) == pytest.approx((0.5958, 0.9821), abs=1e-4)
-    assert calibration_error([0.95] * 100, [True] * 95 + [False] * 5) == pytest.approx(0.0, abs=1e-12)
-    assert calibration_error([0.95] * 100, [True] * 60 + [False] * 40) == pytest.approx(0.35)
-    assert [bar.found.n for bar in reliability([0.1, 0.9, 1.0], [True, True, False])] == [1, 2]
-    assert auroc([2.0, 3.0], [1.0, 2.0]) == pytest.approx(0.875)
-    assert math.isnan(auroc([], [1.0]))
-
-
-def test_few_answers_are_off_by_chance_however_well_calibrated_they_are() -> None:
-    one = calibration_error_by_chance([0.5])  # right or wrong, it is off by a half
-    hundred = calibration_error_by_chance([0.95] * 100)  # mean absolute deviation of a binomial share
-    assert one.value == pytest.approx(0.5)
-    assert hundred.value == pytest.approx(math.sqrt(2 / math.pi * 0.95 * 0.05 / 100), rel=0.1)
-    assert hundred.low < hundred.value < hundred.high
 
 
 @pytest.fixture
