@@ -284,8 +284,8 @@ def alpha_by_side(lean_rad: float) -> FamilyFinding:
     side = "θ > 0" if lean_rad > 0.0 else "θ < 0"
     text = (
         f"α is {2e3 * abs(lean_rad):.1f} mrad larger where {side} than to the other side: the fit of the "
-        "whole motion counts with both, r by peaks and durations with their mean. Usual causes: a base that "
-        "is not level, a mass off the middle, unequal edges, a cable to one side"
+        "whole motion counts with both, CRT with their mean. Usual causes: a base that is not level, a mass "
+        "off the middle, unequal edges, a cable to one side"
     )
     return FamilyFinding("wall", (), "lean", lean_rad, "rad", "none", "warning", text)
 
