@@ -25,6 +25,13 @@ def test_wilson_and_calibration_against_known_numbers() -> None:
     assert math.isnan(auroc([], [1.0]))
 
 
+@pytest.mark.parametrize("count", [1, 24, 200])
+def test_an_interval_of_none_or_all_ends_there(count: int) -> None:
+    assert share([False] * count).low == 0.0
+    assert share([True] * count).high == 1.0
+    assert share([False] * count).high == pytest.approx(1.0 - share([True] * count).low)
+
+
 def test_few_answers_are_off_by_chance_however_well_calibrated_they_are() -> None:
     one = calibration_error_by_chance([0.5])  # right or wrong, it is off by a half
     hundred = calibration_error_by_chance([0.95] * 100)  # mean absolute deviation of a binomial share

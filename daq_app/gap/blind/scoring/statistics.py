@@ -45,7 +45,9 @@ def share(flags: Sequence[bool]) -> Value:
     z2 = _Z95**2
     centre = (p + z2 / (2 * n)) / (1 + z2 / n)
     half = _Z95 * math.sqrt(p * (1 - p) / n + z2 / (4 * n * n)) / (1 + z2 / n)
-    return Value(p, max(0.0, centre - half), min(1.0, centre + half), n)
+    # Rounding leaves 1e-18 where no flag is true, and as little to one where all are.
+    low, high = 0.0 if p == 0.0 else centre - half, 1.0 if p == 1.0 else centre + half
+    return Value(p, low, high, n)
 
 
 def bootstrap(
