@@ -25,6 +25,24 @@ def white_noise(values: Floats) -> float:
     return float(np.median(np.abs(second, out=second), overwrite_input=True)) * 1.4826 / math.sqrt(6.0)
 
 
+def moving_noise(rows: Floats, rate_hz: float) -> Floats:
+    """rms of one sample of each of some records of one motion, (k,), as means over 15 ms see it.
+
+    `rows`, (k, n), differ by errors of their own alone: windings and wipers of potentiometers err where they
+    move, and not at rest. By second differences of the means, robust to impacts; NaN for fewer than three
+    records or too few samples.
+    """
+    count, size = len(rows), max(int(_MEAN_S * rate_hz), 1)
+    if count < 3 or rows.shape[1] < 20 * size:
+        return np.full(count, math.nan)
+    means = rows[:, : rows.shape[1] // size * size].reshape(count, -1, size).mean(axis=2)
+    second = np.diff(means - means.mean(axis=0), 2, axis=1)
+    about_mean = (1.4826 * np.median(np.abs(second), axis=1)) ** 2 / 6.0 * size
+    # The mean has 1/k of each record: σ_i² (1 − 2/k) + Σ σ² / k² is left of it.
+    total = about_mean.sum() / (1.0 - 1.0 / count)
+    return np.asarray(np.sqrt(np.maximum(about_mean - total / count**2, 0.0) / (1.0 - 2.0 / count)))
+
+
 def timing_noise(rest: Floats, rate_hz: float) -> float:
     """rms of one sample of a record at rest (n,), as means over 15 ms see it, of the unit of `rest`.
 

@@ -23,7 +23,7 @@ from daq_app.gap.rocking_model.motion.release_speed import release_speed
 from daq_app.gap.rocking_model.motion.rotation import (
     Rotation,
     mean_rotation,
-    sample_noise,
+    noise_of_wires,
     straight_line,
     wire_height,
     wires_of,
@@ -111,7 +111,7 @@ def _reference(run: GapRun, joint: Rotation, wanted: str) -> tuple[str, FloatArr
         return "lvdt", joint.theta, joint.noise_rad, (*notes, *limit)
     why = "LVDTs reach their range" if not joint.whole else "the LVDTs are not fit for it"
     note = f"{run.name}: {why}; its motion is read from the wires."
-    return "wire", theta, sample_noise(theta, run.rate_hz), (*notes, note)
+    return "wire", theta, noise_of_wires(run, theta), (*notes, note)
 
 
 def _times(

@@ -14,7 +14,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.records import GapRun, Sensor, Vector3
 from daq_app.gap.rocking_model.tolerances.sensors import FEWEST_LVDTS, LVDT_MISFIT
 from daq_app.rocking.geometry.joint import BaseJoint, at_range_end
-from daq_app.rocking.geometry.noise import timing_noise
+from daq_app.rocking.geometry.noise import moving_noise, timing_noise
 from daq_app.rocking.geometry.wires import wire_rotation, wire_shortening
 from daq_app.rocking.means import means_over
 
@@ -279,6 +279,19 @@ def mean_rotation(run: GapRun) -> FloatArray | None:
     """Mean of what the wires show of the wall's rotation (weights z²), (n,), rad; None where none reads."""
     rows, chosen = wall_rotation(run)
     return np.average(rows, axis=0, weights=run.positions(chosen)[:, 2] ** 2) if chosen else None
+
+
+def noise_of_wires(run: GapRun, theta: FloatArray) -> float:
+    """rms noise of one sample of the wires' mean rotation `theta`, (n,), rad: at rest, or while they move.
+
+    The larger of the two: a potentiometer errs from winding to winding, which at rest is one and the same.
+    """
+    rows, chosen = wall_rotation(run)
+    moving = np.abs(theta) > 0.05 * np.abs(theta).max()
+    weights = run.positions(chosen)[:, 2] ** 2
+    each = moving_noise(rows[:, moving], run.rate_hz)
+    of_mean = float(np.linalg.norm(weights / weights.sum() * each))
+    return float(np.nanmax([sample_noise(theta, run.rate_hz), of_mean]))
 
 
 def wire_height(run: GapRun) -> float:
