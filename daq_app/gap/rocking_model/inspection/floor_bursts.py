@@ -31,6 +31,8 @@ _SHORTEST = 40
 """Samples of the grid that a half-cycle must have: in a shorter one a smooth curve takes up a vibration, and
 the rotation's own second derivative is not known well enough."""
 _ROUNDS = 12
+_NEAR = 0.25
+"""Difference in the logarithm of jumps that are about the same."""
 _ALIKE = 7
 """Half-cycles, those after the nearest jumps, that say what such a jump usually leaves."""
 
@@ -60,8 +62,9 @@ def floor_bursts(
 
     What is usual is said by all half-cycles of all runs: noise, and what an impact leaves, which grows with
     the jump of the speed, or what half of those leave that follow about as large a jump: a base that slips
-    shows it for longer than an impact takes. `ring` is the wall's bending after impacts, whose shape over the
-    heights is not quite z²: it is the same wall in every run, so that one size of it is taken out of all.
+    shows it for longer than an impact takes. Nor is a burst what comes back in two other tests. `ring` is the
+    wall's bending after impacts, whose shape over the heights is not quite z²: it is the same wall in every
+    run, so that one size of it is taken out of all.
     """
     seen = [_half_cycles(run, grid, survey, ring) for run, grid in zip(runs, grids, strict=True)]
     known = [cycle for cycles in seen for cycle in cycles]
@@ -73,10 +76,14 @@ def floor_bursts(
     jumps = np.array([cycle.jump for cycle in known])
     powers = np.array([cycle.power(rings) for cycle in known])
     floor, per_jump = _usual(jumps, powers)
-    for row, cycles in zip(findings, seen, strict=True):
+    test = np.repeat(np.arange(len(seen)), [len(cycles) for cycles in seen])
+    for k, (row, cycles) in enumerate(zip(findings, seen, strict=True)):
         power = np.array([cycle.power(rings) for cycle in cycles])
         own = np.array([cycle.jump for cycle in cycles])
-        usual = np.maximum(floor + per_jump * own**2, [_of_alike(jump, jumps, powers) for jump in own])
+        elsewhere = test != k
+        alike = [_of_alike(jump, jumps, powers) for jump in own]
+        again = [_seen_again(jump, jumps[elsewhere], powers[elsewhere]) for jump in own]
+        usual = np.maximum.reduce([floor + per_jump * own**2, np.array(alike), np.array(again)])
         excess, loud = _loudest(cycles, power, usual)
         if loud > SHAKEN_POWER:
             size = float(np.sqrt(max(excess, 0.0)))
@@ -134,6 +141,15 @@ def _of_alike(jump: float, jumps: FloatArray, powers: FloatArray) -> float:
     """Power that half of the half-cycles after the nearest jumps leave; 0 where they are too few."""
     nearest = np.argsort(np.abs(np.log(np.abs(jumps) / abs(jump))))[:_ALIKE]
     return float(np.median(powers[nearest])) if nearest.size == _ALIKE else 0.0
+
+
+def _seen_again(jump: float, jumps: FloatArray, powers: FloatArray) -> float:
+    """Power that two half-cycles of other tests leave after about such a jump to the same side; 0 for none.
+
+    What an edge does that slips at fast impacts comes back in other tests, and a burst does not.
+    """
+    near = (np.sign(jumps) == np.sign(jump)) & (np.abs(np.log(np.abs(jumps / jump))) < _NEAR)
+    return float(np.sort(powers[near])[-2]) if np.count_nonzero(near) > 1 else 0.0
 
 
 def _usual(jump: FloatArray, power: FloatArray) -> tuple[float, float]:
