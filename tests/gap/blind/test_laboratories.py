@@ -220,7 +220,10 @@ def _seen(configs: Path, tmp_path: Path, name: str, **parameters: float) -> floa
 
 
 def test_an_effect_is_as_visible_as_what_it_looks_like_is_known(configs: Path, tmp_path: Path) -> None:
-    """A pivot counts in half widths by tape, a gain in calibrations, a hum in what sound channels pick up."""
+    """A pivot counts in half widths by tape, a gain in calibrations, a hum in what sound channels pick up, a
+    tilt in what a level leaves."""
+    for tilt_rad, seen in ((3e-4, 1.0), (3e-3, 10.0)):
+        assert 0.8 * seen < _seen(configs, tmp_path, "base_tilt", beta_rad=tilt_rad) <= seen
     for parameters, least, most in (({"a_m": 9e-3}, 2.9, 4.0), ({"a_m": 18e-3}, 5.9, 8.0)):
         assert least < _seen(configs, tmp_path, "pivot_shift", **parameters) < most
     hidden = dataclasses.replace(order(configs, tmp_path, "rough"), hidden="gain")
@@ -237,3 +240,23 @@ def test_an_effect_is_as_visible_as_what_it_looks_like_is_known(configs: Path, t
     assert detectability(dataclasses.replace(hum, surroundings=loud), hum.effects[0]) == pytest.approx(
         detectability(hum, hum.effects[0]) / 2
     )
+
+
+def test_walls_and_amplifiers_have_a_little_of_some_effects_that_no_label_names(
+    configs: Path, tmp_path: Path
+) -> None:
+    plain, tilted = (
+        draw_case(dataclasses.replace(order(configs, tmp_path, "ordinary"), hidden=name), 1)[0]
+        for name in ("nothing", "base_tilt")
+    )
+    sizes = plain.surroundings.sizes
+    assert not plain.effects
+    assert 0.0 < abs(plain.mechanical["base_tilt"]["beta_rad"]) < 4.0 * sizes["lean"]
+    assert plain.mechanical["winkler"]["theta_c_rad"] == pytest.approx(sizes["bed"] ** 2)
+    assert plain.mechanical["restitution_slope"]["k_s_rad"] != 0.0
+    (late,) = plain.faults
+    assert late.name == "filter_delay" and late.parameters["tau_s"] < sizes["late"]
+    assert tilted.mechanical["base_tilt"] == tilted.effects[0].parameters, "what is hidden takes its place"
+    assert tilted.mechanical["alpha_asymmetry"] == plain.mechanical["alpha_asymmetry"]
+    own = draw_case(order(configs, tmp_path, "own"), 1)[0]
+    assert not own.usual

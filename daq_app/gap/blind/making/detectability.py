@@ -5,7 +5,8 @@ two quiet twins of a run, with and without the effect, first in what swings and 
 (duration and loss of a swing, speed against peak, restitution of an impact, against impact scatter
 and with α, p and r refitted), then in what the channels show beyond the motion (against their noise,
 with gain, offset and the half width of the base refitted as far as they are known to). Hum counts against
-the hum that sound channels pick up. No diagnosis can see much more.
+the hum that sound channels pick up, and a lean, a slope of r or a delay against what any wall and rig has of
+it. No diagnosis can see much more.
 """
 
 from __future__ import annotations
@@ -37,12 +38,41 @@ _MODEL_SHARE: Final = 1e-3
 _CLOCK_SD: Final = 1e-3
 _HALF_WIDTH_SD_M: Final = 3e-3
 """A half width of the base as it is measured by tape (the default of the diagnosis's survey)."""
+_USUAL: Final = {
+    "alpha_asymmetry": ("delta_rad", 3e-4),
+    "base_tilt": ("beta_rad", 3e-4),
+    "restitution_slope": ("k_s_rad", 4e-3),
+    "restitution_asymmetry": ("d", 5e-4),
+    "lag": ("tau_s", 1.4e-3),
+    "slow_response": ("tau_s", 1.4e-3),
+    "filter_delay": ("tau_s", 1.4e-3),
+}
+"""Effects of which any wall or rig has some, and how much: a lean that a level leaves, an r that changes a
+little with speed and side, amplifiers of 100 to 500 Hz."""
+_USUAL_LEAN_RAD: Final = 3e-4
 _LEAST_HUM: Final = 0.02
 """Amplitude of the hum that any channel picks up, in noises: the least of all laboratories."""
 
 
 def detectability(world: World, effect: Drawn) -> float:
     """Strength of one effect of a case in standard deviations of what it could be known to."""
+    shown, beyond_usual = _shown(world, effect), _beyond_usual(world, effect)
+    return shown if math.isinf(beyond_usual) else 1.0 / math.hypot(1.0 / max(shown, 1e-9), 1.0 / beyond_usual)
+
+
+def _beyond_usual(world: World, effect: Drawn) -> float:
+    """Strength of an effect over what any wall or rig has of it; infinite where that is nothing."""
+    if effect.name == "eccentric_mass":
+        lean = effect.parameters["e_m"] / world.wall.centroid_height
+        return abs(lean) / _USUAL_LEAN_RAD
+    if effect.name not in _USUAL or len(effect.targets) == 1:
+        return math.inf
+    parameter, usual = _USUAL[effect.name]
+    return abs(effect.parameters[parameter]) / usual
+
+
+def _shown(world: World, effect: Drawn) -> float:
+    """How many standard deviations the runs show of an effect."""
     if effect.name == "clock":
         return abs(effect.parameters["error"]) / _CLOCK_SD
     if effect.name == "hum" and world.surroundings.installation is not None:
@@ -50,6 +80,7 @@ def detectability(world: World, effect: Drawn) -> float:
     alone = replace(
         world,
         effects=(effect,),
+        usual=(),
         wall=replace(world.wall, restitution_scatter=0.0),
         runs=_extremes(world),
         surroundings=Surroundings(),

@@ -135,6 +135,7 @@ def _label(name: str, seed: int, category: str, world: World, made: Sequence[Mad
         "engine": world.engine,
         "laboratory": around.laboratory,
         "imperfections": dict(around.sizes),
+        "usual": [asdict(effect) for effect in world.usual],
         "numerics": asdict(around.numerics),
         "shock": asdict(around.shock),
         "effects": [

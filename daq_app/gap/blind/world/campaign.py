@@ -30,6 +30,7 @@ from daq_app.gap.blind.world.sensors.field_chain import field_readings
 from daq_app.gap.blind.world.sensors.installation import Installation, draw_installation
 from daq_app.gap.blind.world.shock import Shock, draw_shock
 from daq_app.gap.blind.world.sway import Sway, draw_sway
+from daq_app.gap.blind.world.usual import draw_usual
 from daq_app.gap.blind.world.wall import Wall, draw_wall, off_survey
 
 LEVELS: Final = {"L1": 0.15, "L2": 0.25, "L3": 0.35, "L4": 0.40}
@@ -39,7 +40,8 @@ _RELEASE_SCATTER = 0.01
 _SHORTEST_S = 1.5
 """Shortest part of a record before the release and after the rest."""
 _SURROUNDINGS = 0x5AB0
-"""Tells the random numbers of a case's surroundings from those of its wall."""
+_USUAL = 0x0507
+"""Tell the random numbers of a case's surroundings, and of what is usual there, from those of its wall."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,15 +111,19 @@ class World:
     runs: tuple[PlannedRun, ...]
     engine: Engine = "events"
     surroundings: Surroundings = field(default_factory=Surroundings)
+    usual: tuple[Drawn, ...] = ()
+    """What any wall and rig has of some effects; what is hidden under the same name takes its place."""
 
     @property
     def mechanical(self) -> dict[str, dict[str, float]]:
         """Effects on the wall, the floor and the clock by name; those on channels are `faults`."""
-        return {e.name: e.parameters for e in self.effects if not e.targets}
+        return {e.name: e.parameters for e in (*self.usual, *self.effects) if not e.targets}
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        return tuple(Fault(e.name, e.parameters, e.targets) for e in self.effects if e.targets)
+        return tuple(
+            Fault(e.name, e.parameters, e.targets) for e in (*self.usual, *self.effects) if e.targets
+        )
 
     def make(self) -> Iterator[MadeRun]:
         """The runs in their order; the wall wears from one to the next."""
@@ -210,6 +216,7 @@ def in_laboratory(world: World, laboratory: Laboratory, seed: int, index: int) -
         calibration=draw_calibration(world.rig, rng, sizes.get("calibration", CALIBRATION_TOLERANCE)),
         runs=tuple(_run_in_laboratory(run, sizes, rng) for run in world.runs),
         surroundings=around,
+        usual=draw_usual(world.rig, sizes, np.random.default_rng([seed, index, _USUAL])),
     )
 
 

@@ -43,6 +43,14 @@ _ELECTRONICS: Final = (
     Imperfection("coarse_steps", "bit", "bits of 16 that a module lacks, at most"),
     Imperfection("skew", "s", "a module samples later or earlier, at most"),
     Imperfection("calibration", "1", "standard deviation of a channel's gain"),
+    Imperfection("late", "s", "delay of the LVDTs' amplifiers, at most"),
+)
+_WALL: Final = (
+    Imperfection("lean", "rad", "standard deviation of a base's tilt, and of half the difference of its α"),
+    Imperfection(
+        "slope_of_r", "s/rad", "standard deviation of the slope of r over speed; 8 times that of sides"
+    ),
+    Imperfection("bed", "√rad", "root of the rotation at which a bed of mortar begins to open"),
 )
 _INSTALLATION: Final = (
     Imperfection("mount_angle", "rad", "standard deviation of the turn of accelerometers and tiltmeters"),
@@ -63,7 +71,7 @@ _TEST: Final = (
 )
 
 IMPERFECTIONS: Final[dict[str, Imperfection]] = {
-    imperfection.name: imperfection for imperfection in (*_ELECTRONICS, *_INSTALLATION, *_TEST)
+    imperfection.name: imperfection for imperfection in (*_ELECTRONICS, *_INSTALLATION, *_WALL, *_TEST)
 }
 
 Chain = Literal["own", "bench", "field"]
@@ -136,6 +144,10 @@ _ORDINARY: Final[Mapping[str, Range]] = {
     "coarse_steps": (0.5, 1.5),
     "skew": (1e-5, 1e-4),
     "calibration": (0.001, 0.003),
+    "late": (2e-4, 2e-3),
+    "lean": (5e-5, 4e-4),
+    "slope_of_r": (5e-4, 4e-3),
+    "bed": (2e-4, 7e-4),
     "mount_angle": (0.002, 0.01),
     "anchor_error": (0.001, 0.004),
     "tilt_constant": (0.03, 0.15),
