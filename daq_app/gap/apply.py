@@ -31,6 +31,8 @@ FORMS_ONLY: Final = {
     ("sliding", "back"),
     ("sliding_on", "back"),
     ("sliding_on", "own"),
+    ("sliding", "slope"),
+    ("sliding_on", "slope"),
 }
 """Parameters that the simulator has not: of a form that it knows only one of, or of a run by itself."""
 _MEASURED_ONLY: Final = ("ambient@floor", "acceleration@", "sliding@base", "corner_twist@base")

@@ -18,7 +18,7 @@ from daq_app.gap.core.fitting.held_out import GapSize, HeldOutRun, gap_size
 from daq_app.gap.core.fitting.parallel import Workers
 from daq_app.gap.core.fitting.problem import Problem
 from daq_app.gap.core.fitting.tasks import FitTask, ScoreTask
-from daq_app.gap.core.judging.decision import Evidence, decide
+from daq_app.gap.core.judging.decision import Evidence, Usual, decide
 from daq_app.gap.core.judging.evidence import NULL, Hypothesis, Ranked, answers, credible_set, inclusion
 from daq_app.gap.core.judging.hypotheses import Hypotheses, Options
 from daq_app.gap.core.judging.joined import with_findings
@@ -26,7 +26,7 @@ from daq_app.gap.core.judging.other_forms import with_other_forms
 from daq_app.gap.core.judging.remainder import remainder
 from daq_app.gap.core.judging.where import gap_map
 from daq_app.gap.core.model import Model
-from daq_app.gap.core.parameters import NORMAL_95
+from daq_app.gap.core.parameters import NORMAL_95, Parameter
 from daq_app.gap.core.result import CannotDiagnose, Cause, Detection, Diagnosis, Estimate
 
 PER_RUN = " (mean of the runs; each has its own)"
@@ -92,7 +92,9 @@ class _Study(Hypotheses):
         classes = answers(ranked, self.library)
         rest = remainder(self.experiment, self.library, null, fit, forms, self._gains(best), self.policy)
         detection = self._detection()
-        decision, following = decide(Evidence(self.library, classes, fit, rest, detection), self.policy)
+        decision, following = decide(
+            Evidence(self.library, classes, fit, rest, detection, self._usual(fit)), self.policy
+        )
         gap, alone = self._held_out(best)
         if not fit.converged:
             limits.append(f"The fit of {' + '.join(best) or 'nothing missing'} has not settled.")
@@ -209,6 +211,23 @@ class _Study(Hypotheses):
             Estimate(s.name, fit.sigmas[s.name], math.nan, math.nan, s.unit, s.median, s.log_sd, s.meaning)
             for s in self.experiment.model.scatters
         )
+
+    def _usual(self, fit: Fit) -> tuple[Usual, ...]:
+        """What the model has of effects in any case, as far as the library has these.
+
+        Those of one family are judged together: a lean and unequal edges are hard to tell apart.
+        """
+        families: dict[str, list[tuple[Parameter, Estimate]]] = {}
+        estimates = self._estimates(fit, nuisance=True)
+        for parameter, estimate in zip(self.experiment.model.nuisance, estimates, strict=True):
+            if parameter.usual_of in self.library:
+                families.setdefault(self.library[parameter.usual_of].family, []).append((parameter, estimate))
+        found = []
+        for members in families.values():
+            most, shown = max(members, key=lambda m: abs(m[1].value / m[0].sd))
+            sd = fit.distance({parameter.name for parameter, _ in members})
+            found.append(Usual(most.usual_of, _in_words("", (shown,)).lstrip(": "), sd))
+        return tuple(found)
 
     def _detection(self) -> tuple[Detection, ...]:
         """Strength at which each effect would be as many posterior sd from none as detection needs."""

@@ -37,6 +37,8 @@ class Parameter:
     smallest: float = 0.0
     """Strength (on a linear scale, centred on zero) below which, to either side, there is no effect: the
     prior has nothing there."""
+    usual_of: str = ""
+    """Effect that this unknown of a model is the usual size of: as much of it as any sound specimen has."""
 
     def __post_init__(self) -> None:
         if self.sd <= 0:

@@ -98,6 +98,9 @@ class Policy:
     """Probability that the set of answers holds."""
     detected_sd: float = 4.0
     """Posterior sd below which a cause is below detection (design: effects from 4 sd on must be found)."""
+    usual_sd: float = 2.0
+    """Posterior sd from none from which the answer says of what any specimen has that these runs show it
+    (one in twenty by chance); raising it says less."""
     null_probability: float = 0.5
     """Probability of "nothing missing" from which it is the answer although weak causes are not excluded;
     below, the likeliest of them is said to be below detection."""

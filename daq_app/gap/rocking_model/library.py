@@ -145,6 +145,10 @@ _SQUARE = Parameter(
 )
 """An impact throws the base aside with a speed in proportion to its own, and friction stops it over a way in
 proportion to the square of that."""
+_SLOPE_OF_SLIPS = Parameter(
+    "slope", 0.0, 0.03, "s/rad", meaning="slope of r over speed that slips make", starts=(0.0,)
+)
+"""Friction takes another share of the speed at fast impacts than at slow ones, where a base may not slip."""
 _FORMS = {
     "alpha_asymmetry": (_PLASTIC,),
     "eccentric_mass": (_PLASTIC,),
@@ -156,11 +160,12 @@ _FORMS = {
         Parameter("forced", 0.5, 0.4, "1", 0.0, 1.0, meaning="share of its own inertia in its bending"),
         Parameter("recoil", 0.0, 0.5, "1", 0.0, 1.5, meaning="turn of the base against it, over its tilt"),
     ),
-    "sliding": (_DRAWN_BACK, _SQUARE),
+    "sliding": (_DRAWN_BACK, _SQUARE, _SLOPE_OF_SLIPS),
     # In one test further than in another.
     "sliding_on": (
         _DRAWN_BACK,
         _SQUARE,
+        _SLOPE_OF_SLIPS,
         Parameter(
             "own", 0.0, 0.4, "1", meaning="what each test's slips differ by", per_run=True, starts=(0.0,)
         ),

@@ -56,6 +56,7 @@ def _sensor(channel: dict[str, Any]) -> Sensor:
         channel.get("axis", "z" if family == "lvdt" else "x"),
         (channel["range"][0] * factor, channel["range"][1] * factor),
         time_constant_s=channel.get("time_constant_s", 0.0),
+        ac_coupled="AC coupled" in channel.get("measures", ""),
     )
 
 

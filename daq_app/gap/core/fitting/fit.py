@@ -74,16 +74,17 @@ class Fit:
         return 0.5 * np.append(square / (1.0 + sizes.discrepancy), np.sum(self.u[own] ** 2))
 
     def strength(self, effect: str, only: Collection[str] = ()) -> float:
-        """How many posterior sd the effect is from none.
+        """How many posterior sd the effect is from none; `only` restricts it to parameters by key."""
+        own = {key for key, _ in self.keys if key.startswith(effect + ".")}
+        return self.distance(own.intersection(only) if only else own)
 
-        For several parameters, or one in every run, this is the number of sd at which a single one would be
-        as unlikely by chance as their Mahalanobis distance is. `only` restricts it to parameters by key.
+    def distance(self, unknowns: Collection[str]) -> float:
+        """How many posterior sd the unknowns of these keys are from the centres of their priors.
+
+        For several, or one in every run, this is the number of sd at which a single one would be as unlikely
+        by chance as their Mahalanobis distance is.
         """
-        index = [
-            i
-            for i, (key, _) in enumerate(self.keys)
-            if key.startswith(effect + ".") and (not only or key in only)
-        ]
+        index = [i for i, (key, _) in enumerate(self.keys) if key in unknowns]
         block = self.covariance[np.ix_(index, index)]
         u = self.u[index]
         square = max(float(u @ np.linalg.solve(block, u)), 0.0)

@@ -15,6 +15,16 @@ from daq_app.gap.core.result import Decision, Detection, verdict_of
 
 
 @dataclass(frozen=True, slots=True)
+class Usual:
+    """As much of an effect as any sound specimen has, where the runs show it."""
+
+    effect: str
+    words: str
+    sd: float
+    """How many posterior sd it is from none."""
+
+
+@dataclass(frozen=True, slots=True)
 class Evidence:
     """What a decision is made from."""
 
@@ -25,6 +35,7 @@ class Evidence:
     """Fit of the best hypothesis of the library."""
     rest: Remainder
     detection: Sequence[Detection]
+    usual: Sequence[Usual] = ()
 
     @property
     def best(self) -> Answer:
@@ -131,6 +142,8 @@ def _null(evidence: Evidence, policy: Policy) -> tuple[Decision, str]:
             f"{_would_need(evidence, weak.effects[0])}."
         )
         return _below_detection(weak, weak.effects[0], sentence, probability)
+    if seen := _usual(evidence, policy):
+        return seen
     if evidence.rest.nominal > policy.parameters_gap * max(evidence.rest.after, 1.0):
         words = (
             "No effect is missing: other parameter values close the gap "
@@ -139,6 +152,23 @@ def _null(evidence: Evidence, policy: Policy) -> tuple[Decision, str]:
         return Decision("parameters", (), "none", words, probability), "Use the fitted parameters."
     words = "Nothing is missing within noise and scatter."
     return Decision("nothing_missing", (), "none", words, probability), "None needed at these levels."
+
+
+def _usual(evidence: Evidence, policy: Policy) -> tuple[Decision, str] | None:
+    """What the runs show of an effect, and any sound specimen has; None where they show none."""
+    shown = [u for u in evidence.usual if u.sd >= policy.usual_sd]
+    alone = {a.effects: a for a in evidence.answers if len(a.effects) == 1}
+    seen = max((u for u in shown if (u.effect,) in alone), key=lambda u: u.sd, default=None)
+    if seen is None:
+        return None
+    probability = evidence.best.probability * evidence.rest.known(policy)
+    sentence = (
+        f"Nothing is missing that these runs show (probability {probability:.2f}); {seen.words}, "
+        f"is no more than is usual{_would_need(evidence, seen.effect)}."
+    )
+    answer = alone[(seen.effect,)]
+    decision = Decision("below_detection", answer.effects, answer.first.family, sentence, probability)
+    return decision, "Use the fitted parameters."
 
 
 def _check_advice(library: Library, best: Answer) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
@@ -15,9 +16,10 @@ from daq_app.gap.rocking_model.features.channel_response import channel
 from daq_app.gap.rocking_model.features.families import sensor_families
 from daq_app.gap.rocking_model.features.family import CROSSTALK_SHARE, Predict, Size
 from daq_app.gap.rocking_model.features.oscillations.ring_response import bending, turning
+from daq_app.gap.rocking_model.features.response import electronics
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.records import Survey
-from daq_app.gap.rocking_model.tolerances.sensors import CROSSTALK
+from daq_app.gap.rocking_model.tolerances.sensors import CROSSTALK, ELECTRONICS_S
 
 BIAS = "bias_"
 """Prefix of the parameters that say what sound sensors may be off by in all runs."""
@@ -127,7 +129,14 @@ def sensor_priors(survey: Survey) -> tuple[Parameter, ...]:
         if size.bias > 0.0
     )
     unequal = (known(f"{name}_unequal", 1.0, "1", f"{name} from unequal accelerometers") for name in _RINGS)
+    late = (
+        replace(
+            known(electronics(family), ELECTRONICS_S, "s", f"lateness of the {family}s"),
+            usual_of=f"lag@{family}",
+        )
+        for family in ("wire", "accelerometer")
+    )
     shared = Parameter(
         CROSSTALK_SHARE, 0.0, CROSSTALK, "1", meaning="crosstalk from the channel scanned before"
     )
-    return (*family_priors, *biases, *unequal, shared)
+    return (*family_priors, *biases, *unequal, *late, shared)

@@ -32,7 +32,8 @@ def pivots(run: RockingRun, values: Mapping[str, float]) -> tuple[float, float]:
     worn = half - tall * np.tan(alpha * (1.0 - wear))
     inwards = half - run.survey.half_base_m - values.get("pivot_shift.a", 0.0) - worn
     inwards -= values.get("rounded_edge.rho", 0.0)
-    apart = values.get("alpha_asymmetry.delta", 0.0) * tall / np.cos(alpha) ** 2
+    unequal = values["uneven"] + values.get("alpha_asymmetry.delta", 0.0)
+    apart = unequal * tall / np.cos(alpha) ** 2
     return inwards, apart - values.get("uneven_edges.rho", 0.0)
 
 

@@ -126,8 +126,19 @@ def transfer(rate: complex, family: str, values: Mapping[str, float]) -> complex
     return complex(factor)
 
 
+def electronics(family: str) -> str:
+    """Parameter by which the electronics of a sound family are later than those of the LVDTs, s."""
+    return f"late_{family}"
+
+
+def later(first: str, second: str, values: Mapping[str, float]) -> float:
+    """By how much the sensors of one family are later than those of another, s, electronics and all."""
+    sound = [values.get(electronics(family), 0.0) for family in (first, second)]
+    return sound[0] - sound[1] + delay(first, values) - delay(second, values)
+
+
 def delay(family: str, values: Mapping[str, float]) -> float:
-    """By how much a family's sensors are late, s."""
+    """By how much effects make a family's sensors late, s."""
     late = sum(
         values.get(f"{effect}@{family}.tau", 0.0) for effect in ("lag", "slow_response", "filter_delay")
     )

@@ -15,6 +15,7 @@ from daq_app.gap.rocking_model.features.families.lvdts import FACE_SKEW
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.prediction.free_forms import departed, free_times
 from daq_app.gap.rocking_model.prediction.true_motion import pause_at_impact, true_rotations
+from daq_app.gap.rocking_model.prediction.usual import BED, USUAL, of_bed
 from daq_app.gap.rocking_model.prediction.vector import (
     HalfCycles,
     half_cycle_table,
@@ -88,6 +89,7 @@ class RockingModel:
                 2.0,
                 meaning="half width of the base",
             ),
+            *USUAL,
             *(
                 Parameter(f"cal_{name}_{shape}", 0.0, sd, meaning=f"{shape} of {name}", linear=True)
                 for name, sound in self.channels.items()
@@ -141,7 +143,7 @@ def swing_features(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
     """Predicted times (T,) and log peaks (P,) of the half-cycles of a run."""
     # r and what else acts at impacts only moves none of the half-cycles.
     cycles = run.cache.part("half-cycles", values, partial(_half_cycles, run))
-    table, true = departed(run, values, cycles), cycles.true
+    table, true = departed(run, values, cycles) + values[BED] * of_bed(run), cycles.true
     speeds_out, speeds_in = table[:, shooting.SPEED_OUT], table[:, shooting.SPEED_IN]
     pause = pause_at_impact(values, speeds_out, np.sign(true))
     across = run.across

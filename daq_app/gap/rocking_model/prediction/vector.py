@@ -37,6 +37,7 @@ _DEFAULTS = {
 }
 PROBE_SPEEDS = (0.0, 0.1, 0.2, 0.3, 0.45)
 """Knots of the free r(v), rad/s."""
+_SLOPES = ("restitution_slope.k", "sliding.slope", "sliding_on.slope")
 _RESTITUTION = (0.05, 1.2)
 """Ends between which a fit may try coefficients of restitution: far beyond what walls have."""
 _MIDDLE_SPEED = 0.36
@@ -64,6 +65,8 @@ def kernel_vector(run: RockingRun, values: Mapping[str, float]) -> FloatArray:
                 vector[place] = default
         vector[index] = value
     vector[par.OMEGA0] += values["omega0"] + values.get("initial_velocity.own", 0.0)
+    vector[par.BASE_TILT] += values["lean"]
+    vector[par.ALPHA_ASYMMETRY] += values["uneven"]
     vector[par.COULOMB] += values.get("loss_power.mu", 0.0)
     return vector
 
@@ -125,9 +128,10 @@ def restitution_of(
 
     `speeds` before the impacts, rad/s; `sides` that the wall comes from, ±1; `impacts` counted from 0.
     """
-    r = values["r"] + values.get("restitution_slope.k", 0.0) * (speeds - 0.2)
+    slope = values["r_slope"] + sum(values.get(key, 0.0) for key in _SLOPES)
+    r = values["r"] + slope * (speeds - 0.2)
     r = r + _curvature(run, values, speeds)
-    r = r + sides * values.get("restitution_asymmetry.d", 0.0)
+    r = r + sides * (values["r_sides"] + values.get("restitution_asymmetry.d", 0.0))
     r = r * (1.0 - sides * _uneven_impact(values))
     if "free_restitution.k0" in values:
         knots = [values[f"free_restitution.k{i}"] for i in range(len(PROBE_SPEEDS))]

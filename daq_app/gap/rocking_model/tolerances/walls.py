@@ -101,6 +101,34 @@ BENDING_OF_MEAN = 2.0
 Raising it takes slides for bending.
 """
 
+# -- the wall as it was built ----------------------------------------------------------------------
+BED_ROOT = 6e-4
+"""Sd, √rad, of the root of the rotation at which the joint of a sound wall begins to open, √θ_c.
+
+Beds of mortar of 1e11 N/m³ below a metre of wall begin at 0.4 microradian (assumed). Raising it hides springs
+below a base that begin to open below nine times its square.
+"""
+
+LEAN_RAD = 3e-4
+"""Sd, rad, of a sound wall's lean: what a builder's level leaves of the base, and bricklaying of the centre
+of mass and of its edges (assumed: 0.3 mm in a metre, each).
+
+Raising it hides tilted bases, masses off centre and unequal edges below three times its value.
+"""
+
+SLOPE_S_RAD = 4e-3
+"""Sd, s/rad, of the slope of r over the approach speed that no law of impact excludes: a tenth of a per cent
+of r from the slow to the fast impacts of a test (assumed).
+
+Raising it hides slopes of r below three times its value.
+"""
+
+SIDES_R = 5e-4
+"""Sd, 1, of half the difference of r between the sides of a sound wall (assumed).
+
+Raising it hides differences of r between the sides below three times its value.
+"""
+
 # -- impacts ---------------------------------------------------------------------------------------
 MIDDLE_OF_IMPACT_S = 1.5e-3
 """Time, s, from the contact to the middle of an impact, by which accelerometers seem late that are not.

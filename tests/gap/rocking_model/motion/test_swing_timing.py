@@ -99,4 +99,6 @@ def test_late_accelerometers_are_told_from_impacts_of_another_form() -> None:
     assert result.decision.effects == ("lag@accelerometer",)
     (tau,) = [p for p in result.effect_parameters if p.name.endswith("tau")]
     assert tau.low < 3e-3 < tau.high
-    assert tau.high - tau.low < 2e-3
+    # Some of it any amplifier has; both together are well known.
+    usual_s = next(p.value for p in result.parameters if p.name == "late_accelerometer")
+    assert tau.value + usual_s == pytest.approx(3e-3, abs=5e-4)

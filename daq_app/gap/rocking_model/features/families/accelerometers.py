@@ -18,7 +18,7 @@ from daq_app.gap.rocking_model.features.family import (
     with_crosstalk,
     with_systematic,
 )
-from daq_app.gap.rocking_model.features.response import delay
+from daq_app.gap.rocking_model.features.response import later
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.impact_timing import acceleration_delay
@@ -84,13 +84,12 @@ def _predict(run: RockingRun, block: Block, values: Mapping[str, float]) -> Floa
 
 def _predict_impact_timing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     """Accelerometers against the reference rotation: their own delay less that of the reference."""
-    late = delay("accelerometer", values) - delay(run.reference, values)
-    return np.array([values["onset"] + late])
+    return np.array([values["onset"] + later("accelerometer", run.reference, values)])
 
 
 def _predict_swing_timing(run: RockingRun, block: Block, values: Mapping[str, float]) -> FloatArray:
     """The same between impacts, whose form does not matter there."""
-    return np.array([delay("accelerometer", values) - delay(run.reference, values)])
+    return np.array([later("accelerometer", run.reference, values)])
 
 
 def _observe(scene: Scene) -> Iterator[Block | None]:

@@ -73,6 +73,7 @@ def _predict_joint(run: RockingRun, block: Block, values: Mapping[str, float]) -
         (apart, "theta", lambda: theta),
         (curved, "square", lambda: size**2),
         (0.5 * values.get("uneven_edges.rho", 0.0), "lopsided square", lambda: size * theta),
+        (-2.0 * values["half_base"] * values["bed"], "root", lambda: np.sqrt(size)),
     )
     of_sensors: tuple[Term, ...] = (
         # The opening is told against |θ|, whose zero is where the wall came to rest: a wall that rests a

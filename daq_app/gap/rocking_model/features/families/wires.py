@@ -29,6 +29,7 @@ from daq_app.gap.rocking_model.features.oscillations.ring_response import (
     turning_wave,
 )
 from daq_app.gap.rocking_model.features.pivots import travel
+from daq_app.gap.rocking_model.features.response import electronics
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import (
     Term,
@@ -284,6 +285,7 @@ def _predict_wire(run: RockingRun, block: Block, values: Mapping[str, float]) ->
         (-face_gain(values, "face_b"), "negative", lambda: np.minimum(theta, 0.0)),
         (values["wire_even"], "even", lambda: theta**2),
         (values["wire_play"], "play", lambda: play_shape(theta)),
+        (-values[electronics("wire")], "later", lambda: run.grid.omega),
         *step_terms(run, slides(run, values), 1.0 / run.wire_height_m),
         *_moved_apart(run, values, of_base=False),
     )

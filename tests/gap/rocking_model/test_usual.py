@@ -1,0 +1,79 @@
+"""What any wall and rig has of some effects is no cause; more of it is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from daq_app.gap.core import Options, fit
+from daq_app.gap.core.result import NO_CAUSE
+from daq_app.gap.rocking_model.prediction.model import RockingModel
+from daq_app.gap.rocking_model.prediction.usual import of_bed
+from daq_app.gap.rocking_model.prediction.vector import half_cycle_table, kernel_vector
+from daq_app.gap.rocking_model.study import diagnose_runs, prepare
+from sim_hardware.dynamics import parameters as par
+from tests.support.simulated_wall import simulate
+
+LEVELS = (0.25, -0.35, 0.4, -0.2)
+USUAL = {
+    "base_tilt": {"beta": 6e-4},
+    "winkler": {"theta_c": 4e-7},
+    "restitution_slope": {"k": 4e-3},
+    "restitution_asymmetry": {"d": 5e-4},
+    "filter_delay@lvdt": {"tau": 1.5e-3},
+}
+
+
+def test_a_bed_a_lean_and_late_amplifiers_are_parameters_of_any_wall() -> None:
+    """Each comes out with its size: the springs and the tilt are the simulator's own effects."""
+    runs, _ = prepare(simulate(USUAL, LEVELS))
+    values = fit(RockingModel(runs[0].survey), runs).values
+    assert values["bed"][0] ** 2 == pytest.approx(4e-7, rel=0.2)
+    assert values["lean"][0] + values["uneven"][0] == pytest.approx(6e-4, abs=4e-4), (
+        "the gains of the two faces feign some of it"
+    )
+    for name in ("late_wire", "late_accelerometer"):
+        assert values[name][1] < -1.5e-3 < values[name][2], "the LVDTs are late, and time counts from them"
+
+
+def test_a_bed_acts_as_the_root_of_its_first_uplift() -> None:
+    """To first order: four times the angle has twice the effect on all times and speeds."""
+    run = prepare(simulate({}, LEVELS[:1]))[0][0]
+    survey = run.survey
+    block = {"alpha": survey.alpha_rad, "p": survey.p_rad_s, "half_base": survey.half_base_m, "omega0": 0.0}
+    vector = kernel_vector(run, block | {"lean": 0.0, "uneven": 0.0})
+    peaks, levels = run.swings.peak_rad, run.swings.levels
+    stiff = half_cycle_table(run, vector, peaks, levels)
+    vector[par.WINKLER] = 1e-7
+    soft = half_cycle_table(run, vector, peaks, levels)
+    large = np.abs(peaks) > 5e-3
+    np.testing.assert_allclose(
+        math.sqrt(1e-7) * of_bed(run)[large], (soft - stiff)[large], rtol=0.05, atol=2e-6
+    )
+
+
+@pytest.mark.heavy
+@pytest.mark.timeout(600)
+def test_what_any_wall_has_is_no_cause_and_is_told() -> None:
+    decision = diagnose_runs(simulate(USUAL, LEVELS), Options(causes=1)).decision
+    assert decision.verdict in NO_CAUSE, decision.sentence
+    assert "usual" in decision.sentence
+
+
+@pytest.mark.heavy
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize(
+    ("effect", "named"),
+    [
+        ({"base_tilt": {"beta": 2.5e-3}}, {"base_tilt", "eccentric_mass", "alpha_asymmetry"}),
+        ({"winkler": {"theta_c": 3e-5}}, {"winkler"}),
+        ({"restitution_slope": {"k": 0.03}}, {"restitution_slope"}),
+        ({"filter_delay@lvdt": {"tau": 0.012}}, {"filter_delay@lvdt", "lag@lvdt"}),
+    ],
+)
+def test_more_than_any_wall_has_is_a_cause(effect: dict[str, dict[str, float]], named: set[str]) -> None:
+    decision = diagnose_runs(simulate(USUAL | effect, LEVELS, seed=2), Options(causes=1)).decision
+    assert decision.verdict not in NO_CAUSE, decision.sentence
+    assert decision.effects and set(decision.effects) <= named, decision.sentence
