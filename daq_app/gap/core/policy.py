@@ -64,6 +64,10 @@ class Policy:
     """Correlation of residuals with the next ones, in standard errors, from which they are no scatter: one
     group of independent residuals in 370 has it. Raising it takes another law for scatter."""
 
+    expected_scatter_sd: float = 2.0
+    """Prior sd, in the logarithm, up to which a scatter may be in order: where r remembers earlier impacts it
+    is four. Raising it takes larger laws for scatter."""
+
     # Hypotheses
     prior_null: float = 0.2
     """Prior probability that nothing is missing (design targets: 10 to 20 % of cases)."""

@@ -11,6 +11,8 @@ Floats = NDArray[np.float64]
 
 _MEAN_S = 0.015
 """Length of the means over which a crossing is timed."""
+_CLIPPED = 4.0
+"""Standard deviations beyond which a mean is that of an impact, which counts for no more."""
 
 
 def white_noise(values: Floats) -> float:
@@ -25,19 +27,25 @@ def white_noise(values: Floats) -> float:
     return float(np.median(np.abs(second, out=second), overwrite_input=True)) * 1.4826 / math.sqrt(6.0)
 
 
-def moving_noise(rows: Floats, rate_hz: float) -> Floats:
+def moving_noise(rows: Floats, shapes: Floats, rate_hz: float) -> Floats:
     """rms of one sample of each of some records of one motion, (k,), as means over 15 ms see it.
 
-    `rows`, (k, n), differ by errors of their own alone: windings and wipers of potentiometers err where they
-    move, and not at rest. By second differences of the means, robust to impacts; NaN for fewer than three
-    records or too few samples.
+    `rows`, (k, n), differ by errors of their own, and by `shapes`, (s, n), as sound sensors do (gains,
+    times): windings and wipers of potentiometers err where they move, and not at rest. Robust to impacts; NaN
+    for fewer than three records or too few samples.
     """
     count, size = len(rows), max(int(_MEAN_S * rate_hz), 1)
     if count < 3 or rows.shape[1] < 20 * size:
         return np.full(count, math.nan)
-    means = rows[:, : rows.shape[1] // size * size].reshape(count, -1, size).mean(axis=2)
-    second = np.diff(means - means.mean(axis=0), 2, axis=1)
-    about_mean = (1.4826 * np.median(np.abs(second), axis=1)) ** 2 / 6.0 * size
+
+    def means(values: Floats) -> Floats:
+        whole = values[:, : values.shape[1] // size * size]
+        return np.asarray(whole.reshape(len(values), -1, size).mean(axis=2))
+
+    apart, design = means(rows - rows.mean(axis=0)).T, means(shapes).T
+    left = np.abs(apart - design @ np.linalg.lstsq(design, apart, rcond=None)[0])
+    usual = 1.4826 * np.median(left, axis=0)
+    about_mean = np.mean(np.minimum(left, _CLIPPED * usual) ** 2, axis=0) * size
     # The mean has 1/k of each record: σ_i² (1 − 2/k) + Σ σ² / k² is left of it.
     total = about_mean.sum() / (1.0 - 1.0 / count)
     return np.asarray(np.sqrt(np.maximum(about_mean - total / count**2, 0.0) / (1.0 - 2.0 / count)))

@@ -15,7 +15,7 @@ from daq_app.gap.core.fitting.fit import Fit, effects_of
 from daq_app.gap.core.fitting.likelihood import Sizes
 from daq_app.gap.core.fitting.problem import Problem
 from daq_app.gap.core.judging.other_forms import FreeForm
-from daq_app.gap.core.judging.scattering import beyond_scatter
+from daq_app.gap.core.judging.scattering import beyond_expected, beyond_scatter
 from daq_app.gap.core.policy import Policy
 
 
@@ -98,8 +98,8 @@ def remainder(
     white = _white(experiment, problem, best.known(), sizes)
     after = _size(white)
     costs = misfit_nats(experiment, best.sizes, policy)
-    if np.any(costs):
-        costs = beyond_scatter(best.linear(problem), costs, policy)
+    linear = best.linear(problem)
+    costs = beyond_scatter(linear, costs, policy) + beyond_expected(linear, policy)
     groups = _groups(experiment, best, white, costs)
     nats = math.fsum(group.nats for group in groups)
     explained = max(best.log_evidence - null.log_evidence, 0.0)

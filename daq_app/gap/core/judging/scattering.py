@@ -38,6 +38,35 @@ def beyond_scatter(linear: Linear, costs: FloatArray, policy: Policy) -> FloatAr
     return nats
 
 
+def beyond_expected(linear: Linear, policy: Policy) -> FloatArray:
+    """What scatters cost beyond what is expected of them where they are in order, in nats, shape (group,).
+
+    A law that no effect has makes a scatter as large as it takes, and no group misfits; what it makes follows
+    from one feature to the next, as scatter does not.
+    """
+    nats = np.zeros(len(linear.problem.experiment.groups))
+    for scatter, log_size in zip(linear.problem.model.scatters, linear.sizes.log_scatter, strict=True):
+        beyond = float(log_size) - math.log(scatter.median) - policy.expected_scatter_sd * scatter.log_sd
+        if beyond <= 0.0:
+            continue
+        counts = np.array([_loaded(linear, scatter.name, group) for group in range(nats.size)])
+        residuals = [row for group in np.flatnonzero(counts) for row in _in_group(linear, int(group))]
+        if _order(residuals) > policy.ordered_sd:
+            nats += counts * beyond
+    return nats
+
+
+def _loaded(linear: Linear, scatter: str, group: int) -> int:
+    """How many features of a group a scatter acts on."""
+    loadings = (line.prediction.loadings.get(scatter) for line in linear.lines)
+    indices = linear.problem.experiment.groups.index
+    return sum(
+        int(np.count_nonzero(np.abs(loading).reshape(loading.shape[0], -1)[index == group].sum(axis=1)))
+        for loading, index in zip(loadings, indices, strict=True)
+        if loading is not None
+    )
+
+
 def _with_scatter(linear: Linear, group: int) -> list[Sizes]:
     """Sizes with the discrepancy of a group in a scatter instead, for each that acts on all its features."""
     sizes = linear.sizes

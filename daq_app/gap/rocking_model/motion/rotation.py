@@ -289,7 +289,9 @@ def noise_of_wires(run: GapRun, theta: FloatArray) -> float:
     rows, chosen = wall_rotation(run)
     moving = np.abs(theta) > 0.05 * np.abs(theta).max()
     weights = run.positions(chosen)[:, 2] ** 2
-    each = moving_noise(rows[:, moving], run.rate_hz)
+    shown, rate = theta[moving], np.gradient(theta)[moving]
+    shapes = np.array([np.ones_like(shown), shown, shown**2, np.abs(shown), rate, np.arange(shown.size)])
+    each = moving_noise(rows[:, moving], shapes / np.abs(shapes).max(axis=1, keepdims=True), run.rate_hz)
     of_mean = float(np.linalg.norm(weights / weights.sum() * each))
     return float(np.nanmax([sample_noise(theta, run.rate_hz), of_mean]))
 
