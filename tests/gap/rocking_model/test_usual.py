@@ -20,8 +20,8 @@ LEVELS = (0.25, -0.35, 0.4, -0.2)
 USUAL = {
     "base_tilt": {"beta": 6e-4},
     "winkler": {"theta_c": 4e-7},
-    "restitution_slope": {"k": 4e-3},
-    "restitution_asymmetry": {"d": 5e-4},
+    "restitution_slope": {"k": 3e-3},
+    "restitution_asymmetry": {"d": 3e-4},
     "filter_delay@lvdt": {"tau": 1.5e-3},
 }
 

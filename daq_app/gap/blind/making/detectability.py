@@ -41,8 +41,8 @@ _HALF_WIDTH_SD_M: Final = 3e-3
 _USUAL: Final = {
     "alpha_asymmetry": ("delta_rad", 3e-4),
     "base_tilt": ("beta_rad", 3e-4),
-    "restitution_slope": ("k_s_rad", 4e-3),
-    "restitution_asymmetry": ("d", 5e-4),
+    "restitution_slope": ("k_s_rad", 3e-3),
+    "restitution_asymmetry": ("d", 3e-4),
     "lag": ("tau_s", 1.4e-3),
     "slow_response": ("tau_s", 1.4e-3),
     "filter_delay": ("tau_s", 1.4e-3),

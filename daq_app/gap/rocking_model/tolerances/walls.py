@@ -116,14 +116,14 @@ of mass and of its edges (assumed: 0.3 mm in a metre, each).
 Raising it hides tilted bases, masses off centre and unequal edges below three times its value.
 """
 
-SLOPE_S_RAD = 4e-3
+SLOPE_S_RAD = 3e-3
 """Sd, s/rad, of the slope of r over the approach speed that no law of impact excludes: a tenth of a per cent
 of r from the slow to the fast impacts of a test (assumed).
 
 Raising it hides slopes of r below three times its value.
 """
 
-SIDES_R = 5e-4
+SIDES_R = 3e-4
 """Sd, 1, of half the difference of r between the sides of a sound wall (assumed).
 
 Raising it hides differences of r between the sides below three times its value.

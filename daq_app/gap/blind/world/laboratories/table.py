@@ -146,7 +146,7 @@ _ORDINARY: Final[Mapping[str, Range]] = {
     "calibration": (0.001, 0.003),
     "late": (2e-4, 2e-3),
     "lean": (5e-5, 4e-4),
-    "slope_of_r": (5e-4, 4e-3),
+    "slope_of_r": (5e-4, 3e-3),
     "bed": (2e-4, 7e-4),
     "mount_angle": (0.002, 0.01),
     "anchor_error": (0.001, 0.004),
