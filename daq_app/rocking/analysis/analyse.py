@@ -133,7 +133,8 @@ def _with_what_is_left(
     """The findings, and what they explain of neither the scatter of impacts nor the fit's misfit."""
     others = [*instruments.findings, *found]
     scatter = scatter_findings(estimates["eav"], estimates["crt"], others)
-    return [*found, *scatter, *misfit_findings(fit, others)]
+    r0_m = instruments.record.rig.specimen.r0_m
+    return [*found, *scatter, *misfit_findings(fit, others, r0_m)]
 
 
 def _joint(instruments: Instruments, signals: Signals, track: MotionTrack) -> JointSummary | None:
@@ -147,14 +148,14 @@ def _joint(instruments: Instruments, signals: Signals, track: MotionTrack) -> Jo
 
 
 def _for_this_wall(fit: MotionFit, findings: Sequence[FamilyFinding], by_speed: float) -> MotionFit:
-    """The fit with errors that hold for r at any impact; p and α have none where the wall is no rigid block.
+    """The fit with errors that hold for r at any impact; p, α and edges have none on a wall that is no block.
 
     They are then those of the nearest block, and no property of the wall.
     """
     fit = replace(fit, standard_error=math.hypot(fit.standard_error, by_speed))
     if fit.explains_the_motion and is_rigid_block(findings):
         return fit
-    return replace(fit, sigma_p_rad_s=math.nan, sigma_alpha_rad=math.nan)
+    return replace(fit, sigma_p_rad_s=math.nan, sigma_alpha_rad=math.nan, sigma_inset_rad=math.nan)
 
 
 def _with_what_was_found(

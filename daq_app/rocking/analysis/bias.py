@@ -168,4 +168,5 @@ def _fitted(
         noise_rad=wanted.noise_rad,
         p_rad_s=wanted.settings.p_rad_s,
         alpha_rad=wanted.settings.alpha_rad,
+        edges_yield=False,
     )

@@ -9,7 +9,7 @@ from typing import Final, Literal
 Kind = Literal[
     "slow", "late", "gain", "zero", "hum", "reversed", "unit", "drift", "motion",
     "speed", "side", "loss", "pause", "hop", "duration", "scatter", "release",
-    "misfit", "pivot", "bending", "alpha", "lean", "p", "slide", "slip", "turn",
+    "misfit", "pivot", "bending", "alpha", "lean", "edge", "p", "slide", "slip", "turn",
     "hysteresis", "steps", "still", "leaps", "noise", "vibration",
 ]  # fmt: skip
 Treatment = Literal["none", "left out", "put in step", "put right", "removed"]

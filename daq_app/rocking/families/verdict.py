@@ -22,6 +22,7 @@ _FAMILIES_APART = 0.0015
 """Difference of r between wires and LVDTs below which nothing is said, however small the errors."""
 _METHODS_APART = 0.002
 _SIGMAS = 4.0
+_MOVES_NO_R = frozenset({"gain", "late", "scatter", "misfit", "alpha", "lean", "edge", "p", "noise", "turn"})
 _MODEL_R = 5e-5
 """Standard uncertainty of r that the fits of half-cycles leave on exact motion."""
 
@@ -191,12 +192,12 @@ def _touches_r(finding: FamilyFinding) -> bool:
     """Whether r may be off by it: a gain cancels in EAV and moves CRT by 0.0001 for 1 %; no time is in r.
 
     What a scatter or noise makes of r is in its error, what the survey's α makes of it in that of CRT, and a
-    misfit is in the error of r by the fit alone. r is a ratio of speeds: no p is in it, and what a wall leans
-    by cancels between the sides.
+    misfit is in the error of r by the fit alone. r is a ratio of speeds: no p is in it, what a wall leans by
+    cancels between the sides, and edges that yield take and give the same at either end of a half-cycle.
     """
     if finding.family in ("tiltmeters", "accelerometers"):
         return False
-    return finding.kind not in ("gain", "late", "scatter", "misfit", "alpha", "lean", "p", "noise", "turn")
+    return finding.kind not in _MOVES_NO_R
 
 
 def _share_of_r(finding: FamilyFinding, r: float) -> float:

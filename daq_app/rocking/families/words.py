@@ -290,6 +290,17 @@ def alpha_by_side(lean_rad: float) -> FamilyFinding:
     return FamilyFinding("wall", (), "lean", lean_rad, "rad", "none", "warning", text)
 
 
+def edges_yield(inset_m: float, sigma_m: float) -> FamilyFinding:
+    """The weight of the upright wall rests `inset_m` inside the edges, with this standard error."""
+    text = (
+        f"the edges yield: the weight rests {inset_m * 1e3:.1f} ± {sigma_m * 1e3:.1f} mm inside them where "
+        "the wall is upright, and further out the more it leans. p and α of the fit are those of sharp edges "
+        "and hold this in their errors; those by durations and peaks are the nearest block's. Usual causes: "
+        "crushed or soft edges, mortar that is pressed out, packing under the edges"
+    )
+    return FamilyFinding("wall", (), "edge", inset_m, "m", "none", "warning", text)
+
+
 def slow_release(misfit_share: float) -> FamilyFinding:
     """The wall was let go slowly, or pushed: its fall is not that of a block from rest at θ0."""
     text = (

@@ -1,8 +1,8 @@
 """r by a fit of the whole motion: exact Housner rocking to the recorded rotation, all at once.
 
-Free: θ0, release time, p, α of either side, the zero of the rotation and r; p and α are held to their nominal
-values by 5 % and 10 %. Where r scatters from impact to impact, each impact has its own deviation,
-held to zero by that scatter: the standard error of the mean r then says so.
+Free: θ0, release time, p, α of either side, what the edges yield by, the zero of the rotation and r; p and α
+are held to their nominal values by 5 % and 10 %. Where r scatters from impact to impact, each impact has its
+own deviation, held to zero by that scatter: the standard error of the mean r then says so.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from daq_app.rocking.means import means_over
 from daq_app.rocking.motion.motion_model import (
     ALPHA_PRIOR,
     FIXED,
+    INSET,
+    INSET_PRIOR_RAD,
     P_PRIOR,
     POINT_S,
     ZERO_PRIOR_RAD,
@@ -90,6 +92,10 @@ class MotionFit:
     lean_rad: float = 0.0
     """By how much α is larger where θ > 0, and smaller where θ < 0: the base is off level, or a mass off the
     middle."""
+    inset_rad: float = 0.0
+    """By how much sin α is smaller where the wall is upright than on sharp edges: the edges yield, and the
+    wall stands on a strip (`YieldingEdge.inset_rad`). p and α are those of sharp edges."""
+    sigma_inset_rad: float = math.inf
 
     @property
     def explains_the_motion(self) -> bool:
@@ -116,13 +122,15 @@ def fit_motion(
     noise_rad: float,
     p_rad_s: float,
     alpha_rad: float,
+    edges_yield: bool = True,
 ) -> MotionFit | None:
     """Fit the rotation (n,) from release to the last half-cycle worth it; None with too few impacts.
 
     `r`, `impacts_s`, `peaks_rad` (release first) and `speeds_rad_s` (at the impacts) start the fit;
     `noise_rad` is the rms of one sample.
     `scatter` is the relative standard deviation of r from impact to impact (at least 0.0003 is
-    allowed for); None says that r is the same at every impact.
+    allowed for); None says that r is the same at every impact. Without `edges_yield` edges are held to be
+    sharp, and the errors hold for sharp ones only.
     """
     count = _span(peaks_rad, len(impacts_s))
     if count < 2 or not 0.0 < r <= 1.0:
@@ -132,7 +140,7 @@ def fit_motion(
     )
     side, log_r = 1.0 if theta0_rad > 0 else -1.0, math.log(r)
     known = (impacts_s, speeds_rad_s, p_rad_s, alpha_rad)
-    record = _Record(time_s, rotation_rad, noise_rad, *known, count, stop_s, side)
+    record = _Record(time_s, rotation_rad, noise_rad, *known, count, stop_s, side, edges_yield)
     at_release = _Start(release_s - 0.1, release_s, abs(theta0_rad), log_r, scatter)
     whole = record.fit(at_release, thorough=False)
     if whole is None or whole.residual_rad < _NO_CLEAN_FALL * whole.noise_rad:
@@ -181,6 +189,7 @@ class _Record:
     count: int
     stop_s: float
     side: float
+    edges_yield: bool
 
     def fit(self, start: _Start, *, thorough: bool) -> MotionFit | None:
         """None with too few points."""
@@ -191,8 +200,8 @@ class _Record:
         own = np.zeros(0)
         if spread is not None:
             own = _deviations(self.speeds_rad_s, self.count, start.log_r) / spread
-        wall = (self.side, self.p_rad_s, self.alpha_rad)
-        problem = MotionModel(t, y, sigma, start.begin_s, start.amplitude_rad, *wall, start.log_r, spread)
+        wall = (self.side, self.p_rad_s, self.alpha_rad, start.log_r, spread, self.edges_yield)
+        problem = MotionModel(t, y, sigma, start.begin_s, start.amplitude_rad, *wall)
         return _stepwise(problem, own, self.impacts_s, self.count, self.stop_s, thorough=thorough)
 
 
@@ -241,7 +250,7 @@ def _stepwise(
     best = joined([*growing, count] if thorough else usual, thorough=False)
     if thorough and np.mean(best.fun**2) > _POOR**2:
         best = min(best, joined(usual, thorough=True), key=lambda found: float(found.cost))
-    return _result(problem, best, count, problem.sigma)
+    return _result(problem, best, count, stop_s)
 
 
 def _least(
@@ -337,8 +346,17 @@ def _of_walking_zero(answer: Floats, sigma: float) -> Floats:
     return np.asarray(steps @ steps.T)
 
 
-def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: float) -> MotionFit | None:
-    x = found.x
+def _of_unknown_strip(answer: Floats, by_lift: Floats) -> Floats:
+    """Covariance that a strip adds which lifts at another rotation than the one that is taken.
+
+    `by_lift`: what one standard deviation of ln θ₁ makes of the points; the parameters answer by `answer`.
+    """
+    moved = answer @ by_lift
+    return np.outer(moved, moved)
+
+
+def _result(problem: MotionModel, found: OptimizeResult, count: int, stop_s: float) -> MotionFit | None:
+    x, sigma = found.x, problem.sigma
     data = found.fun[: found.fun.size - len(held(x.size))]
     # Data rows are weakened by what the model leaves; priors keep their weight.
     scaled = found.jac.copy()
@@ -347,6 +365,7 @@ def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: floa
         answer = np.linalg.solve(found.jac.T @ found.jac, points.T)
         scaled[: data.size] /= math.sqrt(max(1.0, _long_run_variance(data, points, answer.T)))
         covariance = np.linalg.inv(scaled.T @ scaled) + _of_walking_zero(answer, sigma)
+        covariance += _of_unknown_strip(answer, problem.by_lift(x, count, stop_s))
     except np.linalg.LinAlgError:
         return None
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -359,17 +378,19 @@ def _result(problem: MotionModel, found: OptimizeResult, count: int, sigma: floa
     return MotionFit(
         r=float(r),
         standard_error=float(r * slope) * math.hypot(0.01 * float(deviations[5]), deviation),
-        p_rad_s=motion.p_rad_s,
-        sigma_p_rad_s=motion.p_rad_s * P_PRIOR * float(deviations[2]),
-        alpha_rad=motion.alpha_rad,
-        sigma_alpha_rad=motion.alpha_rad * ALPHA_PRIOR * float(deviations[3]),
-        theta0_rad=motion.side * float(motion.peaks_rad[0]),
-        release_s=motion.release_s,
+        p_rad_s=motion.sharp.p_rad_s,
+        sigma_p_rad_s=motion.sharp.p_rad_s * P_PRIOR * float(deviations[2]),
+        alpha_rad=motion.sharp.alpha_rad,
+        sigma_alpha_rad=motion.sharp.alpha_rad * ALPHA_PRIOR * float(deviations[3]),
+        theta0_rad=motion.sharp.side * float(motion.half_cycles.peaks_rad[0]),
+        release_s=motion.sharp.release_s,
         zero_rad=ZERO_PRIOR_RAD * float(x[4]),
-        restitutions=tuple(float(value) for value in motion.restitution[:count]),
+        restitutions=tuple(float(value) for value in motion.sharp.restitution[:count]),
         impacts=count,
         residual_rad=float(np.sqrt(np.mean(data**2))) * sigma,
         noise_rad=sigma,
         degrees_of_freedom=max(count - 1, 1),
-        lean_rad=motion.lean_rad,
+        lean_rad=motion.sharp.lean_rad,
+        inset_rad=float(motion.half_cycles.edge.inset_rad),
+        sigma_inset_rad=INSET_PRIOR_RAD * float(deviations[INSET]),
     )

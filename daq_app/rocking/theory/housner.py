@@ -124,14 +124,8 @@ class FreeRocking:
 
         Before the release the time from the peak is 0; beyond the last half-cycle the sign is 0.
         """
-        time = np.asarray(time_s, dtype=np.float64)
-        index = np.searchsorted(self.impacts_s, time, side="right")
         quarter = exact_quarter_period(self.peaks_rad, self.p_rad_s, self.alphas_rad)
-        peak_time = np.concatenate(([self.release_s], self.impacts_s + quarter[1:]))
-        local = time - peak_time[index]
-        local = np.where((index == 0) & (local < 0.0), 0.0, local)
-        sign = self.side * np.where(index % 2 == 0, 1.0, -1.0)
-        return index, local, np.where(local > quarter[index], 0.0, sign)
+        return place_in_half_cycles(time_s, self.release_s, self.impacts_s, quarter, self.side)
 
     def at(self, time_s: ArrayLike) -> tuple[Floats, Floats]:
         """θ and θ̇ at any times, rad and rad/s, signed."""
@@ -200,8 +194,29 @@ def free_rocking(
     n = int(small[0]) + 1 if small.size else max_impacts
     peaks = np.concatenate(([peak0], following[:n]))
     quarter = exact_quarter_period(peaks, p_rad_s, alphas[: peaks.size])
-    impacts = release_s + np.concatenate(([quarter[0]], 2.0 * quarter[1:-1])).cumsum()
+    impacts = impact_times(release_s, quarter)
     return FreeRocking(p_rad_s, alpha_rad, release_s, side, peaks, impacts, sequence[:n].copy(), lean_rad)
+
+
+def place_in_half_cycles(
+    time_s: ArrayLike, release_s: float, impacts_s: Floats, quarters_s: Floats, side: int
+) -> tuple[NDArray[np.int_], Floats, Floats]:
+    """(half-cycle, time from its peak in s, sign of θ) at each time, as `FreeRocking.locate` has them.
+
+    `impacts_s` (n,) and `quarters_s` (n + 1,), the time from each peak to the impact after it.
+    """
+    time = np.asarray(time_s, dtype=np.float64)
+    index = np.searchsorted(impacts_s, time, side="right")
+    peak_time = np.concatenate(([release_s], impacts_s + quarters_s[1:]))
+    local = time - peak_time[index]
+    local = np.where((index == 0) & (local < 0.0), 0.0, local)
+    sign = side * np.where(index % 2 == 0, 1.0, -1.0)
+    return index, local, np.where(local > quarters_s[index], 0.0, sign)
+
+
+def impact_times(release_s: float, quarters_s: Floats) -> Floats:
+    """Times of the impacts, (n,), after a release from rest, for quarters (n + 1,) from peaks to impacts."""
+    return np.asarray(release_s + np.concatenate(([quarters_s[0]], 2.0 * quarters_s[1:-1])).cumsum())
 
 
 def _alphas(alpha_rad: float, lean_rad: float, side: int, half_cycles: int) -> Floats:
