@@ -15,7 +15,9 @@ from daq_app.config.hardware.inventory import devices_of
 from daq_app.config.planning.plan import PlannedChannel, TaskPlan
 from daq_app.config.rig import Channel, Rig
 from sim_hardware.daqmx_server.channels.converter import Converter
+from sim_hardware.dynamics.motion import simulate_vector
 from sim_hardware.sensors.rows import excitation_v
+from sim_hardware.simulated_test import Engine
 from sim_hardware.virtual_rig import DEFAULT_LEVEL, VirtualRig
 
 _BLOCK: Final = 8_000
@@ -48,12 +50,13 @@ def synthesise_test(
     effects: Mapping[str, Mapping[str, float]] = _NO_EFFECTS,
     impacts_before: int = 0,
     post_rest_s: float | None = None,
+    engine: Engine = simulate_vector,
 ) -> SynthesisedTest:
     """One scripted test of the rig's simulated wall at the level θ₀/α, through the plan's converters.
 
     None means what the rig file says.  The samples are those of the simulated device server for the
-    same rig, seed and level.  `ValueError` in words for a level, restitution or effect that makes no
-    sense.
+    same rig, seed and level, where `engine`, which moves the wall, is not another one.  `ValueError`
+    in words for a level, restitution or effect that makes no sense.
     """
     wall = VirtualRig(
         rig,
@@ -62,6 +65,7 @@ def synthesise_test(
         restitution=restitution,
         effects=effects,
         impacts_before=impacts_before,
+        engine=engine,
     )
     test = wall.tests[-1]
     after = rig.acquisition.post_rest_s if post_rest_s is None else post_rest_s

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +21,8 @@ DURATION_S = 120.0
 """Longest motion after a release."""
 
 Effects = Mapping[str, Mapping[str, float]]
+Engine = Callable[[NDArray[np.float64], NDArray[np.float64]], Motion]
+"""From kernel parameters and the deviates of r of the impacts, (n,) or none, to the motion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,10 +85,18 @@ class Wall:
     impacts_before: int
     motion_effects: dict[str, dict[str, float]]
     sensor_effects: dict[str, dict[str, float]]
+    engine: Engine = simulate_vector
+    """What moves it."""
 
     @classmethod
     def of(
-        cls, rig: Rig, seed: int, restitution: float | None, effects: Effects, impacts_before: int = 0
+        cls,
+        rig: Rig,
+        seed: int,
+        restitution: float | None,
+        effects: Effects,
+        impacts_before: int = 0,
+        engine: Engine = simulate_vector,
     ) -> Wall:
         """`effects` and `restitution` go over those of the rig's `simulation` table."""
         simulation = rig.simulation
@@ -105,6 +115,7 @@ class Wall:
             impacts_before,
             motion,
             sensor,
+            engine,
         )
 
     def vector(
@@ -152,7 +163,7 @@ class Wall:
         seed = int(key_of(self.seed, f"pull {pull}", "impacts"))
         scattered = vector[par.SCATTER] != 0.0
         deviates = Restitution(1.0, seed=seed).deviates(4096) if scattered else np.empty(0)
-        motion = simulate_vector(vector, deviates)
+        motion = self.engine(vector, deviates)
         effects = {**self.motion_effects, **self.sensor_effects}
         planned = theta_rad if planned_rad is None else planned_rad
         return SimulatedTest(pull, at_s, planned, motion, effects)

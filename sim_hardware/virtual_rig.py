@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.config.rig import Rig
+from sim_hardware.dynamics.motion import simulate_vector
 from sim_hardware.handling import footsteps, lower_path, pull_path
 from sim_hardware.sensors import Knock, Scene, SensorChain
 from sim_hardware.sensors.noise import generator
-from sim_hardware.simulated_test import SimulatedTest, Wall
+from sim_hardware.simulated_test import Engine, SimulatedTest, Wall
 
 COMMAND_GRID_S: Final = 0.01
 """Commands take effect on a grid of 10 ms, which all other grids of the simulation divide."""
@@ -47,17 +48,19 @@ class VirtualRig:
         scripted: bool = True,
         effects: Mapping[str, Mapping[str, float]] = _NO_EFFECTS,
         impacts_before: int = 0,
+        engine: Engine = simulate_vector,
     ) -> None:
         """`theta0_over_alpha` is the planned level, negative to release from the other side.
 
         `restitution` and `effects` (``name`` or ``name@sensors`` → parameters) go over the rig
         file's.  `impacts_before` counts the impacts of earlier tests, for effects that wear.
+        `engine` moves the wall once it is let go.
         `ValueError` in words for an effect, a level or a restitution that makes no sense.
         """
         self.rig = rig
         self.seed = seed
         self.theta0_over_alpha = theta0_over_alpha
-        self._wall = Wall.of(rig, seed, restitution, effects, impacts_before)
+        self._wall = Wall.of(rig, seed, restitution, effects, impacts_before, engine)
         self._wall.check_level(theta0_over_alpha)
         self._chain = SensorChain(rig, seed, self._wall.sensor_effects)
         self._scene = Scene.upright(self._wall.vector(), rig.specimen.height_m)

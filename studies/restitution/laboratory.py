@@ -18,6 +18,8 @@ from daq_app.config import Rig, Scaling, plan_tasks
 from daq_app.config.rig import Channel
 from daq_app.rocking import TestRecord
 from sim_hardware.direct import synthesise_test
+from sim_hardware.dynamics.motion import simulate_vector
+from sim_hardware.simulated_test import Engine
 
 Floats = NDArray[np.float64]
 
@@ -75,13 +77,14 @@ def draw_test(
     effects: Mapping[str, Mapping[str, float]] = _NO_EFFECTS,
     laboratory: int | None = None,
     level: float | None = None,
+    engine: Engine = simulate_vector,
 ) -> LaboratoryTest:
     """A test of a laboratory drawn by `seed`; without `ordinary` its sensors are perfect but for noise.
 
     `effects`: what its wall does that Housner's block does not, by name with parameters. `laboratory`: the
     seed of all that one laboratory and its wall keep from test to test (calibration, places, levels of noise,
     clock, body, r and its scatter from impact to impact), so that several `seed` make a campaign. `level`:
-    θ0 over α in place of the drawn one, to the drawn side.
+    θ0 over α in place of the drawn one, to the drawn side. `engine`: what moves the wall once it is let go.
     """
     rng = np.random.default_rng(seed)
     kept = rng if laboratory is None else np.random.default_rng([laboratory, 3])
@@ -101,7 +104,13 @@ def draw_test(
     drawn, side = float(rng.uniform(0.15, 0.4)), float(rng.choice([-1.0, 1.0]))
     r = float(kept.uniform(0.82, 0.94))
     test = synthesise_test(
-        rig, plan, side * (drawn if level is None else level), seed, restitution=r, effects=effects
+        rig,
+        plan,
+        side * (drawn if level is None else level),
+        seed,
+        restitution=r,
+        effects=effects,
+        engine=engine,
     )
     upright = test.readings[:, : test.upright_samples].mean(axis=1)
     zeros = {c.id: float(mean - c.offset) for c, mean in zip(rig.channels, upright, strict=True)}
