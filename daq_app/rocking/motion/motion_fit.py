@@ -96,6 +96,8 @@ class MotionFit:
     """By how much sin α is smaller where the wall is upright than on sharp edges: the edges yield, and the
     wall stands on a strip (`YieldingEdge.inset_rad`). p and α are those of sharp edges."""
     sigma_inset_rad: float = math.inf
+    sigma_inset_if_sharp_rad: float = math.inf
+    """The same without what is not known of a strip, which sharp edges do not have."""
 
     @property
     def explains_the_motion(self) -> bool:
@@ -364,8 +366,8 @@ def _result(problem: MotionModel, found: OptimizeResult, count: int, stop_s: flo
         points = found.jac[: data.size]
         answer = np.linalg.solve(found.jac.T @ found.jac, points.T)
         scaled[: data.size] /= math.sqrt(max(1.0, _long_run_variance(data, points, answer.T)))
-        covariance = np.linalg.inv(scaled.T @ scaled) + _of_walking_zero(answer, sigma)
-        covariance += _of_unknown_strip(answer, problem.by_lift(x, count, stop_s))
+        on_known_edges = np.linalg.inv(scaled.T @ scaled) + _of_walking_zero(answer, sigma)
+        covariance = on_known_edges + _of_unknown_strip(answer, problem.by_lift(x, count, stop_s))
     except np.linalg.LinAlgError:
         return None
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -393,4 +395,5 @@ def _result(problem: MotionModel, found: OptimizeResult, count: int, stop_s: flo
         lean_rad=motion.sharp.lean_rad,
         inset_rad=float(motion.half_cycles.edge.inset_rad),
         sigma_inset_rad=INSET_PRIOR_RAD * float(deviations[INSET]),
+        sigma_inset_if_sharp_rad=INSET_PRIOR_RAD * math.sqrt(max(float(on_known_edges[INSET, INSET]), 0.0)),
     )

@@ -14,6 +14,7 @@ from daq_app.rocking.motion import motion_fit
 from daq_app.rocking.motion.motion_fit import fit_motion
 from daq_app.rocking.motion.swings import REST_ZERO_SIGMA_RAD
 from daq_app.rocking.theory.housner import free_rocking
+from daq_app.rocking.theory.yielding_edge import YieldingEdge, free_rocking_on
 
 RATE_HZ, RELEASE_S, R = 500.0, 0.5, 0.88
 NOISE_RAD = 1e-6
@@ -43,7 +44,18 @@ def rocking(rig, share, lean_rad=0.0):
     return time, np.where(time < RELEASE_S, theta0, motion.at(time)[0]), motion
 
 
-def fitted(rig, time, rotation, motion, *, speeds_off=0.0):
+def on_a_strip(rig, share, edge):
+    """The same on edges that yield."""
+    specimen = rig.specimen
+    theta0 = share * specimen.alpha0_rad
+    motion = free_rocking_on(
+        edge, theta0, R, specimen.p_rad_s, specimen.alpha0_rad, release_s=RELEASE_S, max_impacts=20
+    )
+    time = np.arange(0.0, motion.impacts_s[-1] + 0.5, 1.0 / RATE_HZ)
+    return time, np.where(time < RELEASE_S, theta0, motion.at(time)[0]), motion
+
+
+def fitted(rig, time, rotation, motion, *, speeds_off=0.0, edges_yield=True):
     """The fit that starts from speeds that are off by this share at random."""
     impacts = [float(value) for value in motion.impacts_s]
     off = 1.0 + speeds_off * np.random.default_rng(9).standard_normal(len(impacts))
@@ -60,6 +72,7 @@ def fitted(rig, time, rotation, motion, *, speeds_off=0.0):
         noise_rad=NOISE_RAD,
         p_rad_s=rig.specimen.p_rad_s,
         alpha_rad=rig.specimen.alpha0_rad,
+        edges_yield=edges_yield,
     )
 
 
@@ -93,6 +106,33 @@ def test_a_wall_that_leans_shows_its_own_p_alpha_r_and_zero(rig, share, lean_rad
     assert np.ptp(fit.restitutions) < 3e-3
     assert abs(fit.zero_rad) < 1e-5
     assert fit.lean_rad == pytest.approx(lean_rad, abs=5e-5)
+
+
+@pytest.mark.parametrize("lift_rad", [0.0015, 0.004, 0.01])
+def test_p_and_alpha_of_edges_that_yield_hold_where_their_strip_lifts(rig, lift_rad):
+    """A strip of 3 mm that lifts at a rotation which the fit is not told."""
+    strip = YieldingEdge(1e-3, lift_rad)
+    time, rotation, motion = on_a_strip(rig, 0.3, strip)
+    noise = np.random.default_rng(8).normal(0.0, NOISE_RAD, time.size)
+
+    fit = fitted(rig, time, rotation + noise, motion.sharp)
+
+    specimen = rig.specimen
+    assert fit.p_rad_s == pytest.approx(specimen.p_rad_s, abs=2.0 * fit.sigma_p_rad_s)
+    assert fit.alpha_rad == pytest.approx(specimen.alpha0_rad, abs=2.0 * fit.sigma_alpha_rad)
+    assert fit.r == pytest.approx(R, abs=2e-4)
+    assert fit.sigma_p_rad_s < 0.003 * fit.p_rad_s
+
+
+def test_edges_that_are_held_to_be_sharp_leave_p_better_known_and_wrong_where_they_yield(rig):
+    time, rotation, motion = on_a_strip(rig, 0.3, YieldingEdge(1e-3, 0.004))
+    free = fitted(rig, time, rotation, motion.sharp)
+    held = fitted(rig, time, rotation, motion.sharp, edges_yield=False)
+
+    assert held.inset_rad == 0.0
+    assert free.inset_rad == pytest.approx(1e-3, abs=1e-4)
+    assert held.sigma_p_rad_s < free.sigma_p_rad_s
+    assert abs(held.p_rad_s - rig.specimen.p_rad_s) > 3.0 * held.sigma_p_rad_s
 
 
 def test_wires_a_millimetre_off_move_p_by_less_than_its_stated_error(rig):
