@@ -16,7 +16,7 @@ from daq_app.config import Rig
 from daq_app.gap.blind.world.effects.catalogue import Drawn, Parameters
 
 _SIDES_S_RAD: Final = 8.0
-"""Slope of r over the speed for a difference of one between its sides, s/rad."""
+"""Slope of r over the speed, s/rad, that goes with half a difference of r between the sides of 1."""
 
 
 def draw_usual(rig: Rig, sizes: Mapping[str, float], rng: np.random.Generator) -> tuple[Drawn, ...]:

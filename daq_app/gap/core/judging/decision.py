@@ -163,7 +163,7 @@ def _usual(evidence: Evidence, policy: Policy) -> tuple[Decision, str] | None:
         return None
     probability = evidence.best.probability * evidence.rest.known(policy)
     sentence = (
-        f"Nothing is missing that these runs show (probability {probability:.2f}); {seen.words}, "
+        f"Nothing is missing that these runs show (probability {probability:.2f}); {seen.words} "
         f"is no more than is usual{_would_need(evidence, seen.effect)}."
     )
     answer = alone[(seen.effect,)]

@@ -131,7 +131,7 @@ def sensor_priors(survey: Survey) -> tuple[Parameter, ...]:
     unequal = (known(f"{name}_unequal", 1.0, "1", f"{name} from unequal accelerometers") for name in _RINGS)
     late = (
         replace(
-            known(electronics(family), ELECTRONICS_S, "s", f"lateness of the {family}s"),
+            known(electronics(family), ELECTRONICS_S, "s", f"delay of the {family}s behind the LVDTs"),
             usual_of=f"lag@{family}",
         )
         for family in ("wire", "accelerometer")

@@ -18,17 +18,38 @@ from sim_hardware.dynamics import parameters as par
 BED = "bed"
 """Parameter of what a bed of mortar gives: √θ_c, √rad, of the rotation at which its joint begins to open."""
 USUAL = (
-    Parameter("r_slope", 0.0, SLOPE_S_RAD, "s/rad", meaning="slope of r", usual_of="restitution_slope"),
-    Parameter("r_sides", 0.0, SIDES_R, "1", meaning="r of the sides", usual_of="restitution_asymmetry"),
+    Parameter(
+        "r_slope",
+        0.0,
+        SLOPE_S_RAD,
+        "s/rad",
+        meaning="slope of r over the speed",
+        usual_of="restitution_slope",
+    ),
+    Parameter(
+        "r_sides",
+        0.0,
+        SIDES_R,
+        "1",
+        meaning="half the difference of r between the sides",
+        usual_of="restitution_asymmetry",
+    ),
     Parameter("lean", 0.0, LEAN_RAD, "rad", meaning="lean", usual_of="base_tilt"),
-    Parameter("uneven", 0.0, LEAN_RAD, "rad", meaning="α of the sides", usual_of="alpha_asymmetry"),
+    Parameter(
+        "uneven",
+        0.0,
+        LEAN_RAD,
+        "rad",
+        meaning="half the difference of α between the sides",
+        usual_of="alpha_asymmetry",
+    ),
     Parameter(
         BED,
         0.0,
         BED_ROOT,
         "√rad",
         0.0,
-        meaning="root of the bed's first uplift",
+        meaning="root of the rotation at which the bed begins to open",
         starts=(0.0,),
         usual_of="winkler",
     ),
