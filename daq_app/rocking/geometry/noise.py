@@ -27,28 +27,31 @@ def white_noise(values: Floats) -> float:
     return float(np.median(np.abs(second, out=second), overwrite_input=True)) * 1.4826 / math.sqrt(6.0)
 
 
-def moving_noise(rows: Floats, shapes: Floats, rate_hz: float) -> Floats:
-    """rms of one sample of each of some records of one motion, (k,), as means over 15 ms see it.
+def moving_noise(rows: Floats, patterns: Floats, shapes: Floats, rate_hz: float) -> float:
+    """rms of one sample of records of one make while they move, as means over 15 ms see it.
 
-    `rows`, (k, n), differ by errors of their own, and by `shapes`, (s, n), as sound sensors do (gains,
-    times): windings and wipers of potentiometers err where they move, and not at rest. Robust to impacts; NaN
-    for fewer than three records or too few samples.
+    Windings and wipers of potentiometers err where they move, and not at rest. Noise is what is left of
+    `rows`, (k, n), at each instant beyond `patterns` over them, (k, p), which the motion makes, and in time
+    beyond `shapes`, (s, n), by which sound sensors differ (gains, times). Robust to impacts; NaN for no more
+    records than patterns, or too few samples.
     """
-    count, size = len(rows), max(int(_MEAN_S * rate_hz), 1)
-    if count < 3 or rows.shape[1] < 20 * size:
-        return np.full(count, math.nan)
+    size = max(int(_MEAN_S * rate_hz), 1)
+    left_of, sizes, _ = np.linalg.svd(patterns, full_matrices=False)
+    basis = left_of[:, sizes > 1e-9 * sizes[0]]
+    rank = basis.shape[1]
+    if len(rows) <= rank or rows.shape[1] < 20 * size:
+        return math.nan
 
     def means(values: Floats) -> Floats:
         whole = values[:, : values.shape[1] // size * size]
         return np.asarray(whole.reshape(len(values), -1, size).mean(axis=2))
 
-    apart, design = means(rows - rows.mean(axis=0)).T, means(shapes).T
+    apart, design = means(rows), means(shapes).T
+    apart = (apart - basis @ (basis.T @ apart)).T
     left = np.abs(apart - design @ np.linalg.lstsq(design, apart, rcond=None)[0])
     usual = 1.4826 * np.median(left, axis=0)
-    about_mean = np.mean(np.minimum(left, _CLIPPED * usual) ** 2, axis=0) * size
-    # The mean has 1/k of each record: σ_i² (1 − 2/k) + Σ σ² / k² is left of it.
-    total = about_mean.sum() / (1.0 - 1.0 / count)
-    return np.asarray(np.sqrt(np.maximum(about_mean - total / count**2, 0.0) / (1.0 - 2.0 / count)))
+    square = np.mean(np.minimum(left, _CLIPPED * usual) ** 2, axis=0).sum()
+    return math.sqrt(float(square) / (len(rows) - rank) * size)
 
 
 def timing_noise(rest: Floats, rate_hz: float) -> float:

@@ -20,17 +20,21 @@ def test_windings_of_potentiometers_are_noise_while_they_move_and_none_at_rest()
     rows = 0.1 * np.round((travel_mm + zeros) / 0.1) - zeros
     errors_of_means = (rows - travel_mm).reshape(5, -1, 60).mean(axis=2)
     erring = errors_of_means.std() * math.sqrt(60.0)
-    moving = moving_noise(rows, np.array([np.ones_like(time_s), travel_mm]), RATE_HZ)
-    assert math.sqrt(np.mean(moving**2)) == pytest.approx(erring, rel=0.3)
+    alike = np.ones((5, 1))
+    moving = moving_noise(rows, alike, np.array([np.ones_like(time_s), travel_mm]), RATE_HZ)
+    assert moving == pytest.approx(erring, rel=0.3)
     assert timing_noise(np.full(4000, rows[0, 0]), RATE_HZ) < 1e-9
 
 
-def test_white_noise_of_moving_records_comes_out_with_its_size() -> None:
-    """Each with its own: two of them are ten times as noisy as the others."""
+def test_what_moves_all_wires_of_a_wall_together_is_no_noise() -> None:
+    """A wall that rotates and rings by fifty times the noise, and wires with gains of their own."""
     rng = np.random.default_rng(5)
-    travel = np.sin(np.arange(0.0, 8.0, 1.0 / RATE_HZ))
-    gain = travel[None, :]
-    sizes = np.array([0.02, 0.002, 0.02, 0.002, 0.002])
-    rows = travel + sizes[:, None] * rng.standard_normal((5, travel.size))
-    assert moving_noise(rows, gain, RATE_HZ) == pytest.approx(sizes, rel=0.25, abs=0.002)
-    assert np.isnan(moving_noise(rows[:2], gain, RATE_HZ)).all()
+    time_s = np.arange(0.0, 8.0, 1.0 / RATE_HZ)
+    height_m = np.array([0.6, 1.1, 1.6, 2.1, 2.6])
+    rotation, ringing = np.sin(time_s), np.sin(75.0 * time_s)
+    rows = np.outer(height_m * (1.0 + 0.003 * rng.standard_normal(5)), rotation)
+    rows += 0.1 * np.outer(height_m**2, ringing) + 0.002 * rng.standard_normal(rows.shape)
+    together = np.column_stack([height_m, height_m**2])
+    assert moving_noise(rows, together, rotation[None, :], RATE_HZ) == pytest.approx(0.002, rel=0.15)
+    assert moving_noise(rows, together[:, :1], rotation[None, :], RATE_HZ) > 0.02
+    assert math.isnan(moving_noise(rows[:2], together[:2], rotation[None, :], RATE_HZ))

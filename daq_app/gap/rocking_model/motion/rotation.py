@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -287,13 +288,19 @@ def noise_of_wires(run: GapRun, theta: FloatArray) -> float:
     The larger of the two: a potentiometer errs from winding to winding, which at rest is one and the same.
     """
     rows, chosen = wall_rotation(run)
+    _, y, z = run.positions(chosen).T
     moving = np.abs(theta) > 0.05 * np.abs(theta).max()
-    weights = run.positions(chosen)[:, 2] ** 2
     shown, rate = theta[moving], np.gradient(theta)[moving]
     shapes = np.array([np.ones_like(shown), shown, shown**2, np.abs(shown), rate, np.arange(shown.size)])
-    each = moving_noise(rows[:, moving], shapes / np.abs(shapes).max(axis=1, keepdims=True), run.rate_hz)
-    of_mean = float(np.linalg.norm(weights / weights.sum() * each))
-    return float(np.nanmax([sample_noise(theta, run.rate_hz), of_mean]))
+    # A wall that rotates, bends or turns moves all wires together.
+    together = np.column_stack([z, z**2, y * z])
+    travel = moving_noise(
+        z[:, None] * rows[:, moving],
+        together / np.abs(together).max(axis=0).clip(1e-9),
+        shapes / np.abs(shapes).max(axis=1, keepdims=True),
+        run.rate_hz,
+    )
+    return float(np.nanmax([sample_noise(theta, run.rate_hz), travel / math.sqrt(float(z @ z))]))
 
 
 def wire_height(run: GapRun) -> float:
