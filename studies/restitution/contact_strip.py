@@ -29,7 +29,7 @@ _DAMPING: Final = 0.3
 leaves the ground."""
 _LONGEST_STEP_S: Final = 4e-3
 _TURNING_S: Final = 5.0
-"""A half-cycle takes no longer: a wall that stays to one side as long has come to rest."""
+"""Longest time of a half-cycle, s: a wall that stays to one side for longer has come to rest."""
 _STILL_RAD_S: Final = 3e-3
 """Speed at an impact below which the wall is taken to stand: a peak of 0.005 mrad follows."""
 _SHORTEST_PIECE_S: Final = 2.5e-4

@@ -20,8 +20,9 @@ from daq_app.rocking.motion.swings import MotionTrack, hold_level, steady_level
 NAMES: Final = {"tiltmeters": "tiltmeters", "wires": "wires", "lvdts": "LVDTs"}
 """The word for the reader by the key of `TestAnalysis.theta0_by_family`."""
 _TIME_CONSTANTS: Final = 6.0
-"""Time constants of the tiltmeters, 1, over which the rotation is followed before their levels are read. A
-level holds 0.2 % of what the rotation was before that; lowering it leaves sway in θ0 by tiltmeters."""
+"""Time constants of the tiltmeters, 1, over which their response to the rotation is followed before their
+levels are read. What the rotation was before that has a share of 0.2 % in a level. Lowering the number leaves
+sway in θ0 by tiltmeters."""
 
 
 def theta0_by_family(
