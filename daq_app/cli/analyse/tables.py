@@ -201,7 +201,7 @@ def _base_table(analysis: TestAnalysis) -> Table:
             error = plus_minus(sigma) or "(nearest block; no error is known)"
             table.add_row(name, f"{value:.4f} {error}", f"{survey:.4f}")
         inset = f"{fit.inset_rad * 1e3:.2f} {plus_minus(fit.sigma_inset_rad * 1e3, 2)}"
-        table.add_row("α less upright than on sharp edges, mrad", inset, "0")
+        table.add_row("what the edges yield by, mrad of α", inset, "0")
         table.add_row(
             "misfit of the fit, mrad rms", f"{fit.residual_rad * 1e3:.4f}", f"noise {fit.noise_rad * 1e3:.4f}"
         )

@@ -7,6 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.rocking.means import means_over
+
 Floats = NDArray[np.float64]
 
 _MEAN_S = 0.015
@@ -41,12 +43,7 @@ def moving_noise(rows: Floats, patterns: Floats, shapes: Floats, rate_hz: float)
     rank = basis.shape[1]
     if len(rows) <= rank or rows.shape[1] < 20 * size:
         return math.nan
-
-    def means(values: Floats) -> Floats:
-        whole = values[:, : values.shape[1] // size * size]
-        return np.asarray(whole.reshape(len(values), -1, size).mean(axis=2))
-
-    apart, design = means(rows), means(shapes).T
+    apart, design = means_over(rows, size), means_over(shapes, size).T
     apart = (apart - basis @ (basis.T @ apart)).T
     left = np.abs(apart - design @ np.linalg.lstsq(design, apart, rcond=None)[0])
     usual = 1.4826 * np.median(left, axis=0)
@@ -61,7 +58,7 @@ def timing_noise(rest: Floats, rate_hz: float) -> float:
     """
     white = float(np.sqrt(np.mean(np.diff(rest, 2) ** 2) / 6.0))
     size = max(int(_MEAN_S * rate_hz), 1)
-    means = rest[: rest.size // size * size].reshape(-1, size).mean(axis=1)
+    means = means_over(rest, size)
     place = np.arange(means.size)
     left = means - np.polyval(np.polyfit(place, means, 1), place)
     coloured = float(np.sqrt(np.sum(left**2) / max(means.size - 2, 1) * size))

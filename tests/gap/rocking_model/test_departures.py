@@ -193,12 +193,8 @@ def test_a_curvature_of_r_is_neither_a_level_nor_a_slope_of_it(run: RockingRun) 
     order = np.zeros(4, dtype=np.intp)
 
     def added(name: str) -> np.ndarray:
-        found = (
-            restitution_of(
-                run, {"r": 0.9, "r_slope": 0.0, "r_sides": 0.0, name: 0.1}, speeds, np.ones(4), order
-            )
-            - 0.9
-        )
+        values = {"r": 0.9, "r_slope": 0.0, "r_sides": 0.0, name: 0.1}
+        found = restitution_of(run, values, speeds, np.ones(4), order) - 0.9
         return np.asarray(found)
 
     for name in ("slope_power.c", "slope_square.c"):

@@ -39,7 +39,7 @@ def test_a_bed_a_lean_and_late_amplifiers_are_parameters_of_any_wall() -> None:
 
 
 def test_a_bed_acts_as_the_root_of_its_first_uplift() -> None:
-    """To first order: four times the angle has twice the effect on all times and speeds."""
+    """To first order: what 0.1 µrad does to times and speeds is √0.1 of what 1 µrad does."""
     run = prepare(simulate({}, LEVELS[:1]))[0][0]
     survey = run.survey
     block = {"alpha": survey.alpha_rad, "p": survey.p_rad_s, "half_base": survey.half_base_m, "omega0": 0.0}

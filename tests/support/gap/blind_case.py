@@ -1,30 +1,40 @@
-"""One case of the blind check as files, with what its label says."""
+"""One case of the blind check as files, with what it hides."""
 
 from __future__ import annotations
 
-import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
-from daq_app.gap.blind.making.make import Order, make_case
+from daq_app.gap.blind.making.case_files import write_case
+from daq_app.gap.blind.making.make import Order, case_name, draw_case
 from daq_app.runfile import open_run
 
 _RIG = Path(__file__).parents[3] / "configs" / "fr1.toml"
 
 
 def blind_case(
-    folder: Path, laboratory: str, hidden: str, *, seed: int, runs: int, place: int = 0
+    folder: Path,
+    laboratory: str,
+    hidden: str,
+    *,
+    seed: int,
+    runs: int,
+    place: int = 0,
+    usual: bool = True,
 ) -> tuple[list[Path], dict[str, float]]:
     """Run files of the case at a place of its order, and the parameters of the effect that it hides.
 
-    The files are sorted by level. A case that hides nothing has no parameters.
+    The files are sorted by level. A case that hides nothing has no parameters. Without `usual` the wall and
+    its amplifiers have nothing of what any wall and rig has of some effects.
     """
     text = _RIG.read_text(encoding="utf-8")
     order = Order(seed, folder / "out", folder / "kept", (text,), runs, None, laboratory, "", hidden)
-    name = make_case(order, place)
-    label = json.loads(json.loads((folder / "kept" / f"{name}.json").read_text(encoding="utf-8"))["label"])
-    effects = label["effects"]
-    return sorted((folder / "out" / name).glob("*.h5")), effects[0]["parameters"] if effects else {}
+    world, rig_text, _ = draw_case(order, place)
+    name = case_name(place)
+    write_case(order.out / name, name, world if usual else replace(world, usual=()), rig_text, 0)
+    effects = world.effects
+    return sorted((order.out / name).glob("*.h5")), effects[0].parameters if effects else {}
 
 
 def slippery_base(folder: Path, *, runs: int, place: int) -> tuple[list[Path], float]:

@@ -70,9 +70,11 @@ def _as_on_a_base_that_holds(run: RockingRun, slip: BaseSlip) -> RockingRun:
 
 @pytest.fixture(scope="module")
 def one_edge(tmp_path_factory: pytest.TempPathFactory) -> list[GapRun]:
-    """Tests of a wall that walks by centimetres, for one of its edges slips."""
+    """Tests of a wall that walks by centimetres, for one of its edges slips; its LVDTs are not late."""
     pytest.importorskip("mujoco", reason="the extra 'contact' is not installed")
-    files, _ = blind_case(tmp_path_factory.mktemp("edge"), "contact", "slippery_edge", seed=73, runs=3)
+    files, _ = blind_case(
+        tmp_path_factory.mktemp("edge"), "contact", "slippery_edge", seed=73, runs=3, usual=False
+    )
     return [load_run(file) for file in files]
 
 
@@ -93,8 +95,7 @@ def test_a_wall_that_walks_spoils_no_other_sensor(one_edge: list[GapRun]) -> Non
     for before, after in zip(walked, rest, strict=True):
         assert before is not None and after is not None
         assert np.ptp(before[0]) > 5e-3
-        # LVDTs that are a millisecond late feign a part of a walk.
-        assert np.ptp(after[0]) < 0.17 * np.ptp(before[0])
+        assert np.ptp(after[0]) < 0.15 * np.ptp(before[0])
 
 
 def test_the_answer_about_a_wall_that_walks_is_the_slip(one_edge: list[GapRun]) -> None:

@@ -110,7 +110,8 @@ def test_a_burst_of_shaking_is_found_in_the_run_that_has_it() -> None:
 def _slipping(fastest_held: dict[float, float]) -> list[GapRun]:
     """A base that friction stops by 0.7 m/s² for as long as the impact was fast.
 
-    Impacts to either side (±1) that are no faster than so many rad/s hold it.
+    Impacts to a side (±1) that are no faster than so many rad/s do not set it off, in every other test those
+    that are up to a fifth faster either.
     """
     runs = []
     for k, examined in enumerate(examine(run) for run in simulate({}, (0.25, -0.35, 0.4, 0.3, -0.3))):
@@ -119,7 +120,6 @@ def _slipping(fastest_held: dict[float, float]) -> list[GapRun]:
         t = np.arange(channels.shape[1]) / run.rate_hz - examined.features.swings.release_s
         base = np.zeros(t.size)
         for impact_s, speed in zip(grid.impact_s, grid.approach, strict=True):
-            # In every other test a little faster ones.
             if abs(speed) <= fastest_held[float(np.sign(speed))] * (1.0 + 0.2 * (k % 2)):
                 continue
             slips = (t > impact_s) & (t < impact_s + 0.15 * abs(speed))
