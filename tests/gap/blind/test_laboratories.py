@@ -242,6 +242,18 @@ def test_an_effect_is_as_visible_as_what_it_looks_like_is_known(configs: Path, t
     )
 
 
+def test_a_push_is_as_visible_as_it_bends_the_start_of_the_fall(configs: Path, tmp_path: Path) -> None:
+    """Whichever way a wall is pushed: a fall that begins a little earlier or later is no push."""
+    for speed_rad_s, least, most in ((4e-3, 0.0, 2.0), (15e-3, 4.0, 8.0)):
+        inwards, outwards = (
+            _seen(configs, tmp_path, "initial_velocity", omega_rad_s=sign * speed_rad_s) for sign in (-1, 1)
+        )
+        assert least < inwards < most
+        assert outwards == pytest.approx(inwards, rel=0.4)
+    assert _seen(configs, tmp_path, "slow_release", tau_s=0.02) < 2.0
+    assert _seen(configs, tmp_path, "slow_release", tau_s=0.1) > 10.0
+
+
 def test_walls_and_amplifiers_have_a_little_of_some_effects_that_no_label_names(
     configs: Path, tmp_path: Path
 ) -> None:

@@ -4,9 +4,10 @@ An estimate in units of standard deviations, for sorting cases into weak and str
 two quiet twins of a run, with and without the effect, first in what swings and impacts show locally
 (duration and loss of a swing, speed against peak, restitution of an impact, against impact scatter
 and with α, p and r refitted), then in what the channels show beyond the motion (against their noise,
-with gain, offset and the half width of the base refitted as far as they are known to). Hum counts against
-the hum that sound channels pick up, and a lean, a slope of r or a delay against what any wall and rig has of
-it. No diagnosis can see much more.
+with gain, offset and the half width of the base refitted as far as they are known to). A push and a slow
+release count against the release at rest that comes nearest. Hum counts against the hum that sound channels
+pick up, and a lean, a slope of r or a delay against what any wall and rig has of it. No diagnosis can see
+much more.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Final
 
 import numpy as np
 
+from daq_app.gap.blind.making.let_go import LET_GO, left_by_a_release_at_rest
 from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.campaign import PlannedRun, Surroundings, World
 from daq_app.gap.blind.world.course import Course
@@ -89,8 +91,10 @@ def _shown(world: World, effect: Drawn) -> float:
     for index in range(len(alone.runs)):
         course = alone.course(index, (0, 30 * (len(world.runs) - 1))[index])
         seen.append(_in_channels(alone, alone.runs[index], course, noise))
+        if effect.name in LET_GO:
+            in_swings += _in_the_fall(alone, course, noise)
         if not effect.targets:
-            in_swings += _in_swings(course.motion, world.wall)
+            in_swings += _in_swings(course.motion, world.wall, at_rest=effect.name not in LET_GO)
     stand_for = len(world.runs) / len(alone.runs)
     square = stand_for * in_swings + _evidence(
         [np.hstack(runs) for runs in zip(*seen, strict=True)], stand_for
@@ -117,9 +121,28 @@ def block_swing(theta: float, alpha: float, p: float) -> tuple[float, float]:
     return time, speed
 
 
-def _in_swings(motion: Followed, wall: Wall) -> float:
-    """Squared distance of a motion from any rigid block's in local features: α, p and r are free."""
-    values, sds, columns = _features(motion, wall)
+def _in_the_fall(alone: World, course: Course, noise_si: FloatArray) -> float:
+    """Squared distance of the start of a fall from that of any wall that is let go at rest."""
+    time_s = _times(course)
+    plain = course.plain(time_s)
+    place = Place(0.0, abs(course.motion.release.theta0))
+    signals = quiet_signals(alone.rig, plain, (), np.random.default_rng(0), place)
+    left_rad = left_by_a_release_at_rest(course.motion, alone.wall, time_s)
+    turning = plain.theta - np.median(plain.theta)
+    square = 0.0
+    for channel, signal, noise in zip(alone.rig.channels, signals, noise_si, strict=True):
+        if channel.family != "accelerometer":
+            per_rad = float((signal - np.median(signal)) @ turning / (turning @ turning))
+            square += float(np.sum((per_rad * left_rad / _sd(noise, signal)) ** 2))
+    return square
+
+
+def _in_swings(motion: Followed, wall: Wall, at_rest: bool) -> float:
+    """Squared distance of a motion from any rigid block's in local features: α, p and r are free.
+
+    Where a wall may not have been let go `at_rest`, nobody knows when the first swing begins.
+    """
+    values, sds, columns = _features(motion, wall, at_rest)
     if values.size <= columns.shape[1]:
         return 0.0
     weighted, design = values / sds, columns / sds[:, None]
@@ -127,7 +150,7 @@ def _in_swings(motion: Followed, wall: Wall) -> float:
     return float(left @ left)
 
 
-def _features(motion: Followed, wall: Wall) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _features(motion: Followed, wall: Wall, at_rest: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Departures from the rigid block (n,), their standard deviations, and the (n, 3) slopes in α, p, r."""
     crossings = [impact for impact in motion.impacts if impact.restitution > 0.0]
     turning = list(motion.peaks)
@@ -140,7 +163,8 @@ def _features(motion: Followed, wall: Wall) -> tuple[FloatArray, FloatArray, Flo
             break
         time, speed, slopes = _block_with_slopes(abs(peak), wall)
         impact = crossings[k]
-        rows.append(((impact.time - at) / time - 1.0, _TIME_SD_S / time, slopes[0], slopes[1], 0.0))
+        if k > 0 or at_rest:
+            rows.append(((impact.time - at) / time - 1.0, _TIME_SD_S / time, slopes[0], slopes[1], 0.0))
         rows.append((abs(impact.before) / speed - 1.0, _SPEED_SD, slopes[2], slopes[3], 0.0))
         rows.append((impact.restitution - wall.restitution, scatter, 0.0, 0.0, 1.0))
         if k > 0:
@@ -192,7 +216,7 @@ def _over_ordinary_hum(world: World, effect: Drawn) -> float:
 def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatArray) -> list[FloatArray]:
     """What each channel shows of the effect, a gain and a half width that are off by one sd, for one and the
     same motion: (3, n) each, over its noise, the zero taken out."""
-    time_s = np.arange(-0.5, course.motion.rest_s + 0.5, 1.0 / _RATE_HZ)
+    time_s = _times(course)
     place = Place(run.campaign_s + 600.0, abs(run.theta0))
     rng = np.random.default_rng(0)
     scene = course.scene(time_s)
@@ -212,10 +236,19 @@ def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatA
         shown = np.vstack(
             [signal - noise - reference, CALIBRATION_TOLERANCE * reference, of_half_width[row] - reference]
         )
-        sd = math.hypot(noise_si[row], _MODEL_SHARE * float(np.max(np.abs(reference))))
         shown -= np.median(shown, axis=1, keepdims=True)
-        found.append(shown / (sd * math.sqrt(_CORRELATED)))
+        found.append(shown / _sd(float(noise_si[row]), reference))
     return found
+
+
+def _times(course: Course) -> FloatArray:
+    """Times (n,), s, at which channels are compared: half a second before and after the motion too."""
+    return np.arange(-0.5, course.motion.rest_s + 0.5, 1.0 / _RATE_HZ)
+
+
+def _sd(noise_si: float, signal: FloatArray) -> float:
+    """What a sample of a channel counts for: its noise, and what nobody trusts of its signal (n,), SI."""
+    return math.hypot(noise_si, _MODEL_SHARE * float(np.max(np.abs(signal)))) * math.sqrt(_CORRELATED)
 
 
 def _evidence(channels: Sequence[FloatArray], stand_for: float) -> float:
