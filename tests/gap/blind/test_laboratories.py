@@ -30,6 +30,7 @@ IN_THE_HELD_PART = {
     "calibration",
     "mount_angle",
     "anchor_error",
+    "lvdt_straightness",
     "zero_start",
     "sway",
 }

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from daq_app.gap.core import Options, fit
+from daq_app.gap.core.fitting.fit import effects_of
 from daq_app.gap.core.result import NO_CAUSE
 from daq_app.gap.rocking_model.prediction.model import RockingModel
 from daq_app.gap.rocking_model.prediction.usual import of_bed
 from daq_app.gap.rocking_model.prediction.vector import half_cycle_table, kernel_vector
-from daq_app.gap.rocking_model.study import diagnose_runs, prepare
+from daq_app.gap.rocking_model.records import GapRun
+from daq_app.gap.rocking_model.study import diagnose_runs, model_and_library, prepare
 from sim_hardware.dynamics import parameters as par
 from tests.support.simulated_wall import simulate
 
@@ -77,3 +80,30 @@ def test_more_than_any_wall_has_is_a_cause(effect: dict[str, dict[str, float]], 
     decision = diagnose_runs(simulate(USUAL | effect, LEVELS, seed=2), Options(causes=1)).decision
     assert decision.verdict not in NO_CAUSE, decision.sentence
     assert decision.effects and set(decision.effects) <= named, decision.sentence
+
+
+def not_straight(runs: list[GapRun], share: float) -> list[GapRun]:
+    """The same runs, whose LVDTs at x < 0 all read an S of this share of their range beside the opening."""
+    bent = []
+    for run in runs:
+        channels = run.channels.copy()
+        for place in run.indices("lvdt"):
+            low, high = run.sensors[place].range_si
+            if run.sensors[place].position_m[0] < 0.0:
+                at = 2.0 * math.pi * (channels[place] - low) / (high - low)
+                channels[place] += share * (high - low) * np.sin(at)
+        bent.append(replace(run, channels=channels))
+    return bent
+
+
+def test_lvdts_that_are_not_straight_are_no_spring() -> None:
+    """A fifth of a data sheet's 0.25 % on all LVDTs of one face: p and α stay, and no cable is seen."""
+    runs, _ = prepare(not_straight(simulate({}, (0.25, -0.35, 0.4, -0.2)), 5e-4))
+    model, library = model_and_library(runs)
+    found = fit(model, runs)
+    for name, true in (("alpha", runs[0].survey.alpha_rad), ("p", runs[0].survey.p_rad_s)):
+        value, low, high = found.values[name]
+        assert low < true < high, (name, value, low, high)
+    assert abs(found.values["face_a_cube"][0]) > 2.0 * abs(found.values["face_b_cube"][0])
+    held = fit(model, runs, effects_of(("residual_cable",), library))
+    assert held.log_evidence < found.log_evidence + 3.0

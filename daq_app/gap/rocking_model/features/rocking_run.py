@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -66,6 +67,8 @@ class RockingRun:
     """All wires whose geometry is known."""
     leaked: FloatArray = field(default_factory=lambda: np.zeros(0))
     """What a full crosstalk adds to a reference rotation that is read from wires, (m,), rad; else empty."""
+    lvdt_range_m: tuple[float, float] = (math.nan, math.nan)
+    """Least and largest reading of the LVDTs; NaN where it is not known."""
     wiring: Wiring = field(default_factory=Wiring)
     """What was put right in all runs before anything was read from them."""
     findings: tuple[RunFinding, ...] = ()

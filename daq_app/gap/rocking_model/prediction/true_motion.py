@@ -12,6 +12,7 @@ from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.differences import face_gain
 from daq_app.gap.rocking_model.features.pivots import turned_by
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.features.straightness import not_straight
 from daq_app.gap.rocking_model.motion.rotation import anchors_turn
 from daq_app.gap.rocking_model.prediction.wires_alone import peaks_carry
 from sim_hardware.dynamics.parameters import SLIDE_SPEED
@@ -31,8 +32,10 @@ def true_rotations(run: RockingRun, values: Mapping[str, float]) -> tuple[FloatA
     drift = values.get("drift@wire.rate", 0.0) / run.wire_height_m if name == "wire" else 0.0
     offset = values["zero"] + drift * (run.swings.peak_s - run.grid.rest_s) + peaks_carry(run, values)
     levels = side[:, None] * run.swings.levels
-    true = peaks - offset - _bent(run, values, peaks, "peaks")
-    behind = levels - offset[:, None] - _bent(run, values, levels, "levels")
+    true, behind = peaks - offset, levels - offset[:, None]
+    for added in (_bent, not_straight):
+        true = true - added(run, values, peaks, "peaks")
+        behind = behind - added(run, values, levels, "levels")
     if second := _second_order(values, name):
         # A delay moves peaks and crossings alike; what a response rounds beyond it goes with the
         # acceleration. At the first peak the wall is held.

@@ -35,6 +35,13 @@ It goes with the impedance of the source, which is alike for sensors of one make
 a wire that is scanned after an LVDT.
 """
 
+LVDT_STRAIGHT = 2e-3
+"""Sd, over half of the range, 1, of the square and of the cube by which one LVDT is not straight.
+
+Assumed: 0.1 % of the range, where data sheets state 0.25 % at most. Raising it hides springs, cables and
+edges that change the times of large swings by less than a thousandth.
+"""
+
 PLAY_RAD = 1e-4
 """Prior sd of the play of the wires' drums in the rotation that they show together, rad.
 

@@ -58,6 +58,9 @@ _INSTALLATION: Final = (
     Imperfection("tilt_constant", "1", "a tiltmeter's time constant is off by this share at most"),
     Imperfection("wire_backlash", "m", "play of a wire's drum, at most"),
     Imperfection("wire_sag", "1/m", "share of a wire's travel that sag takes for each metre, at most"),
+    Imperfection(
+        "lvdt_straightness", "1", "share of its range by which an LVDT departs from a straight line"
+    ),
     Imperfection("impact_shock", "s", "length of an impact's shock in the accelerometers; 0.002 in `own`"),
 )
 _TEST: Final = (
@@ -151,6 +154,7 @@ _ORDINARY: Final[Mapping[str, Range]] = {
     "mount_angle": (0.002, 0.01),
     "anchor_error": (0.001, 0.004),
     "tilt_constant": (0.03, 0.15),
+    "lvdt_straightness": (2e-4, 1.2e-3),
     "impact_shock": (0.002, 0.006),
     "sway": (1e-5, 6e-5),
     "release_scatter": (0.01, 0.03),

@@ -96,6 +96,16 @@ def _wire_sag(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
     return signal - q["kappa_1_m"] * signal**2
 
 
+def _not_straight(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
+    """An S and an arch over the range, shares of it, whose ends lie on the straight line."""
+    low, high = bench.channel.range_si
+    span = high - low
+    place, upright = math.pi * (signal - low) / span, -math.pi * low / span
+    odd = np.sin(2.0 * place) - math.sin(2.0 * upright)
+    even = np.sin(place) - math.sin(upright)
+    return np.asarray(signal + span * (q["odd"] * odd + q["even"] * even))
+
+
 def _wire_inertia(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
     """Second-order response of the drum and spring (bilinear)."""
     natural, zeta, rate = 2.0 * math.pi * q["frequency_hz"], q["zeta"], bench.scene.rate_hz
@@ -188,6 +198,7 @@ RESPONSES: dict[str, Apply] = {
     "saturation": _saturation,
     "wire_sag": _wire_sag,
     "wire_inertia": _wire_inertia,
+    "not_straight": _not_straight,
     "cubic_gain": _cubic_gain,
     "backlash": _backlash,
     "loose_bracket": _loose_bracket,

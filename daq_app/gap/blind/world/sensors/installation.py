@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -57,7 +57,7 @@ def draw_installation(rig: Rig, sizes: Sizes, rng: np.random.Generator) -> Insta
     skew = sizes.get("skew", 0.0)
     lost_bits = sizes.get("coarse_steps", 0.0)
     mains = sizes.get("mains_pick_up", 0.0) * np.exp(rng.uniform(-0.7, 0.7, n))
-    return Installation(
+    installation = Installation(
         rig=rig.model_copy(update={"channels": tuple(_as_it_stands(c, sizes, rng) for c in channels)}),
         faults=tuple(_ordinary_faults(rig, sizes, rng)),
         noise_si=np.array([c.noise_si for c in channels]) * _unequal(channels, sizes, rng),
@@ -68,6 +68,16 @@ def draw_installation(rig: Rig, sizes: Sizes, rng: np.random.Generator) -> Insta
         mains_phase=rng.uniform(0.0, 2.0 * math.pi, n),
         cable=np.where(rng.uniform(size=n) < _CABLES_THAT_MOVE, rng.uniform(0.3, 1.0, n), 0.0),
     )
+    return replace(installation, faults=(*installation.faults, *_not_straight(rig, sizes, rng)))
+
+
+def _not_straight(rig: Rig, sizes: Sizes, rng: np.random.Generator) -> Iterator[Fault]:
+    """What the lines of the LVDTs' data sheets leave: each is off by a share of its range in two forms."""
+    if share := sizes.get("lvdt_straightness", 0.0):
+        for channel in rig.channels:
+            if channel.family == "lvdt":
+                odd, even = rng.standard_normal(2).tolist()
+                yield Fault("not_straight", {"odd": share * odd, "even": share * even}, (channel.id,))
 
 
 def _as_it_stands(channel: Channel, sizes: Sizes, rng: np.random.Generator) -> Channel:

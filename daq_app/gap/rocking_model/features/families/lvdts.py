@@ -19,6 +19,7 @@ from daq_app.gap.rocking_model.features.pivots import pivots
 from daq_app.gap.rocking_model.features.response import bessel, first_order
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.shapes import Term
+from daq_app.gap.rocking_model.features.straightness import straightness
 from daq_app.gap.rocking_model.motion.late_joint import in_step
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
 from daq_app.gap.rocking_model.motion.rotation import Rotation, coarse
@@ -151,6 +152,7 @@ def _priors(survey: Survey) -> tuple[Parameter, ...]:
             )
             for name, where in faces
         ),
+        *straightness(dict(faces)),
         Parameter(
             "faces",
             0.0,
