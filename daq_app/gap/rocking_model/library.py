@@ -85,9 +85,10 @@ _WIDER = {
 goes with the wall's speed it is a multiple of the jump, which is a tenth of the speed; how far the wall bends
 goes with one over its frequency. A filter may be as late as any other sensor: with a shorter
 reach it would be the likelier answer for short delays, whose form the runs do not show."""
-_FURTHEST = {("dwell", "tau"): 0.3}
+_FURTHEST = {("dwell", "tau"): 0.3, ("residual_cable", "k"): 3.0}
 """Ends of strengths beyond six times their reach. A wall that stays on its joint for longer than its fit may
-say leaves the rest of that to the sample clock."""
+say leaves the rest of that to the sample clock; a rope of steel that is left on is as stiff as the wall is
+heavy."""
 _DRIFT_REACH = {"lvdt": 1e-3, "wire": 2e-3, "tiltmeter": 1e-3, "accelerometer": 1e-2}
 
 
