@@ -31,6 +31,7 @@ _LEAST = {
     "unlike": POLICY.finding_unlike,
 }
 """Size from which a condition that every laboratory has a little of is material; any other always is."""
+_UNITS_OF_LIMITS = {"1/m": "m", "s²/m": "m/s²"}
 _FAMILIES = {"floor": "ambient", "base": "contact"}
 """Family of the effects that a finding belongs to, by who has it, where that is no instrument."""
 
@@ -52,7 +53,7 @@ def _finding(key: str, findings: Sequence[RunFinding], runs: int) -> Finding:
     unit = findings[0].unit
     if kind == "saturation":
         # The finding is the inverse of the limit, so that no limit is 0 ± sd.
-        size, sd, unit = 1.0 / size, sd / size**2, "m"
+        size, sd, unit = 1.0 / size, sd / size**2, _UNITS_OF_LIMITS[unit]
     rms = size / math.sqrt(2.0) if kind == "hum" else size
     in_noise = rms / findings[0].noise if kind in _IN_NOISE and findings[0].noise > 0.0 else math.nan
     limit = _LEAST.get(kind, 0.0)

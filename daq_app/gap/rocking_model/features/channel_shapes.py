@@ -20,7 +20,7 @@ from daq_app.gap.rocking_model.tolerances.inspection import REMAINS_SD, SOUND, S
 from daq_app.gap.rocking_model.tolerances.sensors import CALIBRATION, CERTIFIED
 
 _SHAPES = ("gain", "lag", "curvature", "drift")
-_GAIN, _CURVATURE = _SHAPES.index("gain"), _SHAPES.index("curvature")
+_GAIN, _LAG, _CURVATURE = (_SHAPES.index(name) for name in ("gain", "lag", "curvature"))
 SHAPES: dict[Family, tuple[str, ...]] = {
     "lvdt": (*_SHAPES, "rounding"),
     "wire": (*_SHAPES, "side"),
@@ -65,6 +65,9 @@ class Others:
     curved: float = 1.0
     """How many times one channel's curvature that of the prediction is: an error that goes with the square of
     a large reading is predicted into a small one."""
+    slower: float = 1.0
+    """How many times less this wire travels than most: friction in its drum holds back a length, for as many
+    times longer."""
     rough: float = 0.0
     """Rms of what the steps of these readings make of the difference; 0 where they have none."""
     repeats: int = 1
@@ -76,6 +79,12 @@ class Others:
     imperfections: FloatArray | None = None
     """What one sd of each ordinary imperfection adds to what this channel shows beyond the others, (k, m),
     SI: crosstalk from the channels that are scanned before, mounts that are turned."""
+
+    def tolerance(self, family: Family) -> FloatArray:
+        """What a sound channel differs by from the prediction in each shape, (k,)."""
+        sizes = self.spread * np.array(TOLERANCE[family])
+        sizes[_LAG] *= self.slower
+        return np.asarray(sizes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +181,9 @@ def usual_deviation(family: Family, of_channels: Sequence[tuple[Others, Deviatio
     stated[_GAIN] = CALIBRATION
     if not of_channels:
         return np.asarray(stated, dtype=np.float64)
-    seen = [robust_sd(shape) for shape in np.array([m.values / b.spread for b, m in of_channels]).T]
+    table = np.array(TOLERANCE[family])
+    off = np.array([m.values / b.tolerance(family) * table for b, m in of_channels])
+    seen = [robust_sd(shape) for shape in off.T]
     weights = np.array([CERTIFIED, len(of_channels)]) / (CERTIFIED + len(of_channels))
     usual = np.sqrt(weights @ np.square([stated, seen]))
     # The others say of gains alone that one is better than stated: each anchor is measured by tape anew.
@@ -221,5 +232,6 @@ def block_of(
 def _levers(beside: Others, usual: FloatArray) -> tuple[float, ...]:
     """What a sound channel is off by from the others' prediction (sd); `usual`, (k,): from the truth."""
     levers = beside.spread * usual
+    levers[_LAG] *= beside.slower
     levers[_CURVATURE] *= max(beside.curved / beside.spread, 1.0)
     return tuple(levers.tolist())

@@ -141,6 +141,10 @@ def beside(data: ChannelFamily, name: str, without: tuple[str, ...]) -> Others:
     expected_rms = float(np.sqrt(np.mean(expected**2))) + 1e-300
     spread = float(np.sqrt(1.0 + np.sum((weights * sizes / expected_rms) ** 2)))
     curved = float(np.sqrt(1.0 + np.sum((weights * (sizes / expected_rms) ** 2) ** 2)))
+    travels = np.sqrt(np.mean(data.signals**2, axis=1))
+    slower = (
+        max(float(np.median(travels) / (travels[place] + 1e-300)), 1.0) if data.lateral_m is not None else 1.0
+    )
     rough = data.step / np.sqrt(12.0) * float(np.sqrt(1.0 + np.sum(weights**2)))
     # The imperfections of the others are in the prediction.
     rows = [] if data.leaked is None else [data.leaked[place] - weights @ data.leaked[others]]
@@ -153,6 +157,7 @@ def beside(data: ChannelFamily, name: str, without: tuple[str, ...]) -> Others:
         data.pick,
         spread,
         curved,
+        slower,
         rough,
         data.repeats,
         data.further,
@@ -215,7 +220,7 @@ def _share(other: Others, family: Family) -> tuple[float, float]:
     values = inverse @ difference
     covariance = coefficient_covariance(difference - columns @ values, inverse, other.pick, columns.shape[1])
     k = len(TOLERANCE[family])
-    usual = np.diag((other.spread * np.array(TOLERANCE[family])) ** 2)
+    usual = np.diag(other.tolerance(family) ** 2)
     gain = np.linalg.solve(covariance[:k, :k] + usual, covariance[:k, -1])
     variance = covariance[-1, -1] - gain @ covariance[:k, -1]
     return float(values[-1] - gain @ values[:k]), float(np.sqrt(max(variance, 0.0)))

@@ -245,7 +245,7 @@ def _sizes(
         table = {name: deviation(other) for name, other in rows_beside.items()}
         usual = usual_remains([misfit.remains for misfit in table.values()])
         for name, misfit in table.items():
-            tolerance = np.array(TOLERANCE[family]) * rows_beside[name].spread
+            tolerance = rows_beside[name].tolerance(family)
             sizes = _errors(misfit.values, misfit.covariance + np.diag(tolerance**2))
             if shape:
                 rows.setdefault(name, []).append(float(sizes[SHAPES[family].index(shape)]))

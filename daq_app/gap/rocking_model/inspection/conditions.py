@@ -1,4 +1,4 @@
-"""What the electronics do to a channel, seen in its own samples: hum, quantisation, frozen samples, spikes.
+"""What the electronics do to a channel, seen in its own samples: hum, steps, frozen and lone ones, clipping.
 
 None of these needs a fit of the wall. Each becomes a finding: a number with its error that is zero on a
 healthy channel, and which only the effect of that name predicts to be anything else.
@@ -28,13 +28,20 @@ from daq_app.gap.rocking_model.inspection.spikes import (
 )
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.tolerances.inspection import (
+    ACCELEROMETER_STEP,
+    CLIPPED_SAMPLES,
+    CLIPPED_TOPS,
     FROZEN_S,
     FROZEN_SD,
     GOES_ON_STEPS,
+    INSIDE_RANGE,
+    LIMIT_SD,
     LOUD,
     LOUD_SD,
     RANGE_MARGIN,
+    SHOCK_IN_NOISE,
     SPIKES_SD_PER_S,
+    STANDS_BETWEEN_STEPS,
     STANDS_OUT,
     STEP_SD,
 )
@@ -56,6 +63,8 @@ class Condition:
     step_si: float = 0.0
     frozen_share: float = 0.0
     lone: LoneSamples = NO_LONE_SAMPLES
+    limit_si: float = 0.0
+    """Reading that an accelerometer goes no further than; 0 where it goes as far as it should."""
     noise_si: float = 0.0
     """Rms noise of one reading: that of this record or the declared one, whichever is larger."""
 
@@ -71,16 +80,41 @@ def inspect_channel(run: GapRun, index: int, still: Mask, shaken: Mask | None = 
         return Condition()
     rate, accelerometer = run.rate_hz, run.sensors[index].family == "accelerometer"
     hum, hum_sd, wave = hum_of(values, rate)
-    usual = reading_noise(run, index)
+    usual, limits = reading_noise(run, index), run.sensors[index].range_si
     clean = values if wave is None else values - wave
     if accelerometer:
-        lone = NO_LONE_SAMPLES if shaken is None else lone_samples(clean, usual, rate, still, ~shaken)
-        return Condition(hum, hum_sd, wave, lone=lone, noise_si=usual)
+        step, limit = _step_beside_shocks(values, limits), _clips_at(values, usual, limits)
+        lone = NO_LONE_SAMPLES
+        if shaken is not None and step == 0.0:
+            lone = lone_samples(clean, usual, rate, still, ~shaken)
+        return Condition(hum, hum_sd, wave, step, lone=lone, limit_si=limit, noise_si=usual)
     step = coarse_step(values, run.sensors[index].noise_si)
-    frozen = _frozen(values, rate, step, run.sensors[index].range_si)
+    frozen = _frozen(values, rate, step, limits)
     # A channel that rests at the end of its range shows no noise there.
     lone = lone_samples(clean, usual, rate, still) if step == 0.0 and frozen == 0.0 else NO_LONE_SAMPLES
-    return Condition(hum, hum_sd, wave, step, frozen, lone, usual)
+    return Condition(hum, hum_sd, wave, step, frozen, lone, noise_si=usual)
+
+
+def _step_beside_shocks(values: FloatArray, limits: tuple[float, float]) -> float:
+    """Step of an accelerometer's reading, of which a shock takes many at once; 0 for a converter's own."""
+    step = resolution(values)
+    coarse = step > ACCELEROMETER_STEP * (limits[1] - limits[0])
+    return step if coarse and np.mean(np.diff(values) == 0.0) > STANDS_BETWEEN_STEPS else 0.0
+
+
+def _clips_at(values: FloatArray, noise: float, limits: tuple[float, float]) -> float:
+    """Size of the reading at which the tops of an accelerometer are flat, inside its range; 0 for none.
+
+    A shock has one largest sample, or two. One that clips has many that are as large as all others.
+    """
+    size = np.abs(values)
+    largest = float(size.max())
+    if largest < SHOCK_IN_NOISE * noise or largest > INSIDE_RANGE * min(abs(end) for end in limits):
+        return 0.0
+    at_top = size > largest - 1.5 * resolution(values)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], at_top.astype(np.int8), [0]])))
+    flat = int(np.sum(edges[1::2] - edges[::2] >= CLIPPED_SAMPLES))
+    return largest if flat >= CLIPPED_TOPS else 0.0
 
 
 def _frozen(values: FloatArray, rate_hz: float, step: float, limits: tuple[float, float]) -> float:
@@ -143,13 +177,13 @@ def findings_per_run(
         if not ids:
             continue
         noise = float(np.median([[c.noise_si for c in row] for row in rows]))
-        for run_findings in findings:
-            run_findings += _loud(ids, rows, noise)
+        for run_findings, of_run in zip(findings, rows, strict=True):
+            run_findings += [*_loud(ids, rows, noise), *_clipped(ids, of_run)]
         # Every channel has a lone sample now and then: what counts is how many it has in all runs.
         spiky = [often_alone([c.lone for c in of_channel]) for of_channel in zip(*rows, strict=True)]
         seen = [[_seen(c, often) for c, often in zip(row, spiky, strict=True)] for row in rows]
         for name, words in _WORDS.items():
-            if family == "accelerometer" and name not in ("hum", "spikes"):
+            if family == "accelerometer" and name == "dropout":
                 continue
             cells = [[of_channel[name] for of_channel in row] for row in seen]
             unit = _UNITS.get(name, of_family)
@@ -169,6 +203,13 @@ def _loud(ids: Sequence[str], rows: Sequence[Sequence[Condition]], usual: float)
         if factor > LOUD and not any(c.step_si for c in of_channel):
             findings.append(RunFinding(f"noise@{name}", "noise", "1", factor, LOUD_SD * factor))
     return findings
+
+
+def _clipped(ids: Sequence[str], row: Sequence[Condition]) -> list[RunFinding]:
+    """The accelerometers that clip in one run: the inverse of their limits."""
+    seen = ((name, 1.0 / c.limit_si) for name, c in zip(ids, row, strict=True) if c.limit_si > 0.0)
+    words, unit = "inverse of the limit", "s²/m"
+    return [RunFinding(f"saturation@{name}", words, unit, value, LIMIT_SD * value) for name, value in seen]
 
 
 _WORDS = {

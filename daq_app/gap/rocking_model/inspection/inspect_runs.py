@@ -73,7 +73,13 @@ def inspect(runs: Sequence[GapRun]) -> Cleaned:
     # Readings that stand still or go in steps must be seen as they were; all else is put on one clock.
     clean = [without_hum(run, c).at_clock() for run, c in zip(mended, conditions, strict=True)]
     families: dict[str, Family] = {s.id: s.family for s in runs[0].sensors}
-    clean = [run.excluding(_spoiled(findings, families)) for run in clean]
+    stairs = [
+        name
+        for row in conditions
+        for name, c in row.items()
+        if c.step_si and families[name] == "accelerometer"
+    ]
+    clean = [run.excluding([*_spoiled(findings, families), *stairs]) for run in clean]
     return Cleaned(clean, merged(findings, [_wiring_findings(wiring, families)] * len(clean)), wiring)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from daq_app.gap.core.features import FloatArray
 from daq_app.gap.rocking_model.features.block import Block
-from daq_app.gap.rocking_model.features.channel_shapes import TOLERANCE, Others, block_of, deviation
+from daq_app.gap.rocking_model.features.channel_shapes import Others, block_of, deviation
 from daq_app.gap.rocking_model.inspection.channel_families import smoothed
 from daq_app.gap.rocking_model.motion.crosstalk import crosstalk
 from daq_app.gap.rocking_model.motion.motion_grid import Grid
@@ -36,7 +36,7 @@ def odd_vertical(runs: Sequence[GapRun], grids: Sequence[Grid], late_s: Sequence
             misfit = deviation(beside)
             # On one edge such a place hardly moves, so that a gain and a curvature look much alike here:
             # together they say what neither says alone.
-            tolerance = np.diag((np.array(TOLERANCE["accelerometer"]) * beside.spread) ** 2)
+            tolerance = np.diag(beside.tolerance("accelerometer") ** 2)
             square = misfit.values @ np.linalg.solve(misfit.covariance + tolerance, misfit.values)
             sizes.setdefault(name, []).append(float(np.sqrt(square)))
     usual = {name: float(np.median(values)) for name, values in sizes.items()}

@@ -69,6 +69,43 @@ FLAT_TOP = 0.985
 Raising it leaves too few samples of a top to be called flat.
 """
 
+ACCELEROMETER_STEP = 1e-3
+"""Step of an accelerometer's reading over its range, 1, up to which it is the converter's own: ten bits.
+
+Raising it overlooks fine steps.
+"""
+
+STANDS_BETWEEN_STEPS = 0.5
+"""Share of samples, 1, at which a reading in coarse steps stays (assumed).
+
+Raising it overlooks steps that noise takes now and then.
+"""
+
+CLIPPED_SAMPLES = 3
+"""Samples in a row, 1, within a step of its largest reading that make a top of an accelerometer flat.
+
+Shocks of 2 ms and more lie a per cent and more below their top on both sides of it. Raising it passes over
+sensors that clip the very tops of their shocks.
+"""
+
+CLIPPED_TOPS = 5
+"""Flat tops in a run, 1, from which an accelerometer clips (assumed).
+
+Raising it passes over sensors that clip in the hardest impacts alone.
+"""
+
+SHOCK_IN_NOISE = 10.0
+"""Largest reading of an accelerometer over its noise, 1, below which it has no shocks that could be clipped.
+
+Raising it passes over sensors that clip at a few tenths of a metre per second squared.
+"""
+
+INSIDE_RANGE = 0.9
+"""Share of its range, 1, from which an accelerometer may end (assumed): beyond it shocks clip in any sensor.
+
+Raising it blames accelerometers that go as far as their data sheet says.
+"""
+
 SHORTEST_TOP_S = 0.05
 """Time, s, that a channel must be at its top for it to be looked at (assumed).
 

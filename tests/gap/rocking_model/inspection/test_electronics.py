@@ -103,3 +103,17 @@ def test_channels_that_are_half_as_noisy_again_are_ordinary() -> None:
     (weaker,) = findings_of(prepare(simulate({"noise@LV-A05": {"factor": 2.5}}, LEVELS))[0])
     assert not weaker.material
     assert not findings_of(prepare(simulate({"noise@LV-A05": {"factor": 1.5}}, LEVELS))[0])
+
+
+def test_accelerometers_that_read_in_steps_are_named_and_left_out() -> None:
+    """Between two steps of all of them nothing is left to look for a shaking floor in."""
+    runs = simulate({}, LEVELS)
+    for run in runs:
+        places = run.indices("accelerometer", "x")
+        low, high = run.sensors[places[0]].range_si
+        step = 0.02 * (high - low)
+        run.channels[places] = step * np.round(run.channels[places] / step)
+    prepared = prepare(runs)[0]
+    assert conditions_found(prepared) == {"quantisation@accelerometer"}
+    (found,) = (f for f in findings_of(prepared) if f.name == "quantisation@accelerometer")
+    assert found.size == pytest.approx(step) and found.material

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from daq_app.gap.rocking_model.findings import findings_of
 from daq_app.gap.rocking_model.inspection.saturation import saturated
 from daq_app.gap.rocking_model.study import prepare
 from tests.support.gap.conditions import conditions_found
@@ -65,3 +68,22 @@ def test_wires_that_drift_do_not_make_lvdts_stop_short() -> None:
     fault = {"drift@wire": {"rate": -2.4e-3}, "bounce": {"tau": 0.0095}}
     _, findings = saturated(simulate(fault, (0.4,)))
     assert [finding.value for finding in findings[0]] == [0.0, 0.0]
+
+
+def test_an_accelerometer_that_clips_its_shocks_is_found_and_left_out() -> None:
+    """Far inside its range; one that clips at its range, and sound ones beside it, are not."""
+    runs = []
+    for run in simulate({}, (0.35, -0.4)):
+        channels, sensors = run.channels.copy(), list(run.sensors)
+        for name, share in (("AC-3", 0.4), ("AC-7", 0.5)):
+            place = run.place(name)
+            limit = share * float(np.abs(channels[place]).max())
+            channels[place] = np.clip(channels[place], -limit, limit)
+            if name == "AC-7":
+                sensors[place] = replace(sensors[place], range_si=(-limit, limit))
+        runs.append(replace(run, channels=channels, sensors=tuple(sensors)))
+    prepared = prepare(runs)[0]
+    assert conditions_found(prepared) == {"saturation@AC-3"}
+    (found,) = (f for f in findings_of(prepared) if f.name == "saturation@AC-3")
+    assert found.unit == "m/s²" and found.material
+    assert "AC-3 goes no further than" in found.words

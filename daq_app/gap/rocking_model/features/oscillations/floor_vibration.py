@@ -117,6 +117,8 @@ def quiet_record(run: GapRun, grid: Grid, ring: Ring | None) -> QuietRecord | No
     columns[:, 2:] /= np.abs(columns[:, 2:]).max(axis=0) + 1e-30
     basis, _ = np.linalg.qr(columns[:, np.any(columns != 0.0, axis=0)])
     measured = np.array([gridded(run, i)[pick] for i in chosen])
+    if np.ptp(measured, axis=1).max() == 0.0:
+        return None  # between two steps of their converters they say nothing
     return QuietRecord(grid.time_s[pick], measured - (measured @ basis) @ basis.T, basis)
 
 
