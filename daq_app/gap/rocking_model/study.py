@@ -13,6 +13,7 @@ from daq_app.gap.core.result import Decision, Verdict
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.run_features import Examined, examine
 from daq_app.gap.rocking_model.features.run_findings import RunFinding
+from daq_app.gap.rocking_model.features.straightness import equally_straight
 from daq_app.gap.rocking_model.findings import findings_of
 from daq_app.gap.rocking_model.inspection.inspect_runs import (
     Cleaned,
@@ -90,7 +91,7 @@ def _examined(cleaned: Cleaned, stated: Sequence[str]) -> tuple[list[RockingRun]
     for entry in examined:
         limits += entry.features.notes
     runs_of_all = completed(examined, findings_of_all, channels, inspected.wiring)
-    whole = [on_its_base(on_its_floor(run)) for run in runs_of_all]
+    whole = [on_its_base(on_its_floor(run)) for run in equally_straight(runs_of_all)]
     limits += [
         f"{name} disagrees with the other {lone.family} channels; it is examined on its own."
         for name, lone in channels.items()

@@ -69,6 +69,8 @@ class RockingRun:
     """What a full crosstalk adds to a reference rotation that is read from wires, (m,), rad; else empty."""
     lvdt_range_m: tuple[float, float] = (math.nan, math.nan)
     """Least and largest reading of the LVDTs; NaN where it is not known."""
+    lvdt_curves: float = math.nan
+    """Sd by which one LVDT is not straight, over half of its range; NaN where the run does not show it."""
     wiring: Wiring = field(default_factory=Wiring)
     """What was put right in all runs before anything was read from them."""
     findings: tuple[RunFinding, ...] = ()

@@ -1,25 +1,37 @@
-"""How far LVDTs are from straight: what the face that opens adds to the rotation, beside its gain."""
+"""How far LVDTs are from straight: what the face that opens adds to the rotation, beside its gain.
+
+How far single ones are shows in what those of one face differ by; their mean may be off by that over the root
+of their number, or by what all sensors of one make have in common.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Final
 
 import numpy as np
 
 from daq_app.gap.core import Parameter
-from daq_app.gap.core.features import FloatArray
+from daq_app.gap.core.features import FloatArray, robust_sd
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
+from daq_app.gap.rocking_model.motion.rotation import gridded
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances.sensors import LVDT_STRAIGHT
+from daq_app.gap.rocking_model.tolerances.sensors import LVDT_STRAIGHT, LVDTS_ALIKE
 
 _FORMS: Final[dict[str, Callable[[FloatArray], FloatArray]]] = {
     "square": lambda x: np.asarray(1.5 * x**2),
     "cube": lambda x: np.asarray(2.5 * x**3 - 1.5 * x),
 }
 """Legendre's polynomials over the range, −1 to 1, less constants: no straight line has a part in them."""
+
+
+_FEWEST: Final = 4
+"""LVDTs of a face whose differences say how straight one of them is."""
+_SHORTEST: Final = 100
+"""Readings of the grid at which a face is open."""
 
 
 def straightness(faces: Mapping[str, str]) -> tuple[Parameter, ...]:
@@ -45,6 +57,37 @@ def lvdt_range(run: GapRun) -> tuple[float, float]:
     return low, high
 
 
+def lvdt_curves(run: GapRun, theta: FloatArray) -> float:
+    """Sd of what an LVDT differs by from its face in each form, over half of the range; NaN for too few.
+
+    `theta` (m,), rad, is the rotation on the grid.
+    """
+    low, high = lvdt_range(run)
+    half, middle = 0.5 * (high - low), 0.5 * (high + low)
+    sizes: list[float] = []
+    for side in (-1.0, 1.0):
+        places = [
+            i for i in run.indices("lvdt") if side * run.sensors[i].position_m[0] > 0.0 and run.reads(i)
+        ]
+        opens = side * theta < 0.0
+        if len(places) < _FEWEST or opens.sum() < _SHORTEST or not np.isfinite(half):
+            continue
+        signals = np.array([gridded(run, place)[opens] for place in places])
+        face = np.median(signals, axis=0)
+        shapes = [form((face - middle) / half) for form in _FORMS.values()]
+        design = np.column_stack([*shapes, face, np.ones_like(face)])
+        found = np.linalg.lstsq(design, (signals - face).T, rcond=None)[0][: len(shapes)]
+        sizes += (found / half).ravel().tolist()
+    return float(robust_sd(np.array(sizes))) if sizes else math.nan
+
+
+def equally_straight(runs: Sequence[RockingRun]) -> list[RockingRun]:
+    """The runs of one campaign, whose LVDTs are as straight in all: as the largest release shows it."""
+    seen = max(runs, key=lambda run: abs(run.swings.peak_rad[0])).lvdt_curves
+    size = LVDT_STRAIGHT if math.isnan(seen) else max(seen, LVDTS_ALIKE * LVDT_STRAIGHT)
+    return [replace(run, lvdt_curves=size) for run in runs]
+
+
 def not_straight(
     run: RockingRun, values: Mapping[str, float], theta: FloatArray, name: str
 ) -> FloatArray | float:
@@ -65,10 +108,14 @@ def not_straight(
 
 
 def _shape(run: RockingRun, form: str, theta: FloatArray) -> FloatArray:
-    """What one per half of the range of a form adds to rotations, rad; of the shape of `theta`."""
+    """What a form that is one over half of the range adds to rotations, rad; of the shape of `theta`.
+
+    Where LVDTs are straighter than the table says, a parameter of one stands for as much less.
+    """
     low, high = run.lvdt_range_m
     half, middle = 0.5 * (high - low), 0.5 * (high + low)
     opened = 2.0 * run.survey.half_base_m * np.abs(theta)
     of = _FORMS[form]
     shape = of((opened - middle) / half) - of(np.array(-middle / half))
-    return np.asarray(np.sign(theta) * half * shape / (2.0 * run.survey.half_base_m))
+    size = half * run.lvdt_curves / LVDT_STRAIGHT
+    return np.asarray(np.sign(theta) * size * shape / (2.0 * run.survey.half_base_m))

@@ -38,8 +38,15 @@ a wire that is scanned after an LVDT.
 LVDT_STRAIGHT = 2e-3
 """Sd, over half of the range, 1, of the square and of the cube by which one LVDT is not straight.
 
-Assumed: 0.1 % of the range, where data sheets state 0.25 % at most. Raising it hides springs, cables and
-edges that change the times of large swings by less than a thousandth.
+Assumed: 0.1 % of the range, where data sheets state 0.25 % at most. It counts where too few LVDTs read to
+show how straight they are. Raising it hides springs, cables and edges that change the times of large swings
+by less than a thousandth.
+"""
+
+LVDTS_ALIKE = 0.25
+"""Share of that, 1, which LVDTs of one make may have in common, however little they differ (assumed).
+
+Raising it hides the same, and edges of which one is round.
 """
 
 PLAY_RAD = 1e-4
