@@ -95,7 +95,7 @@ def not_straight(
 
     `name` is that of these rotations, which are always the same ones in a run.
     """
-    if run.reference != "lvdt" or not np.isfinite(run.lvdt_range_m[1]):
+    if run.reference != "lvdt" or not np.isfinite(run.lvdt_curves * run.lvdt_range_m[1]):
         return 0.0
     added: FloatArray = np.zeros_like(theta)
     for form in _FORMS:
