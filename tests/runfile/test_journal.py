@@ -128,14 +128,15 @@ def test_failed_flush_acknowledges_nothing_ever_after(
 def test_slow_flush_is_reported_and_does_not_stop_appending(
     tmp_path: Path, header: RunHeader, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    released = threading.Event()
+    begun, released = threading.Event(), threading.Event()
     real = journal.fsync_data
     writer = JournalWriter(tmp_path / "run.journal", header)
-    monkeypatch.setattr(journal, "fsync_data", lambda fd: (released.wait(30), real(fd)))
+    monkeypatch.setattr(journal, "fsync_data", lambda fd: (begun.set(), released.wait(30), real(fd)))
     writer.append_block(0, np.ones((4, 10)))
     with pytest.raises(JournalSlowDisk, match=r"for 0\.01 s") as caught:
         writer.sync(timeout_s=0.01)
     assert caught.value.safe_sample == 0
+    assert begun.wait(30)
     writer.append_block(10, np.ones((4, 10)))
     released.set()
     assert writer.sync(timeout_s=30) == 10  # the flush that was under way did not promise the later block
