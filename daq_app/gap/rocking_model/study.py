@@ -91,7 +91,8 @@ def _examined(cleaned: Cleaned, stated: Sequence[str]) -> tuple[list[RockingRun]
     for entry in examined:
         limits += entry.features.notes
     runs_of_all = completed(examined, findings_of_all, channels, inspected.wiring)
-    whole = [on_its_base(on_its_floor(run)) for run in equally_straight(runs_of_all)]
+    runs_of_all = equally_straight(runs_of_all, [entry.run for entry in examined])
+    whole = [on_its_base(on_its_floor(run)) for run in runs_of_all]
     limits += [
         f"{name} disagrees with the other {lone.family} channels; it is examined on its own."
         for name, lone in channels.items()

@@ -16,7 +16,7 @@ from daq_app.gap.rocking_model.prediction.usual import of_bed
 from daq_app.gap.rocking_model.prediction.vector import half_cycle_table, kernel_vector
 from daq_app.gap.rocking_model.records import GapRun
 from daq_app.gap.rocking_model.study import diagnose_runs, model_and_library, prepare
-from daq_app.gap.rocking_model.tolerances.sensors import LVDT_STRAIGHT, LVDTS_ALIKE
+from daq_app.gap.rocking_model.tolerances.sensors import STRAIGHTEST_LVDT
 from sim_hardware.dynamics import parameters as par
 from tests.support.simulated_wall import simulate
 
@@ -86,7 +86,8 @@ def test_more_than_any_wall_has_is_a_cause(effect: dict[str, dict[str, float]], 
 def not_straight(runs: list[GapRun], share: float) -> list[GapRun]:
     """The same runs, whose LVDTs read an S beside the opening, of about this share of their range.
 
-    Those at x < 0 have half of that in common."""
+    Those at x < 0 have half of that in common.
+    """
     rng = np.random.default_rng(4)
     shares = {s.id: share * rng.standard_normal() for s in runs[0].sensors if s.family == "lvdt"}
     bent = []
@@ -118,4 +119,4 @@ def test_lvdts_that_are_not_straight_are_no_spring() -> None:
 
 def test_straight_lvdts_are_known_to_be_straight() -> None:
     runs, _ = prepare(simulate({}, (0.25, -0.35)))
-    assert {run.lvdt_curves for run in runs} == {LVDTS_ALIKE * LVDT_STRAIGHT}
+    assert {run.lvdt_curves for run in runs} == {STRAIGHTEST_LVDT}

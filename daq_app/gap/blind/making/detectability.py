@@ -133,8 +133,8 @@ def _in_the_fall(alone: World, course: Course, noise_si: FloatArray) -> float:
     for channel, signal, noise in zip(alone.rig.channels, signals, noise_si, strict=True):
         if channel.family != "accelerometer":
             per_rad = float((signal - np.median(signal)) @ turning / (turning @ turning))
-            square += float(np.sum((per_rad * left_rad / _sd(noise, signal)) ** 2))
-    return square
+            square += (per_rad / _sd(noise, signal)) ** 2
+    return square * float(left_rad @ left_rad)
 
 
 def _in_swings(motion: Followed, wall: Wall, at_rest: bool) -> float:

@@ -22,7 +22,7 @@ LET_GO: Final = {"initial_velocity", "slow_release"}
 """Effects that are nothing but another start of the fall."""
 _STEP_RAD: Final = 1e-4
 _SCALES: Final = np.array([1e-3, 1e-5])
-"""Of the time, s, and the rotation, rad, at which a wall is let go."""
+"""Units of the search: in them it counts the time, s, and the rotation, rad, at which the wall is let go."""
 
 
 def left_by_a_release_at_rest(motion: Followed, wall: Wall, time_s: FloatArray) -> FloatArray:

@@ -70,7 +70,7 @@ class RockingRun:
     lvdt_range_m: tuple[float, float] = (math.nan, math.nan)
     """Least and largest reading of the LVDTs; NaN where it is not known."""
     lvdt_curves: float = math.nan
-    """Sd by which one LVDT is not straight, over half of its range; NaN where the run does not show it."""
+    """Sd by which one LVDT is not straight, over half of that range; NaN where they count as straight."""
     wiring: Wiring = field(default_factory=Wiring)
     """What was put right in all runs before anything was read from them."""
     findings: tuple[RunFinding, ...] = ()

@@ -15,7 +15,6 @@ from daq_app.gap.rocking_model.features.families.wires import leaked_turn
 from daq_app.gap.rocking_model.features.family import Scene
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.features.slips.base_walk import beside_slips
-from daq_app.gap.rocking_model.features.straightness import lvdt_curves, lvdt_range
 from daq_app.gap.rocking_model.motion import swings as sw
 from daq_app.gap.rocking_model.motion.hold import from_hold
 from daq_app.gap.rocking_model.motion.motion_grid import make_grid
@@ -96,8 +95,6 @@ def examine(run: GapRun, reference: str = "") -> Examined:
         np.zeros((len(rows), 0)),
         notes,
         wires=wires_of(run),
-        lvdt_range_m=lvdt_range(run),
-        lvdt_curves=lvdt_curves(run, grid.theta),
         leaked=leaked_turn(run) if reference == "wire" else np.zeros(0),
     )
     return Examined(run, joint, features.with_blocks(blocks), wanted)

@@ -1,7 +1,7 @@
 """How far LVDTs are from straight: what the face that opens adds to the rotation, beside its gain.
 
-How far single ones are shows in what those of one face differ by; their mean may be off by that over the root
-of their number, or by what all sensors of one make have in common.
+How far a single one is shows in what those of one face differ by; the mean of a face is off by that over the
+root of their number.
 """
 
 from __future__ import annotations
@@ -19,15 +19,13 @@ from daq_app.gap.core.features import FloatArray, robust_sd
 from daq_app.gap.rocking_model.features.rocking_run import RockingRun
 from daq_app.gap.rocking_model.motion.rotation import gridded
 from daq_app.gap.rocking_model.records import GapRun
-from daq_app.gap.rocking_model.tolerances.sensors import LVDT_STRAIGHT, LVDTS_ALIKE
+from daq_app.gap.rocking_model.tolerances.sensors import LVDT_STRAIGHT, STRAIGHTEST_LVDT
 
 _FORMS: Final[dict[str, Callable[[FloatArray], FloatArray]]] = {
     "square": lambda x: np.asarray(1.5 * x**2),
     "cube": lambda x: np.asarray(2.5 * x**3 - 1.5 * x),
 }
 """Legendre's polynomials over the range, −1 to 1, less constants: no straight line has a part in them."""
-
-
 _FEWEST: Final = 4
 """LVDTs of a face whose differences say how straight one of them is."""
 _SHORTEST: Final = 100
@@ -49,7 +47,7 @@ def straightness(faces: Mapping[str, str]) -> tuple[Parameter, ...]:
     )
 
 
-def lvdt_range(run: GapRun) -> tuple[float, float]:
+def _range(run: GapRun) -> tuple[float, float]:
     """Range of the LVDTs, m, in the median; NaN where none has one."""
     ranges = [run.sensors[place].range_si for place in run.indices("lvdt")]
     known = [each for each in ranges if np.all(np.isfinite(each))]
@@ -57,20 +55,19 @@ def lvdt_range(run: GapRun) -> tuple[float, float]:
     return low, high
 
 
-def lvdt_curves(run: GapRun, theta: FloatArray) -> float:
+def _differ_by(run: GapRun, theta: FloatArray, ends_m: tuple[float, float]) -> float:
     """Sd of what an LVDT differs by from its face in each form, over half of the range; NaN for too few.
 
     `theta` (m,), rad, is the rotation on the grid.
     """
-    low, high = lvdt_range(run)
-    half, middle = 0.5 * (high - low), 0.5 * (high + low)
+    half, middle = 0.5 * (ends_m[1] - ends_m[0]), 0.5 * (ends_m[1] + ends_m[0])
     sizes: list[float] = []
     for side in (-1.0, 1.0):
         places = [
             i for i in run.indices("lvdt") if side * run.sensors[i].position_m[0] > 0.0 and run.reads(i)
         ]
         opens = side * theta < 0.0
-        if len(places) < _FEWEST or opens.sum() < _SHORTEST or not np.isfinite(half):
+        if len(places) < _FEWEST or opens.sum() < _SHORTEST:
             continue
         signals = np.array([gridded(run, place)[opens] for place in places])
         face = np.median(signals, axis=0)
@@ -81,11 +78,18 @@ def lvdt_curves(run: GapRun, theta: FloatArray) -> float:
     return float(robust_sd(np.array(sizes))) if sizes else math.nan
 
 
-def equally_straight(runs: Sequence[RockingRun]) -> list[RockingRun]:
-    """The runs of one campaign, whose LVDTs are as straight in all: as the largest release shows it."""
-    seen = max(runs, key=lambda run: abs(run.swings.peak_rad[0])).lvdt_curves
-    size = LVDT_STRAIGHT if math.isnan(seen) else max(seen, LVDTS_ALIKE * LVDT_STRAIGHT)
-    return [replace(run, lvdt_curves=size) for run in runs]
+def equally_straight(runs: Sequence[RockingRun], recorded: Sequence[GapRun]) -> list[RockingRun]:
+    """The runs of a campaign, whose LVDTs are in all as straight as its largest release shows them.
+
+    `recorded` are the runs that these were examined from, in the same order.
+    """
+    largest = max(range(len(runs)), key=lambda k: abs(runs[k].swings.peak_rad[0]))
+    ends_m = _range(recorded[largest])
+    if math.isnan(ends_m[0]):
+        return list(runs)
+    seen = _differ_by(recorded[largest], runs[largest].grid.theta, ends_m)
+    size = LVDT_STRAIGHT if math.isnan(seen) else max(seen, STRAIGHTEST_LVDT)
+    return [replace(run, lvdt_range_m=ends_m, lvdt_curves=size) for run in runs]
 
 
 def not_straight(
@@ -95,7 +99,7 @@ def not_straight(
 
     `name` is that of these rotations, which are always the same ones in a run.
     """
-    if run.reference != "lvdt" or not np.isfinite(run.lvdt_curves * run.lvdt_range_m[1]):
+    if run.reference != "lvdt" or math.isnan(run.lvdt_curves):
         return 0.0
     added: FloatArray = np.zeros_like(theta)
     for form in _FORMS:

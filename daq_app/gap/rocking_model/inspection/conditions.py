@@ -31,6 +31,7 @@ from daq_app.gap.rocking_model.tolerances.inspection import (
     ACCELEROMETER_STEP,
     CLIPPED_SAMPLES,
     CLIPPED_TOPS,
+    FLAT_TOP,
     FROZEN_S,
     FROZEN_SD,
     GOES_ON_STEPS,
@@ -97,9 +98,10 @@ def inspect_channel(run: GapRun, index: int, still: Mask, shaken: Mask | None = 
 
 def _step_beside_shocks(values: FloatArray, limits: tuple[float, float]) -> float:
     """Step of an accelerometer's reading, of which a shock takes many at once; 0 for a converter's own."""
+    if np.mean(np.diff(values) == 0.0) < STANDS_BETWEEN_STEPS:
+        return 0.0
     step = resolution(values)
-    coarse = step > ACCELEROMETER_STEP * (limits[1] - limits[0])
-    return step if coarse and np.mean(np.diff(values) == 0.0) > STANDS_BETWEEN_STEPS else 0.0
+    return step if step > ACCELEROMETER_STEP * (limits[1] - limits[0]) else 0.0
 
 
 def _clips_at(values: FloatArray, noise: float, limits: tuple[float, float]) -> float:
@@ -110,6 +112,8 @@ def _clips_at(values: FloatArray, noise: float, limits: tuple[float, float]) -> 
     size = np.abs(values)
     largest = float(size.max())
     if largest < SHOCK_IN_NOISE * noise or largest > INSIDE_RANGE * min(abs(end) for end in limits):
+        return 0.0
+    if np.count_nonzero(size > FLAT_TOP * largest) < CLIPPED_SAMPLES * CLIPPED_TOPS:
         return 0.0
     at_top = size > largest - 1.5 * resolution(values)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], at_top.astype(np.int8), [0]])))

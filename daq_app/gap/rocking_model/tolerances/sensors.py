@@ -43,8 +43,9 @@ show how straight they are. Raising it hides springs, cables and edges that chan
 by less than a thousandth.
 """
 
-LVDTS_ALIKE = 0.25
-"""Share of that, 1, which LVDTs of one make may have in common, however little they differ (assumed).
+STRAIGHTEST_LVDT = 5e-4
+"""The same sd, 1, that one LVDT has at least, however little those of a face differ (assumed: 0.025 % of the
+range).
 
 Raising it hides the same, and edges of which one is round.
 """
