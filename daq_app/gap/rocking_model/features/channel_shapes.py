@@ -105,11 +105,14 @@ def shape_columns(beside: Others) -> FloatArray:
     """The shapes in which a channel may differ at the samples used, (n, k + 1); the last is its zero."""
     e = beside.expected
     rate = np.gradient(e, 1.0 / GRID_HZ)
+    used = e[beside.pick]
+    # Sound LVDTs are bent: their gain is the mean slope over the readings used, which a bend leaves as it is.
+    slope = float(used**2 @ used) / max(float(used @ used), 1e-300) if "rounding" in beside.further else 0.0
     return np.column_stack(
         [
             e,
             -rate,
-            e**2,
+            e**2 - slope * e,
             np.arange(e.size) / GRID_HZ,
             *(np.abs(e) if name == "side" else np.gradient(rate, 1.0 / GRID_HZ) for name in beside.further),
             np.ones_like(e),
