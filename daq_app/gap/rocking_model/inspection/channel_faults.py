@@ -13,12 +13,13 @@ from types import MappingProxyType
 import numpy as np
 
 from daq_app.config.rig import Family
-from daq_app.gap.core.features import FloatArray
+from daq_app.gap.core.features import FloatArray, robust_sd
 from daq_app.gap.rocking_model.features.block import Block
 from daq_app.gap.rocking_model.features.channel_shapes import (
     RINGING,
     SHAPES,
     TOLERANCE,
+    Deviation,
     Others,
     block_of,
     deviation,
@@ -38,6 +39,8 @@ from daq_app.gap.rocking_model.tolerances.inspection import AS_SINGLE, OTHERS_AG
 
 CROWDED: tuple[Family, ...] = ("lvdt", "accelerometer")
 """Families in which several channels may be wrong and the others still say so."""
+TELLING: tuple[Family, ...] = ("lvdt",)
+"""Families of so many channels that they themselves tell how much sound ones differ."""
 _POWERS = (1, 1, 2, 0, 1)
 """Power of its reading that each of a wire's shapes goes with. The wall's rotation θ adds height × f(θ) to
 every reading, and its base the same to all."""
@@ -244,9 +247,10 @@ def _sizes(
         rows_beside = {name: beside(entry, name, without) for name in entry.ids}
         table = {name: deviation(other) for name, other in rows_beside.items()}
         usual = usual_remains([misfit.remains for misfit in table.values()])
+        tolerances = {name: rows_beside[name].tolerance(family) for name in table}
+        wider = _wider(table, tolerances) if family in TELLING else 1.0
         for name, misfit in table.items():
-            tolerance = rows_beside[name].tolerance(family)
-            sizes = _errors(misfit.values, misfit.covariance + np.diag(tolerance**2))
+            sizes = _errors(misfit.values, misfit.covariance + np.diag((wider * tolerances[name]) ** 2))
             if shape:
                 rows.setdefault(name, []).append(float(sizes[SHAPES[family].index(shape)]))
                 continue
@@ -255,6 +259,17 @@ def _sizes(
                 usual = misfit.remains
             rows.setdefault(name, []).append(max(size, SUSPECT[family] * (misfit.remains - usual) / REMAINS))
     return {name: float(np.median(values)) for name, values in rows.items()}
+
+
+def _wider(table: Mapping[str, Deviation], tolerances: Mapping[str, FloatArray]) -> FloatArray:
+    """How many times the tolerance of each shape the channels of a family differ by, (k,); 1 at least.
+
+    Some laboratories have LVDTs that bend more than most, and drift as little as any.
+    """
+    off = np.array([misfit.values / tolerances[name] for name, misfit in table.items()])
+    noise = np.array([np.diag(misfit.covariance) / tolerances[name] ** 2 for name, misfit in table.items()])
+    seen = np.array([robust_sd(shape) for shape in off.T])
+    return np.asarray(np.sqrt(np.maximum(seen**2 - np.median(noise, axis=0), 1.0)))
 
 
 def _errors(values: FloatArray, covariance: FloatArray) -> FloatArray:

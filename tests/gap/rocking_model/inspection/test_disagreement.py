@@ -17,6 +17,7 @@ from tests.support.gap.play import behind
 from tests.support.simulated_wall import simulate
 
 LEVEL = (-0.35,)
+_BENDS_1_M = np.random.default_rng(5).uniform(-0.6, 0.6, 24).tolist()
 
 
 def _scaled(factors: dict[str, float], levels: tuple[float, ...] = LEVEL) -> list[GapRun]:
@@ -57,6 +58,26 @@ def test_two_channels_of_one_family_that_disagree_are_examined_one_by_one(factor
         assert f"gain@{name}" in library
         block = next(b for b in prepared[0].blocks if b.family == name)
         assert block.values[block.names.index("gain")] == pytest.approx(factor - 1.0, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("drift_m_s", "found"), [(4e-5, {"LV-A09": "lvdt"}), (0.0, {})], ids=["one drifts", "none does"]
+)
+def test_an_lvdt_that_drifts_is_found_among_lvdts_that_bend_more_than_most(
+    drift_m_s: float, found: dict[str, str]
+) -> None:
+    """Their readings are bent by up to 0.6 of themselves for each metre, each in its own way."""
+    runs = simulate({}, (-0.35, 0.3, -0.25))
+    bends_1_m = dict(zip((s.id for s in runs[0].sensors if s.family == "lvdt"), _BENDS_1_M, strict=True))
+    for run in runs:
+        time_s = np.arange(run.channels.shape[1]) / run.rate_hz
+        for name, bend_1_m in bends_1_m.items():
+            readings = run.channels[run.place(name)]
+            readings += bend_1_m * readings**2
+        run.channels[run.place("LV-A09")] += drift_m_s * time_s
+    prepared, _ = prepare(runs)
+    assert found_channels(prepared) == found
+    assert conditions_found(prepared) == set()
 
 
 @pytest.mark.parametrize("name", ["LV-A06", "LV-A01"])
