@@ -221,8 +221,8 @@ def _seen(configs: Path, tmp_path: Path, name: str, **parameters: float) -> floa
 
 
 def test_an_effect_is_as_visible_as_what_it_looks_like_is_known(configs: Path, tmp_path: Path) -> None:
-    """A pivot counts in half widths by tape, a gain in calibrations, a hum in what sound channels pick up, a
-    tilt in what a level leaves."""
+    """A pivot counts in half widths by tape, a gain in calibrations, that of all LVDTs in the distance of
+    their faces by tape, a hum in what sound channels pick up, a tilt in what a level leaves."""
     for tilt_rad, seen in ((3e-4, 1.0), (3e-3, 10.0)):
         assert 0.8 * seen < _seen(configs, tmp_path, "base_tilt", beta_rad=tilt_rad) <= seen
     for parameters, least, most in (({"a_m": 9e-3}, 2.9, 4.0), ({"a_m": 18e-3}, 5.9, 8.0)):
@@ -230,7 +230,11 @@ def test_an_effect_is_as_visible_as_what_it_looks_like_is_known(configs: Path, t
     hidden = dataclasses.replace(order(configs, tmp_path, "rough"), hidden="gain")
     world = draw_case(hidden, 1)[0]
     one = dataclasses.replace(world.effects[0], targets=("LV-A03",), parameters={"error": 0.012})
-    assert detectability(world, one) == pytest.approx(0.012 / 0.003, rel=0.05)
+    # One of 24 LVDTs, that tell the two numbers by tape as well.
+    assert detectability(world, one) == pytest.approx(0.012 / 0.003 * np.sqrt(22 / 24), rel=0.05)
+    lvdts = tuple(channel.id for channel in world.rig.channels if channel.family == "lvdt")
+    all_of_them = dataclasses.replace(one, targets=lvdts, parameters={"error": 0.03})
+    assert detectability(world, all_of_them) == pytest.approx(0.03 / (3e-3 / world.wall.half_width), rel=0.1)
     weak, strong = (_seen(configs, tmp_path, "hum", times_noise=size) for size in (0.1, 1.0))
     assert strong == pytest.approx(10.0 * weak)
     sizes = dict(world.surroundings.sizes)

@@ -4,10 +4,10 @@ An estimate in units of standard deviations, for sorting cases into weak and str
 two quiet twins of a run, with and without the effect, first in what swings and impacts show locally
 (duration and loss of a swing, speed against peak, restitution of an impact, against impact scatter
 and with α, p and r refitted), then in what the channels show beyond the motion (against their noise,
-with gain, offset and the half width of the base refitted as far as they are known to). A push and a slow
-release count against the release at rest that comes nearest. Hum counts against the hum that sound channels
-pick up, and a lean, a slope of r or a delay against what any wall and rig has of it. No diagnosis can see
-much more.
+with gain, offset, the half width of the base and the distance of the LVDTs' faces refitted as far as they
+are known to). A push and a slow release count against the release at rest that comes nearest. Hum counts
+against the hum that sound channels pick up, and a lean, a slope of r or a delay against what any wall and
+rig has of it. No diagnosis can see much more.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ _MODEL_SHARE: Final = 1e-3
 """Part of a channel's signal that nobody trusts."""
 _CLOCK_SD: Final = 1e-3
 _HALF_WIDTH_SD_M: Final = 3e-3
-"""A half width of the base as it is measured by tape (the default of the diagnosis's survey)."""
+"""A half width of the base, or half the distance of the LVDTs' faces, as it is measured by tape (the default
+of the diagnosis's survey)."""
 _USUAL: Final = {
     "alpha_asymmetry": ("delta_rad", 3e-4),
     "base_tilt": ("beta_rad", 3e-4),
@@ -214,8 +215,8 @@ def _over_ordinary_hum(world: World, effect: Drawn) -> float:
 
 
 def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatArray) -> list[FloatArray]:
-    """What each channel shows of the effect, a gain and a half width that are off by one sd, for one and the
-    same motion: (3, n) each, over its noise, the zero taken out."""
+    """What each channel shows of the effect, and of a gain, a half width and a distance of the LVDTs' faces
+    that are off by one sd, for one and the same motion: (4, n) each, over its noise, the zero taken out."""
     time_s = _times(course)
     place = Place(run.campaign_s + 600.0, abs(run.theta0))
     rng = np.random.default_rng(0)
@@ -223,7 +224,8 @@ def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatA
     with_effect = quiet_signals(alone.rig, scene, alone.faults, rng, place)
     plain = scene if alone.faults else course.plain(time_s)
     without = quiet_signals(alone.rig, plain, (), rng, place)
-    wider = replace(plain, pivot_x=plain.pivot_x * (1.0 + _HALF_WIDTH_SD_M / alone.wall.half_width))
+    by_tape = _HALF_WIDTH_SD_M / alone.wall.half_width
+    wider = replace(plain, pivot_x=plain.pivot_x * (1.0 + by_tape))
     of_half_width = quiet_signals(alone.rig, wider, (), rng, place)
     found = []
     for row, channel in enumerate(alone.rig.channels):
@@ -233,8 +235,14 @@ def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatA
         noise = noise_si[row] * rng.standard_normal(time_s.size)
         signal = through_electronics(with_effect[row] + noise, alone.faults, bench)
         reference = without[row]
+        faces = by_tape * reference if channel.family == "lvdt" else np.zeros_like(reference)
         shown = np.vstack(
-            [signal - noise - reference, CALIBRATION_TOLERANCE * reference, of_half_width[row] - reference]
+            [
+                signal - noise - reference,
+                CALIBRATION_TOLERANCE * reference,
+                of_half_width[row] - reference,
+                faces,
+            ]
         )
         shown -= np.median(shown, axis=1, keepdims=True)
         found.append(shown / _sd(float(noise_si[row]), reference))
@@ -254,11 +262,11 @@ def _sd(noise_si: float, signal: FloatArray) -> float:
 def _evidence(channels: Sequence[FloatArray], stand_for: float) -> float:
     """Squared distance of an effect from none, of channels as `_in_channels` shows them in some runs.
 
-    Gains and half width are the same in all runs. Each of these runs stands for `stand_for` of them.
+    Gains, half width and faces are the same in all runs. Each of these runs stands for `stand_for` of them.
     """
-    square = across = of_width = 0.0
+    square, by_tape, known = 0.0, np.zeros(2), np.eye(2)
     for shown in channels:
         products = stand_for * (shown @ shown.T)
         left = products - np.outer(products[1], products[1]) / (1.0 + products[1, 1])
-        square, across, of_width = square + left[0, 0], across + left[0, 2], of_width + left[2, 2]
-    return float(square - across**2 / (1.0 + of_width))
+        square, by_tape, known = square + left[0, 0], by_tape + left[0, 2:], known + left[2:, 2:]
+    return float(square - by_tape @ np.linalg.solve(known, by_tape))
