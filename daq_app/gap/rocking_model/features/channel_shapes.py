@@ -106,7 +106,8 @@ def shape_columns(beside: Others) -> FloatArray:
     e = beside.expected
     rate = np.gradient(e, 1.0 / GRID_HZ)
     used = e[beside.pick]
-    # Sound LVDTs are bent: their gain is the mean slope over the readings used, which a bend leaves as it is.
+    # Sound LVDTs are bent, and they alone have a rounding. The gain of one is the mean slope over the
+    # readings used, which a bend leaves as it is.
     slope = float(used**2 @ used) / max(float(used @ used), 1e-300) if "rounding" in beside.further else 0.0
     return np.column_stack(
         [

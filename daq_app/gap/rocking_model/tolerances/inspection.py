@@ -250,8 +250,8 @@ LOUD_SD = 0.1
 SUSPECT: dict[Family, float] = {"lvdt": 3.5, "wire": 2.0, "accelerometer": 3.0}
 """What a channel must be off by, in what sound ones differ by (`channel_shapes.TOLERANCE`), to be suspect, 1.
 
-LVDTs that differ by more among themselves have that for a unit. Each wire is told from few others, so its
-tolerance is wide already. Raising it hides single channels.
+What LVDTs differ by among themselves is their unit where that is more. Each wire is told from few others,
+so its tolerance is wide already. Raising it hides single channels.
 """
 
 OTHERS_AGREE = 0.4
