@@ -6,6 +6,8 @@ the whole family does cancels.
 
 from __future__ import annotations
 
+import math
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -19,7 +21,6 @@ from daq_app.gap.rocking_model.features.channel_shapes import (
     RINGING,
     SHAPES,
     TOLERANCE,
-    Deviation,
     Others,
     block_of,
     deviation,
@@ -50,6 +51,8 @@ right, and a pivot 40 mm further in makes 0.02 of the square, whatever wires do.
 LOOKED_AT = 6
 """The channels that are off most, of which any may be the wrong one: at the end of a row it moves what its
 neighbours are predicted by more than they leave of its own fault."""
+_OF_MEDIAN = math.pi / 2.0
+"""Variance of the median of many values over that of their mean; that of two is their mean."""
 SCREENED = 3
 """Runs that are looked at before all are."""
 
@@ -241,35 +244,41 @@ def _misfit(data: ChannelFamily, without: str) -> float:
 def _sizes(
     data: Sequence[ChannelFamily], family: Family, without: tuple[str, ...], shape: str = ""
 ) -> dict[str, float]:
-    """How far off each channel is, in tolerances: the middle of all runs; in one shape, or in any."""
-    rows: dict[str, list[float]] = {}
+    """How far off each channel is, in tolerances: in the middle of all runs; in one shape, or in any."""
+    off, noise = defaultdict[str, list[FloatArray]](list), defaultdict[str, list[FloatArray]](list)
+    left = defaultdict[str, list[float]](list)
     for entry in data:
         rows_beside = {name: beside(entry, name, without) for name in entry.ids}
         table = {name: deviation(other) for name, other in rows_beside.items()}
         usual = usual_remains([misfit.remains for misfit in table.values()])
-        tolerances = {name: rows_beside[name].tolerance(family) for name in table}
-        wider = _wider(table, tolerances) if family in TELLING else 1.0
         for name, misfit in table.items():
-            sizes = _errors(misfit.values, misfit.covariance + np.diag((wider * tolerances[name]) ** 2))
-            if shape:
-                rows.setdefault(name, []).append(float(sizes[SHAPES[family].index(shape)]))
-                continue
-            size = float(sizes.max())
-            if family in RINGING:
-                usual = misfit.remains
-            rows.setdefault(name, []).append(max(size, SUSPECT[family] * (misfit.remains - usual) / REMAINS))
-    return {name: float(np.median(values)) for name, values in rows.items()}
+            tolerance = rows_beside[name].tolerance(family)
+            off[name].append(misfit.values / tolerance)
+            noise[name].append(misfit.covariance / np.outer(tolerance, tolerance))
+            left[name].append(0.0 if family in RINGING else misfit.remains - usual)
+    middle = {name: np.median(each, axis=0) for name, each in off.items()}
+    share = (_OF_MEDIAN if len(data) > 2 else 1.0) / len(data)
+    known = {name: share * np.mean(each, axis=0) for name, each in noise.items()}
+    wider = _wider(middle, known) if family in TELLING else np.ones(len(SHAPES[family]))
+    sizes: dict[str, float] = {}
+    for name, values in middle.items():
+        errors = _errors(values, known[name] + np.diag(wider**2))
+        remains = SUSPECT[family] * float(np.median(left[name])) / REMAINS
+        sizes[name] = (
+            float(errors[SHAPES[family].index(shape)]) if shape else max(float(errors.max()), remains)
+        )
+    return sizes
 
 
-def _wider(table: Mapping[str, Deviation], tolerances: Mapping[str, FloatArray]) -> FloatArray:
+def _wider(off: Mapping[str, FloatArray], noise: Mapping[str, FloatArray]) -> FloatArray:
     """How many times the tolerance of each shape the channels of a family differ by, (k,); 1 at least.
 
-    Some laboratories have LVDTs that bend more than most, and drift as little as any.
+    Some laboratories have LVDTs that bend more than most, and drift as little as any. `off` (k,) and `noise`,
+    its covariance, are in tolerances.
     """
-    off = np.array([misfit.values / tolerances[name] for name, misfit in table.items()])
-    noise = np.array([np.diag(misfit.covariance) / tolerances[name] ** 2 for name, misfit in table.items()])
-    seen = np.array([robust_sd(shape) for shape in off.T])
-    return np.asarray(np.sqrt(np.maximum(seen**2 - np.median(noise, axis=0), 1.0)))
+    seen = np.array([robust_sd(shape) for shape in np.array(list(off.values())).T])
+    usual = np.median([np.diag(covariance) for covariance in noise.values()], axis=0)
+    return np.asarray(np.sqrt(np.maximum(seen**2 - usual, 1.0)))
 
 
 def _errors(values: FloatArray, covariance: FloatArray) -> FloatArray:

@@ -80,6 +80,21 @@ def test_an_lvdt_that_drifts_is_found_among_lvdts_that_bend_more_than_most(
     assert conditions_found(prepared) == set()
 
 
+@pytest.mark.parametrize(("drift_m_s", "found"), [(2e-5, {"LV-A09": "lvdt"}), (0.0, {})])
+def test_a_drift_that_no_run_tells_alone_is_found_over_all_of_them(
+    drift_m_s: float, found: dict[str, str]
+) -> None:
+    """Zeros of all LVDTs walk by 0.01 mm in a second."""
+    rng = np.random.default_rng(5)
+    runs = simulate({}, (-0.35, 0.3, -0.25, 0.4, 0.35, -0.3))
+    for run in runs:
+        n = run.channels.shape[1]
+        for place in run.indices("lvdt"):
+            run.channels[place] += 1e-5 / np.sqrt(run.rate_hz) * np.cumsum(rng.standard_normal(n))
+        run.channels[run.place("LV-A09")] += drift_m_s * np.arange(n) / run.rate_hz
+    assert found_channels(prepare(runs)[0]) == found
+
+
 @pytest.mark.parametrize("name", ["LV-A06", "LV-A01"])
 def test_an_lvdt_into_which_a_wire_leaks_is_examined_on_its_own(name: str) -> None:
     """What leaks goes with the rotation: as much as of a mount that is 10 mm off along the thickness."""
