@@ -39,6 +39,8 @@ _LEAST_PEAK_RAD = 1e-12
 """Peak of a half-cycle at least: a search that strays to no r at all has none."""
 _LEAST_ENERGY = 1e-9
 """Energy ratio of a release at least: a strip that takes more than the whole lever leaves none."""
+_MOST_ENERGY = 1.0 - 1e-9
+"""Energy ratio of a release at most: an edge that stands out gives more than what overturns a sharp one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,12 +217,15 @@ def free_rocking_on(
 ) -> YieldingRocking:
     """The motion after a release from rest at `theta0_rad` (either side) on edges that yield.
 
-    `restitution` is one r, or one per impact, as in `free_rocking`, of speeds at θ = 0. `ValueError` for a
+    `restitution` is one r, or one per impact, as in `free_rocking`, of speeds at θ = 0. A release within α
+    from where edges that stand out overturn the wall is taken just short of there. `ValueError` for a
     release beyond α.
     """
     first_rad = alpha_rad + np.sign(theta0_rad) * lean_rad
+    if abs(theta0_rad) >= first_rad:
+        raise ValueError(f"the release rotation must lie below α = {first_rad:g} rad, not {theta0_rad:g}")
     taken = edge.work(theta0_rad) / (1.0 - np.cos(first_rad))
-    energy = np.maximum(exact_energy(theta0_rad, first_rad) - taken, _LEAST_ENERGY)
+    energy = np.clip(exact_energy(theta0_rad, first_rad) - taken, _LEAST_ENERGY, _MOST_ENERGY)
     sharp = free_rocking(
         float(np.sign(theta0_rad) * exact_amplitude(energy, first_rad)),
         restitution,

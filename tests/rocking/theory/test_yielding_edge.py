@@ -95,3 +95,18 @@ def test_half_cycles_with_more_energy_reach_further_and_last_longer():
 
     assert changed.peaks_rad == pytest.approx(other.half_cycles.peaks_rad, rel=1e-9)
     assert changed.quarters_s == pytest.approx(other.half_cycles.quarters_s, rel=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.9, 0.97])
+def test_an_edge_that_stands_out_and_would_overturn_the_block_gives_a_motion_still(share):
+    """A search for the motion of a test strays there; no wall has such an edge."""
+    motion = free_rocking_on(
+        YieldingEdge(-0.1 * ALPHA, 4.5e-3), share * ALPHA, R, P, ALPHA, max_impacts=IMPACTS
+    )
+    assert np.all(np.isfinite(motion.at(np.linspace(0.0, 6.0, 601))))
+    assert np.all(np.diff(motion.impacts_s) > 0.0)
+
+
+def test_a_release_beyond_the_angle_of_the_block_is_refused():
+    with pytest.raises(ValueError, match="below α"):
+        free_rocking_on(YieldingEdge(1e-3, 4.5e-3), 1.01 * ALPHA, R, P, ALPHA)
