@@ -212,10 +212,22 @@ def test_an_effect_is_less_visible_where_a_laboratory_is_noisier(configs: Path, 
     assert (ratio < 1.0) == (noise[own.rig.channel_ids.index("WP-4")] > 1.0)
 
 
-def _seen(configs: Path, tmp_path: Path, name: str, **parameters: float) -> float:
-    """How visible an effect of that size is in the rough laboratory, sd."""
-    hidden = dataclasses.replace(order(configs, tmp_path, "rough"), hidden=name)
-    world = draw_case(hidden, 1)[0]
+def _without(world: World, imperfection: str) -> World:
+    sizes = {name: size for name, size in world.surroundings.sizes.items() if name != imperfection}
+    return dataclasses.replace(world, surroundings=dataclasses.replace(world.surroundings, sizes=sizes))
+
+
+def _seen(
+    configs: Path,
+    tmp_path: Path,
+    name: str,
+    laboratory: str = "rough",
+    without: str = "",
+    **parameters: float,
+) -> float:
+    """How visible an effect of that size is in a laboratory `without` one of its imperfections, sd."""
+    hidden = dataclasses.replace(order(configs, tmp_path, laboratory), hidden=name)
+    world = _without(draw_case(hidden, 1)[0], without)
     drawn = world.effects[0]
     return detectability(world, dataclasses.replace(drawn, parameters=drawn.parameters | parameters))
 
@@ -231,7 +243,9 @@ def test_an_effect_is_as_visible_as_what_it_looks_like_is_known(configs: Path, t
     world = draw_case(hidden, 1)[0]
     one = dataclasses.replace(world.effects[0], targets=("LV-A03",), parameters={"error": 0.012})
     # One of 24 LVDTs, that tell the two numbers by tape as well.
-    assert detectability(world, one) == pytest.approx(0.012 / 0.003 * np.sqrt(22 / 24), rel=0.05)
+    straight = detectability(_without(world, "lvdt_straightness"), one)
+    assert straight == pytest.approx(0.012 / 0.003 * np.sqrt(22 / 24), rel=0.05)
+    assert 0.85 * straight < detectability(world, one) < 0.95 * straight
     lvdts = tuple(channel.id for channel in world.rig.channels if channel.family == "lvdt")
     all_of_them = dataclasses.replace(one, targets=lvdts, parameters={"error": 0.03})
     assert detectability(world, all_of_them) == pytest.approx(0.03 / (3e-3 / world.wall.half_width), rel=0.1)
@@ -245,6 +259,18 @@ def test_an_effect_is_as_visible_as_what_it_looks_like_is_known(configs: Path, t
     assert detectability(dataclasses.replace(hum, surroundings=loud), hum.effects[0]) == pytest.approx(
         detectability(hum, hum.effects[0]) / 2
     )
+
+
+def test_what_contacts_that_give_way_do_is_no_part_of_an_effect(configs: Path, tmp_path: Path) -> None:
+    assert _seen(configs, tmp_path, "corner_twist", "contact", turn_s=1e-9) < 0.1
+    assert _seen(configs, tmp_path, "corner_twist", "contact", turn_s=2e-3) > 4.0
+
+
+def test_a_twist_is_less_visible_beside_zeros_that_walk(configs: Path, tmp_path: Path) -> None:
+    walk, none = (
+        _seen(configs, tmp_path, "corner_twist", without=name, turn_s=4e-4) for name in ("", "zero_walk")
+    )
+    assert walk < 0.8 * none
 
 
 def test_a_push_is_as_visible_as_it_bends_the_start_of_the_fall(configs: Path, tmp_path: Path) -> None:

@@ -3,17 +3,17 @@
 An estimate in units of standard deviations, for sorting cases into weak and strong ones: it compares
 two quiet twins of a run, with and without the effect, first in what swings and impacts show locally
 (duration and loss of a swing, speed against peak, restitution of an impact, against impact scatter
-and with α, p and r refitted), then in what the channels show beyond the motion (against their noise,
-with gain, offset, the half width of the base and the distance of the LVDTs' faces refitted as far as they
-are known to). A push and a slow release count against the release at rest that comes nearest. Hum counts
-against the hum that sound channels pick up, and a lean, a slope of r or a delay against what any wall and
-rig has of it. No diagnosis can see much more.
+and with α, p and r refitted), then in what the channels show beyond any motion (against their noise, with
+gain, the walk of the zero, the straightness of LVDTs, the half width of the base and the distance of the
+LVDTs' faces refitted as far as they are known to). A push and a slow release count against the release at
+rest that comes nearest. Hum counts against the hum that sound channels pick up, and a lean, a slope of r or a
+delay against what any wall and rig has of it. No diagnosis can see much more.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -26,12 +26,15 @@ from daq_app.gap.blind.world.course import Course
 from daq_app.gap.blind.world.effects.catalogue import Drawn
 from daq_app.gap.blind.world.events.motion import Followed
 from daq_app.gap.blind.world.sensors.chain import CALIBRATION_TOLERANCE, quiet_signals
-from daq_app.gap.blind.world.sensors.faults import Bench, Place, through_electronics
+from daq_app.gap.blind.world.sensors.faults import Bench, Place, not_straight, through_electronics
 from daq_app.gap.blind.world.wall import Wall
 
 _SMALLEST_PEAK_RAD: Final = 4e-3
 _TIME_SD_S: Final = 3e-4
 _SPEED_SD: Final = 2e-3
+_MOST_OF_ONE: Final = 3.0
+"""Standard deviations that one feature of a swing counts at most: an engine of contacts may find one turning
+point some milliseconds off."""
 _RATE_HZ: Final = 500.0
 _CORRELATED: Final = 10.0
 """Samples at 500 Hz that count as one: what remains of motion and calibration is not white."""
@@ -53,6 +56,8 @@ _USUAL: Final = {
 """Effects of which any wall or rig has some, and how much: a lean that a level leaves, an r that changes a
 little with speed and side, amplifiers of 100 to 500 Hz."""
 _USUAL_LEAN_RAD: Final = 3e-4
+_LEAST_TURN: Final = 1e-12
+"""Where no channel shows that the wall turns, as before it is let go, nothing is a rotation."""
 _LEAST_HUM: Final = 0.02
 """Amplitude of the hum that any channel picks up, in noises: the least of all laboratories."""
 
@@ -88,19 +93,26 @@ def _shown(world: World, effect: Drawn) -> float:
         runs=_extremes(world),
         surroundings=Surroundings(),
     )
-    in_swings, noise, seen = 0.0, total_noise(world), list[list[FloatArray]]()
-    for index in range(len(alone.runs)):
-        course = alone.course(index, (0, 30 * (len(world.runs) - 1))[index])
-        seen.append(_in_channels(alone, alone.runs[index], course, noise))
+    in_swings, noise = 0.0, total_noise(world)
+    seen, without_it = list[FloatArray](), list[FloatArray]()
+    for index, run in enumerate(alone.runs):
+        before = (0, 30 * (len(world.runs) - 1))[index]
+        course = alone.course(index, before)
+        seen.append(_beyond_motion(_in_channels(alone, run, course, noise, world.surroundings.sizes)))
         if effect.name in LET_GO:
             in_swings += _in_the_fall(alone, course, noise)
         if not effect.targets:
-            in_swings += _in_swings(course.motion, world.wall, at_rest=effect.name not in LET_GO)
+            plain = replace(alone, effects=()).course(index, before)
+            without_it.append(
+                _beyond_motion(_in_channels(alone, run, plain, noise, world.surroundings.sizes))
+            )
+            in_swings += _in_swings(course.motion, plain.motion, world.wall, effect.name not in LET_GO)
     stand_for = len(world.runs) / len(alone.runs)
-    square = stand_for * in_swings + _evidence(
-        [np.hstack(runs) for runs in zip(*seen, strict=True)], stand_for
-    )
-    return math.sqrt(square)
+    in_channels = _evidence(seen, stand_for)
+    if without_it:
+        # Points that press and give way move the base of any wall.
+        in_channels = max(in_channels - _evidence(without_it, stand_for), 0.0)
+    return math.sqrt(stand_for * in_swings + in_channels)
 
 
 def _extremes(world: World) -> tuple[PlannedRun, PlannedRun]:
@@ -138,17 +150,21 @@ def _in_the_fall(alone: World, course: Course, noise_si: FloatArray) -> float:
     return square * float(left_rad @ left_rad)
 
 
-def _in_swings(motion: Followed, wall: Wall, at_rest: bool) -> float:
-    """Squared distance of a motion from any rigid block's in local features: α, p and r are free.
+def _in_swings(motion: Followed, without: Followed, wall: Wall, at_rest: bool) -> float:
+    """Squared distance of a motion from that `without` the effect in local features: α, p and r are free.
 
-    Where a wall may not have been let go `at_rest`, nobody knows when the first swing begins.
+    Points that press and give way are no sharp edges, and what they do is no part of an effect. Where a wall
+    may not have been let go `at_rest`, nobody knows when the first swing begins.
     """
     values, sds, columns = _features(motion, wall, at_rest)
-    if values.size <= columns.shape[1]:
+    plain = _features(without, wall, at_rest)[0]
+    n = min(values.size, plain.size)
+    if n <= columns.shape[1]:
         return 0.0
-    weighted, design = values / sds, columns / sds[:, None]
+    weighted, design = (values[:n] - plain[:n]) / sds[:n], columns[:n] / sds[:n, None]
     left = weighted - design @ np.linalg.lstsq(design, weighted, rcond=None)[0]
-    return float(left @ left)
+    counted = np.clip(left, -_MOST_OF_ONE, _MOST_OF_ONE)
+    return float(counted @ counted)
 
 
 def _features(motion: Followed, wall: Wall, at_rest: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -214,9 +230,16 @@ def _over_ordinary_hum(world: World, effect: Drawn) -> float:
     return math.sqrt(square)
 
 
-def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatArray) -> list[FloatArray]:
-    """What each channel shows of the effect, and of a gain, a half width and a distance of the LVDTs' faces
-    that are off by one sd, for one and the same motion: (4, n) each, over its noise, the zero taken out."""
+def _in_channels(
+    alone: World, run: PlannedRun, course: Course, noise_si: FloatArray, sizes: Mapping[str, float]
+) -> list[tuple[FloatArray, FloatArray]]:
+    """What each channel shows, over its noise: a turn of the wall, (n,), and the changes beside it, (7, n).
+
+    The turn is its own rotation once more. The changes are the effect, and what is off by one sd, for one and
+    the same motion, with the zero taken out: the half width, the distance of the LVDTs' faces, and of each
+    channel a gain, an S and an arch of an LVDT's line, and a zero that walks. The imperfections of the
+    laboratory have these `sizes`.
+    """
     time_s = _times(course)
     place = Place(run.campaign_s + 600.0, abs(run.theta0))
     rng = np.random.default_rng(0)
@@ -227,6 +250,8 @@ def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatA
     by_tape = _HALF_WIDTH_SD_M / alone.wall.half_width
     wider = replace(plain, pivot_x=plain.pivot_x * (1.0 + by_tape))
     of_half_width = quiet_signals(alone.rig, wider, (), rng, place)
+    straight = sizes.get("lvdt_straightness", 0.0)
+    walk = sizes.get("zero_walk", 0.0) * np.linspace(0.0, 1.0, time_s.size)
     found = []
     for row, channel in enumerate(alone.rig.channels):
         if plain.pivot_dd is not scene.pivot_dd and channel.family == "accelerometer":
@@ -235,17 +260,18 @@ def _in_channels(alone: World, run: PlannedRun, course: Course, noise_si: FloatA
         noise = noise_si[row] * rng.standard_normal(time_s.size)
         signal = through_electronics(with_effect[row] + noise, alone.faults, bench)
         reference = without[row]
-        faces = by_tape * reference if channel.family == "lvdt" else np.zeros_like(reference)
-        shown = np.vstack(
-            [
-                signal - noise - reference,
-                CALIBRATION_TOLERANCE * reference,
-                of_half_width[row] - reference,
-                faces,
-            ]
-        )
-        shown -= np.median(shown, axis=1, keepdims=True)
-        found.append(shown / _sd(float(noise_si[row]), reference))
+        changes = np.zeros((7, time_s.size))
+        changes[:2] = signal - noise - reference, of_half_width[row] - reference
+        changes[3], changes[6] = CALIBRATION_TOLERANCE * reference, noise_si[row] * walk
+        if channel.family == "lvdt":
+            changes[2] = by_tape * reference
+            for form, bend in enumerate(({"odd": straight, "even": 0.0}, {"odd": 0.0, "even": straight}), 4):
+                changes[form] = not_straight(reference, bend, bench) - reference
+        changes -= np.median(changes, axis=1, keepdims=True)
+        turns = channel.family != "accelerometer"
+        turn = turns * (reference - np.median(reference))
+        sd = _sd(float(noise_si[row]), reference)
+        found.append((turn / sd, changes / sd))
     return found
 
 
@@ -259,14 +285,33 @@ def _sd(noise_si: float, signal: FloatArray) -> float:
     return math.hypot(noise_si, _MODEL_SHARE * float(np.max(np.abs(signal)))) * math.sqrt(_CORRELATED)
 
 
-def _evidence(channels: Sequence[FloatArray], stand_for: float) -> float:
-    """Squared distance of an effect from none, of channels as `_in_channels` shows them in some runs.
+def _beyond_motion(channels: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
+    """Products of all changes that channels show in one run, whatever the motion and the walk of the zeros.
 
-    Gains, half width and faces are the same in all runs. Each of these runs stands for `stand_for` of them.
+    `channels` are as `_in_channels` has them. The rotation is what makes them agree best at each instant.
+    Rows are the effect, the half width and the faces, and each channel's own: gain, S and arch.
     """
-    square, by_tape, known = 0.0, np.zeros(2), np.eye(2)
-    for shown in channels:
-        products = stand_for * (shown @ shown.T)
-        left = products - np.outer(products[1], products[1]) / (1.0 + products[1, 1])
-        square, by_tape, known = square + left[0, 0], by_tape + left[0, 2:], known + left[2:, 2:]
-    return float(square - by_tape @ np.linalg.solve(known, by_tape))
+    count = len(channels)
+    size = 3 + 4 * count
+    products = np.zeros((size, size))
+    along, turns = np.zeros((size, channels[0][0].size)), np.zeros(channels[0][0].size)
+    for k, (turn, changes) in enumerate(channels):
+        rows = [0, 1, 2, *range(3 + 3 * k, 6 + 3 * k), 3 + 3 * count + k]
+        products[np.ix_(rows, rows)] += changes @ changes.T
+        along[rows] += turn * changes
+        turns += turn**2
+    along /= np.sqrt(np.maximum(turns, _LEAST_TURN))
+    products -= along @ along.T
+    kept, walks = products[: 3 + 3 * count], products[3 + 3 * count :]
+    of_walks, known = walks[:, : kept.shape[0]], np.eye(count) + walks[:, kept.shape[0] :]
+    return np.asarray(kept[:, : kept.shape[0]] - of_walks.T @ np.linalg.solve(known, of_walks))
+
+
+def _evidence(runs: Sequence[FloatArray], stand_for: float) -> float:
+    """Squared distance of an effect from none, from the products that channels have in some runs.
+
+    Gains, bends, half width and faces are the same in all runs. Each of these runs stands for `stand_for`.
+    """
+    products = stand_for * np.sum(runs, axis=0)
+    known = np.eye(products.shape[0] - 1) + products[1:, 1:]
+    return float(products[0, 0] - products[0, 1:] @ np.linalg.solve(known, products[1:, 0]))

@@ -96,7 +96,7 @@ def _wire_sag(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
     return signal - q["kappa_1_m"] * signal**2
 
 
-def _not_straight(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
+def not_straight(signal: FloatArray, q: Parameters, bench: Bench) -> FloatArray:
     """An S and an arch over the range, shares of it, whose ends lie on the straight line."""
     low, high = bench.channel.range_si
     span = high - low
@@ -198,7 +198,7 @@ RESPONSES: dict[str, Apply] = {
     "saturation": _saturation,
     "wire_sag": _wire_sag,
     "wire_inertia": _wire_inertia,
-    "not_straight": _not_straight,
+    "not_straight": not_straight,
     "cubic_gain": _cubic_gain,
     "backlash": _backlash,
     "loose_bracket": _loose_bracket,
