@@ -23,7 +23,7 @@ from daq_app.gap.blind.making.let_go import LET_GO, left_by_a_release_at_rest
 from daq_app.gap.blind.world.arrays import FloatArray
 from daq_app.gap.blind.world.campaign import PlannedRun, Surroundings, World
 from daq_app.gap.blind.world.course import Course
-from daq_app.gap.blind.world.effects.catalogue import Drawn
+from daq_app.gap.blind.world.effects.catalogue import CONTACT_OUTSIDE, Drawn
 from daq_app.gap.blind.world.events.motion import Followed
 from daq_app.gap.blind.world.sensors.chain import CALIBRATION_TOLERANCE, quiet_signals
 from daq_app.gap.blind.world.sensors.faults import Bench, Place, not_straight, through_electronics
@@ -32,9 +32,6 @@ from daq_app.gap.blind.world.wall import Wall
 _SMALLEST_PEAK_RAD: Final = 4e-3
 _TIME_SD_S: Final = 3e-4
 _SPEED_SD: Final = 2e-3
-_MOST_OF_ONE: Final = 3.0
-"""Standard deviations that one feature of a swing counts at most: an engine of contacts may find one turning
-point some milliseconds off."""
 _RATE_HZ: Final = 500.0
 _CORRELATED: Final = 10.0
 """Samples at 500 Hz that count as one: what remains of motion and calibration is not white."""
@@ -56,6 +53,14 @@ _USUAL: Final = {
 """Effects of which any wall or rig has some, and how much: a lean that a level leaves, an r that changes a
 little with speed and side, amplifiers of 100 to 500 Hz."""
 _USUAL_LEAN_RAD: Final = 3e-4
+_SHARED: Final = 3
+"""Changes that all channels share: the effect, the half width, the faces."""
+_OF_RUNS: Final = 6
+"""From this change on they are each run's own."""
+_PINK_HZ: Final = (0.05, 300.0)
+"""Where the 1/f noise of laboratories is, with as much power in each octave."""
+_SLOW_PERIODS: Final = 8
+"""Periods of 1/f noise in a run that are as slow as what the wall does."""
 _LEAST_TURN: Final = 1e-12
 """Where no channel shows that the wall turns, as before it is let go, nothing is a rotation."""
 _LEAST_HUM: Final = 0.02
@@ -92,27 +97,19 @@ def _shown(world: World, effect: Drawn) -> float:
         wall=replace(world.wall, restitution_scatter=0.0),
         runs=_extremes(world),
         surroundings=Surroundings(),
+        # Points that press and give way are no sharp edges, and what they do is no part of the effect.
+        engine=world.engine if effect.name in CONTACT_OUTSIDE else "events",
     )
-    in_swings, noise = 0.0, total_noise(world)
-    seen, without_it = list[FloatArray](), list[FloatArray]()
+    in_swings, noise, seen = 0.0, total_noise(world), list[FloatArray]()
     for index, run in enumerate(alone.runs):
-        before = (0, 30 * (len(world.runs) - 1))[index]
-        course = alone.course(index, before)
+        course = alone.course(index, (0, 30 * (len(world.runs) - 1))[index])
         seen.append(_beyond_motion(_in_channels(alone, run, course, noise, world.surroundings.sizes)))
         if effect.name in LET_GO:
             in_swings += _in_the_fall(alone, course, noise)
         if not effect.targets:
-            plain = replace(alone, effects=()).course(index, before)
-            without_it.append(
-                _beyond_motion(_in_channels(alone, run, plain, noise, world.surroundings.sizes))
-            )
-            in_swings += _in_swings(course.motion, plain.motion, world.wall, effect.name not in LET_GO)
+            in_swings += _in_swings(course.motion, world.wall, at_rest=effect.name not in LET_GO)
     stand_for = len(world.runs) / len(alone.runs)
-    in_channels = _evidence(seen, stand_for)
-    if without_it:
-        # Points that press and give way move the base of any wall.
-        in_channels = max(in_channels - _evidence(without_it, stand_for), 0.0)
-    return math.sqrt(stand_for * in_swings + in_channels)
+    return math.sqrt(stand_for * in_swings + _evidence(seen, stand_for))
 
 
 def _extremes(world: World) -> tuple[PlannedRun, PlannedRun]:
@@ -150,21 +147,17 @@ def _in_the_fall(alone: World, course: Course, noise_si: FloatArray) -> float:
     return square * float(left_rad @ left_rad)
 
 
-def _in_swings(motion: Followed, without: Followed, wall: Wall, at_rest: bool) -> float:
-    """Squared distance of a motion from that `without` the effect in local features: α, p and r are free.
+def _in_swings(motion: Followed, wall: Wall, at_rest: bool) -> float:
+    """Squared distance of a motion from any rigid block's in local features: α, p and r are free.
 
-    Points that press and give way are no sharp edges, and what they do is no part of an effect. Where a wall
-    may not have been let go `at_rest`, nobody knows when the first swing begins.
+    Where a wall may not have been let go `at_rest`, nobody knows when the first swing begins.
     """
     values, sds, columns = _features(motion, wall, at_rest)
-    plain = _features(without, wall, at_rest)[0]
-    n = min(values.size, plain.size)
-    if n <= columns.shape[1]:
+    if values.size <= columns.shape[1]:
         return 0.0
-    weighted, design = (values[:n] - plain[:n]) / sds[:n], columns[:n] / sds[:n, None]
+    weighted, design = values / sds, columns / sds[:, None]
     left = weighted - design @ np.linalg.lstsq(design, weighted, rcond=None)[0]
-    counted = np.clip(left, -_MOST_OF_ONE, _MOST_OF_ONE)
-    return float(counted @ counted)
+    return float(left @ left)
 
 
 def _features(motion: Followed, wall: Wall, at_rest: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -233,11 +226,11 @@ def _over_ordinary_hum(world: World, effect: Drawn) -> float:
 def _in_channels(
     alone: World, run: PlannedRun, course: Course, noise_si: FloatArray, sizes: Mapping[str, float]
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """What each channel shows, over its noise: a turn of the wall, (n,), and the changes beside it, (7, n).
+    """What each channel shows, over its noise: a turn of the wall, (n,), and the changes beside it, (k, n).
 
     The turn is its own rotation once more. The changes are the effect, and what is off by one sd, for one and
     the same motion, with the zero taken out: the half width, the distance of the LVDTs' faces, and of each
-    channel a gain, an S and an arch of an LVDT's line, and a zero that walks. The imperfections of the
+    channel a gain, an S and an arch of an LVDT's line, and what its zero does. The imperfections of the
     laboratory have these `sizes`.
     """
     time_s = _times(course)
@@ -251,7 +244,7 @@ def _in_channels(
     wider = replace(plain, pivot_x=plain.pivot_x * (1.0 + by_tape))
     of_half_width = quiet_signals(alone.rig, wider, (), rng, place)
     straight = sizes.get("lvdt_straightness", 0.0)
-    walk = sizes.get("zero_walk", 0.0) * np.linspace(0.0, 1.0, time_s.size)
+    zero = _of_zeros(sizes, time_s)
     found = []
     for row, channel in enumerate(alone.rig.channels):
         if plain.pivot_dd is not scene.pivot_dd and channel.family == "accelerometer":
@@ -260,9 +253,9 @@ def _in_channels(
         noise = noise_si[row] * rng.standard_normal(time_s.size)
         signal = through_electronics(with_effect[row] + noise, alone.faults, bench)
         reference = without[row]
-        changes = np.zeros((7, time_s.size))
+        changes = np.zeros((_OF_RUNS + len(zero), time_s.size))
         changes[:2] = signal - noise - reference, of_half_width[row] - reference
-        changes[3], changes[6] = CALIBRATION_TOLERANCE * reference, noise_si[row] * walk
+        changes[3], changes[_OF_RUNS:] = CALIBRATION_TOLERANCE * reference, noise_si[row] * zero
         if channel.family == "lvdt":
             changes[2] = by_tape * reference
             for form, bend in enumerate(({"odd": straight, "even": 0.0}, {"odd": 0.0, "even": straight}), 4):
@@ -285,26 +278,37 @@ def _sd(noise_si: float, signal: FloatArray) -> float:
     return math.hypot(noise_si, _MODEL_SHARE * float(np.max(np.abs(signal)))) * math.sqrt(_CORRELATED)
 
 
+def _of_zeros(sizes: Mapping[str, float], time_s: FloatArray) -> FloatArray:
+    """What zeros do in a run, (k, n) in noises, each by one sd: they walk, and 1/f noise is slow as well."""
+    octaves, periods = math.log(_PINK_HZ[1] / _PINK_HZ[0]), np.arange(1, _SLOW_PERIODS + 1)
+    sd = sizes.get("pink_noise", 0.0) * np.sqrt(np.log((periods + 0.5) / (periods - 0.5)) / octaves)
+    place = np.linspace(0.0, 1.0, time_s.size)
+    phase = 2.0 * math.pi * periods[:, None] * place
+    slow = sd[:, None] * np.array([np.cos(phase), np.sin(phase)])
+    return np.vstack([sizes.get("zero_walk", 0.0) * place, *slow])
+
+
 def _beyond_motion(channels: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
     """Products of all changes that channels show in one run, whatever the motion and the walk of the zeros.
 
     `channels` are as `_in_channels` has them. The rotation is what makes them agree best at each instant.
     Rows are the effect, the half width and the faces, and each channel's own: gain, S and arch.
     """
-    count = len(channels)
-    size = 3 + 4 * count
+    own, zeros = _OF_RUNS - _SHARED, channels[0][1].shape[0] - _OF_RUNS
+    last = _SHARED + own * len(channels)
+    size = last + zeros * len(channels)
     products = np.zeros((size, size))
     along, turns = np.zeros((size, channels[0][0].size)), np.zeros(channels[0][0].size)
     for k, (turn, changes) in enumerate(channels):
-        rows = [0, 1, 2, *range(3 + 3 * k, 6 + 3 * k), 3 + 3 * count + k]
+        first, walks = _SHARED + own * k, last + zeros * k
+        rows = [*range(_SHARED), *range(first, first + own), *range(walks, walks + zeros)]
         products[np.ix_(rows, rows)] += changes @ changes.T
         along[rows] += turn * changes
         turns += turn**2
     along /= np.sqrt(np.maximum(turns, _LEAST_TURN))
     products -= along @ along.T
-    kept, walks = products[: 3 + 3 * count], products[3 + 3 * count :]
-    of_walks, known = walks[:, : kept.shape[0]], np.eye(count) + walks[:, kept.shape[0] :]
-    return np.asarray(kept[:, : kept.shape[0]] - of_walks.T @ np.linalg.solve(known, of_walks))
+    of_zeros, known = products[last:, :last], np.eye(size - last) + products[last:, last:]
+    return np.asarray(products[:last, :last] - of_zeros.T @ np.linalg.solve(known, of_zeros))
 
 
 def _evidence(runs: Sequence[FloatArray], stand_for: float) -> float:
