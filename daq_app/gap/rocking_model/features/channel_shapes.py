@@ -229,13 +229,18 @@ def block_of(
         noise=misfit.noise * float(np.exp(usual)),
         wire=wire,
         sensor_family=family,
-        levers=_levers(beside, usual_deviation(family, sound)),
+        levers=_levers(beside, usual_deviation(family, sound), misfit),
     )
 
 
-def _levers(beside: Others, usual: FloatArray) -> tuple[float, ...]:
-    """What a sound channel is off by from the others' prediction (sd); `usual`, (k,): from the truth."""
+def _levers(beside: Others, usual: FloatArray, misfit: Deviation) -> tuple[float, ...]:
+    """What a sound channel is off by from the others' prediction (sd); `usual`, (k,): from the truth.
+
+    No fault of the library bends one LVDT: one is bent by what it shows.
+    """
     levers = beside.spread * usual
     levers[_LAG] *= beside.slower
     levers[_CURVATURE] *= max(beside.curved / beside.spread, 1.0)
+    if "rounding" in beside.further:
+        levers[_CURVATURE] = max(levers[_CURVATURE], abs(float(misfit.values[_CURVATURE])))
     return tuple(levers.tolist())

@@ -95,6 +95,19 @@ def test_a_drift_that_no_run_tells_alone_is_found_over_all_of_them(
     assert found_channels(prepare(runs)[0]) == found
 
 
+def test_an_lvdt_that_bends_more_than_the_others_hides_no_cause() -> None:
+    """By 0.6 mm at a reading of 28 mm, which makes its mean slope 2 % less; the others bend by a tenth."""
+    runs = simulate({}, (-0.35, 0.3, -0.25, 0.4))
+    bends_1_m = np.random.default_rng(5).uniform(-0.1, 0.1, len(runs[0].sensors))
+    bends_1_m[runs[0].place("LV-B03")] = -0.8
+    for run in runs:
+        for place in run.indices("lvdt"):
+            run.channels[place] += bends_1_m[place] * run.channels[place] ** 2
+    diagnosis = diagnose_runs(runs)
+    assert diagnosis.which[0].effects == ("gain@LV-B03",)
+    assert diagnosis.decision.verdict != "none_of_these"
+
+
 @pytest.mark.parametrize("name", ["LV-A06", "LV-A01"])
 def test_an_lvdt_into_which_a_wire_leaks_is_examined_on_its_own(name: str) -> None:
     """What leaks goes with the rotation: as much as of a mount that is 10 mm off along the thickness."""
