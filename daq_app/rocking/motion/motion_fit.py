@@ -126,7 +126,9 @@ def fit_motion(
     alpha_rad: float,
     edges_yield: bool = True,
 ) -> MotionFit | None:
-    """Fit the rotation (n,) from release to the last half-cycle worth it; None with too few impacts.
+    """Fit the rotation (n,) from release to the last half-cycle worth it.
+
+    None with too few impacts, and where impacts would have to lose nothing: what no wall does is no r.
 
     `r`, `impacts_s`, `peaks_rad` (release first) and `speeds_rad_s` (at the impacts) start the fit;
     `noise_rad` is the rms of one sample.
@@ -376,7 +378,10 @@ def _result(problem: MotionModel, found: OptimizeResult, count: int, stop_s: flo
     # for the motion is the same with another level and deviations to match. How far it was still to go is
     # in the error.
     deviation = 0.0 if problem.spread is None else problem.spread * float(np.mean(x[FIXED:]))
-    r, slope = below_one(np.asarray(problem.log_r + 0.01 * x[5] + deviation))
+    log_r = problem.log_r + 0.01 * x[5] + deviation
+    if log_r >= 0.0:
+        return None
+    r, slope = below_one(np.asarray(log_r))
     return MotionFit(
         r=float(r),
         standard_error=float(r * slope) * math.hypot(0.01 * float(deviations[5]), deviation),

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
-_OVERTURNED = 0.9999
+OVERTURNED = 0.9999
 """Energy ratio beyond which a block does not turn: the motion of one that leans over to its weaker side with
 more is followed as if it had this."""
 _NODES = 64
@@ -189,7 +189,7 @@ def free_rocking(
     # Energies are shares of what overturns the block to the side that it is on.
     barriers = (np.sin(alphas[0] / 2.0) / np.sin(alphas[1:] / 2.0)) ** 2
     energies = float(exact_energy(peak0, alphas[0])) * np.cumprod(sequence**2) * barriers
-    following = exact_amplitude(np.minimum(energies, _OVERTURNED), alphas[1:])
+    following = exact_amplitude(np.minimum(energies, OVERTURNED), alphas[1:])
     small = np.flatnonzero(following < smallest_peak_rad)
     n = int(small[0]) + 1 if small.size else max_impacts
     peaks = np.concatenate(([peak0], following[:n]))

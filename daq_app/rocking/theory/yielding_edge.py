@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from daq_app.rocking.theory.housner import (
+    OVERTURNED,
     FreeRocking,
     exact_amplitude,
     exact_energy,
@@ -39,8 +40,6 @@ _LEAST_PEAK_RAD = 1e-12
 """Peak of a half-cycle at least: a search that strays to no r at all has none."""
 _LEAST_ENERGY = 1e-9
 """Energy ratio of a release at least: a strip that takes more than the whole lever leaves none."""
-_MOST_ENERGY = 1.0 - 1e-9
-"""Energy ratio of a release at most: an edge that stands out gives more than what overturns a sharp one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +133,7 @@ class HalfCycles:
 
     def with_energy_times(self, factor: float) -> HalfCycles:
         """The same with this much of their energies."""
-        energies = factor * exact_energy(self.sharp_peaks_rad, self.alphas_rad)
+        energies = np.minimum(factor * exact_energy(self.sharp_peaks_rad, self.alphas_rad), OVERTURNED)
         sharp = exact_amplitude(energies, self.alphas_rad)
         return HalfCycles.on(self.edge, self.p_rad_s, self.alphas_rad, sharp)
 
@@ -225,7 +224,7 @@ def free_rocking_on(
     if abs(theta0_rad) >= first_rad:
         raise ValueError(f"the release rotation must lie below α = {first_rad:g} rad, not {theta0_rad:g}")
     taken = edge.work(theta0_rad) / (1.0 - np.cos(first_rad))
-    energy = np.clip(exact_energy(theta0_rad, first_rad) - taken, _LEAST_ENERGY, _MOST_ENERGY)
+    energy = np.clip(exact_energy(theta0_rad, first_rad) - taken, _LEAST_ENERGY, OVERTURNED)
     sharp = free_rocking(
         float(np.sign(theta0_rad) * exact_amplitude(energy, first_rad)),
         restitution,

@@ -26,13 +26,13 @@ def rig(configs):
     return load_rig(configs / "fr1.toml")
 
 
-def rocking(rig, share, lean_rad=0.0):
+def rocking(rig, share, lean_rad=0.0, r=R):
     """Time, rotation and motion of a block let go at `share` of α."""
     specimen = rig.specimen
     theta0 = share * specimen.alpha0_rad
     motion = free_rocking(
         theta0,
-        np.full(40, R),
+        np.full(40, r),
         specimen.p_rad_s,
         specimen.alpha0_rad,
         release_s=RELEASE_S,
@@ -196,3 +196,9 @@ def test_a_wall_that_hardly_stops_is_fitted_by_its_first_hundred_impacts(rig):
     assert motion.impacts_s.size == 160
     assert fit.impacts == 100
     assert fit.r == pytest.approx(r, abs=1e-4)
+
+
+def test_a_motion_that_loses_nothing_gives_no_r(rig):
+    """The search keeps r below 1, where its error would be next to nothing."""
+    time, rotation, motion = rocking(rig, 0.25, r=1.0)
+    assert fitted(rig, time, rotation, motion) is None
