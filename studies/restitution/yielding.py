@@ -1,5 +1,7 @@
 """``python -m studies.restitution.yielding --tests 60``: intervals where edges are sharp, and yield.
 
+With ``--drawn-mm 0 6`` each wall has a strip of its own, as wide as any between the two.
+
 The walls of drawn laboratories stand on points that press and give way (`contact_strip`), along a strip of
 each width at either edge; a width of 0 is an edge that is sharp and yields downwards only. What an edge is
 stiff by is drawn. The table has, for each width, how often the 95 % intervals of the analysis hold the body's
@@ -93,9 +95,9 @@ def _of_r(analysis: TestAnalysis, true_r: float) -> dict[str, float]:
     }
 
 
-def line_of(width_m: float, outcomes: Sequence[Outcome]) -> str:
+def line_of(widths: str, outcomes: Sequence[Outcome]) -> str:
     """Shares that hold, rms of errors over the stated ones, stated errors, and what was said."""
-    parts = [f"{width_m * 1e3:4.0f} mm"]
+    parts = [f"{widths:>6s} mm"]
     for name in outcomes[0].ratios:
         ratios = np.array([outcome.ratios[name] for outcome in outcomes])
         ratios = ratios[np.isfinite(ratios)]
@@ -116,19 +118,36 @@ def _outcome(seed: int, width_m: float) -> Outcome:
     return outcome_of(strip_test(seed, width_m))
 
 
+def _outcome_of_any(seed: int, narrowest_m: float, widest_m: float) -> Outcome:
+    width_m = np.random.default_rng([seed, 6]).uniform(narrowest_m, widest_m)
+    return outcome_of(strip_test(seed, width_m))
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(prog="python -m studies.restitution.yielding", description=__doc__)
     parser.add_argument("--tests", type=int, default=60, help="tests for each width")
     parser.add_argument("--first-seed", type=int, default=7000)
     parser.add_argument("--widths-mm", type=float, nargs="*", default=[1e3 * width for width in WIDTHS_M])
+    parser.add_argument(
+        "--drawn-mm",
+        type=float,
+        nargs=2,
+        metavar=("LOW", "HIGH"),
+        help="draw the width of each test's strip between these",
+    )
     parser.add_argument("--workers", type=int, default=None, help="processes; all cores if left out")
     options = parser.parse_args()
     seeds = range(options.first_seed, options.first_seed + options.tests)
     with process_pool(options.workers) as pool:
+        if options.drawn_mm:
+            low_mm, high_mm = options.drawn_mm
+            drawn = partial(_outcome_of_any, narrowest_m=1e-3 * low_mm, widest_m=1e-3 * high_mm)
+            print(line_of(f"{low_mm:g}–{high_mm:g}", list(pool.map(drawn, seeds))))
+            return
         for width_mm in options.widths_mm:
             outcomes = list(pool.map(partial(_outcome, width_m=1e-3 * width_mm), seeds))
-            print(line_of(1e-3 * width_mm, outcomes), flush=True)
+            print(line_of(f"{width_mm:g}", outcomes), flush=True)
 
 
 if __name__ == "__main__":
