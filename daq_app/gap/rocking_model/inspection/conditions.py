@@ -192,7 +192,7 @@ def findings_per_run(
             cells = [[of_channel[name] for of_channel in row] for row in seen]
             unit = _UNITS.get(name, of_family)
             rms = noise if name in ("hum", "quantisation") else math.nan
-            for key, chosen in _attribute_condition(family, ids, cells):
+            for key, chosen in _attribute_condition(family, ids, cells, now_and_then=name == "dropout"):
                 for run_findings, row in zip(findings, cells, strict=True):
                     value, sd = _median_with_sd(name, [row[k] for k in chosen] if chosen else row)
                     run_findings.append(RunFinding(f"{name}@{key}", words, unit, value, sd, rms))
@@ -240,15 +240,16 @@ def _seen(condition: Condition, often: bool) -> dict[str, _Seen]:
 
 
 def _attribute_condition(
-    family: str, ids: Sequence[str], cells: Sequence[Sequence[_Seen]]
+    family: str, ids: Sequence[str], cells: Sequence[Sequence[_Seen]], *, now_and_then: bool
 ) -> list[tuple[str, list[int]]]:
     """(name, places) of who has a condition: one channel, or the family when several or none have it.
 
-    A channel that has far more of it than the others of the family stands for itself beside them.
+    It must have it in half of the runs, and in any run where it comes `now_and_then`, as readings that stand
+    still do. A channel that has far more of it than the others of the family stands for itself beside them.
     """
     share = np.mean([[seen for _, _, seen in row] for row in cells], axis=0)
     size = np.median([[value for value, _, _ in row] for row in cells], axis=0)
-    having = [int(k) for k in np.flatnonzero(share >= 0.5)]
+    having = [int(k) for k in np.flatnonzero(share > 0.0 if now_and_then else share >= 0.5)]
     if len(having) == 1:
         return [(ids[having[0]], having)]
     most = max(having, key=lambda k: float(size[k]), default=0)

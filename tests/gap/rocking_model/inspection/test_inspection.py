@@ -112,6 +112,16 @@ def test_a_channel_that_freezes_while_the_wall_is_at_rest_is_found() -> None:
     assert conditions_found(prepare(runs)[0]) == {"dropout@LV-B08"}
 
 
+def test_a_channel_that_freezes_in_one_run_of_several_is_named_and_left_out() -> None:
+    runs = simulate({}, (0.25, -0.35, 0.3))
+    place, start = runs[0].place("LV-B08"), round(4.0 * runs[0].rate_hz)
+    readings = runs[0].channels[place]
+    readings[start : start + round(0.24 * runs[0].rate_hz)] = readings[start]
+    prepared, _ = prepare(runs)
+    assert conditions_found(prepared) == {"dropout@LV-B08"}
+    assert found_channels(prepared) == {}
+
+
 def test_a_channel_with_far_more_pick_up_than_its_family_stands_for_itself() -> None:
     runs = _prepared({"hum@wire": {"amplitude": 2e-4}, "hum@WP-2": {"amplitude": 8e-4}})
     assert conditions_found(runs) == {"hum@wire", "hum@WP-2"}
