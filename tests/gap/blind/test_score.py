@@ -272,6 +272,17 @@ def test_a_hidden_fault_that_was_measured_is_right_if_it_belongs_into_the_answer
     assert not judged_with(["hum"], both).answered_rightly
 
 
+def test_a_decision_that_names_less_than_its_first_hypothesis_is_judged_by_what_it_names() -> None:
+    """A slip was measured, and what fits best beside it is below detection."""
+    slip = {"name": "sliding@base", "material": True}
+    decided = {"verdict": "effect", "effects": ["sliding@base"], "family": "contact"}
+    both = claim(["sliding@base", "viscous"], 0.7, "effect", findings=[slip], decision_detail=decided)
+    alone = judged_with(["sliding"], both)
+    assert alone.answered_rightly
+    assert not alone.first_right
+    assert not judged_with(["sliding", "viscous"], both).answered_rightly
+
+
 def test_a_measured_fault_that_no_effect_does_is_right_and_claims_no_probability() -> None:
     """ "None of these, spikes were measured" gives next to nothing to the hypotheses, and is right."""
     spikes = {"name": "spikes@lvdt", "material": True}

@@ -43,6 +43,9 @@ class Judged:
     """Probability that the diagnosis gives its first answer: of all forms that no sensor tells apart. NaN
     where it names a measured fault that no effect does: its probabilities are then no claim about that."""
     first_right: bool
+    """Whether the likeliest hypothesis is what was hidden."""
+    named_right: bool
+    """The same of what the decision names."""
     family_right: bool
     in_set: bool
     set_size: int
@@ -72,7 +75,7 @@ class Judged:
     @property
     def exact(self) -> bool:
         """Whether the decision names what was hidden, all of it and nothing else."""
-        return self.blames and self.first_right
+        return self.blames and self.named_right
 
     @property
     def answered_rightly(self) -> bool:
@@ -102,7 +105,7 @@ def judge(label: dict[str, Any], outcome: Outcome) -> Judged:
     accept = [tuple(effect["accept"]) for effect in effects]
     sought = [names for names in accept if not _measured(names, findings)]
     decision = _decision(result, which, measured=len(sought) < len(accept))
-    named, family, claimed = _answer(decision, result, which)
+    named, family, claimed = _answer(decision, result, which, findings)
     if decision != "none_of_these" and result.get("decision") == "none_of_these":
         claimed = math.nan
     gap = result.get("gap") or {}
@@ -118,6 +121,7 @@ def judge(label: dict[str, Any], outcome: Outcome) -> Judged:
         named_family=family,
         claimed=claimed,
         first_right=bool(which) and _matches(_first(which)[0].effects, sought),
+        named_right=_matches(named, sought),
         family_right=set(families_of(family)) == {effect["family"] for effect in effects},
         in_set=any(_matches(hypothesis.effects, sought) for hypothesis in set95),
         set_size=len({class_of(hypothesis.effects) for hypothesis in set95}),
@@ -171,14 +175,21 @@ def _hypotheses(entries: Any, findings: Collection[str]) -> list[Hypothesis]:
 
 
 def _answer(
-    decision: str, result: dict[str, Any], which: Sequence[Hypothesis]
+    decision: str, result: dict[str, Any], which: Sequence[Hypothesis], findings: Collection[str]
 ) -> tuple[tuple[str, ...], str, float]:
-    """(effects named, family named, claimed probability of the first hypothesis)."""
+    """(effects named, family named, claimed probability of the first hypothesis).
+
+    A decision may name less than its first hypothesis has: a slip that was measured, and not what fits best
+    beside it and is below detection. Forms that no sensor tells apart are named as that hypothesis has them.
+    """
     first, claimed = _first(which) if which else (Hypothesis((), "", 0.0), 0.0)
-    if decision in NAMING:
-        return first.effects, first.family, claimed
     detail = result.get("decision_detail") or {}
-    return (), str(detail.get("family") or ""), claimed
+    if decision not in NAMING:
+        return (), str(detail.get("family") or ""), claimed
+    decided = {str(name) for name in detail.get("effects", first.effects)}
+    if findings and len(decided - set(findings)) < len(first.effects):
+        return tuple(sorted(decided - set(findings))), str(detail.get("family") or ""), claimed
+    return first.effects, first.family, claimed
 
 
 def _first(which: Sequence[Hypothesis]) -> tuple[Hypothesis, float]:
