@@ -34,6 +34,8 @@ from daq_app.gap.rocking_model.records import GapRun, check_consistent
 from daq_app.gap.rocking_model.tolerances.walls import EITHER, FAR_FROM_SURVEY
 from daq_app.workers import warm_up
 
+SLIDES: Final = ("sliding", "sliding_on", "corner_twist")
+"""Effects by which the base moves at impacts."""
 PRELOADED: Final = "daq_app.gap.rocking_model.prediction.preloaded"
 """Module that worker processes are forked from."""
 
@@ -158,11 +160,14 @@ def diagnose_prepared(
 def model_and_library(prepared: Sequence[RockingRun]) -> tuple[RockingModel, Library]:
     """The model with the calibrations of the channels that are examined on their own, and the effects.
 
-    Effects that these runs cannot show at all are left out: vibration of the floor where none is seen.
+    Effects that these runs cannot show at all are left out: vibration of the floor where none is seen, and
+    slides and turns at impacts of a base whose slip is measured, for they are a part of it.
     """
     library = rocking_library(found_channels(prepared))
     if not any(run.vibration is not None and run.vibration.found for run in prepared):
         library = library.without("ambient")
+    if any(run.slip is not None for run in prepared):
+        library = library.without(*SLIDES)
     shaking = any(run.floor_loadings is not None for run in prepared)
     return RockingModel(prepared[0].survey, calibrations(prepared), on_shaking_floor=shaking), library
 

@@ -44,6 +44,14 @@ def test_its_friction_is_that_of_the_base(slippery: tuple[list[RockingRun], floa
     assert "lets the base slip" in finding.words
 
 
+def test_what_the_base_does_at_impacts_is_a_part_of_its_slip(
+    slippery: tuple[list[RockingRun], float],
+) -> None:
+    library = model_and_library(slippery[0])[1]
+    assert {"sliding", "sliding_on", "corner_twist"}.isdisjoint(library)
+    assert "viscous" in library
+
+
 def test_what_it_does_to_the_motion_is_taken_out(slippery: tuple[list[RockingRun], float]) -> None:
     """Without that the answer is something unknown, or a cause that is not there."""
     runs, _ = slippery
