@@ -128,7 +128,7 @@ def fit_motion(
 ) -> MotionFit | None:
     """Fit the rotation (n,) from release to the last half-cycle worth it.
 
-    None with too few impacts, and where impacts would have to lose nothing: what no wall does is no r.
+    None with too few impacts, and where r would be 0.993 and more: no wall loses as little as that.
 
     `r`, `impacts_s`, `peaks_rad` (release first) and `speeds_rad_s` (at the impacts) start the fit;
     `noise_rad` is the rms of one sample.

@@ -198,7 +198,8 @@ def test_a_wall_that_hardly_stops_is_fitted_by_its_first_hundred_impacts(rig):
     assert fit.r == pytest.approx(r, abs=1e-4)
 
 
-def test_a_motion_that_loses_nothing_gives_no_r(rig):
+@pytest.mark.parametrize("r", [0.998, 1.0])
+def test_a_motion_that_loses_next_to_nothing_gives_no_r(rig, r):
     """The search keeps r below 1, where its error would be next to nothing."""
-    time, rotation, motion = rocking(rig, 0.25, r=1.0)
+    time, rotation, motion = rocking(rig, 0.25, r=r)
     assert fitted(rig, time, rotation, motion) is None

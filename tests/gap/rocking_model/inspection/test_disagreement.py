@@ -97,12 +97,12 @@ def test_a_drift_that_no_run_tells_alone_is_found_over_all_of_them(
 
 def test_an_lvdt_that_bends_more_than_the_others_hides_no_cause() -> None:
     """By 0.6 mm at a reading of 28 mm, which makes its mean slope 2 % less; the others bend by a tenth."""
-    runs = simulate({}, (-0.35, 0.3, -0.25, 0.4))
-    bends_1_m = np.random.default_rng(5).uniform(-0.1, 0.1, len(runs[0].sensors))
-    bends_1_m[runs[0].place("LV-B03")] = -0.8
+    runs, rng = simulate({}, (-0.35, 0.3, -0.25, 0.4)), np.random.default_rng(5)
+    lvdts = [sensor.id for sensor in runs[0].sensors if sensor.family == "lvdt"]
+    bends_1_m = {name: -0.8 if name == "LV-B03" else rng.uniform(-0.1, 0.1) for name in lvdts}
     for run in runs:
-        for place in run.indices("lvdt"):
-            run.channels[place] += bends_1_m[place] * run.channels[place] ** 2
+        for name, bend_1_m in bends_1_m.items():
+            run.channels[run.place(name)] += bend_1_m * run.channels[run.place(name)] ** 2
     diagnosis = diagnose_runs(runs)
     assert diagnosis.which[0].effects == ("gain@LV-B03",)
     assert diagnosis.decision.verdict != "none_of_these"
