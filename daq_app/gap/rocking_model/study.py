@@ -34,7 +34,7 @@ from daq_app.gap.rocking_model.records import GapRun, check_consistent
 from daq_app.gap.rocking_model.tolerances.walls import EITHER, FAR_FROM_SURVEY
 from daq_app.workers import warm_up
 
-SLIDES: Final = ("sliding", "sliding_on", "corner_twist")
+_SLIDES: Final = ("sliding", "sliding_on", "corner_twist")
 """Effects by which the base moves at impacts."""
 PRELOADED: Final = "daq_app.gap.rocking_model.prediction.preloaded"
 """Module that worker processes are forked from."""
@@ -167,7 +167,7 @@ def model_and_library(prepared: Sequence[RockingRun]) -> tuple[RockingModel, Lib
     if not any(run.vibration is not None and run.vibration.found for run in prepared):
         library = library.without("ambient")
     if any(run.slip is not None for run in prepared):
-        library = library.without(*SLIDES)
+        library = library.without(*_SLIDES)
     shaking = any(run.floor_loadings is not None for run in prepared)
     return RockingModel(prepared[0].survey, calibrations(prepared), on_shaking_floor=shaking), library
 

@@ -18,6 +18,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from scipy.special import stdtrit
 
 from daq_app.rocking.means import means_over
+from daq_app.rocking.motion.fit_errors import covariances
 from daq_app.rocking.motion.motion_model import (
     ALPHA_PRIOR,
     FIXED,
@@ -56,10 +57,6 @@ _FIRST_IN_PHASE = 4
 """Impacts that are fitted first, so few that none is out of phase where α is off by a quarter."""
 _EVALUATIONS = 60
 """Residuals that one search works out at most; one that comes to an end takes some twenty."""
-_CORRELATED_POINTS = 12
-"""Residuals this many points (0.1 s) apart may still be correlated: slow noise, hum, sway of the wall."""
-_LEAST_LEFT = 0.2
-"""Share of slow noise that a fit is taken to leave at least: of less, residuals say too little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +145,7 @@ def fit_motion(
     at_release = _Start(release_s - 0.1, release_s, abs(theta0_rad), log_r, scatter)
     whole = record.fit(at_release, thorough=False)
     if whole is None or whole.residual_rad < _NO_CLEAN_FALL * whole.noise_rad:
-        poor = whole is not None and whole.residual_rad > _POOR * whole.noise_rad
+        poor = whole is None or whole.residual_rad > _POOR * whole.noise_rad
         return record.fit(at_release, thorough=True) if poor else whole
     amplitude, begin_s, own = _fall_to_first_impact(
         impacts_s[0], peaks_rad[1], _deviations(speeds_rad_s[1:], count, log_r), log_r, p_rad_s, alpha_rad
@@ -316,60 +313,13 @@ def _points(
     return t[good], y[good], noise_rad / math.sqrt(size)
 
 
-def _long_run_variance(residuals: Floats, points: Floats, answer: Floats) -> float:
-    """Variance that counts for slow parameters: autocovariances under a flat top (Politis and Romano 1995).
-
-    Up to half the lags count whole. Weights that fall from the first lag on (Bartlett's) leave out 7 % of the
-    variance of noise that stays correlated for 10 ms.
-    `points` (n, parameters): the rows of the Jacobian J of `residuals` (n,), without those of the priors;
-    `answer`, of the same shape: what each point makes of the parameters, those rows of J (JᵀJ)⁻¹. A parameter
-    takes up what is as slow as itself, so that residuals hold less of slow noise than there was:
-    each sum is divided by the share of it that the fit leaves of white noise, whose covariance of residuals
-    is I − J (JᵀJ)⁻¹ Jᵀ. At least the plain variance: neighbours that alternate make nothing better known.
-    """
-    lags = range(1, min(_CORRELATED_POINTS, residuals.size - 1) + 1)
-    weights = [min(1.0, 2.0 * (1.0 - k / (_CORRELATED_POINTS + 1.0))) for k in lags]
-    plain, left = float(residuals @ residuals), residuals.size - float(np.sum(answer * points))
-    total = plain + 2.0 * sum(
-        w * float(residuals[k:] @ residuals[:-k]) for k, w in zip(lags, weights, strict=True)
-    )
-    taken = 2.0 * sum(w * float(np.sum(answer[k:] * points[:-k])) for k, w in zip(lags, weights, strict=True))
-    return max(plain / left, total / max(left - taken, _LEAST_LEFT * residuals.size))
-
-
-def _of_walking_zero(answer: Floats, sigma: float) -> Floats:
-    """Covariance that a zero adds which walks from the first fitted point to the last.
-
-    It walks by what a zero from rest, seconds old, may be wrong by. The fit takes up a zero that stands
-    still; one that walks bends late half-cycles against early ones, which p and α of small motions answer to.
-    The parameters answer to the points by `answer` (parameters, points), (JᵀJ)⁻¹Jᵀ; each step of the walk
-    moves all points before it. Places of sensors that are a millimetre off make a tenth to a third of that in
-    p and are left out.
-    """
-    steps = np.cumsum(answer / sigma, axis=1) * (REST_ZERO_SIGMA_RAD / math.sqrt(answer.shape[1]))
-    return np.asarray(steps @ steps.T)
-
-
-def _of_unknown_strip(answer: Floats, by_lift: Floats) -> Floats:
-    """Covariance that a strip adds which lifts at another rotation than the one that is taken.
-
-    `by_lift`: what one standard deviation of ln θ₁ makes of the points; the parameters answer by `answer`.
-    """
-    moved = answer @ by_lift
-    return np.outer(moved, moved)
-
-
 def _result(problem: MotionModel, found: OptimizeResult, count: int, stop_s: float) -> MotionFit | None:
     x, sigma = found.x, problem.sigma
     data = found.fun[: found.fun.size - len(held(x.size))]
-    # Data rows are weakened by what the model leaves; priors keep their weight.
-    scaled = found.jac.copy()
     try:
-        points = found.jac[: data.size]
-        answer = np.linalg.solve(found.jac.T @ found.jac, points.T)
-        scaled[: data.size] /= math.sqrt(max(1.0, _long_run_variance(data, points, answer.T)))
-        on_known_edges = np.linalg.inv(scaled.T @ scaled) + _of_walking_zero(answer, sigma)
-        covariance = on_known_edges + _of_unknown_strip(answer, problem.by_lift(x, count, stop_s))
+        on_known_edges, covariance = covariances(
+            found.jac, data, REST_ZERO_SIGMA_RAD / sigma, problem.by_lift(x, count, stop_s)
+        )
     except np.linalg.LinAlgError:
         return None
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from daq_app.config import load_rig
 from daq_app.rocking.geometry.kinematics import RotationGeometry
-from daq_app.rocking.motion import motion_fit
+from daq_app.rocking.motion.fit_errors import long_run_variance
 from daq_app.rocking.motion.motion_fit import fit_motion
 from daq_app.rocking.motion.swings import REST_ZERO_SIGMA_RAD
 from daq_app.rocking.theory.housner import free_rocking
@@ -160,7 +160,7 @@ def test_noise_that_stays_correlated_counts_with_all_of_its_variance_for_slow_pa
     noise = lfilter([1.0], [1.0, -correlation], rng.standard_normal(points)) * np.sqrt(1.0 - correlation**2)
     no_parameter = np.zeros((points, 1))
 
-    variance = motion_fit._long_run_variance(noise, no_parameter, no_parameter)
+    variance = long_run_variance(noise, no_parameter, no_parameter)
 
     assert variance == pytest.approx((1.0 + correlation) / (1.0 - correlation), rel=0.03)
 

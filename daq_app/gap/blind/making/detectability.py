@@ -62,7 +62,8 @@ _PINK_HZ: Final = (0.05, 300.0)
 _SLOW_PERIODS: Final = 8
 """Periods of 1/f noise in a run that are as slow as what the wall does."""
 _LEAST_TURN: Final = 1e-12
-"""Where no channel shows that the wall turns, as before it is let go, nothing is a rotation."""
+"""Least square of the turn that all channels together show at an instant, over their noise: a wall that is
+upright shows none, and the projection on the motion divides by it."""
 _LEAST_HUM: Final = 0.02
 """Amplitude of the hum that any channel picks up, in noises: the least of all laboratories."""
 
