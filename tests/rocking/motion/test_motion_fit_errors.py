@@ -203,3 +203,25 @@ def test_a_motion_that_loses_next_to_nothing_gives_no_r(rig, r):
     """The search keeps r below 1, where its error would be next to nothing."""
     time, rotation, motion = rocking(rig, 0.25, r=r)
     assert fitted(rig, time, rotation, motion) is None
+
+
+@pytest.mark.parametrize("off", [0.8, 1.4])
+def test_a_first_search_that_ends_where_impacts_lose_nothing_is_not_the_last(rig, off):
+    """With α and p far from the survey's and speeds that say nothing it ends there; a thorough one finds r."""
+    time, rotation, motion = rocking(rig, 0.4 if off < 1.0 else 0.25)
+    fit = fit_motion(
+        time,
+        rotation,
+        release_s=RELEASE_S,
+        theta0_rad=float(rotation[0]),
+        impacts_s=motion.impacts_s.tolist(),
+        peaks_rad=np.abs(motion.peaks_rad).tolist(),
+        speeds_rad_s=[1.0] * motion.impacts_s.size,
+        r=R,
+        scatter=3e-4,
+        noise_rad=NOISE_RAD,
+        p_rad_s=off * rig.specimen.p_rad_s,
+        alpha_rad=off * rig.specimen.alpha0_rad,
+    )
+    assert fit is not None
+    assert fit.r == pytest.approx(R, abs=1e-4)
