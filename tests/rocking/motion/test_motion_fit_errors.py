@@ -207,7 +207,7 @@ def test_a_motion_that_loses_next_to_nothing_gives_no_r(rig, r):
 
 @pytest.mark.parametrize("off", [0.8, 1.4])
 def test_a_first_search_that_ends_where_impacts_lose_nothing_is_not_the_last(rig, off):
-    """With α and p far from the survey's and speeds that say nothing it ends there; a thorough one finds r."""
+    """With α and p far from the survey's and speeds that say nothing it does; a thorough one finds r."""
     time, rotation, motion = rocking(rig, 0.4 if off < 1.0 else 0.25)
     fit = fit_motion(
         time,
